@@ -1,0 +1,103 @@
+"""Pinhole projection: a Camera and an image size to matrices, and points to pixels.
+
+Pixel coordinates: x to the right, y down, (0, 0) at the top left corner of the image, so pixel
+(column i, row j) has its centre at (i + 0.5, j + 0.5). View space: x right, y down, z forward
+along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.scene import Camera
+
+MM = 1e-3
+"""Metres in a millimetre: scene data is in mm, the GPU and view space in metres."""
+
+NEAR_M = 0.1
+FAR_M = 200.0
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera bound to an image size.
+
+    rotation: float64 [3, 3], world to view. position_m: float64 [3], world metres.
+    focal_px: focal length in pixels, the same on both axes. size: (width, height).
+    """
+
+    rotation: NDArray[np.float64]
+    position_m: NDArray[np.float64]
+    focal_px: float
+    size: tuple[int, int]
+
+    @property
+    def center_px(self) -> tuple[float, float]:
+        """Principal point (x, y) in pixels: the middle of the image."""
+        return self.size[0] / 2, self.size[1] / 2
+
+    def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
+        """World points [..., 3] in mm to view space [..., 3] in metres."""
+        points_m = np.asarray(points_mm, np.float64) * MM
+        return (points_m - self.position_m) @ self.rotation.T
+
+    def project(
+        self, points_mm: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """World points [..., 3] in mm to pixels [..., 2] and depth [...] in metres.
+
+        Depth is along the optical axis; pixels of points at or behind the camera mean nothing.
+        """
+        view = self.to_view(points_mm)
+        depth = view[..., 2]
+        safe = np.where(depth > 1e-9, depth, np.nan)
+        return view[..., :2] / safe[..., None] * self.focal_px + np.array(self.center_px), depth
+
+    def rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origin [3] in mm and unit directions [H, W, 3] of the rays through all pixel centres."""
+        width, height = self.size
+        x = (np.arange(width) + 0.5 - width / 2) / self.focal_px
+        y = (np.arange(height) + 0.5 - height / 2) / self.focal_px
+        rays = np.stack(np.broadcast_arrays(x[None, :], y[:, None], 1.0), axis=-1)
+        directions = rays @ self.rotation
+        return self.position_m / MM, directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+    def clip_matrix(self) -> NDArray[np.float64]:
+        """World metres to OpenGL clip space, float64 [4, 4].
+
+        Clip y points down the image, so that row 0 of the framebuffer is the image's top row and
+        no read-back needs flipping; front faces are then clockwise. Depth maps [NEAR_M, FAR_M]
+        to [-1, 1]. OpenGL 4.5 core specification, section 13.6.
+        """
+        width, height = self.size
+        world_to_view = np.eye(4)
+        world_to_view[:3, :3] = self.rotation
+        world_to_view[:3, 3] = -self.rotation @ self.position_m
+        projection = np.zeros((4, 4))
+        projection[0, 0] = 2 * self.focal_px / width
+        projection[1, 1] = 2 * self.focal_px / height
+        projection[2, 2] = (FAR_M + NEAR_M) / (FAR_M - NEAR_M)
+        projection[2, 3] = -2 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
+        projection[3, 2] = 1.0
+        return projection @ world_to_view
+
+
+def view_of(camera: Camera, size: tuple[int, int]) -> View:
+    """The view of `camera` for an image of `size` (width, height) in pixels.
+
+    The image's up direction is the world's z, turned clockwise by the camera's roll.
+    """
+    position = np.array(camera.position_mm, np.float64) * MM
+    forward = np.array(camera.target_mm, np.float64) * MM - position
+    forward /= np.linalg.norm(forward)
+    up_hint = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, up_hint)
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    roll = np.deg2rad(camera.roll_deg)
+    # turning the camera counter-clockwise turns what it sees clockwise
+    rolled_right = np.cos(roll) * right - np.sin(roll) * down
+    rolled_down = np.sin(roll) * right + np.cos(roll) * down
+    focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
+    return View(np.stack([rolled_right, rolled_down, forward]), position, focal_px, size)

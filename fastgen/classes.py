@@ -1,0 +1,21 @@
+"""Class names, their order in each label format, and the numbers that stand for them in masks."""
+
+MARKER_CLASSES = (
+    *("C1.1", "C1.2", "C1.3", "C1.4", "C2.1", "C2.2", "C2.3", "C2.4", "C2.5", "C3.1", "C3.2"),
+    *("C4.1", "C4.2", "C4.3", "C4.4", "C5.1", "C5.2", "C5.3", "C6.1", "C6.2"),
+    *("C7.1", "C7.2", "C7.3", "C7.4", "C8.1", "C9.1"),
+)
+"""The 26 dangerous-goods markers; seafront.txt Fig. 3 and Table 9."""
+
+DETECTION_CLASSES = ("container", "text", *MARKER_CLASSES)
+"""YOLO order of the marker task, 28 classes."""
+
+DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
+
+SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
+"""COCO category i + 1 is SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance."""
+
+SOUND_CONTAINER = 101
+"""Mask value of undamaged container surface: category 1, instance 1 (seafront.txt 3.3.4)."""
+
+OBJECT_CLASSES = ("container", "spreader", "text", *MARKER_CLASSES, *DAMAGE_CLASSES)

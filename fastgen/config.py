@@ -1,0 +1,224 @@
+"""Config: every parameter of the distributions that scenes are drawn from, validated, with units.
+
+A preset is a Config made here; a YAML or JSON file changes single values of it. Ranges are drawn
+uniformly unless their comment says otherwise. Lengths are millimetres, angles degrees, colours
+sRGB hex in files (people pick them on screens) and linear albedo in scenes.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fastgen.container import KINDS, WallProfiles
+from fastgen.damage_config import DamageConfig
+from fastgen.errors import ConfigError
+from fastgen.markings_config import MarkingsConfig
+from fastgen.mesh import FACES
+from fastgen.records import Range, bounds, from_plain, nearest, to_plain
+
+UNIT = bounds(0.0, 1.0)
+LENGTH = bounds(0.0, 1e6, "mm")
+
+
+@dataclass(frozen=True)
+class SurfaceConfig:
+    """Paint and its ageing, seafront.txt section 3.2; one block of ranges per layer of Fig. 5."""
+
+    colors: dict[str, str] = field(
+        default_factory=lambda: {
+            "oxide red": "#6b2a22",
+            "maroon": "#57202a",
+            "rust brown": "#6e3b26",
+            "signal blue": "#1f4e84",
+            "navy": "#1c2c48",
+            "sky blue": "#4a86ad",
+            "turquoise": "#24777a",
+            "sea green": "#2a6650",
+            "leaf green": "#3c7a45",
+            "olive": "#5a5d3c",
+            "traffic orange": "#c4561f",
+            "amber": "#d08a22",
+            "cream": "#c9bfa2",
+            "light grey": "#a3a6a6",
+            "mid grey": "#6d7276",
+            "white": "#d2d3ce",
+            "magenta": "#9a2b62",
+            "charcoal": "#3a3d40",
+        }
+    )
+    roughness: Range = field(default=Range(0.38, 0.62), metadata=bounds(0.045, 1.0))
+    tone_variation: Range = field(default=Range(0.02, 0.12), metadata=UNIT)
+    ageing_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
+    ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=LENGTH)
+    dirt_strength: Range = field(default=Range(0.05, 0.55), metadata=UNIT)
+    dirt_reach_mm: Range = field(default=Range(60, 320), metadata=LENGTH)
+    dirt_color: str = "#a8a59c"
+    rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)  # squared: mostly low
+    rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
+    rust_colors: tuple[str, ...] = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
+    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=bounds(0.045, 1.0))
+    scratch_coverage: Range = field(default=Range(0.0, 0.003), metadata=UNIT)
+    wear_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
+    wear_scale_mm: Range = field(default=Range(700, 2500), metadata=bounds(50, 1e5, "mm"))
+
+
+@dataclass(frozen=True)
+class ContainerConfig:
+    """Which containers come, and how much their corrugation differs from the nominal profile."""
+
+    kinds: dict[str, float] = field(
+        default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1},
+        metadata=bounds(0.0, 1e6),
+    )
+    profiles: WallProfiles = field(default_factory=WallProfiles)
+    depth_scale: tuple[float, ...] = field(default=(0.92, 1.0, 1.08), metadata=bounds(0.2, 3.0))
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """One camera of the rig: it looks at the middle of a face from a varied position.
+
+    azimuth_deg turns the camera about the vertical through that middle (0: straight at the face,
+    positive: it stands to the right, seen from the camera); elevation_deg lifts it.
+    """
+
+    face: str
+    focal_mm: float = field(metadata=bounds(1.0, 2000.0, "mm"))
+    distance_mm: Range = field(metadata=bounds(100.0, 1e6, "mm"))
+    azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
+    elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
+    roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))
+    target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e5, 1e5, "mm"))
+    sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
+    exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
+
+
+def _seafront_rig() -> dict[str, CameraConfig]:
+    """The paper's four cameras (3.2 and Fig. 4); a 40' fills about 3/4 of A and B."""
+    return {
+        "A": CameraConfig("front", 14.5, Range(5600, 7400)),
+        "B": CameraConfig("back", 28.0, Range(10500, 13500)),
+        "Cl": CameraConfig("no_door", 45.0, Range(4600, 7200)),
+        "Cr": CameraConfig("door", 45.0, Range(4600, 7200)),
+    }
+
+
+@dataclass(frozen=True)
+class EnvironmentConfig:
+    """The light. names: HDRIs to choose from by file name without ending; empty means all found."""
+
+    names: tuple[str, ...] = ()
+    yaw_deg: Range = field(default=Range(0, 360), metadata=bounds(-360.0, 360.0, "degrees"))
+
+
+@dataclass(frozen=True)
+class SplitConfig:
+    """Fractions of the scenes that go to train, val and test; they are normalised to sum to 1."""
+
+    train: float = field(default=0.7, metadata=UNIT)
+    val: float = field(default=0.15, metadata=UNIT)
+    test: float = field(default=0.15, metadata=UNIT)
+
+
+@dataclass(frozen=True)
+class LabelConfig:
+    """When a label is written. min_visible_px: objects with fewer visible pixels are not listed
+    in the marker labels. min_text_px: height in pixels below which a text is no legible crop."""
+
+    min_visible_px: int = field(default=12, metadata=bounds(1, 1e6, "pixels"))
+    min_text_px: float = field(default=10.0, metadata=bounds(1.0, 1e4, "pixels"))
+
+
+@dataclass(frozen=True)
+class Config:
+    """All that decides a distribution of scenes and the labels made from them."""
+
+    container: ContainerConfig = field(default_factory=ContainerConfig)
+    surface: SurfaceConfig = field(default_factory=SurfaceConfig)
+    markings: MarkingsConfig = field(default_factory=MarkingsConfig)
+    damage: DamageConfig = field(default_factory=DamageConfig)
+    environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
+    cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
+    labels: LabelConfig = field(default_factory=LabelConfig)
+    split: SplitConfig = field(default_factory=SplitConfig)
+
+    def __post_init__(self) -> None:
+        """Hold values to the choices that no single bound can express."""
+        for kind in self.container.kinds:
+            if kind not in KINDS:
+                raise ConfigError(f"container.kinds.{kind}: unknown kind{nearest(kind, KINDS)}")
+        if sum(self.container.kinds.values()) <= 0:
+            raise ConfigError("container.kinds: all weights are 0; give at least one above 0")
+        if not self.cameras:
+            raise ConfigError("cameras: the rig is empty; describe at least one camera")
+        for name, camera in self.cameras.items():
+            if camera.face not in FACES:
+                hint = nearest(camera.face, FACES)
+                raise ConfigError(f"cameras.{name}.face: unknown face {camera.face!r}{hint}")
+        if self.split.train + self.split.val + self.split.test <= 0:
+            raise ConfigError("split: all fractions are 0; give at least one above 0")
+        for name, color in self.surface.colors.items():
+            linear_color(color, f"surface.colors.{name}")
+        if not self.surface.colors:
+            raise ConfigError("surface.colors: the list is empty; give at least one color")
+        if not self.surface.rust_colors:
+            raise ConfigError("surface.rust_colors: the list is empty; give at least one color")
+        for color in (*self.surface.rust_colors, self.surface.dirt_color):
+            linear_color(color, "surface")
+
+    @staticmethod
+    def preset(name: str = "seafront") -> "Config":
+        """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
+        if name not in PRESETS:
+            raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
+        return from_plain(Config, PRESETS[name])
+
+    @staticmethod
+    def from_values(data: Any, base: "Config | None" = None) -> "Config":
+        """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
+        return from_plain(Config, data, base=base or Config.preset())
+
+    @staticmethod
+    def load(path: str | Path, base: "Config | None" = None) -> "Config":
+        """Read a YAML or JSON file whose values replace those of `base` (default: seafront).
+
+        A mapping such as `cameras` or `surface.colors` is replaced as a whole, so a port describes
+        its own rig; a camera named as one of the base's inherits what the file leaves out.
+        Raises ConfigError naming the file and the key or value that does not fit.
+        """
+        try:
+            data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
+        try:
+            return Config.from_values(data or {}, base)
+        except ConfigError as error:
+            raise ConfigError(f"{path}: {error}") from None
+
+    def to_plain(self) -> dict[str, Any]:
+        """The configuration as plain values, ready for JSON or YAML."""
+        plain: dict[str, Any] = to_plain(self)
+        return plain
+
+
+PRESETS: dict[str, dict[str, Any]] = {"seafront": {}}
+
+
+def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
+    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'. IEC 61966-2-1.
+
+    Raises ConfigError naming `path` when the text is no color.
+    """
+    digits = text.removeprefix("#")
+    try:
+        if len(digits) != 6:
+            raise ValueError
+        encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
+    except ValueError:
+        raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'") from None
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
+    return r, g, b

@@ -1,0 +1,151 @@
+"""Frozen dataclasses to and from plain JSON/YAML values, with errors that name the field.
+
+One small engine serves both the configuration (bounds and ranges are checked) and the scenes
+(exact round trip). A field may carry `metadata=bounds(lo, hi)`; every number below it is held to
+these bounds, and a `Range` must also be ordered.
+"""
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeVar
+
+from fastgen.errors import ConfigError
+
+T = TypeVar("T")
+
+
+class Range(NamedTuple):
+    """A closed interval that a value is drawn from, uniformly unless said otherwise."""
+
+    lo: float
+    hi: float
+
+
+def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[str, Any]:
+    """Field metadata: the closed interval that all numbers of the field lie in, and their unit."""
+    return {"lo": lo, "hi": hi, "unit": unit}
+
+
+def nearest(word: str, choices: typing.Iterable[str]) -> str:
+    """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
+    names = sorted(choices)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    if close:
+        return f" (did you mean {close[0]}?)"
+    return f" (choose from {', '.join(names)})"
+
+
+def to_plain(value: Any) -> Any:
+    """Turn dataclasses, tuples and mappings into the dicts, lists and scalars of JSON and YAML."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): to_plain(item) for key, item in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [to_plain(item) for item in value]
+    return value
+
+
+def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -> T:
+    """Build dataclass `cls` from plain values.
+
+    data: mapping of field names; missing fields are taken from `base`, else from the defaults.
+    path: what stands before the field names in error messages, for example 'cameras.A'.
+    Raises ConfigError naming the field, the value and what would be right.
+    """
+    if not isinstance(data, Mapping):
+        raise ConfigError(f"{path or cls.__name__}: expected a mapping of fields, got {data!r}")
+    hints = typing.get_type_hints(cls)
+    fields = {f.name: f for f in dataclasses.fields(typing.cast(Any, cls))}
+    values: dict[str, Any] = {}
+    for key, item in data.items():
+        where = f"{path}.{key}" if path else str(key)
+        if key not in fields:
+            raise ConfigError(f"{where}: unknown key{nearest(str(key), fields)}")
+        old = getattr(base, key) if base is not None else None
+        values[key] = _convert(hints[key], item, where, fields[key].metadata, old)
+    if base is not None:
+        return typing.cast(T, dataclasses.replace(typing.cast(Any, base), **values))
+    missing = [
+        name
+        for name, field in fields.items()
+        if name not in values
+        and field.default is dataclasses.MISSING
+        and field.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise ConfigError(f"{path or cls.__name__}: missing {', '.join(missing)}")
+    return cls(**values)
+
+
+def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> Any:
+    origin = typing.get_origin(hint)
+    if origin in (typing.Union, types.UnionType):
+        choices = [arg for arg in typing.get_args(hint) if arg is not type(None)]
+        return None if value is None else _convert(choices[0], value, path, meta, old)
+    if dataclasses.is_dataclass(hint):
+        return from_plain(typing.cast(type, hint), value, path, old)
+    if hint is Range:
+        return _range(value, path, meta)
+    if origin is tuple:
+        return _tuple(hint, value, path, meta)
+    if origin in (dict, Mapping):
+        return _mapping(hint, value, path, meta, old)
+    return _scalar(hint, value, path, meta)
+
+
+def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
+    pair = [value, value] if isinstance(value, (int, float)) else value
+    if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {value!r}")
+    lo, hi = (_scalar(float, item, path, meta) for item in pair)
+    if lo > hi:
+        raise ConfigError(f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
+    return Range(lo, hi)
+
+
+def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
+    if not isinstance(value, (list, tuple)):
+        raise ConfigError(f"{path}: expected a list, got {value!r}")
+    args = typing.get_args(hint)
+    if len(args) == 2 and args[1] is Ellipsis:
+        args = (args[0],) * len(value)
+    if len(args) != len(value):
+        raise ConfigError(f"{path}: expected {len(args)} values, got {len(value)}")
+    return tuple(
+        _convert(arg, item, f"{path}[{i}]", meta, None)
+        for i, (arg, item) in enumerate(zip(args, value, strict=True))
+    )
+
+
+def _mapping(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"{path}: expected a mapping, got {value!r}")
+    item_hint = typing.get_args(hint)[1]
+    old = old or {}
+    # what is given is the whole mapping; an item with a namesake inherits what it leaves out
+    return {
+        str(key): _convert(item_hint, item, f"{path}.{key}", meta, old.get(str(key)))
+        for key, item in value.items()
+    }
+
+
+def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
+    if hint is bool or hint is str:
+        if not isinstance(value, hint):
+            kind = "true or false" if hint is bool else "text"
+            raise ConfigError(f"{path}: expected {kind}, got {value!r}")
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ConfigError(f"{path}: expected a number, got {value!r}")
+    if hint is int and value != int(value):
+        raise ConfigError(f"{path}: expected a whole number, got {value!r}")
+    lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
+    if not lo <= value <= hi or not math.isfinite(value):
+        unit = f" {meta['unit']}" if meta.get("unit") else ""
+        raise ConfigError(f"{path}: {value!r} is out of range; give {lo:g} to {hi:g}{unit}")
+    return hint(value)
