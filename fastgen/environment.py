@@ -1,0 +1,398 @@
+"""HDRI -> prefiltered light, cached on disk. Plain arrays: no GL here.
+
+World z is up; map projections and their borders are described in prefilter.py. Radiance is linear
+with Rec. 709 primaries. A yaw in degrees turns the environment about +z, counter-clockwise seen
+from above: radiance(direction) = map(Rz(-yaw) direction).
+"""
+
+import hashlib
+import json
+import os
+import re
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenEXR
+from numpy.typing import ArrayLike, NDArray
+
+from fastgen import prefilter
+from fastgen.errors import AssetError
+from fastgen.resources import asset_path
+
+PREFILTER_VERSION = 2
+"""Part of the cache key: count up whenever the prefiltered arrays change."""
+
+ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
+"""Perceptual roughness of the layers of `EnvironmentLight.specular`; interpolate linearly."""
+
+SPECULAR_SIZE = 128
+IRRADIANCE_SIZE = 34
+"""Texels along a side, border included, as for SPECULAR_SIZE."""
+
+HALF_MAX = 65504.0
+"""Largest finite value of IEEE 754 binary16, in which a GPU holds the maps."""
+
+REC_709 = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of linear red, green and blue: ITU-R BT.709-6, section 3.2."""
+
+MIN_WIDTH, MAX_WIDTH = 256, 16384
+"""Widths of an HDRI that can be used, in texels."""
+
+_ASPECT_TOLERANCE = 0.02
+_MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a float32 sum
+_LUMINANCE_WIDTH = 32
+_LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
+_DFG_POINTS = 4096
+_MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentLight:
+    """Light of one HDRI, ready for a GPU. All maps are float32, finite, within [0, HALF_MAX].
+
+    The octahedral maps have a border of one texel (prefilter.py says how uv meets it). Their values
+    are exactly representable as half floats.
+    """
+
+    name: str
+    specular: NDArray[np.float32]
+    """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS."""
+    irradiance: NDArray[np.float32]
+    """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
+    background: NDArray[np.float32]
+    """[B, B, 3] radiance as it is; B is a power of two from 512 to 4096 near the width."""
+    luminance: NDArray[np.float32]
+    """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
+    mean_luminance: float
+    """Mean of the luminance over the whole sphere."""
+
+
+def find_hdris(folder: str | Path) -> list[Path]:
+    """The .hdr and .exr files directly in a folder, sorted by name; any case of the extension.
+
+    Raises AssetError where the folder does not exist or holds none.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise AssetError(f"{folder}: no such folder; give one that holds .hdr or .exr files")
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in (".hdr", ".exr"))
+    if not found:
+        raise AssetError(f"{folder}: no .hdr or .exr file in this folder")
+    return found
+
+
+def bundled_hdris() -> dict[str, Path]:
+    """Name -> file of every environment that ships with fastgen, sorted by name.
+
+    Their sources and licences (all CC0) stand in assets/hdri/SOURCES.md.
+    """
+    index = json.loads(asset_path("hdri", "index.json").read_text(encoding="utf-8"))
+    return {name: asset_path("hdri", entry["file"]) for name, entry in sorted(index.items())}
+
+
+def load_radiance(path: str | Path) -> NDArray[np.float32]:
+    """Linear radiance float32 [H, W, 3] of an equirectangular .exr or .hdr file.
+
+    W is 256 to 16384 and H within 2 % of W/2. Alpha is dropped, grey becomes three equal channels,
+    negative values become 0, infinity HALF_MAX (it stands for a sun too bright for half floats),
+    and NaN the mean of its valid neighbours. Raises AssetError, naming the file, for anything else.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (".exr", ".hdr"):
+        raise AssetError(f"{path}: an HDRI must be an .exr or .hdr file")
+    if not path.is_file():
+        raise AssetError(f"{path}: no such file")
+    radiance = _read_exr(path) if kind == ".exr" else _read_hdr(path)
+    return _sanitized(radiance)
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if not MIN_WIDTH <= width <= MAX_WIDTH:
+        raise AssetError(
+            f"{path}: {width} texels wide; an HDRI must be {MIN_WIDTH} to {MAX_WIDTH} wide"
+        )
+    if abs(2 * height - width) > _ASPECT_TOLERANCE * width:
+        raise AssetError(f"{path}: {width}x{height} texels; an HDRI must be twice as wide as high")
+
+
+def _read_exr(path: Path) -> NDArray[np.float32]:
+    try:
+        # the header first, so that a file of a wrong size is not decoded
+        header = OpenEXR.File(str(path), header_only=True).header()
+        low, high = header["dataWindow"]
+        width, height = (int(n) for n in high - low + 1)
+    except Exception as error:  # whatever the decoder raises, the file is at fault
+        raise AssetError(f"{path}: not a readable OpenEXR file ({error})") from None
+    _check_size(path, width, height)
+    try:
+        # asked first because the decoder prints to the terminal when a file ends too soon
+        if not OpenEXR.InputFile(str(path)).isComplete():
+            raise ValueError("it ends too soon")
+        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+        planes = {name: channel.pixels for name, channel in channels.items()}
+    except Exception as error:
+        raise AssetError(f"{path}: damaged OpenEXR file ({error})") from None
+    names = _color_channels(path, list(planes))
+    radiance = np.empty((height, width, 3), np.float32)
+    for c, name in enumerate(names):
+        if planes[name].shape != (height, width):
+            raise AssetError(f"{path}: channel {name} is subsampled; save it at full resolution")
+        radiance[..., c] = planes[name]
+    return radiance
+
+
+def _color_channels(path: Path, names: list[str]) -> tuple[str, str, str]:
+    for red in sorted((n for n in names if n.split(".")[-1].upper() in ("R", "RED")), key=len):
+        prefix = red.rpartition(".")[0]
+        by_last = {n.split(".")[-1][0].upper(): n for n in names if n.rpartition(".")[0] == prefix}
+        if {"R", "G", "B"} <= by_last.keys():
+            return by_last["R"], by_last["G"], by_last["B"]
+    if not {"RY", "BY"} & set(names):
+        for grey in ("Y", "L"):
+            if grey in names:
+                return grey, grey, grey
+    raise AssetError(f"{path}: holds channels {', '.join(names)}; an HDRI must hold R, G and B")
+
+
+def _read_hdr(path: Path) -> NDArray[np.float32]:
+    with path.open("rb") as file:
+        head = file.read(4096)
+    # Radiance's own resolution string (Reference Manual, picture format): rows from the top, then
+    # columns from the left; OpenCV reads no other order
+    size = re.search(rb"\n\n-Y +(\d+) +\+X +(\d+)\n", head)
+    if not head.startswith(b"#?") or not size:
+        raise AssetError(f"{path}: not a Radiance HDR picture with rows from the top (-Y, +X)")
+    height, width = int(size[1]), int(size[2])
+    _check_size(path, width, height)
+    log_level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        bgr = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    except cv2.error:
+        bgr = None
+    finally:
+        cv2.utils.logging.setLogLevel(log_level)
+    if bgr is None or bgr.shape != (height, width, 3) or bgr.dtype != np.float32:
+        raise AssetError(f"{path}: damaged Radiance HDR picture")
+    return np.ascontiguousarray(bgr[..., ::-1])
+
+
+def _sanitized(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The radiance, changed in place, without NaN, infinity and negative values."""
+    unknown = np.empty(radiance.shape[:2], bool)
+    for flags, values in zip(unknown, radiance, strict=True):  # by rows: small masks at 16k
+        flags[:] = np.isnan(values).any(axis=-1)
+        np.nan_to_num(values, copy=False, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+        np.clip(values, 0.0, _MAX_RADIANCE, out=values)
+    for row in np.flatnonzero(unknown.any(axis=1)):
+        around = slice(max(row - 1, 0), row + 2)
+        known = ~unknown[around]
+        total, count = (radiance[around] * known[..., None]).sum(0), known.sum(0)[:, None]
+        total, count = (a + np.roll(a, 1, axis=0) + np.roll(a, -1, axis=0) for a in (total, count))
+        radiance[row, unknown[row]] = (total / np.maximum(count, 1))[unknown[row]]
+    return radiance
+
+
+def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> EnvironmentLight:
+    """Prefilter equirectangular radiance, float32 [H, W, 3], finite and 0 or more, H close to W/2.
+
+    Sums stay in float32 or wider; only the results are clamped to half range, so a sun of 1e6 keeps
+    its energy wherever it is spread over more than a few texels.
+    """
+    background_size = int(np.clip(2 ** round(np.log2(radiance.shape[1])), 512, 4096))
+    source = prefilter.shrink(radiance, min(2 * background_size, _MAX_WORK_WIDTH))
+    background = prefilter.resample_octahedral(prefilter.smooth_poles(source), background_size, 2)
+
+    # about a texel and a half of the layers; wider lobes do with half of it
+    fine = prefilter.shrink(source, 4 * SPECULAR_SIZE)
+    coarse = prefilter.shrink(fine, 2 * SPECULAR_SIZE)
+    layers = []
+    for roughness in ROUGHNESS_LEVELS:
+        if roughness < 0.08:  # the lobe is narrower than a texel, whose mean is the better answer
+            lobes = prefilter.smooth_poles(fine)
+        else:
+            grid = fine if roughness < 0.25 else coarse
+            lobes = prefilter.convolve(grid, prefilter.ggx_lobe(roughness))
+        layers.append(prefilter.resample_octahedral(lobes, SPECULAR_SIZE, 4))
+    diffuse = prefilter.convolve(coarse, prefilter.cosine_lobe)
+    irradiance = prefilter.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
+
+    cells = prefilter.shrink(coarse, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells)
+
+
+def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
+    return np.minimum(radiance, HALF_MAX).astype(np.float16)
+
+
+def _light(
+    name: str,
+    specular: NDArray[np.float16],
+    irradiance: NDArray[np.float16],
+    background: NDArray[np.float16],
+    luminance: NDArray[np.float32],
+) -> EnvironmentLight:
+    weight = prefilter.row_solid_angle(luminance.shape[0]) / (4 * np.pi)
+    return EnvironmentLight(
+        name=name,
+        specular=specular.astype(np.float32),
+        irradiance=irradiance.astype(np.float32),
+        background=background.astype(np.float32),
+        luminance=luminance,
+        mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
+    )
+
+
+def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> EnvironmentLight:
+    """Read and prefilter an HDRI, or take the result of an earlier time from the disk cache.
+
+    cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen. The key is the content of the
+    file, so a renamed file hits and a changed one misses. Cached or not, the result is the same to
+    the bit. A broken entry is built again, and without a writable folder nothing is cached.
+    Raises AssetError, as `load_radiance` does.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            key = hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise AssetError(f"{path}: cannot read this HDRI: {error.strerror}") from None
+    folder = Path(cache_dir) if cache_dir is not None else _default_cache_dir()
+    entry = folder / f"{key[:32]}-{PREFILTER_VERSION}.npz"
+    cached = _read_cache(path.stem, entry)
+    if cached is None:
+        cached = prefilter_environment(path.stem, load_radiance(path))
+        _write_cache(cached, entry)
+    return cached
+
+
+def _default_cache_dir() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    # the XDG base directory specification asks to ignore relative paths
+    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "fastgen"
+
+
+def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
+    try:
+        with np.load(entry, allow_pickle=False) as stored:
+            specular, irradiance, background, luminance = (
+                stored[key] for key in ("specular", "irradiance", "background", "luminance")
+            )
+    except Exception:  # absent, or damaged in one of the many ways of an archive: build it again
+        return None
+    if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
+        return None
+    return _light(name, specular, irradiance, background, luminance)
+
+
+def _write_cache(light: EnvironmentLight, entry: Path) -> None:
+    temporary = None
+    try:
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        # several workers may write the same entry: each its own file, and the last rename wins
+        with tempfile.NamedTemporaryFile(
+            dir=entry.parent, prefix=entry.stem, suffix=".part", delete=False
+        ) as file:
+            temporary = Path(file.name)
+            np.savez(
+                file,
+                specular=light.specular.astype(np.float16),
+                irradiance=light.irradiance.astype(np.float16),
+                background=light.background.astype(np.float16),
+                luminance=light.luminance,
+            )
+        temporary.replace(entry)
+    except OSError:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
+    """World directions [..., 3] as the directions of the map's own frame: Rz(-yaw) direction."""
+    d = np.asarray(direction, np.float64)
+    c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
+    return d @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
+
+
+def irradiance_at(
+    env: EnvironmentLight, normals: ArrayLike, yaw_deg: float = 0.0
+) -> NDArray[np.float32]:
+    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3]."""
+    return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
+
+
+@cache
+def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    height = _LUMINANCE_WIDTH // 2
+    weight = np.repeat(prefilter.row_solid_angle(height), _LUMINANCE_WIDTH)
+    return prefilter.equirect_directions(height).reshape(-1, 3), weight
+
+
+def metered_luminance(
+    env: EnvironmentLight, direction: ArrayLike, half_angle_deg: float, yaw_deg: float = 0.0
+) -> tuple[float, float]:
+    """Log average and average of the luminance within a cone around a world direction [3].
+
+    Cells of the luminance map, 11.25 degrees wide, fade out over their width at the rim, so that
+    the result moves smoothly with the direction; narrower cones are widened to one cell. The log
+    average counts luminance below 1e-6 as 1e-6.
+    """
+    cells, solid_angle = _meter_cells()
+    cell = 2 * np.pi / _LUMINANCE_WIDTH
+    axis = to_map_frame(direction, yaw_deg)
+    angle = np.arccos(np.clip(cells @ (axis / np.linalg.norm(axis)), -1.0, 1.0))
+    half_angle = max(np.deg2rad(half_angle_deg), cell)
+    weight = solid_angle * np.clip((half_angle - angle) / cell + 0.5, 0.0, 1.0)
+    weight /= weight.sum()
+    luminance = env.luminance.ravel()
+    log_average = np.exp(weight @ np.log(np.maximum(luminance, _LUMINANCE_FLOOR)))
+    return float(log_average), float(weight @ luminance)
+
+
+@cache
+def dfg_table(size: int = 32) -> NDArray[np.float32]:
+    """Split-sum scale and bias (A, B), float32 [size, size, 2]: specular albedo = A F0 + B.
+
+    Row r is roughness (r + 0.5) / size, column c is n.v (c + 0.5) / size: texel centres, so that GL
+    linear sampling with clamping reads it right at (n.v, roughness). GGX with height-correlated
+    Smith masking and Schlick's Fresnel, single scattering. The array is read-only.
+
+    Karis 2013, Real Shading in Unreal Engine 4, environment BRDF; Heitz 2014, Understanding the
+    Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
+    mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
+    """
+    center = (np.arange(size) + 0.5) / size
+    n_dot_v = center[:, None]
+    view = np.stack([np.sqrt(1 - n_dot_v**2), n_dot_v])
+    # a golden-ratio lattice; half the circle mirrors the other across the plane of incidence
+    point = np.arange(_DFG_POINTS)
+    height = ((point + 0.5) / _DFG_POINTS)[None]
+    phi = np.pi * (point * (5**0.5 - 1) / 2 % 1.0)[None]
+    table = np.empty((size, size, 2), np.float32)
+    for row, alpha in enumerate(center**2):
+        stretched = view * np.array([alpha, 1.0])[:, None, None]
+        stretched /= np.sqrt((stretched**2).sum(0))
+        cap_z = 1.0 - height * (1.0 + stretched[1])
+        cap_r = np.sqrt(1.0 - cap_z**2)
+        hx, hy = alpha * (cap_r * np.cos(phi) + stretched[0]), alpha * cap_r * np.sin(phi)
+        hz = cap_z + stretched[1]
+        v_dot_h = (view[0] * hx + view[1] * hz) / np.sqrt(hx**2 + hy**2 + hz**2)
+        n_dot_h = hz / np.sqrt(hx**2 + hy**2 + hz**2)
+        n_dot_l = 2.0 * v_dot_h * n_dot_h - n_dot_v
+        lit = n_dot_l > 0
+        masked_v = _smith_lambda(n_dot_v, alpha)
+        masked_l = _smith_lambda(np.where(lit, n_dot_l, 1.0), alpha)
+        weight = lit * (1.0 + masked_v) / (1.0 + masked_v + masked_l)  # G2 / G1
+        fresnel = (1.0 - np.clip(v_dot_h, 0.0, 1.0)) ** 5
+        table[row] = np.stack([weight * (1.0 - fresnel), weight * fresnel]).mean(-1).T
+    table.flags.writeable = False
+    return table
+
+
+def _smith_lambda(cosine: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
+    return 0.5 * (np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0)) - 1.0)

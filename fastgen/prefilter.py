@@ -1,0 +1,224 @@
+"""Spherical image operations behind environment.py: projections, area filters, convolutions.
+
+Everything is a deterministic sum, without random samples, so a light never carries noise.
+
+Conventions. World z is up. An equirectangular map [H, W, 3] has u = 0.5 - atan2(y, x) / (2 pi)
+(mod 1) along a row and v = acos(z) / pi from the top, so its middle column looks along +x and +y
+is a quarter turn to the left of it. An octahedral map (Cigolle et al. 2014, A Survey of Efficient
+Representations for Independent Unit Vectors, JCGT 3(2), section 3.2) has row 0 at v = 0 and a
+border of one texel, so that uv maps to (1 + uv * (N - 2)) / N of the texture and bilinear lookup is
+seamless over the whole sphere.
+"""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import scipy.fft
+from numpy.typing import ArrayLike, NDArray
+
+BORDER = 1
+
+_BAND_SAMPLES = 1 << 22  # samples gathered at a time: bounds memory at large maps
+_CHUNK_ROWS = 16
+
+
+def octahedral_encode(direction: ArrayLike) -> NDArray[np.float64]:
+    """Directions [..., 3] (any length above 0) to octahedral uv [..., 2] in [0, 1]."""
+    n = np.asarray(direction, np.float64)
+    n = n / np.abs(n).sum(-1, keepdims=True)
+    xy = n[..., :2]
+    sign = np.where(xy < 0, -1.0, 1.0)
+    folded = (1.0 - np.abs(xy[..., ::-1])) * sign
+    return np.where(n[..., 2:] < 0, folded, xy) * 0.5 + 0.5
+
+
+def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
+    """Octahedral uv [..., 2] in [0, 1] to unit directions [..., 3]."""
+    f = np.asarray(uv, np.float64) * 2.0 - 1.0
+    z = 1.0 - np.abs(f).sum(-1, keepdims=True)
+    xy = f - np.where(f < 0, -1.0, 1.0) * np.maximum(-z, 0.0)
+    n = np.concatenate([xy, z], axis=-1)
+    return n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+
+def equirect_encode(direction: ArrayLike) -> NDArray[np.float64]:
+    """Unit directions [..., 3] to equirectangular (u, v) [..., 2], u in [0, 1), v in [0, 1]."""
+    n = np.asarray(direction, np.float64)
+    u = (0.5 - np.arctan2(n[..., 1], n[..., 0]) / (2 * np.pi)) % 1.0
+    v = np.arctan2(np.hypot(n[..., 0], n[..., 1]), n[..., 2]) / np.pi  # acos(z), exact at the poles
+    return np.stack([u, v], axis=-1)
+
+
+def equirect_directions(height: int) -> NDArray[np.float64]:
+    """Unit directions [H, 2H, 3] of the texel centres of an equirectangular map."""
+    theta = np.pi * (np.arange(height) + 0.5)[:, None] / height
+    phi = np.pi - np.pi * (np.arange(2 * height) + 0.5) / height
+    z = np.broadcast_to(np.cos(theta), (height, 2 * height))
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), z], axis=-1)
+
+
+def row_solid_angle(height: int) -> NDArray[np.float64]:
+    """Solid angle [H], in steradian, of one texel in each row of an [H, 2H] equirectangular map."""
+    edges = np.cos(np.linspace(0.0, np.pi, height + 1))
+    return (edges[:-1] - edges[1:]) * np.pi / height
+
+
+def shrink(radiance: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+    """Equirectangular radiance [H, W, C] averaged over solid angle to at most [width/2, width, C].
+
+    A map that is narrower already keeps its width, but becomes exactly 2:1 and even.
+    """
+    height, wide = radiance.shape[:2]
+    width = min(width, wide - wide % 2)
+    if (height, wide) == (width // 2, width):
+        return radiance
+    # area resampling is separable: columns first, then rows weighted by the solid angle they span
+    narrow = _resize(radiance, height, width)
+    edges = np.cos(np.linspace(0.0, np.pi, height + 1))
+    span = (edges[:-1] - edges[1:]).astype(np.float32).reshape(-1, 1, 1)
+    narrow *= span
+    result = _resize(narrow, width // 2, width)
+    result /= _resize(span, width // 2, 1)
+    return result
+
+
+def _resize(image: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
+    resized = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(resized, np.float32).reshape(height, width, image.shape[2])
+
+
+def smooth_poles(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Equirectangular radiance [H, W, 3] averaged along each row over 1 / sin(theta) texels.
+
+    Texels crowd near the poles; after this a point sample stands for as much solid angle there as
+    at the horizon, so a bright texel near the zenith is not missed. (One in the polar row itself
+    comes out about a tenth too strong: bilinear lookups spread it over the neighbouring row.)
+    """
+    height, width = radiance.shape[:2]
+    smooth = radiance.copy()
+    spread = 1.0 / np.sin(np.pi * (np.arange(height) + 0.5) / height)
+    for row, texels in enumerate(2 * np.rint((spread - 1) / 2).astype(int) + 1):
+        if texels >= 3:
+            half = texels // 2
+            wrapped = np.take(radiance[row], np.arange(-half, width + half), axis=0, mode="wrap")
+            smooth[row] = cv2.blur(wrapped[None], (int(texels), 1))[0, half : half + width]
+    return smooth
+
+
+def resample_octahedral(
+    radiance: NDArray[np.float32], size: int, samples: int
+) -> NDArray[np.float32]:
+    """Equirectangular radiance [H, 2H, 3] as a bordered octahedral map [size, size, 3].
+
+    samples: each texel is the mean of samples x samples bilinear lookups spread over it; choose it
+    so that they lie no further apart than a texel of the source.
+    """
+    height, width = radiance.shape[:2]
+    # beyond a pole the sphere continues on the opposite meridian
+    over = [np.roll(radiance[row], width // 2, axis=0)[None] for row in (0, -1)]
+    padded = np.concatenate([over[0], radiance, over[1]])
+    padded = np.concatenate([padded[:, -1:], padded, padded[:, :1]], axis=1)
+
+    inner = size - 2 * BORDER
+    result = np.empty((size, size, 3), np.float32)
+    offset = (np.arange(inner * samples) + 0.5) / (inner * samples)
+    band = max(_BAND_SAMPLES // (inner * samples * samples), 1)
+    for first in range(0, inner, band):
+        last = min(first + band, inner)
+        grid = np.meshgrid(offset, offset[first * samples : last * samples])
+        uv = equirect_encode(octahedral_decode(np.stack(grid, axis=-1)))
+        # texel centres lie at half integers, and the padding shifts by one
+        x = (uv[..., 0] * width + 0.5).astype(np.float32)
+        y = (uv[..., 1] * height + 0.5).astype(np.float32)
+        taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        mean = taken.reshape(last - first, samples, inner, samples, 3).mean(axis=(1, 3))
+        result[BORDER + first : BORDER + last, BORDER:-BORDER] = mean
+    fill_border(result)
+    return result
+
+
+def fill_border(octahedral: NDArray[np.float32]) -> None:
+    """Give the border of a map [N, N, C], in place, the texels that adjoin it on the sphere.
+
+    Over an edge of the square the map continues at the mirror point of the same edge.
+    """
+    m = octahedral
+    m[0, 1:-1], m[-1, 1:-1] = m[1, -2:0:-1], m[-2, -2:0:-1]
+    m[1:-1, 0], m[1:-1, -1] = m[-2:0:-1, 1], m[-2:0:-1, -2]
+    m[0, 0], m[0, -1], m[-1, 0], m[-1, -1] = m[-2, -2], m[-2, 1], m[1, -2], m[1, 1]
+
+
+def sample_octahedral(
+    octahedral: NDArray[np.float32], direction: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """Bilinear lookup, as GL does it, of a bordered map [N, N, C] by directions [K, 3]: [K, C]."""
+    size = octahedral.shape[0]
+    x = BORDER + octahedral_encode(direction) * (size - 2 * BORDER) - 0.5
+    low = np.clip(np.floor(x).astype(int), 0, size - 2)
+    (fx, fy), (c, r) = (x - low).astype(np.float32).T[..., None], low.T
+    top = octahedral[r, c] * (1 - fx) + octahedral[r, c + 1] * fx
+    bottom = octahedral[r + 1, c] * (1 - fx) + octahedral[r + 1, c + 1] * fx
+    return top * (1 - fy) + bottom * fy
+
+
+def ggx_lobe(roughness: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Weight of radiance at angle t from the mirror direction, for view and normal along it.
+
+    Karis 2013, Real Shading in Unreal Engine 4, pre-filtered environment map: half vectors spread
+    as the GGX distribution D with alpha = roughness^2, weighted by n.l. With v = n the half vector
+    lies at t/2, so the density of l is D(t/2) / 4, and cos^2(t/2) = (1 + cos t) / 2 turns D into
+    1 / ((1 - cos t) + alpha^2 (1 + cos t))^2 up to a factor that normalisation removes.
+    """
+    alpha_squared = roughness**4
+
+    def lobe(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+        spread = (1.0 + alpha_squared) - (1.0 - alpha_squared) * cosine
+        np.square(spread, out=spread)
+        return np.divide(np.maximum(cosine, 0.0), spread, out=spread)
+
+    return lobe
+
+
+def cosine_lobe(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lambert's law."""
+    return np.maximum(cosine, 0.0)
+
+
+def convolve(
+    radiance: NDArray[np.float32], lobe: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+) -> NDArray[np.float32]:
+    """Mean of equirectangular radiance [H, 2H, C] around every texel centre, weighted by a lobe.
+
+    lobe: weight at the cosine of the angle to the centre, 0 or more; it may be spread over the
+    whole sphere. Between two rows such a lobe depends on the difference of longitude alone, so the
+    sum over the sphere is a product of small matrices for each Fourier coefficient along the rows
+    (Driscoll and Healy 1994, Computing Fourier Transforms and Convolutions on the 2-Sphere, use
+    the same separation). Being a sum of weights of 0 or more it has no ringing.
+    """
+    height, width, channels = radiance.shape
+    theta = np.pi * (np.arange(height) + 0.5) / height
+    cosine_phi = np.cos(np.pi * np.arange(height + 1) / height)[:, None, None]
+    # double precision: a float32 transform would leave noise of 1e-7 of the sun all over the sky
+    weighted = radiance.astype(np.float64) * row_solid_angle(height)[:, None, None]
+    wave = np.fft.rfft(weighted, axis=1)  # [H, F, C]
+    wave = wave.transpose(1, 0, 2)
+    # a lobe between rows i and j equals that between their mirror images, so half the rows do
+    both = np.concatenate([wave.real, wave.imag, wave.real[:, ::-1], wave.imag[:, ::-1]], axis=2)
+    both = np.ascontiguousarray(both)
+    solid_angle = row_solid_angle(height)
+    result = np.empty((height, width, channels))
+    for first in range(0, (height + 1) // 2, _CHUNK_ROWS):
+        rows = np.arange(first, min(first + _CHUNK_ROWS, (height + 1) // 2))
+        sines = np.sin(theta[rows])[:, None] * np.sin(theta)
+        cosine = sines * cosine_phi + np.cos(theta[rows])[:, None] * np.cos(theta)
+        # the transform of an even sequence of 2H values is a DCT-I of its first H + 1
+        kernel = scipy.fft.dct(lobe(cosine), type=1, axis=0, overwrite_x=True)  # [F, rows, H]
+        total = (kernel[0] @ solid_angle)[:, None, None]
+        product = (kernel @ both).transpose(1, 0, 2)  # [rows, F, 4C]
+        c = channels
+        upper = product[..., :c] + 1j * product[..., c : 2 * c]
+        lower = product[..., 2 * c : 3 * c] + 1j * product[..., 3 * c :]
+        result[rows] = np.fft.irfft(upper, width, axis=1) / total
+        result[height - 1 - rows] = np.fft.irfft(lower, width, axis=1) / total
+    return np.maximum(result, 0.0).astype(np.float32)

@@ -1,0 +1,38 @@
+"""Where the shaders and assets that ship with fastgen lie: in the wheel or in the source tree."""
+
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from fastgen.errors import AssetError
+
+
+@cache
+def _folder(name: str) -> Path:
+    # a wheel maps the top-level folder to the package fastgen.NAME; a checkout keeps it beside
+    spec = find_spec(f"fastgen.{name}")
+    packaged = list(spec.submodule_search_locations or ()) if spec else []
+    for folder in (*map(Path, packaged), Path(__file__).resolve().parent.parent / name):
+        if folder.is_dir():
+            return folder
+    raise AssetError(f"the folder {name} of fastgen is missing; install fastgen again")
+
+
+def _inside(folder: Path, parts: tuple[str, ...]) -> Path:
+    path = folder.joinpath(*parts)
+    if not path.exists():
+        raise AssetError(f"{path}: missing from this copy of fastgen; install it again")
+    return path
+
+
+def asset_path(*parts: str) -> Path:
+    """Path of a bundled asset, for example `asset_path("hdri", "index.json")`.
+
+    Raises AssetError where it does not exist.
+    """
+    return _inside(_folder("assets"), parts)
+
+
+def shader_path(*parts: str) -> Path:
+    """Path of a bundled shader file. Raises AssetError where it does not exist."""
+    return _inside(_folder("shaders"), parts)

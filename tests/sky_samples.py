@@ -1,0 +1,41 @@
+"""Environments and directions made by formulas that know nothing of fastgen."""
+
+import cv2
+import numpy as np
+
+
+def texel_grid(height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Directions [H, 2H, 3] and solid angles [H, 2H] of equirectangular texels, written out."""
+    v, u = np.mgrid[0:height, 0 : 2 * height] + 0.5
+    polar, turn = np.pi * v / height, 2 * np.pi * (0.5 - u / (2 * height))
+    direction = np.stack(
+        [np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1
+    )
+    return direction, np.sin(polar) * (np.pi / height) ** 2
+
+
+def even_directions(count: int) -> np.ndarray:
+    """Fibonacci sphere [count, 3]: each stands for the same solid angle."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    r = np.sqrt(1 - z**2)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1)
+
+
+def patchwork(seed: int, height: int = 128) -> np.ndarray:
+    """A random environment of soft colours with a few strong lamps, float32 [H, 2H, 3]."""
+    rng = np.random.default_rng(seed)
+    soft = cv2.resize(rng.random((8, 16, 3), dtype=np.float32), (2 * height, height))
+    direction, _ = texel_grid(height)
+    for lamp in even_directions(5) + rng.normal(0, 0.3, (5, 3)):
+        lamp /= np.linalg.norm(lamp)
+        soft += 20 * rng.random(3) * np.exp((direction @ lamp - 1)[..., None] / 0.005)
+    return soft.astype(np.float32)
+
+
+def one_light(direction: np.ndarray, radiance: float, height: int = 128) -> np.ndarray:
+    """Black but for the texel nearest to a direction."""
+    grid, _ = texel_grid(height)
+    image = np.zeros((height, 2 * height, 3), np.float32)
+    image[np.unravel_index((grid @ direction).argmax(), grid.shape[:2])] = radiance
+    return image
