@@ -1,0 +1,168 @@
+"""The measures of a container: kinds, corrugations, and where its members stand.
+
+Inset d: distance from the castings' outer plane of an end, e: from that of a side, both in mm.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.errors import ConfigError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ContainerKind:
+    """External length, width and height in mm (ISO 668) and the size-type code (ISO 6346)."""
+
+    length_mm: float
+    width_mm: float
+    height_mm: float
+    size_type: str
+
+    @property
+    def size_mm(self) -> tuple[float, float, float]:
+        """Length, width, height in mm."""
+        return self.length_mm, self.width_mm, self.height_mm
+
+
+KINDS: Mapping[str, ContainerKind] = MappingProxyType(
+    {
+        "20": ContainerKind(6058.0, 2438.0, 2591.0, "22G1"),
+        "40": ContainerKind(12192.0, 2438.0, 2591.0, "42G1"),
+        "40HC": ContainerKind(12192.0, 2438.0, 2896.0, "45G1"),
+        "45HC": ContainerKind(13716.0, 2438.0, 2896.0, "L5G1"),
+    }
+)
+
+_DEEPEST_MM = 120.0
+"""A deeper wave would not fit between a wall's plane and the inner side of a casting."""
+
+_SHORTEST_MM = 40.0
+"""A shorter pitch multiplies the triangles beyond use."""
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A trapezoidal corrugation in mm. pitch = outer flat + 2 slopes + inner flat, along the wall;
+    depth is across it. Raises ConfigError for widths that do not add up or cannot be built."""
+
+    pitch_mm: float
+    depth_mm: float
+    outer_mm: float
+    slope_mm: float
+    inner_mm: float
+
+    def __post_init__(self) -> None:
+        """Hold the widths to their sum and the depth to what the frame can take."""
+        for name in ("outer_mm", "slope_mm", "inner_mm"):
+            if not getattr(self, name) > 0:
+                raise ConfigError(
+                    f"wave.{name}: {getattr(self, name)} is no width; give mm above 0"
+                )
+        total = self.outer_mm + 2 * self.slope_mm + self.inner_mm
+        if abs(total - self.pitch_mm) > 1e-6 * total:
+            raise ConfigError(
+                f"wave.pitch_mm: {self.pitch_mm:g} is not outer + 2 slope + inner = {total:g}; "
+                "make them agree"
+            )
+        if not _SHORTEST_MM <= self.pitch_mm <= 1000:
+            raise ConfigError(
+                f"wave.pitch_mm: {self.pitch_mm:g} is outside {_SHORTEST_MM:g} to 1000 mm"
+            )
+        if not 0 < self.depth_mm <= _DEEPEST_MM:
+            raise ConfigError(
+                f"wave.depth_mm: {self.depth_mm:g} does not fit the frame; "
+                f"give mm above 0, at most {_DEEPEST_MM:g}"
+            )
+
+
+@dataclass(frozen=True)
+class WallProfiles:
+    """Corrugation of the side walls, the front end wall and the roof; common makers' figures."""
+
+    side: Wave = field(default_factory=lambda: Wave(278.0, 36.0, 72.0, 68.0, 70.0))
+    end: Wave = field(default_factory=lambda: Wave(250.0, 46.0, 110.0, 18.0, 104.0))
+    roof: Wave = field(default_factory=lambda: Wave(209.0, 20.0, 91.0, 13.5, 91.0))
+
+
+CASTING_MM = (178.0, 162.0, 118.0)
+"""Corner fitting along x, y and z; ISO 1161."""
+
+OVERLAP_MM = 5.0
+"""Parts run this far into one another, so that no ray slips between them."""
+
+FLOOR_MM = 145.0
+RING_BOTTOM_MM = 11.0
+"""Lower edge z of rails and sills; ISO 668 keeps the base 12.5 mm (+5, -1.5) off the ground."""
+
+RING_TOP_MM = 5.0
+"""Rails and headers below the top castings' plane."""
+
+DOOR_RING_MM = 12.0
+"""Inset of the rear posts, the gutter and the sill's lip; all door gear lies deeper."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the members of one container stand; depths follow the corrugations they cover.
+
+    The recesses are insets from the castings' planes: of the walls' outermost flats, and of posts
+    and side rails.
+    """
+
+    kind: ContainerKind
+    profiles: WallProfiles
+    max_edge_mm: float
+
+    side_recess_mm: float = 14.0
+    end_recess_mm: float = 16.0
+    roof_recess_mm: float = 6.0
+    frame_recess_mm: float = 4.0
+
+    @property
+    def half(self) -> tuple[float, float]:
+        """Half length and half width."""
+        return self.kind.length_mm / 2, self.kind.width_mm / 2
+
+    @property
+    def top(self) -> float:
+        """Height of the outer box."""
+        return self.kind.height_mm
+
+    @property
+    def side_inner_mm(self) -> float:
+        """Inset e of the rails' inner faces: behind the side wall's inner flats."""
+        return max(64.0, self.side_recess_mm + self.profiles.side.depth_mm + 10)
+
+    @property
+    def end_inner_mm(self) -> float:
+        """Inset d of the front end header's and sill's inner faces."""
+        return max(66.0, self.end_recess_mm + self.profiles.end.depth_mm + 10)
+
+    @property
+    def post_mm(self) -> float:
+        """Outer width of the square front posts' far faces, as an inset d and e."""
+        return max(84.0, self.side_inner_mm, self.end_inner_mm)
+
+    @property
+    def rail_bottom_mm(self) -> float:
+        """Lower edge z of the top rails and the front header."""
+        return self.top - max(65.0, self.roof_recess_mm + self.profiles.roof.depth_mm + 15)
+
+    @property
+    def door_post_mm(self) -> tuple[float, float]:
+        """Insets d and e of the rear posts' inner faces."""
+        return 150.0, max(112.0, self.side_inner_mm)
+
+    def outside_castings(self, points_mm: Array) -> NDArray[np.bool_]:
+        """Which points [..., 3] lie in no corner fitting, bool [...]."""
+        half_length, half_width = self.half
+        long, wide, high = CASTING_MM
+        x, y, z = np.moveaxis(np.abs(points_mm), -1, 0)
+        near_corner = (x > half_length - long) & (y > half_width - wide)
+        return ~(near_corner & ((z < high) | (z > self.top - high)))

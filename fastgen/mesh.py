@@ -1,0 +1,206 @@
+"""A triangle mesh with one atlas in millimetres, and the way from a sheet point to the surface.
+
+Container frame: right-handed, z up, origin at the centre of the footprint, z = 0 at the bottom of
+the bottom castings, +x the door end.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastgen.errors import ConfigError
+
+FACES = ("front", "back", "door", "no_door", "roof", "underside")
+"""front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
+
+MATERIALS = ("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside")
+
+MAX_CHARTS = 1000
+"""The renderer keeps chart + 1 in ten bits."""
+
+GROUP_SLACK_MM = 12.0
+"""A face's frame stands back from the castings' plane by at most this much, see Mesh.groups."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """How a face is looked at from outside: right, up and toward the viewer, unit 3-vectors."""
+
+    right: tuple[float, float, float]
+    up: tuple[float, float, float]
+    out: tuple[float, float, float]
+
+
+FACE_AXES: Mapping[str, Axes] = MappingProxyType(
+    {
+        "front": Axes((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+        "back": Axes((-1, 0, 0), (0, 0, 1), (0, 1, 0)),
+        "door": Axes((0, 1, 0), (0, 0, 1), (1, 0, 0)),
+        "no_door": Axes((0, -1, 0), (0, 0, 1), (-1, 0, 0)),
+        "roof": Axes((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        "underside": Axes((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    }
+)
+"""right x up = out for every face, so nothing printed on a sheet is mirrored."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """One part's piece of the atlas.
+
+    face: the side of the container that it belongs to. rect_mm: x0, y0, width, height in the
+    atlas. Coordinates relative to (x0, y0) are called sheet mm.
+    """
+
+    name: str
+    face: str
+    material: str
+    rect_mm: tuple[float, float, float, float]
+
+    @property
+    def material_index(self) -> int:
+        """Position of the material in MATERIALS."""
+        return MATERIALS.index(self.material)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles counter-clockwise from outside, flat normals, vertices split at creases.
+
+    positions_mm: float32 [V, 3]. normals: float32 [V, 3], unit. atlas_mm: float32 [V, 2].
+    chart: uint16 [V], index into charts. triangles: uint32 [T, 3]. atlas_size_mm: width, height.
+
+    groups: range of triangles of each face, and of "frame". A triangle of face F is never the
+    first hit of a ray from a point outside the container's outer box unless that point lies in
+    front of F's plane of the box moved inward by GROUP_SLACK_MM. What cannot promise that is in
+    "frame".
+
+    flats: sheet coordinates (start, end) in mm of the outermost flats of each corrugated face, in
+    ascending order: along sheet x, for the door along sheet y.
+    """
+
+    positions_mm: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    atlas_mm: NDArray[np.float32]
+    chart: NDArray[np.uint16]
+    triangles: NDArray[np.uint32]
+    charts: tuple[Chart, ...]
+    atlas_size_mm: tuple[float, float]
+    groups: Mapping[str, slice]
+    flats: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+
+    def chart_index(self, name: str) -> int:
+        """Number of the chart called `name`. Raises ConfigError for an unknown one."""
+        try:
+            return self._numbers[name]
+        except KeyError:
+            raise ConfigError(
+                f"chart {name!r}: no such part of the container; panels are {', '.join(FACES)}"
+            ) from None
+
+    def sheet_to_surface(
+        self, chart_name: str, sheet_mm: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions [K, 3] in mm and unit normals [K, 3] of the sheet points [K, 2] of a chart.
+
+        A point on the border of two facets gets either one's normal. A point off the chart's
+        triangles (beyond the border, or in the gap between the door leaves) lies in the plane of
+        the triangle it is least far outside of. Raises ConfigError for an unknown chart.
+        """
+        number = self.chart_index(chart_name)
+        points = np.asarray(sheet_mm, np.float64).reshape(-1, 2)
+        if number not in self._locators:
+            self._locators[number] = _Locator.of(self, number)
+        triangle, weights = self._locators[number].find(points)
+        corners = self.triangles[triangle]
+        positions = np.einsum("kc,kcd->kd", weights, self.positions_mm[corners].astype(np.float64))
+        normals = self.normals[corners[:, 0]].astype(np.float64)
+        return positions, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    @cached_property
+    def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lowest and highest coordinates [3] of all vertices."""
+        return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
+
+    @cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {chart.name: i for i, chart in enumerate(self.charts)}
+
+    @cached_property
+    def _locators(self) -> dict[int, "_Locator"]:
+        return {}
+
+
+_CELL_MM = 120.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Locator:
+    """Point location in one chart: each cell of a grid lists the triangles that touch it.
+
+    candidates: int [cells, M] into triangles, -1 where there are fewer. to_weights: float
+    [N, 2, 3], (x, y, 1) to the weights of a triangle's second and third corner.
+    """
+
+    triangles: NDArray[np.int64]
+    to_weights: NDArray[np.float64]
+    candidates: NDArray[np.int64]
+    shape: tuple[int, int]
+
+    @staticmethod
+    def of(mesh: Mesh, number: int) -> "_Locator":
+        x0, y0, width, height = mesh.charts[number].rect_mm
+        triangles = np.flatnonzero(mesh.chart[mesh.triangles[:, 0]] == number)
+        corners = mesh.atlas_mm[mesh.triangles[triangles]].astype(np.float64) - (x0, y0)
+        a, b, c = corners.transpose(1, 0, 2)
+        inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2))
+        to_weights = np.concatenate([inverse, -(inverse @ a[:, :, None])], axis=2)
+        columns, rows = (max(int(np.ceil(side / _CELL_MM)), 1) for side in (width, height))
+        limit = (columns - 1, rows - 1)
+        low = np.clip((corners.min(axis=1) - 1e-3) // _CELL_MM, 0, limit).astype(int)
+        high = np.clip((corners.max(axis=1) + 1e-3) // _CELL_MM, 0, limit).astype(int)
+        lists: list[list[int]] = [[] for _ in range(columns * rows)]
+        for i, ((c0, r0), (c1, r1)) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+            for row in range(r0, r1 + 1):
+                for column in range(c0, c1 + 1):
+                    lists[row * columns + column].append(i)
+        candidates = np.full((columns * rows, max(map(len, lists))), -1)
+        for cell, members in enumerate(lists):
+            candidates[cell, : len(members)] = members
+        return _Locator(triangles, to_weights, candidates, (columns, rows))
+
+    def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Triangle numbers [K] in the mesh and corner weights [K, 3] of sheet points [K, 2]."""
+        limit = np.array(self.shape) - 1
+        cells = np.clip(points // _CELL_MM, 0, limit).astype(int)
+        listed = self.candidates[cells[:, 1] * self.shape[0] + cells[:, 0]]
+        best, inside = self._best(points, listed)
+        lost = np.flatnonzero(inside < -1e-3)
+        if lost.size:
+            everything = np.broadcast_to(
+                np.arange(len(self.triangles)), (lost.size, len(self.triangles))
+            )
+            best[lost], _ = self._best(points[lost], everything)
+        return self.triangles[best], self._weights(points, best)
+
+    def _best(
+        self, points: NDArray[np.float64], listed: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """The listed triangle that each point is most inside of, and its least weight there."""
+        least = self._weights(points[:, None], listed).min(axis=-1)
+        least[listed < 0] = -np.inf
+        chosen = least.argmax(axis=1)
+        rows = np.arange(len(points))
+        return listed[rows, chosen], least[rows, chosen]
+
+    def _weights(
+        self, points: NDArray[np.float64], triangle: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        matrix = self.to_weights[triangle]
+        second_third = np.einsum("...ij,...j->...i", matrix[..., :2], points) + matrix[..., 2]
+        first = 1 - second_third.sum(axis=-1, keepdims=True)
+        return np.concatenate([first, second_third], axis=-1)
