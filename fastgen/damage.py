@@ -1,0 +1,130 @@
+"""Damage as displacement fields: a handful of parameters each, no mesh surgery.
+
+A damage moves a rest point p (mm, container frame) by amount(p) along its `inward` direction. The
+shader evaluates the same fields (shaders/damage.glsl); this module is its slow, obvious twin and
+the one that tests and the exporter use. Local coordinates of p: u along the damage, v across it,
+w inward from its origin. seafront.txt section 3.3.2 describes the four kinds.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.classes import DAMAGE_CLASSES, SEGMENTATION_CLASSES
+from fastgen.scene import Damage
+
+Array = NDArray[np.floating]
+
+FADE_START_MM, FADE_END_MM = 260.0, 520.0
+"""A field acts on what lies within this depth behind its face: not on the opposite wall."""
+
+HOLE_REACH = 1.95
+"""No outline strays farther than this many mean radii: the config holds 5 lobes to 0.19 each."""
+
+LOBES = 5
+"""Harmonics of a hole's outline; more would be finer than the mesh and most pixels."""
+
+
+def local_coordinates(damage: Damage, points_mm: Array) -> tuple[Array, Array, Array]:
+    """(u, v, w) of points [..., 3], each [...] in mm."""
+    q = np.asarray(points_mm, np.float64) - np.array(damage.origin_mm)
+    return q @ np.array(damage.along), q @ np.array(damage.across), q @ np.array(damage.inward)
+
+
+def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
+    """How far the damage moves rest points [..., 3] along its inward direction, mm [...].
+
+    Negative for a concave damage that bulges outward.
+    """
+    u, v, w = local_coordinates(damage, points_mm)
+    half_length, half_width = damage.size_mm[0] / 2, damage.size_mm[1] / 2
+    if damage.kind == "axis":
+        return damage.depth_mm * _bump(u / half_length) * _bump(np.hypot(v, w) / half_width)
+    fade = 1 - _smoothstep(FADE_START_MM, FADE_END_MM, np.abs(w))
+    if damage.kind == "concave":
+        return damage.depth_mm * _bump(u / half_length) * _bump(v / half_width) * fade
+    if damage.kind == "dented":
+        crease_mm, sink_share, *_ = damage.shape
+        away = np.abs(v - fold_path_mm(damage, u))
+        crease = np.maximum(1 - away / crease_mm, 0.0) ** 1.5
+        sink = _bump(away / half_width)
+        taper = np.maximum(1 - (u / half_length) ** 2, 0.0)
+        return damage.depth_mm * taper * fade * ((1 - sink_share) * crease + sink_share * sink)
+    outside = np.hypot(u, v) - hole_radius_mm(damage, np.arctan2(v, u))
+    rim_mm = damage.shape[0]
+    return damage.depth_mm * np.clip(1 - outside / rim_mm, 0.0, 1.0) ** 2 * fade
+
+
+def fold_path_mm(damage: Damage, u: Array) -> Array:
+    """Where a dent's fold runs: v [...] in mm at u [...], by turns straight and sinusoidal."""
+    _, _, amplitude_mm, wavelength_mm, phase, stretch_mm = damage.shape[:6]
+    # a stretch is straight where this is 0 and sinusoidal where it is 1
+    turn = _smoothstep(-0.25, 0.25, np.sin(np.pi * u / stretch_mm + phase))
+    return amplitude_mm * turn * np.sin(2 * np.pi * u / wavelength_mm)
+
+
+def hole_radius_mm(damage: Damage, angle: Array) -> Array:
+    """Radius [...] in mm of a perforation's outline toward `angle` [...] in radians."""
+    ratio = np.ones_like(np.asarray(angle, np.float64))
+    for k in range(LOBES):
+        size, phase = damage.shape[1 + 2 * k], damage.shape[2 + 2 * k]
+        ratio = ratio + size * np.cos((2 + k) * angle + phase)
+    return damage.size_mm[0] / 2 * ratio
+
+
+def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
+    """Which rest points [..., 3] a perforation has torn away, bool [...]."""
+    if damage.kind != "perforation":
+        return np.zeros(np.shape(points_mm)[:-1], bool)
+    u, v, w = local_coordinates(damage, points_mm)
+    through = np.abs(w) < FADE_START_MM
+    return (np.hypot(u, v) < hole_radius_mm(damage, np.arctan2(v, u))) & through
+
+
+def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]:
+    """Rest points [..., 3] to where all damages together move them, mm [..., 3]."""
+    moved = np.array(points_mm, np.float64)
+    for damage in damages:
+        moved += amount_mm(damage, points_mm)[..., None] * np.array(damage.inward)
+    return moved
+
+
+def hole_corners_mm(damages: tuple[Damage, ...]) -> NDArray[np.float64]:
+    """Corners [8 * holes, 3] in mm of boxes that hold all perforations, torn or not yet."""
+    corners = []
+    for damage in damages:
+        if damage.kind == "perforation":
+            reach = damage.size_mm[0] / 2 * HOLE_REACH
+            for u in (-reach, reach):
+                for v in (-reach, reach):
+                    for w in (-60.0, damage.depth_mm + 120.0):
+                        axes = np.array([damage.along, damage.across, damage.inward])
+                        corners.append(np.array(damage.origin_mm) + (u, v, w) @ axes)
+    return np.array(corners)
+
+
+def variant(damages: tuple[Damage, ...]) -> str:
+    """Which of programs.DAMAGE_VARIANTS draws these damages."""
+    if not damages:
+        return "sound"
+    return "holed" if any(damage.kind == "perforation" for damage in damages) else "damaged"
+
+
+def mask_values(damages: tuple[Damage, ...]) -> list[int]:
+    """Value of each damage in the damage target: category * 100 + instance (seafront.txt 3.3.4)."""
+    counts = dict.fromkeys(DAMAGE_CLASSES, 0)
+    values = []
+    for damage in damages:
+        counts[damage.kind] += 1
+        category = SEGMENTATION_CLASSES.index(damage.kind) + 1
+        values.append(category * 100 + counts[damage.kind])
+    return values
+
+
+def _bump(t: Array) -> Array:
+    """Smooth hill: 1 at 0, flat there, 0 from 1 on with zero slope."""
+    return np.maximum(1 - t * t, 0.0) ** 2
+
+
+def _smoothstep(low: float, high: float, x: Array) -> Array:
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    return t * t * (3 - 2 * t)

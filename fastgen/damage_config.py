@@ -1,0 +1,68 @@
+"""Ranges of the four kinds of damage, seafront.txt section 3.3.2; all lengths in millimetres."""
+
+from dataclasses import dataclass, field
+
+from fastgen.records import Range, bounds
+
+UNIT = bounds(0.0, 1.0)
+MM = bounds(0.0, 20000.0, "mm")
+
+
+@dataclass(frozen=True)
+class AxisConfig:
+    """An edge or corner post pushed in. reach_mm: how far its neighbours are dragged along."""
+
+    length_mm: Range = field(default=Range(700, 1900), metadata=MM)
+    reach_mm: Range = field(default=Range(220, 480), metadata=MM)
+    depth_mm: Range = field(default=Range(45, 130), metadata=MM)
+
+
+@dataclass(frozen=True)
+class ConcaveConfig:
+    """A whole area of a face bowed. outward: probability that it bulges instead."""
+
+    length_mm: Range = field(default=Range(900, 2600), metadata=MM)
+    width_mm: Range = field(default=Range(800, 2000), metadata=MM)
+    depth_mm: Range = field(default=Range(50, 140), metadata=MM)
+    outward: float = field(default=0.3, metadata=UNIT)
+
+
+@dataclass(frozen=True)
+class DentedConfig:
+    """A fine fold along a path. crease_mm: half width of the crease; sink_share: part of the depth
+    that the surroundings sink by; turn_deg: angle of the path against the horizontal."""
+
+    length_mm: Range = field(default=Range(600, 1700), metadata=MM)
+    width_mm: Range = field(default=Range(180, 420), metadata=MM)
+    depth_mm: Range = field(default=Range(18, 50), metadata=MM)
+    crease_mm: Range = field(default=Range(30, 70), metadata=bounds(5, 1000, "mm"))
+    sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
+    amplitude_mm: Range = field(default=Range(25, 110), metadata=MM)
+    wavelength_mm: Range = field(default=Range(280, 800), metadata=bounds(20, 1e5, "mm"))
+    stretch_mm: Range = field(default=Range(250, 600), metadata=bounds(20, 1e5, "mm"))
+    turn_deg: Range = field(default=Range(-50, 50), metadata=bounds(-180, 180, "degrees"))
+
+
+@dataclass(frozen=True)
+class PerforationConfig:
+    """A torn hole. lobes: how far its outline strays from a circle, as a share of the radius."""
+
+    diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
+    rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
+    depth_mm: Range = field(default=Range(35, 100), metadata=MM)
+    lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, 0.19))
+
+
+@dataclass(frozen=True)
+class DamageConfig:
+    """How often a container is damaged and how. count and kind are drawn uniformly (Table 2)."""
+
+    probability: float = field(default=0.4, metadata=UNIT)
+    count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, 128))
+    kinds: tuple[str, ...] = ("axis", "concave", "dented", "perforation")
+    faces: tuple[str, ...] = ("front", "back", "door", "no_door")
+    mask_threshold_mm: float = field(default=5.0, metadata=bounds(0.1, 1000.0, "mm"))
+    axis: AxisConfig = field(default_factory=AxisConfig)
+    concave: ConcaveConfig = field(default_factory=ConcaveConfig)
+    dented: DentedConfig = field(default_factory=DentedConfig)
+    perforation: PerforationConfig = field(default_factory=PerforationConfig)

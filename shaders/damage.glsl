@@ -1,0 +1,136 @@
+// vec3 deformed(vec3 p): where all damages move rest point p (mm, container frame); bool in_hole(i, p);
+// Damaged damage_at(p, n): what the shading needs there. The twin of fastgen/damage.py.
+
+float bump(float t) { float s = max(1.0 - t * t, 0.0); return s * s; }
+float bump_slope(float t) { return -4.0 * t * max(1.0 - t * t, 0.0); }
+
+vec3 damage_local(int i, vec3 p) {
+    vec3 q = p - damage_origin[i].xyz;
+    return vec3(dot(q, damage_along[i].xyz), dot(q, damage_across[i].xyz), dot(q, damage_inward[i].xyz));
+}
+
+float fold_path(vec4 a, vec4 b, float u) {
+    float turn = smoothstep(-0.25, 0.25, sin(PI * u / b.y + b.x));
+    return a.z * turn * sin(2.0 * PI * u / a.w);
+}
+
+float hole_radius(int i, float angle) {
+    vec4 a = damage_shape[3 * i];
+    vec4 b = damage_shape[3 * i + 1];
+    vec4 c = damage_shape[3 * i + 2];
+    float ratio = 1.0 + a.y * cos(2.0 * angle + a.z) + a.w * cos(3.0 * angle + b.x) +
+                  b.y * cos(4.0 * angle + b.z) + b.w * cos(5.0 * angle + c.x) +
+                  c.y * cos(6.0 * angle + c.z);
+    return damage_along[i].w * ratio;
+}
+
+// holes are the first `hole_count` damages
+bool in_hole(int i, vec3 p) {
+    vec3 q = damage_local(i, p);
+    return length(q.xy) < hole_radius(i, atan(q.y, q.x)) && abs(q.z) < DAMAGE_FADE_START_MM;
+}
+
+// which perforation has torn away rest point p, -1 for none
+int hole_at(vec3 p) {
+    int found = -1;
+    for (int i = 0; i < hole_count; ++i) if (in_hole(i, p)) found = i;
+    return found;
+}
+
+// a superset of where damage i moves or marks anything: an edge of the mesh more on all sides
+bool within_reach(int i, vec3 p) {
+    vec3 q = abs(damage_local(i, p));
+    vec2 reach = vec2(damage_along[i].w, damage_across[i].w);
+    if (i < hole_count) reach = reach * HOLE_REACH + damage_shape[3 * i].x;
+    return all(lessThan(q, vec3(reach, DAMAGE_FADE_END_MM) + LONGEST_EDGE_MM));
+}
+
+struct Field {
+    float amount;   // mm along `inward`
+    vec3 slope;     // its gradient in local coordinates; along a fold or an outline only nearly so
+    float scar;     // how much the steel is worked: aged in a fold, rusty along a torn rim; 0..1
+};
+
+Field damage_field(int i, vec3 p) {
+    vec3 q = damage_local(i, p);
+    int kind = int(damage_origin[i].w);
+    float half_length = damage_along[i].w;
+    float half_width = damage_across[i].w;
+    float depth = damage_inward[i].w;
+    vec4 shape = damage_shape[3 * i];
+    float hill = bump(q.x / half_length);
+    float hill_slope = bump_slope(q.x / half_length) / half_length;
+    float fade = 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(q.z));
+    if (kind == DAMAGE_AXIS) {
+        float r = max(length(q.yz), 1e-3);
+        float reach = bump(r / half_width);
+        float reach_slope = bump_slope(r / half_width) / half_width;
+        vec3 slope = depth * vec3(hill_slope * reach, hill * reach_slope * q.yz / r);
+        return Field(depth * hill * reach, slope, 0.35 * hill * hill * reach * reach);
+    }
+    if (kind == DAMAGE_CONCAVE) {
+        float across = bump(q.y / half_width);
+        float across_slope = bump_slope(q.y / half_width) / half_width;
+        vec3 slope = depth * fade * vec3(hill_slope * across, hill * across_slope, 0.0);
+        return Field(depth * hill * across * fade, slope, 0.0);
+    }
+    if (kind == DAMAGE_DENTED) {
+        vec4 more = damage_shape[3 * i + 1];
+        float path = fold_path(shape, more, q.x);
+        float path_slope = (fold_path(shape, more, q.x + 2.0) - path) * 0.5;
+        float away = abs(q.y - path);
+        float side = q.y < path ? -1.0 : 1.0;
+        float taper = max(1.0 - q.x * q.x / (half_length * half_length), 0.0);
+        float taper_slope = taper > 0.0 ? -2.0 * q.x / (half_length * half_length) : 0.0;
+        float rest = max(1.0 - away / shape.x, 0.0);
+        float profile = mix(rest * sqrt(rest), bump(away / half_width), shape.y);
+        float profile_slope =
+            mix(-1.5 * sqrt(rest) / shape.x, bump_slope(away / half_width) / half_width, shape.y);
+        vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
+                          taper * profile_slope * side, 0.0);
+        return Field(depth * taper * fade * profile, depth * fade * slope,
+                     0.7 * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
+    }
+    float r = max(length(q.xy), 1e-3);
+    float outside = r - hole_radius(i, atan(q.y, q.x));
+    float rim = clamp(1.0 - outside / shape.x, 0.0, 1.0);
+    float rim_slope = rim < 1.0 ? -2.0 * rim / shape.x : 0.0;
+    float scar = clamp(1.0 - outside / (0.7 * shape.x), 0.0, 1.0);
+    return Field(depth * rim * rim * fade, depth * fade * rim_slope * vec3(q.xy / r, 0.0),
+                 scar * scar * step(0.5, fade));
+}
+
+vec3 deformed(vec3 p) {
+    vec3 moved = p;
+    for (int i = 0; i < damage_count; ++i) moved += damage_field(i, p).amount * damage_inward[i].xyz;
+    return moved;
+}
+
+struct Damaged {
+    vec3 normal;    // of the deformed surface
+    float scar;
+    uint value;     // mask value of what moved this point most, above the threshold; 0 for none
+};
+
+Damaged damage_at(vec3 p, vec3 n) {
+    vec3 t = normalize(abs(n.z) < 0.9 ? cross(n, vec3(0.0, 0.0, 1.0)) : cross(n, vec3(1.0, 0.0, 0.0)));
+    vec3 b = cross(n, t);
+    vec3 moved_t = t;
+    vec3 moved_b = b;
+    Damaged d = Damaged(n, 0.0, 0u);
+    float most = damage_threshold_mm;
+    for (int i = 0; i < damage_count; ++i) {
+        Field f = damage_field(i, p);
+        vec3 slope = f.slope.x * damage_along[i].xyz + f.slope.y * damage_across[i].xyz +
+                     f.slope.z * damage_inward[i].xyz;
+        moved_t += damage_inward[i].xyz * dot(slope, t);
+        moved_b += damage_inward[i].xyz * dot(slope, b);
+        d.scar = max(d.scar, f.scar);
+        if (abs(f.amount) > most) {
+            most = abs(f.amount);
+            d.value = uint(damage_shape[3 * i + 2].w);
+        }
+    }
+    d.normal = normalize(cross(moved_t, moved_b));
+    return d;
+}
