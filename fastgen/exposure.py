@@ -1,0 +1,36 @@
+"""Exposure as a camera meters it: the container in the middle counts more than what is behind."""
+
+import numpy as np
+
+from fastgen.camera import View
+from fastgen.environment import EnvironmentLight, irradiance_at, metered_luminance
+from fastgen.scene import Camera, Color
+
+MIDDLE_GREY = 0.18
+"""Reflectance that a meter renders as a mid-tone (ISO 2720:1974 calibrates near 0.18)."""
+
+_CENTER_WEIGHT = 0.65
+_MIN_LUMINANCE = 1e-6
+_REC_709 = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, section 3.2
+
+
+def metered_exposure(
+    light: EnvironmentLight, yaw_deg: float, view: View, camera: Camera, paint: Color
+) -> float:
+    """Factor on radiance that puts the metered mean at a mid-tone, then exposure_ev stops off it.
+
+    The middle of the picture is the container: its paint, half adapted to grey as a metering
+    pattern averages over it, under the light that falls on the side facing the camera; around it
+    stands the background in view.
+    """
+    forward = view.rotation[2]
+    toward_camera = -forward * np.array([1.0, 1.0, 0.0])
+    toward_camera /= max(float(np.linalg.norm(toward_camera)), 1e-6)
+    falling = float(irradiance_at(light, toward_camera[None], yaw_deg)[0] @ _REC_709)
+    reflectance = float(np.sqrt(MIDDLE_GREY * max(float(np.array(paint) @ _REC_709), 0.02)))
+    half_angle = float(np.degrees(np.arctan(0.5 * view.size[0] / view.focal_px)))
+    behind, _ = metered_luminance(light, forward, half_angle, yaw_deg)
+    center = max(reflectance * falling, _MIN_LUMINANCE)
+    behind = max(behind, _MIN_LUMINANCE)
+    metered = np.exp(_CENTER_WEIGHT * np.log(center) + (1 - _CENTER_WEIGHT) * np.log(behind))
+    return float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev)

@@ -1,0 +1,166 @@
+"""Generator: the public way from (config, seed, index) to a labelled Sample."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Self
+
+from fastgen.camera import view_of
+from fastgen.config import Config
+from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
+from fastgen.errors import ConfigError
+from fastgen.gl import GLContext, open_context
+from fastgen.labels import label
+from fastgen.programs import LAYERS
+from fastgen.records import nearest
+from fastgen.renderer import Renderer
+from fastgen.sample import Sample
+from fastgen.sampling import sample_scene
+from fastgen.scene import Camera, Scene
+
+MIN_SIZE, MAX_SIZE = 64, 4096
+
+ANTIALIASING = {"none": 1, "balanced": 2, "high": 3}
+"""Samples along each axis of a pixel by quality."""
+
+
+class Generator:
+    """Makes scenes and renders them. A context manager; GL is opened at the first render.
+
+    config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
+    64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
+    in place of the bundled ones. Use it from one thread, and make one in each process.
+
+    Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
+    """
+
+    def __init__(
+        self,
+        config: Config | None = None,
+        seed: int = 0,
+        size: tuple[int, int] = (640, 640),
+        backend: str = "auto",
+        hdri_dir: str | Path | None = None,
+        antialiasing: str = "balanced",
+        device_index: int | None = None,
+    ) -> None:
+        if seed != int(seed) or seed < 0:
+            raise ConfigError(f"seed: {seed!r} is not a whole number of 0 or more")
+        width, height = size
+        for side in size:
+            if not MIN_SIZE <= side <= MAX_SIZE or side != int(side):
+                raise ConfigError(
+                    f"size: {width}x{height} is out of range; "
+                    f"each side takes {MIN_SIZE} to {MAX_SIZE} pixels"
+                )
+        if antialiasing not in ANTIALIASING:
+            raise ConfigError(
+                f"antialiasing: {antialiasing!r} is unknown{nearest(antialiasing, ANTIALIASING)}"
+            )
+        self.config = config or Config.preset()
+        self.seed = int(seed)
+        self.size = (int(width), int(height))
+        self.backend = backend
+        self._samples_per_axis = ANTIALIASING[antialiasing]
+        self._device_index = device_index
+        self._hdris = (
+            {path.stem: path for path in find_hdris(Path(hdri_dir))}
+            if hdri_dir
+            else bundled_hdris()
+        )
+        # kept on the CPU too, for metering; the least recently used fall out
+        self._light = lru_cache(maxsize=24)(self._load_light)
+        self._gl: GLContext | None = None
+        self._renderer: Renderer | None = None
+
+    @property
+    def environments(self) -> tuple[str, ...]:
+        """Names of the HDRIs that scenes may draw."""
+        return tuple(sorted(self._hdris))
+
+    @property
+    def renderer_name(self) -> str:
+        """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
+        self._open()
+        assert self._gl is not None
+        return self._gl.renderer
+
+    @property
+    def used_backend(self) -> str:
+        """Which backend 'auto' came to: egl or osmesa."""
+        self._open()
+        assert self._gl is not None
+        return self._gl.backend
+
+    def scene(self, index: int) -> Scene:
+        """Scene number `index`: plain data, no GL needed, the same on every machine."""
+        if index != int(index) or index < 0:
+            raise ConfigError(f"index: {index!r} is not a whole number of 0 or more")
+        return sample_scene(self.config, self.seed, int(index), self.environments)
+
+    def render(
+        self,
+        index: int | None = None,
+        camera: str | Camera = "A",
+        scene: Scene | None = None,
+        layer: str = "all",
+    ) -> Sample:
+        """One labelled image of scene `index`, or of `scene` when that is given.
+
+        camera: the name of one of the scene's cameras, or a Camera of your own.
+        layer: 'all', or one material layer by itself (see programs.LAYERS).
+        """
+        if (index is None) == (scene is None):
+            raise ConfigError("render: give either index or scene")
+        if layer not in LAYERS:
+            raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
+        if scene is None:
+            assert index is not None
+            scene = self.scene(index)
+        if isinstance(camera, str):
+            names = [c.name for c in scene.cameras]
+            if camera not in names:
+                raise ConfigError(f"camera: {camera!r} is unknown{nearest(camera, names)}")
+            camera = scene.camera(camera)
+        renderer = self._open()
+        frame = renderer.render(scene, camera, self.size, layer)
+        view = view_of(camera, self.size)
+        objects = label(frame, scene, view, renderer.mesh(scene.container))
+        return Sample(
+            image=frame.image,
+            ids=frame.ids,
+            damage=frame.damage,
+            depth=frame.depth,
+            scene=scene,
+            camera=camera,
+            view=view,
+            objects=objects,
+        )
+
+    def close(self) -> None:
+        """Free the renderer and its GL context; a later render opens them again."""
+        if self._renderer is not None:
+            self._renderer.release()
+        if self._gl is not None:
+            self._gl.release()
+        self._renderer, self._gl = None, None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _open(self) -> Renderer:
+        if self._renderer is None:
+            self._gl = open_context(self.backend, self._device_index)
+            threshold_mm = self.config.damage.mask_threshold_mm
+            self._renderer = Renderer(self._gl, self._light, self._samples_per_axis, threshold_mm)
+        else:
+            assert self._gl is not None
+            self._gl.make_current()  # another generator may have been at work in between
+        return self._renderer
+
+    def _load_light(self, name: str) -> EnvironmentLight:
+        if name not in self._hdris:
+            raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, self._hdris)}")
+        return load_environment(self._hdris[name])

@@ -1,0 +1,96 @@
+"""A Mesh on the GPU, drawn with one indirect call that leaves out faces turned away."""
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from fastgen.mesh import Mesh
+
+BULGE_MM = 120.0
+"""How far damage may push a surface beyond the rest mesh."""
+
+
+def facing_groups(mesh: Mesh, position_mm: Iterable[float]) -> list[str]:
+    """Names of the triangle groups that a camera at `position_mm` may see."""
+    low, high = mesh.bounds_mm
+    x, y, z = position_mm
+    ahead = {
+        "front": y < low[1] + BULGE_MM,
+        "back": y > high[1] - BULGE_MM,
+        "door": x > high[0] - BULGE_MM,
+        "no_door": x < low[0] + BULGE_MM,
+        "roof": z > high[2] - BULGE_MM,
+        "underside": z < low[2] + BULGE_MM,
+    }
+    return [name for name in mesh.groups if ahead.get(name, True)]
+
+
+_COMMAND = np.dtype(
+    [("count", "u4"), ("instances", "u4"), ("first", "u4"), ("vertex", "u4"), ("instance", "u4")]
+)
+"""DrawElementsIndirectCommand, OpenGL 4.5 core specification, section 10.4."""
+
+
+class GpuMesh:
+    """Vertex, index and chart data of one Mesh. Owned by the renderer, which releases it.
+
+    programs: the geometry program of each of programs.DAMAGE_VARIANTS.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        mesh: Mesh,
+        programs: Mapping[str, moderngl.Program],
+    ) -> None:
+        self.mesh = mesh
+        layout = np.dtype([("p", "f4", 3), ("n", "f4", 3), ("a", "f4", 2), ("c", "u4")])
+        vertices = np.empty(len(mesh.positions_mm), layout)
+        vertices["p"], vertices["n"] = mesh.positions_mm, mesh.normals
+        vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart
+        self._vertices = ctx.buffer(vertices.tobytes())
+        self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
+        self._commands = ctx.buffer(reserve=_COMMAND.itemsize * 2 * len(mesh.groups))
+        self._views = ctx.buffer(np.arange(2, dtype=np.uint32).tobytes())
+        names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
+        content = (self._vertices, "3f 3f 2f 1u", *names)
+        views = (self._views, "1u/i", "in_inner")
+        self._arrays = {
+            damage: ctx.vertex_array(
+                program, [content, views] if "in_inner" in program else [content], self._indices
+            )
+            for damage, program in programs.items()
+        }
+        charts = np.zeros((2, len(mesh.charts), 4), np.float32)
+        charts[0] = [chart.rect_mm for chart in mesh.charts]
+        charts[1, :, 0] = [chart.material_index for chart in mesh.charts]
+        self.charts = ctx.texture((len(mesh.charts), 2), 4, charts.tobytes(), dtype="f4")
+        self.charts.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    def draw(self, position_mm: Iterable[float], damage: str, bent: Collection[str] = ()) -> None:
+        """Draw what a camera at `position_mm` may see, in one call.
+
+        damage: one of programs.DAMAGE_VARIANTS. 'holed' draws everything a second time, as the
+        instance that shows insides through holes. bent: faces to draw even if turned away.
+        """
+        names = {*facing_groups(self.mesh, position_mm), *bent}
+        seen = [triangles for name, triangles in self.mesh.groups.items() if name in names]
+        draws = [(0, triangles) for triangles in seen]
+        if damage == "holed":
+            draws += [(1, triangles) for triangles in self.mesh.groups.values()]
+        commands = np.zeros(len(draws), _COMMAND)
+        for row, (instance, triangles) in zip(commands, draws, strict=True):
+            row["count"] = 3 * (triangles.stop - triangles.start)
+            row["first"] = 3 * triangles.start
+            row["instances"], row["instance"] = 1, instance
+        self._commands.write(commands.tobytes())
+        self._arrays[damage].render_indirect(self._commands, moderngl.TRIANGLES, len(draws))
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        buffers = (self._vertices, self._indices, self._commands, self._views)
+        items: list[Any] = [*self._arrays.values(), *buffers, self.charts]
+        for item in items:
+            item.release()

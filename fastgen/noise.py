@@ -1,0 +1,115 @@
+"""Tileable noise for the material layers, baked once per process and mip-mapped.
+
+Channels hold values whose distribution is uniform on 0..1, so that `noise > 1 - c` covers the
+fraction c of the surface. Averaging in a mip level narrows that distribution; `lost_deviation`
+says by how much, and the shader widens its thresholds accordingly, so that near and far views
+agree on how much is rusty and nothing shimmers (the idea of Olano and Baker 2010, LEAN mapping:
+variance that filtering removes comes back as softness).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+NOISE_SIZE = 1024
+_SEED = 20261
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseTiles:
+    """levels: uint8 [2, S, S, 4] for S = NOISE_SIZE, NOISE_SIZE / 2, ... 1; row 0 is v = 0.
+
+    Layer 0: tone, rust, stain, grain. Layer 1: scratches, wear, dirt, fine grain.
+    lost_deviation: float32 [2, levels, 4], standard deviation that a level lost against level 0.
+    """
+
+    levels: tuple[NDArray[np.uint8], ...]
+    lost_deviation: NDArray[np.float32]
+
+
+def _uniform(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Replace values [S, S] by their ranks, scaled to 0..1."""
+    ranks = np.empty(values.size, np.float32)
+    ranks[np.argsort(values, axis=None)] = np.linspace(0, 1, values.size, dtype=np.float32)
+    return ranks.reshape(values.shape)
+
+
+def _spectral(
+    rng: np.random.Generator, slope: float, low: float, high: float, stretch: float = 1.0
+) -> NDArray[np.float64]:
+    """Periodic Gaussian noise with power falling as frequency ** -slope between two cut-offs.
+
+    low, high: cycles a tile. stretch above 1 draws the pattern out along y.
+    Ebert et al. 2002, Texturing and Modeling, ch. 2 (spectral synthesis).
+    """
+    fx = np.fft.rfftfreq(NOISE_SIZE, 1 / NOISE_SIZE)[None, :]
+    fy = np.fft.fftfreq(NOISE_SIZE, 1 / NOISE_SIZE)[:, None] * stretch
+    frequency = np.maximum(np.hypot(fx, fy), 1e-3)
+    amplitude = frequency ** (-slope / 2)
+    amplitude *= np.exp(-((low / frequency) ** 4)) * np.exp(-((frequency / high) ** 2))
+    white = np.fft.rfft2(rng.standard_normal((NOISE_SIZE, NOISE_SIZE)))
+    return np.fft.irfft2(white * amplitude, s=(NOISE_SIZE, NOISE_SIZE))
+
+
+def _stain(rust: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Run-off below the rustiest spots: rust dragged toward -y (down a wall), 0..1."""
+    spots = np.clip((rust - 0.93) / 0.07, 0, 1)
+    y = np.arange(NOISE_SIZE)
+    drag = np.exp(-y / 70.0)
+    dragged = np.fft.irfft(
+        np.fft.rfft(spots, axis=0) * np.conj(np.fft.rfft(drag))[:, None], n=NOISE_SIZE, axis=0
+    )
+    return np.clip(dragged / np.quantile(dragged, 0.985), 0, 1).astype(np.float32)
+
+
+def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
+    """Straight thin lines, each with a rank in 0..1, on 0; mostly along x, as scrapes run."""
+    tile = np.zeros((NOISE_SIZE, NOISE_SIZE), np.float32)
+    count = 900
+    angles = rng.normal(0.0, 0.35, count) + np.where(rng.random(count) < 0.2, np.pi / 2, 0.0)
+    lengths = rng.exponential(60.0, count) + 10
+    centers = rng.random((count, 2)) * NOISE_SIZE
+    for i in range(count):
+        step = np.array([np.cos(angles[i]), np.sin(angles[i])]) * lengths[i] / 2
+        for shift in np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * NOISE_SIZE:
+            start, end = centers[i] - shift - step, centers[i] - shift + step
+            points = [tuple(round(v * 16) for v in p) for p in (start, end)]
+            rank = float((i + 1) / count)
+            cv2.line(tile, points[0], points[1], rank, 1, cv2.LINE_8, shift=4)
+    return tile
+
+
+def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The next mip level: 2x2 box average of [2, S, S, 4]."""
+    quads = level.reshape(2, level.shape[1] // 2, 2, level.shape[2] // 2, 2, 4)
+    return quads.mean(axis=(2, 4), dtype=np.float32)
+
+
+@lru_cache(maxsize=1)
+def noise_tiles() -> NoiseTiles:
+    """Bake both layers and their mip chain; always the same, about a second."""
+    rng = np.random.default_rng(_SEED)
+    tone = _uniform(_spectral(rng, 2.6, 1.0, 90.0))
+    ridges = -np.abs(_spectral(rng, 2.4, 3.0, 300.0))
+    blotches = _spectral(rng, 2.2, 2.0, 400.0)
+    rust = _uniform(blotches / blotches.std() + 0.45 * ridges / ridges.std())
+    grain = _uniform(_spectral(rng, 0.8, 30.0, 420.0))
+    wear = _uniform(_spectral(rng, 2.2, 2.0, 250.0, stretch=1.8))
+    dirt = _uniform(_spectral(rng, 1.9, 2.0, 320.0, stretch=6.0))
+    fine = _uniform(_spectral(rng, 0.3, 90.0, 500.0))
+    layers = np.stack(
+        [
+            np.stack([tone, rust, _stain(rust), grain], axis=-1),
+            np.stack([_scratches(rng), wear, dirt, fine], axis=-1),
+        ]
+    )
+    levels = [layers]
+    while levels[-1].shape[1] > 1:
+        levels.append(_halved(levels[-1]))
+    variance = np.stack([level.var(axis=(1, 2)) for level in levels], axis=1)
+    lost = np.sqrt(np.maximum(variance[:, :1] - variance, 0)).astype(np.float32)
+    encoded = tuple(np.rint(np.clip(level, 0, 1) * 255).astype(np.uint8) for level in levels)
+    return NoiseTiles(encoded, lost)

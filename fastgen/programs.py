@@ -1,0 +1,226 @@
+"""Shader text: includes, the constants and uniform blocks that Python and GLSL share, programs."""
+
+import itertools
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import damage as fields
+from fastgen import environment
+from fastgen.artwork import ART_SIZE
+from fastgen.classes import DAMAGE_CLASSES, SOUND_CONTAINER
+from fastgen.lettering import TILE_CAPS
+from fastgen.mesh import MATERIALS
+from fastgen.noise import NOISE_SIZE, noise_tiles
+from fastgen.resources import shader_path
+from fastgen.uniforms import Block
+
+LAYERS = (
+    *("all", "base", "tone", "ageing", "dirt", "rust", "scratches", "decals", "reflection"),
+    "normals",
+)
+"""What the shader can show; `ids` and `damage` of `fastgen show` are label targets."""
+
+PIXEL_CLASSES = {
+    "sky": (),
+    "plain": (),
+    "decal": ("DECALS",),
+    "mixed": ("MIXED",),
+    "mixed_decal": ("MIXED", "DECALS"),
+    "damaged": ("DECALS", "DAMAGE"),
+    "mixed_damaged": ("MIXED", "DECALS", "DAMAGE"),
+    "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
+}
+"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near."""
+
+PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
+
+MAX_DAMAGES = 128
+"""Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
+
+CLASS_DEPTH_STEP = 0.125
+"""Classes are told apart as depths, multiples of this (exact in every depth format)."""
+
+CONTAINER_ID = 1
+
+PORTAL_CHART = 1000
+"""Chart number of what a perforation tore away; real charts number below it."""
+
+DAMAGE_VARIANTS = ("sound", "damaged", "holed")
+"""Programs for scenes without damage, with damage, and with a perforation among it."""
+
+LONGEST_EDGE_MM = 160.0
+"""No panel's mesh has longer edges (container.build_container's default and a little)."""
+
+DECAL_CELL_MM = 128.0
+DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
+MAX_SAMPLES_PER_AXIS = 3
+
+_NOISE_LEVELS = NOISE_SIZE.bit_length()
+
+SCENE_BLOCK = Block(
+    "SceneBlock",
+    0,
+    (
+        ("vec4", "material_base", len(MATERIALS)),
+        ("vec4", "material_trait", len(MATERIALS)),
+        ("vec4", "noise_lost", 2 * _NOISE_LEVELS),
+        ("vec3", "dirt_albedo"),
+        ("float", "dirt_strength"),
+        ("vec3", "rust_albedo"),
+        ("float", "rust_roughness"),
+        ("vec2", "noise_offset_mm"),
+        ("float", "tone_variation"),
+        ("float", "ageing_strength"),
+        ("float", "ageing_reach_mm"),
+        ("float", "dirt_reach_mm"),
+        ("float", "rust_coverage"),
+        ("float", "rust_tile_mm"),
+        ("float", "scratch_coverage"),
+        ("float", "wear_strength"),
+        ("float", "wear_tile_mm"),
+        ("float", "background_size"),
+    ),
+)
+
+VIEW_BLOCK = Block(
+    "ViewBlock",
+    1,
+    (
+        ("mat4", "world_to_clip"),
+        ("vec3", "ray_corner"),
+        ("float", "pixel_angle"),
+        ("vec3", "ray_right"),
+        ("float", "exposure"),
+        ("vec3", "ray_down"),
+        ("vec2", "yaw"),
+    ),
+)
+
+DAMAGE_BLOCK = Block(
+    "DamageBlock",
+    2,
+    (
+        ("vec4", "damage_origin", MAX_DAMAGES),  # position, kind
+        ("vec4", "damage_along", MAX_DAMAGES),  # axis, half length
+        ("vec4", "damage_across", MAX_DAMAGES),  # axis, half width
+        ("vec4", "damage_inward", MAX_DAMAGES),  # axis, depth
+        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape, and last the mask value
+        ("int", "damage_count"),
+        ("int", "hole_count"),  # perforations come first
+        ("float", "damage_threshold_mm"),
+        ("int", "inner_row"),  # first row of the inner view in the sample targets
+    ),
+)
+
+
+def noise_deviation() -> NDArray[np.float32]:
+    """The table `noise_lost` of SCENE_BLOCK, float32 [2 * levels, 4]."""
+    return noise_tiles().lost_deviation.reshape(-1, 4)
+
+
+def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str) -> str:
+    levels = environment.ROUGHNESS_LEVELS
+    steps = "".join(
+        f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
+        for a, b in itertools.pairwise(levels)
+    )
+    if samples_per_axis == 2:  # a tent one pixel to each side
+        tent = {(x, y): (2 - abs(x)) * (2 - abs(y)) / 16 for x in (-1, 0, 1) for y in (-1, 0, 1)}
+    elif samples_per_axis == 3:  # a box: all samples of the pixel
+        tent = {(x, y): 1 / 9 for x in (-1, 0, 1) for y in (-1, 0, 1)}
+    else:
+        tent = {(0, 0): 1.0}
+    around = sorted(tent, key=lambda o: abs(o[0]) + abs(o[1]))  # the centre first
+    shown = {name: int(layer in ("all", "normals", "reflection", name)) for name in LAYERS}
+    defines: dict[str, object] = {
+        "MM": "0.001",
+        "VOID_DEPTH": "uintBitsToFloat(0x7f800000u)",
+        "SOUND_CONTAINER": f"{SOUND_CONTAINER}u",
+        "CONTAINER_ID": f"{CONTAINER_ID}u",
+        "MIN_ROUGHNESS": "0.045",
+        "DIELECTRIC_F0": "0.04",
+        "INSIDE_LIGHT": "0.10",
+        "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",
+        "SPECULAR_LAYERS": f"{len(levels):.1f}",
+        "IRRADIANCE_SIZE": f"{environment.IRRADIANCE_SIZE:.1f}",
+        "NOISE_SIZE": f"{NOISE_SIZE:.1f}",
+        "NOISE_LEVELS": f"{_NOISE_LEVELS:.1f}",
+        "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
+        "ART_SIZE": f"{ART_SIZE:.1f}",
+        "GLYPH_TILE_SIZE": "64.0",
+        "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
+        "GLYPH_RANGE_CAPS": "0.3",
+        **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
+        **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
+        **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},
+        **{f"CLASS_{name.upper()}": i for i, name in enumerate(PIXEL_CLASSES)},
+        "CLASS_DEPTH_STEP": CLASS_DEPTH_STEP,
+        "CLASS": list(PIXEL_CLASSES).index(pixel_class),
+        **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
+        "MAX_SURFACES": 4,
+        "DAMAGED": int(damage != "sound"),
+        "HOLED": int(damage == "holed"),
+        "PI": f"{math.pi:.8f}",
+        "DAMAGE_FADE_START_MM": f"{fields.FADE_START_MM:.1f}",
+        "DAMAGE_FADE_END_MM": f"{fields.FADE_END_MM:.1f}",
+        "LONGEST_EDGE_MM": f"{LONGEST_EDGE_MM:.1f}",
+        "HOLE_REACH": f"{fields.HOLE_REACH}",
+        "PORTAL_CHART": f"{PORTAL_CHART}u",
+        **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
+        "TAKEN": "0xffffffffu",
+        "LAYER": LAYERS.index(layer),
+        "SAMPLES_PER_AXIS": samples_per_axis,
+    }
+    # lets the vertex stage send an instance to the inner view
+    lines = ["#extension GL_ARB_shader_viewport_layer_array : enable"] if damage == "holed" else []
+    lines += [f"#define {name} {value}" for name, value in defines.items()]
+    lines.append("#define SHOWN(name) SHOWN_##name")
+    lines.append(f"float specular_layer(float roughness) {{ return 0.0{steps}; }}")
+    offsets = ", ".join(f"ivec2({x}, {y})" for x, y in around)
+    weights = ", ".join(f"{tent[o]:.8f}" for o in around)
+    lines.append(f"#define TENT_SAMPLES {len(around)}")
+    lines.append(f"const ivec2 TENT_OFFSET[TENT_SAMPLES] = ivec2[TENT_SAMPLES]({offsets});")
+    lines.append(f"const float TENT_WEIGHT[TENT_SAMPLES] = float[TENT_SAMPLES]({weights});")
+    return "\n".join(lines) + "\n"
+
+
+def expand(
+    text: str,
+    samples_per_axis: int = 1,
+    layer: str = "all",
+    pixel_class: str = "sky",
+    damage: str = "sound",
+) -> str:
+    """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
+
+    def include(match: re.Match[str]) -> str:
+        if match[1] == "blocks.glsl":
+            constants = _constants(samples_per_axis, layer, pixel_class, damage)
+            blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
+            return constants + "".join(block.glsl() for block in blocks)
+        return shader_path(match[1]).read_text(encoding="utf-8")
+
+    text = re.sub(r'#include "([^"]+)"\n', include, text)
+    version = re.search(r"#version .*\n", text)
+    assert version, "a shader needs a #version line"
+    return version[0] + text.replace(version[0], "", 1)
+
+
+def link(
+    ctx: moderngl.Context, vertex: str, fragment: str, samplers: Mapping[str, int], **variant: Any
+) -> moderngl.Program:
+    """Compile and link two shader files; samplers: texture unit of each sampler uniform."""
+    program = ctx.program(
+        vertex_shader=expand(shader_path(vertex).read_text(encoding="utf-8"), **variant),
+        fragment_shader=expand(shader_path(fragment).read_text(encoding="utf-8"), **variant),
+    )
+    for name, unit in samplers.items():
+        if name in program:
+            program[name] = unit
+    return program

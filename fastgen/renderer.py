@@ -1,0 +1,280 @@
+"""Renderer: Scene -> Frame, the only user of GL.
+
+One indirect draw of the scene's geometry writes, for each sample, which surface it sees and where
+on the unfolded sheet. Passes over the image then shade each pixel once for each different surface
+among its samples and write colour, ids, damage and depth at the pixel centre. Ids are never
+filtered: a sample lies exactly on each pixel centre.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastgen.artwork import art_images, glyph_tiles
+from fastgen.camera import NEAR_M, View, view_of
+from fastgen.container import build_container
+from fastgen.damage import hole_corners_mm, variant
+from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
+from fastgen.environment import EnvironmentLight, dfg_table
+from fastgen.exposure import metered_exposure
+from fastgen.gl import GLContext
+from fastgen.gpu_light import GpuLight
+from fastgen.gpu_mesh import BULGE_MM, GpuMesh
+from fastgen.mesh import Mesh
+from fastgen.noise import noise_tiles
+from fastgen.programs import DAMAGE_BLOCK, DAMAGE_VARIANTS, LAYERS, SCENE_BLOCK, VIEW_BLOCK, link
+from fastgen.sample import Frame
+from fastgen.scene import Camera, Container, Scene
+from fastgen.shading import UNITS, Shading
+from fastgen.surface_values import damage_values, scene_values
+from fastgen.targets import Region, Targets
+
+
+class _Releasable(Protocol):
+    def release(self) -> None: ...
+
+
+T = TypeVar("T", bound=_Releasable)
+
+
+class _Kept(Generic[T]):
+    """The most recently used GL objects by key; what falls out is released."""
+
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._items: OrderedDict[object, T] = OrderedDict()
+
+    def get(self, key: object, make: Callable[[], T]) -> T:
+        if key not in self._items:
+            self._items[key] = make()
+            if len(self._items) > self._capacity:
+                self._items.popitem(last=False)[1].release()
+        self._items.move_to_end(key)
+        return self._items[key]
+
+    def release(self) -> None:
+        while self._items:
+            self._items.popitem()[1].release()
+
+
+class _SceneDecals:
+    """Decal tables of one scene as textures."""
+
+    def __init__(self, ctx: moderngl.Context, tables: DecalTables) -> None:
+        rows, columns = tables.grid.shape[:2]
+        self.grid = ctx.texture((columns, rows), 4, tables.grid.tobytes(), dtype="u4")
+        count = len(tables.table)
+        self.table = ctx.texture((DECAL_TEXELS, count), 4, tables.table.tobytes(), dtype="f4")
+        rows = len(tables.glyphs)
+        self.glyphs = ctx.texture((GLYPH_COLUMNS, rows), 4, tables.glyphs.tobytes(), dtype="f4")
+        for texture in (self.grid, self.table, self.glyphs):
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    def release(self) -> None:
+        for texture in (self.grid, self.table, self.glyphs):
+            texture.release()
+
+
+class Renderer:
+    """Draws scenes on one GL context. A context manager: leaving it frees all that it made.
+
+    gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2 or 3.
+    mask_threshold_mm: what moved by more counts as damaged.
+    light: gives the prefiltered environment of a name, for example from `load_environment`.
+    """
+
+    def __init__(
+        self,
+        gl: GLContext,
+        light: Callable[[str], EnvironmentLight],
+        samples_per_axis: int = 2,
+        mask_threshold_mm: float = 5.0,
+    ) -> None:
+        self._gl = gl
+        self._ctx = gl.ctx
+        self._light_of = light
+        self._samples_per_axis = samples_per_axis
+        self._mask_threshold_mm = mask_threshold_mm
+        self._geometry = {
+            damage: link(self._ctx, "geometry.vert", "geometry.frag", {}, damage=damage)
+            for damage in DAMAGE_VARIANTS
+        }
+        self._shading: _Kept[Shading] = _Kept(len(DAMAGE_VARIANTS) * len(LAYERS))
+        self._targets: _Kept[Targets] = _Kept(3)
+        self._meshes: _Kept[GpuMesh] = _Kept(16)
+        self._lights: _Kept[GpuLight] = _Kept(24)
+        self._scenes: _Kept[_SceneDecals] = _Kept(2)
+        self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
+        self._view_block = self._ctx.buffer(reserve=VIEW_BLOCK.size)
+        self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
+        art, self._art_layers = art_images()
+        tiles, self._fonts = glyph_tiles()
+        self._art = _mipmapped_array(self._ctx, art)
+        self._tiles = _mipmapped_array(self._ctx, tiles[..., None])
+        self._noise = _noise_texture(self._ctx)
+        table = dfg_table()
+        self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
+        self._dfg.repeat_x = self._dfg.repeat_y = False
+
+    def render(
+        self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
+    ) -> Frame:
+        """Draw `scene` as `camera` sees it, (width, height) = size pixels, and read it back.
+
+        layer: 'all', or one of programs.LAYERS to see a single material layer unlit.
+        """
+        return self.draw(scene, camera, size, layer).read()
+
+    def draw(
+        self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
+    ) -> Targets:
+        """As `render`, without reading back: the targets keep the image until the next draw."""
+        ctx = self._ctx
+        view = view_of(camera, size)
+        damage = variant(scene.damages)
+        targets = self._targets.get(
+            (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
+        )
+        mesh = self._mesh(scene.container)
+        light_data = self._light_of(scene.environment.name)
+        light = self._lights.get(scene.environment.name, lambda: GpuLight(ctx, light_data))
+        decals = self._scenes.get(
+            scene,
+            lambda: _SceneDecals(ctx, pack_decals(scene, mesh.mesh, self._art_layers, self._fonts)),
+        )
+        shading = self._shading.get(
+            (layer, damage), lambda: Shading(ctx, self._samples_per_axis, layer, damage)
+        )
+        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
+        exposure = metered_exposure(
+            light_data, scene.environment.yaw_deg, view, camera, scene.surface.paint.albedo
+        )
+        self._view_block.write(VIEW_BLOCK.pack(_view_values(scene, view, targets, exposure)))
+        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
+
+        if damage != "sound":
+            values = damage_values(scene, self._mask_threshold_mm, targets.inner_row)
+            self._damage_block.write(DAMAGE_BLOCK.pack(values))
+            self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
+
+        targets.begin_samples(
+            _region(view, hole_corners_mm(scene.damages)) if damage == "holed" else None
+        )
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
+        # a dent may tilt a face into view that the rest mesh turns away
+        bent = {face for item in scene.damages for face in item.face.split(".")}
+        mesh.draw(camera.position_mm, damage, bent)
+        targets.end_samples()
+
+        textures: dict[str, Any] = {
+            "surface_keys": targets.keys,
+            "sheet_points": targets.points,
+            "specular_light": light.specular,
+            "irradiance_light": light.irradiance,
+            "background_light": light.background,
+            "dfg_table": self._dfg,
+            "noise_tiles": self._noise,
+            "art": self._art,
+            "glyph_tiles": self._tiles,
+            "chart_table": mesh.charts,
+            "decal_grid": decals.grid,
+            "decal_table": decals.table,
+            "glyph_table": decals.glyphs,
+        }
+        if targets.rest is not None:
+            textures["rest_points"] = targets.rest
+        for name, texture in textures.items():
+            texture.use(UNITS[name])
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)))
+        return targets
+
+    def mesh(self, container: Container) -> Mesh:
+        """The rest mesh of a container, as it is drawn."""
+        return self._mesh(container).mesh
+
+    def _mesh(self, container: Container) -> GpuMesh:
+        def make() -> GpuMesh:
+            mesh = build_container(container.kind, container.profiles)
+            return GpuMesh(self._ctx, mesh, self._geometry)
+
+        return self._meshes.get(container, make)
+
+    def release(self) -> None:
+        """Free every GL object that this renderer made."""
+        caches: list[Any] = [self._shading, self._targets, self._meshes]
+        for kept in (*caches, self._lights, self._scenes):
+            kept.release()
+        blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
+        for item in (*blocks, *self._geometry.values()):
+            item.release()
+        for texture in (self._art, self._tiles, self._noise, self._dfg):
+            texture.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+def _mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
+    """uint8 [K, H, W, C] as a mip-mapped texture array, clamped at the borders."""
+    count, height, width, channels = images.shape
+    data = np.ascontiguousarray(images).tobytes()
+    texture = ctx.texture_array((width, height, count), channels, data, alignment=1)
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = False
+    return texture
+
+
+def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
+    """The noise tiles, repeating; GL's box-filtered mip chain is the one they were measured on."""
+    base = noise_tiles().levels[0]
+    size = base.shape[1]
+    texture = ctx.texture_array((size, size, len(base)), 4, base.tobytes())
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    return texture
+
+
+def _region(view: View, corners_mm: np.ndarray) -> Region | None:
+    """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
+    pixels, depth = view.project(corners_mm)
+    if depth.min() <= NEAR_M:
+        return None
+    x0, y0 = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, view.size)
+    x1, y1 = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size)
+    return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
+
+
+def _mesh_corners(mesh: Mesh) -> np.ndarray:
+    """Corners [8, 3] of the box that holds `mesh`, bulges of damage included."""
+    low, high = mesh.bounds_mm
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    return low - BULGE_MM + corners * (high - low + 2 * BULGE_MM)
+
+
+def _view_values(
+    scene: Scene, view: View, targets: Targets, exposure: float
+) -> dict[str, ArrayLike]:
+    """All members of VIEW_BLOCK."""
+    to_samples = np.diag([*targets.scale, 1.0, 1.0])
+    right, down, forward = view.rotation
+    center_x, center_y = view.center_px
+    yaw = np.deg2rad(scene.environment.yaw_deg)
+    return {
+        "world_to_clip": to_samples @ view.clip_matrix(),
+        "ray_corner": forward - (center_x * right + center_y * down) / view.focal_px,
+        "ray_right": right / view.focal_px,
+        "ray_down": down / view.focal_px,
+        "pixel_angle": 1 / view.focal_px,
+        "exposure": exposure,
+        "yaw": (np.cos(yaw), np.sin(yaw)),
+    }

@@ -1,0 +1,198 @@
+"""(config, seed, index) -> Scene: pure, the same on every machine and in every process.
+
+Every property draws from a stream of its own, named after it, so that adding a property or
+drawing one value more does not change the others in any scene.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fastgen.config import CameraConfig, Config, linear_color
+from fastgen.container import KINDS, WallProfiles, build_container
+from fastgen.damage_sampling import sample_damages
+from fastgen.errors import ConfigError
+from fastgen.markings import sample_decals
+from fastgen.mesh import Mesh
+from fastgen.records import Range
+from fastgen.scene import (
+    Ageing,
+    Camera,
+    Container,
+    Dirt,
+    EnvironmentView,
+    Paint,
+    Rust,
+    Scene,
+    Scratches,
+    Surface,
+    Vec3,
+    Wear,
+)
+
+Streams = Callable[[str], np.random.Generator]
+
+SPLITS = ("train", "val", "test")
+
+
+def stream(seed: int, index: int, name: str) -> np.random.Generator:
+    """The random generator of one property of one scene; depends on nothing but its arguments."""
+    key = hashlib.blake2b(f"{seed}/{index}/{name}".encode(), digest_size=16).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
+
+
+def sample_scene(config: Config, seed: int, index: int, environments: Sequence[str]) -> Scene:
+    """The scene number `index` of the dataset that `config` and `seed` describe.
+
+    environments: names of the HDRIs at hand; config.environment.names chooses among them.
+    Raises ConfigError when it names one that is not there.
+    """
+
+    def streams(name: str) -> np.random.Generator:
+        return stream(seed, index, name)
+
+    kinds = config.container.kinds
+    weights = np.array(list(kinds.values()))
+    kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
+    scale = float(streams("corrugation").choice(config.container.depth_scale))
+    container = Container(kind, _scaled(config.container.profiles, scale))
+    mesh = build_container(container.kind, container.profiles)
+    surface = _surface(config, streams)
+    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
+    return Scene(
+        seed=seed,
+        index=index,
+        container=container,
+        surface=surface,
+        environment=_environment(config, streams, environments),
+        cameras=tuple(
+            _camera(name, rig, kind, streams(f"camera.{name}"))
+            for name, rig in config.cameras.items()
+        ),
+        decals=sample_decals(
+            config.markings,
+            kind,
+            sheet_sizes(mesh),
+            surface.paint.albedo,
+            streams,
+            flats=mesh.flats,
+        ),
+        damages=damages,
+    )
+
+
+def split_of(config: Config, seed: int, index: int) -> str:
+    """'train', 'val' or 'test': all views of a scene fall in the same split, whatever the count."""
+    shares = np.array([config.split.train, config.split.val, config.split.test])
+    edges = np.cumsum(shares / shares.sum())
+    return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
+
+
+def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
+    """Width and height in mm of the unfolded sheet of each face that carries decals."""
+    faces = ("front", "back", "door", "no_door", "roof")
+    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in faces}
+    return {face: (rect[2], rect[3]) for face, rect in rects.items()}
+
+
+def _between(rng: np.random.Generator, values: Range) -> float:
+    return float(rng.uniform(values.lo, values.hi))
+
+
+def _scaled(profiles: WallProfiles, scale: float) -> WallProfiles:
+    def deeper(wave):  # type: ignore[no-untyped-def]
+        return replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
+
+    return WallProfiles(deeper(profiles.side), deeper(profiles.end), deeper(profiles.roof))
+
+
+def _surface(config: Config, streams: Streams) -> Surface:
+    c = config.surface
+    name = str(streams("paint.color").choice(list(c.colors)))
+    rust = streams("rust")
+    rust_color = str(streams("rust.color").choice(c.rust_colors))
+    # squaring keeps most containers presentable and a few bad
+    low, high = c.rust_coverage
+    coverage = low + (high - low) * float(rust.random()) ** 2
+    return Surface(
+        paint=Paint(
+            name,
+            linear_color(c.colors[name]),
+            _between(streams("paint.roughness"), c.roughness),
+            _between(streams("paint.tone"), c.tone_variation),
+        ),
+        ageing=Ageing(
+            _between(streams("ageing.strength"), c.ageing_strength),
+            _between(streams("ageing.reach"), c.ageing_reach_mm),
+        ),
+        dirt=Dirt(
+            _between(streams("dirt.strength"), c.dirt_strength),
+            _between(streams("dirt.reach"), c.dirt_reach_mm),
+            linear_color(c.dirt_color),
+        ),
+        rust=Rust(
+            coverage,
+            _between(streams("rust.scale"), c.rust_scale_mm),
+            linear_color(rust_color),
+            _between(streams("rust.roughness"), c.rust_roughness),
+        ),
+        scratches=Scratches(_between(streams("scratches"), c.scratch_coverage)),
+        wear=Wear(
+            _between(streams("wear"), c.wear_strength),
+            _between(streams("wear.scale"), c.wear_scale_mm),
+        ),
+        noise_offset_mm=(
+            _between(streams("noise.x"), Range(0, 50000)),
+            _between(streams("noise.y"), Range(0, 50000)),
+        ),
+    )
+
+
+def _environment(config: Config, streams: Streams, environments: Sequence[str]) -> EnvironmentView:
+    wanted = config.environment.names or tuple(environments)
+    for name in wanted:
+        if name not in environments:
+            raise ConfigError(
+                f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
+            )
+    name = str(streams("environment").choice(sorted(wanted)))
+    return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
+
+
+def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -> Camera:
+    """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    length, width, height = KINDS[kind].size_mm
+    outward, middle = {
+        "front": ((0, -1, 0), (0, -width / 2, height / 2)),
+        "back": ((0, 1, 0), (0, width / 2, height / 2)),
+        "door": ((1, 0, 0), (length / 2, 0, height / 2)),
+        "no_door": ((-1, 0, 0), (-length / 2, 0, height / 2)),
+        "roof": ((0, 0, 1), (0, 0, height)),
+        "underside": ((0, 0, -1), (0, 0, 0)),
+    }[rig.face]
+    axis = np.array(outward, float)
+    right = np.cross((0, 0, 1), axis) if axis[2] == 0 else np.array([1.0, 0.0, 0.0])
+    up = np.cross(axis, right)
+    azimuth = np.deg2rad(_between(rng, rig.azimuth_deg))
+    elevation = np.deg2rad(_between(rng, rig.elevation_deg))
+    direction = np.cos(elevation) * (np.cos(azimuth) * axis + np.sin(azimuth) * right)
+    direction += np.sin(elevation) * up
+    shift = _between(rng, rig.target_shift_mm) * right + _between(rng, rig.target_shift_mm) * up
+    target = np.array(middle) + shift
+    position = target + direction * _between(rng, rig.distance_mm)
+    return Camera(
+        name=name,
+        position_mm=_rounded(position),
+        target_mm=_rounded(target),
+        focal_mm=rig.focal_mm,
+        roll_deg=round(_between(rng, rig.roll_deg), 3),
+        sensor_width_mm=rig.sensor_width_mm,
+        exposure_ev=round(_between(rng, rig.exposure_ev), 3),
+    )
+
+
+def _rounded(point: np.ndarray) -> Vec3:
+    x, y, z = (round(float(v), 1) for v in point)
+    return x, y, z

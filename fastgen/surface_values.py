@@ -1,0 +1,86 @@
+"""A scene's materials, layers and damages as the values of the shader's uniform blocks."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastgen.classes import DAMAGE_CLASSES
+from fastgen.damage import mask_values
+from fastgen.mesh import MATERIALS
+from fastgen.programs import noise_deviation
+from fastgen.scene import Scene, Surface
+
+_TILE_OF_SCALE = 4.0
+"""A noise tile spans this many of its pattern's typical lengths."""
+
+
+def _materials(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """(albedo and roughness, traits) of each material, float32 [M, 4] each.
+
+    Traits: metallic, proneness to rust, share of the paint's layers. Albedo of hot-dip zinc:
+    the range for weathered galvanised steel lies about 0.35 to 0.5 (measured tables of building
+    materials); rubber and tar are near 0.03.
+    """
+    paint = np.array(surface.paint.albedo)
+    rough = surface.paint.roughness
+    rows: dict[str, tuple[ArrayLike, float, float, float, float]] = {
+        # albedo, roughness, metallic, proneness, layers
+        "paint_sheet": (paint, rough, 0.0, 1.0, 1.0),
+        "paint_frame": (paint * 0.93, rough, 0.0, 1.6, 1.0),
+        "casting": (paint * 0.8, min(rough + 0.15, 1.0), 0.0, 2.6, 1.0),
+        "galvanized": ((0.42, 0.42, 0.41), 0.55, 0.55, 1.3, 0.5),
+        "rubber": ((0.022, 0.022, 0.023), 0.75, 0.0, 0.0, 0.35),
+        "underside": (paint * 0.25 + 0.02, 0.85, 0.0, 1.8, 0.8),
+    }
+    base = np.array([[*np.asarray(rows[m][0]), rows[m][1]] for m in MATERIALS], np.float32)
+    trait = np.array([[*rows[m][2:], 0.0] for m in MATERIALS], np.float32)
+    return base, trait
+
+
+def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
+    """All members of SCENE_BLOCK for `scene`."""
+    surface = scene.surface
+    base, trait = _materials(surface)
+    return {
+        "material_base": base,
+        "material_trait": trait,
+        "noise_lost": noise_deviation(),
+        "dirt_albedo": surface.dirt.albedo,
+        "dirt_strength": surface.dirt.strength,
+        "rust_albedo": surface.rust.albedo,
+        "rust_roughness": surface.rust.roughness,
+        "noise_offset_mm": surface.noise_offset_mm,
+        "tone_variation": surface.paint.tone_variation,
+        "ageing_strength": surface.ageing.strength,
+        "ageing_reach_mm": max(surface.ageing.reach_mm, 1.0),
+        "dirt_reach_mm": max(surface.dirt.reach_mm, 1.0),
+        "rust_coverage": surface.rust.coverage,
+        "rust_tile_mm": surface.rust.scale_mm * _TILE_OF_SCALE,
+        "scratch_coverage": surface.scratches.coverage,
+        "wear_strength": surface.wear.strength,
+        "wear_tile_mm": surface.wear.scale_mm * _TILE_OF_SCALE,
+        "background_size": float(background_size),
+    }
+
+
+def damage_values(scene: Scene, threshold_mm: float, inner_row: int) -> Mapping[str, ArrayLike]:
+    """All members of DAMAGE_BLOCK for `scene`, which has at least one damage."""
+    valued = list(zip(scene.damages, mask_values(scene.damages), strict=True))
+    valued.sort(key=lambda pair: pair[0].kind != "perforation")  # holes first
+    damages = [damage for damage, _ in valued]
+    shape = np.zeros((len(damages), 12), np.float32)
+    for row, (damage, value) in zip(shape, valued, strict=True):
+        row[: len(damage.shape)] = damage.shape
+        row[11] = value
+    return {
+        "damage_origin": [(*d.origin_mm, DAMAGE_CLASSES.index(d.kind)) for d in damages],
+        "damage_along": [(*d.along, d.size_mm[0] / 2) for d in damages],
+        "damage_across": [(*d.across, d.size_mm[1] / 2) for d in damages],
+        "damage_inward": [(*d.inward, d.depth_mm) for d in damages],
+        "damage_shape": shape.reshape(-1, 4),
+        "damage_count": len(damages),
+        "hole_count": sum(damage.kind == "perforation" for damage in damages),
+        "damage_threshold_mm": threshold_mm,
+        "inner_row": inner_row,
+    }

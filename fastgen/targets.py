@@ -1,0 +1,131 @@
+"""The framebuffers of one image size: samples of the geometry draw, and the shaded image."""
+
+import ctypes
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from fastgen.errors import FastgenError
+from fastgen.gl import GLContext
+from fastgen.sample import Frame
+
+Region = tuple[int, int, int, int]
+"""x, y, width and height in pixels."""
+
+_GL_COLOR, _GL_DEPTH, _GL_SCISSOR_TEST = 0x1800, 0x1801, 0x0C11
+_FAR, _SKY = (ctypes.c_float * 1)(1.0), (ctypes.c_float * 1)(0.0)
+_NOTHING = (ctypes.c_uint * 4)()
+
+
+class Targets:
+    """Framebuffers for (width, height) images with `samples_per_axis` squared samples a pixel.
+
+    damage: one of programs.DAMAGE_VARIANTS. Damaged scenes keep rest positions too; holed ones
+    have sample targets of twice the height, for the inner view that shows through holes and
+    begins at `inner_row`.
+    """
+
+    def __init__(
+        self,
+        gl: GLContext,
+        size: tuple[int, int],
+        samples_per_axis: int,
+        damage: str = "sound",
+    ) -> None:
+        self.size = size
+        ctx = gl.ctx
+        # an even number of samples has none at the pixel centre unless shifted by half a sample
+        border = int(samples_per_axis == 2)
+        fine = (size[0] * samples_per_axis + border, size[1] * samples_per_axis + border)
+        self.inner_row = fine[1]
+        stored = (fine[0], fine[1] * (1 + (damage == "holed")))
+        limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+        if max(stored) > limit:
+            raise FastgenError(
+                f"size {size[0]}x{size[1]} with {samples_per_axis} samples an axis needs textures "
+                f"of {max(stored)} texels, this driver has {limit}; take fewer or a smaller size"
+            )
+        self.scale = (size[0] * samples_per_axis / fine[0], size[1] * samples_per_axis / fine[1])
+        self.keys = ctx.texture(stored, 1, dtype="u4")
+        self.points = ctx.texture(stored, 4, dtype="f4")
+        self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
+        attached = [t for t in (self.keys, self.points, self.rest) if t is not None]
+        for texture in attached:
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._depth = ctx.depth_renderbuffer(stored)
+        self.samples = ctx.framebuffer(attached, self._depth)
+        self._fine = fine
+        self._buffers = [*attached, self._depth]
+        self._image = [
+            ctx.renderbuffer(size, 4),
+            ctx.renderbuffer(size, 1, dtype="u4"),
+            ctx.renderbuffer(size, 1, dtype="f4"),
+        ]
+        self._classes = ctx.depth_renderbuffer(size)
+        self.image = ctx.framebuffer(self._image, self._classes)
+        self._viewport = gl.function(
+            "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
+        )
+        self._scissor = gl.function("glScissorIndexed", None, ctypes.c_uint, *[ctypes.c_int] * 4)
+        self._enable = gl.function("glEnablei", None, ctypes.c_uint, ctypes.c_uint)
+        self._disable = gl.function("glDisablei", None, ctypes.c_uint, ctypes.c_uint)
+        self._clear_uint = gl.function(
+            "glClearBufferuiv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
+        )
+        self._clear_float = gl.function(
+            "glClearBufferfv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
+        )
+
+    def begin_samples(self, inner_region: Region | None = None) -> None:
+        """Bind the sample framebuffer, emptied: key 0 is the void.
+
+        inner_region: the pixels of the image that need the inner view, None for all.
+        """
+        self.samples.use()
+        # moderngl's clear is undefined on integer attachments (moderngl issue 686)
+        self._clear_uint(_GL_COLOR, 0, _NOTHING)
+        self._clear_float(_GL_DEPTH, 0, _FAR)
+        width, height = self._fine
+        self.samples.viewport = (0, 0, width, height)
+        if self.samples.height > height:
+            x, y, w, h = inner_region or (0, 0, *self.size)
+            scale = width / self.size[0]
+            left, right = int((x - 1) * scale), int((x + w + 1) * scale)
+            top, bottom = max(int((y - 1) * scale), 0), int((y + h + 1) * scale)
+            self._viewport(1, 0.0, height, width, height)
+            # the inner view is mirrored; it begins below the outer one
+            self._scissor(1, width - right, height + top, right - left, bottom - top)
+            self._enable(_GL_SCISSOR_TEST, 1)
+
+    def end_samples(self) -> None:
+        """Lift the restriction of the inner view."""
+        self._disable(_GL_SCISSOR_TEST, 1)
+
+    def clear_classes(self) -> None:
+        """Mark all pixels of the bound image framebuffer as sky, class 0."""
+        self._clear_float(_GL_DEPTH, 0, _SKY)
+
+    def read(self) -> Frame:
+        """Copy the shaded image out."""
+        width, height = self.size
+        color = np.empty((height, width, 4), np.uint8)
+        labels = np.empty((height, width), np.uint32)
+        depth = np.empty((height, width), np.float32)
+        self.image.read_into(color, components=4, attachment=0, alignment=1)
+        self.image.read_into(labels, components=1, attachment=1, dtype="u4", alignment=1)
+        self.image.read_into(depth, components=1, attachment=2, dtype="f4", alignment=1)
+        pairs = labels.view(np.uint16).reshape(height, width, 2)
+        return Frame(
+            image=np.ascontiguousarray(color[..., :3]),
+            ids=np.ascontiguousarray(pairs[..., 0]),
+            damage=np.ascontiguousarray(pairs[..., 1]),
+            depth=depth,
+        )
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        buffers = (*self._buffers, self._classes, *self._image)
+        items: list[Any] = [self.samples, self.image, *buffers]
+        for item in items:
+            item.release()

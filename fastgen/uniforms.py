@@ -1,0 +1,86 @@
+"""Uniform blocks declared once: the GLSL text and the std140 packing both come from one list.
+
+OpenGL 4.5 core specification, section 7.6.2.2 (standard uniform block layout).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+# GLSL type: (components, base alignment in bytes, dtype)
+_TYPES: dict[str, tuple[int, int, str]] = {
+    "float": (1, 4, "f4"),
+    "int": (1, 4, "i4"),
+    "uint": (1, 4, "u4"),
+    "vec2": (2, 8, "f4"),
+    "ivec2": (2, 8, "i4"),
+    "vec3": (3, 16, "f4"),
+    "vec4": (4, 16, "f4"),
+    "mat4": (16, 16, "f4"),
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A std140 uniform block. members: (GLSL type, name) or (GLSL type, name, array length)."""
+
+    name: str
+    binding: int
+    members: tuple[tuple[str, str] | tuple[str, str, int], ...]
+    _offsets: dict[str, tuple[int, str, int]] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Work out every member's offset."""
+        offset = 0
+        for member in self.members:
+            kind, name = member[0], member[1]
+            length = member[2] if len(member) == 3 else 0
+            components, align, _ = _TYPES[kind]
+            if length and align != 16:
+                raise AssertionError(f"{name}: arrays are of vec3, vec4 or mat4 only")
+            offset = -(-offset // align) * align
+            self._offsets[name] = (offset, kind, length)
+            offset += max(components * 4, 16 if length else 0) * max(length, 1)
+        self._offsets[""] = (-(-offset // 16) * 16, "", 0)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole block."""
+        return self._offsets[""][0]
+
+    def glsl(self) -> str:
+        """The block's declaration."""
+        lines = [
+            f"    {m[0]} {m[1]}[{m[2]}];" if len(m) == 3 else f"    {m[0]} {m[1]};"
+            for m in self.members
+        ]
+        head = f"layout(std140, binding = {self.binding}) uniform {self.name} {{"
+        return "\n".join([head, *lines, "};"]) + "\n"
+
+    def pack(self, values: Mapping[str, ArrayLike]) -> bytes:
+        """The block's bytes. values: one entry a member; matrices are row-major [4, 4] arrays,
+        and an array may leave out its last rows."""
+        data = np.zeros(self.size, np.uint8)
+        names = {m[1] for m in self.members}
+        if names != set(values):
+            raise AssertionError(f"{self.name}: {sorted(names ^ set(values))} missing or unknown")
+        for name, value in values.items():
+            offset, kind, length = self._offsets[name]
+            components, _, dtype = _TYPES[kind]
+            array = np.asarray(value, dtype)
+            if kind == "mat4":
+                array = np.swapaxes(array.reshape(-1, 4, 4), 1, 2)
+            rows = np.ascontiguousarray(array).reshape(-1, components)
+            if len(rows) > max(length, 1):
+                raise AssertionError(f"{name}: {len(rows)} rows do not fit its {length}")
+            stride = 16 if length and components < 4 else components * 4
+            end = offset + stride * len(rows)
+            if end > self.size:  # a last member narrower than its stride
+                data[offset : offset + rows.nbytes] = rows.view(np.uint8).ravel()
+            else:
+                data[offset:end].reshape(len(rows), stride)[:, : components * 4] = rows.view(
+                    np.uint8
+                ).reshape(len(rows), -1)
+        return data.tobytes()

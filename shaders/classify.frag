@@ -1,0 +1,31 @@
+// Writes each pixel's class as its depth, so that the depth test picks who is shaded by what.
+// llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
+#version 430 core
+#include "blocks.glsl"
+
+uniform usampler2D surface_keys;
+uniform sampler2D sheet_points;
+uniform usampler2D decal_grid;
+uniform sampler2D rest_points;
+
+void main() {
+    ivec2 middle = ivec2(gl_FragCoord.xy) * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    uint key = texelFetch(surface_keys, middle, 0).r;
+    bool mixed = false;
+#if SAMPLES_PER_AXIS > 1
+    for (int i = 1; i < TENT_SAMPLES; ++i)
+        mixed = mixed || texelFetch(surface_keys, middle + TENT_OFFSET[i], 0).r != key;
+#endif
+    vec4 sheet = texelFetch(sheet_points, middle, 0);
+    bool decal = key != 0u && texelFetch(decal_grid, ivec2(sheet.xy / DECAL_CELL_MM), 0).x != 0u;
+    int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
+    if (decal) ++found;
+#if DAMAGED
+    float near = key == 0u ? 0.0 : texelFetch(rest_points, middle, 0).w;
+    if (near > 0.0) found = mixed ? CLASS_MIXED_DAMAGED : CLASS_DAMAGED;
+#if HOLED
+    if (near > 1.0) found = CLASS_HOLED;
+#endif
+#endif
+    gl_FragDepth = CLASS_DEPTH_STEP * float(found);
+}

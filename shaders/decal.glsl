@@ -1,0 +1,89 @@
+// DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
+
+uniform usampler2D decal_grid;      // up to 8 decal numbers (1-based, 0: none) a cell in 16 bits each, bottom first
+uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decals.py
+uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
+uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
+uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline
+
+struct DecalHit {
+    vec3 albedo;
+    float alpha;   // coverage of the footprint, 0..1
+    uint id;       // object at the exact point, 0 where none
+};
+
+vec4 decal_texel(uint decal, int column) {
+    return texelFetch(decal_table, ivec2(column, int(decal) - 1), 0);
+}
+
+// a box's signed distance in mm, positive inside
+float inside_box(vec2 p, vec2 half_size) {
+    vec2 d = half_size - abs(p);
+    return min(d.x, d.y);
+}
+
+float text_coverage(vec2 p, vec4 run, float footprint_mm) {
+    float cap_mm = run.x;
+    vec2 nearest = vec2(1e9);
+    float layer = -1.0;
+    for (int i = 0; i < int(run.z); ++i) {
+        int g = int(run.y) + i;
+        vec4 glyph = texelFetch(glyph_table, ivec2(g & 255, g >> 8), 0);
+        vec2 d = p - glyph.xy;
+        if (max(abs(d.x), abs(d.y)) < max(abs(nearest.x), abs(nearest.y))) {
+            nearest = d;
+            layer = glyph.z;
+        }
+    }
+    float tile_mm = GLYPH_TILE_CAPS * cap_mm;
+    vec2 uv = nearest / tile_mm + 0.5;
+    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 0.0;
+    float lod = max(log2(footprint_mm * GLYPH_TILE_SIZE / tile_mm), 0.0);
+    float value = textureLod(glyph_tiles, vec3(uv.x, 1.0 - uv.y, layer), lod).r;
+    float distance_mm = (value - 0.5) * GLYPH_RANGE_CAPS * cap_mm;
+    return clamp(0.5 + distance_mm / footprint_mm, 0.0, 1.0);
+}
+
+void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float grain) {
+    vec4 place = decal_texel(decal, 1);
+    vec4 turn = decal_texel(decal, 0);
+    vec2 d = sheet_mm - place.xy;
+    vec2 p = vec2(dot(turn.xy, d), dot(turn.zw, d));
+    vec4 kind = decal_texel(decal, 3);
+    float inside_mm = kind.x == DECAL_MARKER
+        ? (place.z - abs(p.x) - abs(p.y)) * 0.70710678
+        : inside_box(p, place.zw);
+    if (inside_mm < -footprint_mm) return;
+    vec4 ink = decal_texel(decal, 2);
+    float alpha = clamp(0.5 + inside_mm / footprint_mm, 0.0, 1.0);
+    vec3 albedo = ink.rgb;
+    vec2 uv = p / (2.0 * place.zw) + 0.5;
+    if (kind.x == DECAL_TEXT) {
+        alpha *= text_coverage(p, decal_texel(decal, 4), footprint_mm);
+    } else if (kind.x == DECAL_STRIPES) {
+        float period_mm = 4.0 * place.w;
+        float wave = abs(fract((p.x + p.y) / period_mm) - 0.5) * period_mm - 0.25 * period_mm;
+        albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / footprint_mm, 0.0, 1.0));
+    } else {
+        float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)), 0.0);
+        vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
+        albedo = kind.x == DECAL_EMBLEM ? ink.rgb : srgb_decode(texel.rgb);
+        if (kind.x != DECAL_MARKER) alpha *= texel.a;
+    }
+    alpha *= 1.0 - ink.a * smoothstep(0.45, 0.75, grain);
+    hit.albedo = mix(hit.albedo, albedo, alpha);
+    hit.alpha += alpha * (1.0 - hit.alpha);
+    if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
+}
+
+DecalHit decals_at(vec3 paint, vec2 sheet_mm, float footprint_mm, float grain) {
+    DecalHit hit = DecalHit(paint, 0.0, 0u);
+    uvec4 cell = texelFetch(decal_grid, ivec2(sheet_mm / DECAL_CELL_MM), 0);
+    for (int i = 0; i < 8; ++i) {
+        uint pair = cell[i >> 1];
+        uint decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;
+        if (decal == 0u) break;
+        add_decal(hit, decal, sheet_mm, footprint_mm, grain);
+    }
+    return hit;
+}

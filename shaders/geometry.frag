@@ -1,0 +1,23 @@
+// Fragment stage of the geometry draw: which surface, where on its sheet, how far. Shading comes later.
+#version 430 core
+#include "blocks.glsl"
+
+in vec2 atlas_mm;
+flat in uint surface_key;
+
+layout(location = 0) out uint out_key;
+layout(location = 1) out vec4 out_sheet;   // sheet x, y in mm, depth in m, -
+#if DAMAGED
+in vec4 rest_mm;
+
+layout(location = 2) out vec4 out_rest;    // rest position in mm; above 0 near a damage, above 1 a hole
+#endif
+
+void main() {
+    out_key = surface_key;
+    // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
+    out_sheet = vec4(atlas_mm, 1.0 / gl_FragCoord.w, 0.0);
+#if DAMAGED
+    out_rest = rest_mm;
+#endif
+}

@@ -1,0 +1,40 @@
+// Vertex stage of the scene's only geometry draw: rest mesh, deformed by its damages, to clip space.
+#version 430 core
+#include "blocks.glsl"
+#include "octahedral.glsl"
+#if DAMAGED
+#include "damage.glsl"
+#endif
+
+layout(location = 0) in vec3 in_position_mm;
+layout(location = 1) in vec3 in_normal;
+layout(location = 2) in vec2 in_atlas_mm;
+layout(location = 3) in uint in_chart;
+#if HOLED
+layout(location = 4) in uint in_inner;   // one an instance: 0 the outer view, 1 what holes show
+#endif
+
+out vec2 atlas_mm;
+flat out uint surface_key;
+#if DAMAGED
+out vec4 rest_mm;                        // and what is near: 1 a damage, 2 a hole
+#endif
+
+void main() {
+    atlas_mm = in_atlas_mm;
+    surface_key = pack_surface_key(in_chart, in_normal);
+    vec3 position_mm = in_position_mm;
+#if DAMAGED
+    float near = 0.0;
+    for (int i = 0; i < damage_count; ++i)
+        if (within_reach(i, in_position_mm)) near = max(near, i < hole_count ? 2.0 : 1.0);
+    rest_mm = vec4(in_position_mm, near);
+    position_mm = deformed(in_position_mm);
+#endif
+    gl_Position = world_to_clip * vec4(position_mm * MM, 1.0);
+#if HOLED
+    // seen in a mirror, the sheets' backs pass for fronts: face culling keeps the insides
+    gl_ViewportIndex = int(in_inner);
+    if (in_inner == 1u) gl_Position.x = -gl_Position.x;
+#endif
+}

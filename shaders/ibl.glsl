@@ -1,0 +1,57 @@
+// vec3 lit(Material m, vec3 normal, vec3 view): radiance reflected toward view from the environment.
+// Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
+
+uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
+uniform sampler2D irradiance_light;      // irradiance / pi, 1-texel border
+uniform sampler2D background_light;      // radiance, 1-texel border
+uniform sampler2D dfg_table;             // x: n_dot_v, y: roughness -> scale and bias
+
+struct Material {
+    vec3 albedo;
+    float roughness;
+    float metallic;
+};
+
+vec3 to_environment(vec3 d) {
+    return vec3(yaw.x * d.x + yaw.y * d.y, yaw.x * d.y - yaw.y * d.x, d.z);
+}
+
+// inside the border of a map that is `size` texels wide
+vec2 bordered(vec2 uv, float size) { return (1.0 + uv * (size - 2.0)) / size; }
+
+vec3 prefiltered(vec3 direction, float roughness) {
+    vec2 uv = bordered(octahedral(to_environment(direction)), SPECULAR_SIZE);
+    float layer = specular_layer(roughness);
+    float below = floor(layer);
+    vec3 a = textureLod(specular_light, vec3(uv, below), 0.0).rgb;
+    vec3 b = textureLod(specular_light, vec3(uv, min(below + 1.0, SPECULAR_LAYERS - 1.0)), 0.0).rgb;
+    return mix(a, b, layer - below);
+}
+
+vec3 diffuse_radiance(vec3 normal) {
+    vec2 uv = bordered(octahedral(to_environment(normal)), IRRADIANCE_SIZE);
+    return textureLod(irradiance_light, uv, 0.0).rgb;
+}
+
+vec3 background(vec3 direction) {
+    vec2 uv = bordered(octahedral(to_environment(direction)), background_size);
+    return textureLod(background_light, uv, 0.0).rgb;
+}
+
+vec3 lit(Material m, vec3 normal, vec3 view) {
+    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
+    vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
+    float all = dfg.x + dfg.y;
+    // energy that single scattering loses comes back: Turquin 2019, Practical multiple scattering
+    // compensation for microfacet models, eq. 16; for metal and dielectric apart, then mixed
+    float gain = 1.0 / all - 1.0;
+    vec3 metal = (m.albedo * dfg.x + dfg.y) * (1.0 + m.albedo * gain);
+    float dielectric = (DIELECTRIC_F0 * dfg.x + dfg.y) * (1.0 + DIELECTRIC_F0 * gain);
+    vec3 specular = mix(vec3(dielectric), metal, m.metallic);
+    vec3 diffuse = m.albedo * ((1.0 - dielectric) * (1.0 - m.metallic));
+
+    // rough lobes lean to the normal: Lagarde and de Rousiers 2014, section 4.9.3
+    vec3 mirror = reflect(-view, normal);
+    mirror = normalize(mix(mirror, normal, m.roughness * m.roughness));
+    return diffuse * diffuse_radiance(normal) + specular * prefiltered(mirror, m.roughness);
+}

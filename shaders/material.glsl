@@ -1,0 +1,75 @@
+// SurfacePoint surface_at(chart, sheet_mm, footprint_mm, scar): all layers at a point of the sheet.
+
+uniform sampler2D chart_table;   // row 0: x0, y0, width, height in mm; row 1: material, -, -, -
+
+struct SurfacePoint {
+    Material material;
+    uint decal_id;
+};
+
+// footprint_mm: width of the pixel on the sheet; scar: how much damage has worked the steel, 0..1
+SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float scar) {
+    vec4 rect = texelFetch(chart_table, ivec2(int(chart), 0), 0);
+    int kind = int(texelFetch(chart_table, ivec2(int(chart), 1), 0).x);
+    vec4 base = material_base[kind];   // albedo, roughness
+    vec4 trait = material_trait[kind]; // metallic, proneness to rust, share of the paint layers, -
+
+    vec2 from_low = sheet_mm - rect.xy;
+    vec2 to_border = min(from_low, rect.zw - from_low);
+    float edge_mm = max(min(to_border.x, to_border.y), 0.0);
+    float corner_mm = length(max(to_border, 0.0));
+    vec2 noise_mm = sheet_mm + noise_offset_mm;
+    NoiseSample coarse = read_noise(0, noise_mm, rust_tile_mm, footprint_mm);
+    NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
+
+    SurfacePoint s;
+    s.decal_id = 0u;
+    vec3 albedo = base.rgb;
+    float roughness = base.a;
+
+#if SHOWN(TONE)
+    albedo *= 1.0 + trait.z * tone_variation * (2.0 * coarse.value.x - 1.0);
+#endif
+    float decal_alpha = 0.0;
+#if WITH_DECALS
+    DecalHit decal = decals_at(albedo, sheet_mm, footprint_mm, coarse.value.w);
+    s.decal_id = decal.id;
+#if SHOWN(DECALS)
+    albedo = decal.albedo;
+    decal_alpha = decal.alpha;
+    roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
+#endif
+#endif
+#if SHOWN(AGEING)
+    albedo *= 1.0 - 0.85 * trait.z * ageing(corner_mm, coarse.value.x);
+#endif
+#if SHOWN(REFLECTION)
+    roughness = worn_roughness(roughness, streaks);
+#endif
+#if SHOWN(SCRATCHES)
+    float scraped = trait.z * scratches(streaks);
+    albedo = mix(albedo, vec3(0.38, 0.36, 0.33), 0.5 * scraped);
+#endif
+#if SHOWN(DIRT)
+    float grime = trait.z * dirt(edge_mm, streaks);
+    albedo = mix(albedo, dirt_albedo, grime);
+    roughness = mix(roughness, 0.9, grime);
+#endif
+    float rusty = 0.0;
+#if SHOWN(RUST)
+    float sticker = 1.0 - 0.8 * decal_alpha;
+    albedo = mix(albedo, albedo * rust_albedo * 4.0, trait.y * sticker * rust_stain(coarse) * 0.5);
+    rusty = sticker * rust(edge_mm, coarse, trait.y);
+#if WITH_DAMAGE
+    // worked steel shows: dulled paint, then rust where the noise is rustiest
+    albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
+    rusty = max(rusty, covered(coarse.value.y, 1.0 - scar, coarse.lost.y, 0.15) * step(0.01, scar));
+#endif
+    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x);
+    albedo = mix(albedo, ochre, rusty);
+    roughness = mix(roughness, rust_roughness, rusty);
+#endif
+    s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS),
+                          trait.x * (1.0 - rusty));
+    return s;
+}

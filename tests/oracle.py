@@ -1,0 +1,160 @@
+"""Slow, obvious answers by another route: Embree rays through pixel centres and plain numpy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from fastgen import damage as fields
+from fastgen.camera import View
+from fastgen.mesh import Mesh
+from fastgen.scene import Decal, Scene
+
+_MOST_LAYERS = 12
+
+
+@dataclass
+class Hits:
+    """What the ray through each pixel centre sees, [H, W, ...].
+
+    triangle: int, -1 where nothing. hole: number of the perforation that the ray passed through
+    first, -1 for none. rest_mm [3]: rest position. atlas_mm [2]. depth_m: inf where nothing.
+    """
+
+    triangle: np.ndarray
+    hole: np.ndarray
+    rest_mm: np.ndarray
+    atlas_mm: np.ndarray
+    depth_m: np.ndarray
+
+    @property
+    def hit(self) -> np.ndarray:
+        return self.triangle >= 0
+
+
+def cast(mesh: Mesh, view: View, scene: Scene | None = None) -> Hits:
+    """First outside that each pixel centre sees; through a hole of `scene`, the first inside."""
+    damages = scene.damages if scene else ()
+    rest = mesh.positions_mm.astype(np.float64)
+    moved = fields.deform(damages, rest)
+    # Embree sees metres around the origin, where its float32 is finest
+    body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
+    start, rays = view.rays()
+    rays = rays.reshape(-1, 3)
+    count = len(rays)
+    seen = np.full(count, -1)
+    hole = np.full(count, -1)
+    where = np.zeros((count, 3))
+    atlas = np.zeros((count, 2))
+    depth = np.full(count, np.inf)
+    travelled = np.zeros(count)
+    active = np.arange(count)
+    for _ in range(_MOST_LAYERS):
+        ray = rays[active]
+        origins = (start + (travelled[active, None] + 0.02) * ray) * 1e-3
+        triangle = body.intersects_first(origins, ray)
+        active, ray, triangle = (a[triangle >= 0] for a in (active, ray, triangle))
+        if not active.size:
+            break
+        distance, b, c, facing = _meet(moved[mesh.triangles[triangle]], start, ray)
+        corners = rest[mesh.triangles[triangle]]
+        point = _between(corners, b, c)
+        travelled[active] = np.maximum(distance, travelled[active] + 0.02)
+        torn = np.full(len(active), -1)
+        for i, damage in enumerate(damages):
+            torn[fields.in_hole(damage, point)] = i
+        inside = hole[active] >= 0
+        # outsides end a ray from outside, insides one that came in through a hole
+        wall = facing != inside
+        opened = wall & ~inside & (torn >= 0)
+        hole[active[opened]] = torn[opened]
+        leaves = wall & inside & (torn >= 0)
+        ends = wall & (torn < 0)
+        at = active[ends]
+        seen[at] = triangle[ends]
+        where[at] = point[ends]
+        atlas_corners = mesh.atlas_mm[mesh.triangles[triangle[ends]]].astype(np.float64)
+        atlas[at] = _between(atlas_corners, b[ends], c[ends])
+        depth[at] = view.to_view(start + distance[ends, None] * ray[ends])[:, 2]
+        active = active[~(ends | leaves)]
+    shape = (view.size[1], view.size[0])
+    return Hits(
+        seen.reshape(shape),
+        hole.reshape(shape),
+        where.reshape(*shape, 3),
+        atlas.reshape(*shape, 2),
+        depth.reshape(shape),
+    )
+
+
+def _meet(corners: np.ndarray, start: np.ndarray, ray: np.ndarray):
+    """Distance, weights of corners 1 and 2, and whether the ray meets the front; in float64."""
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(e1, e2)
+    along = (ray * normal).sum(1)
+    distance = ((corners[:, 0] - start) * normal).sum(1) / along
+    local = start + distance[:, None] * ray - corners[:, 0]
+    area = (normal * normal).sum(1)
+    b = (np.cross(local, e2) * normal).sum(1) / area
+    c = (np.cross(e1, local) * normal).sum(1) / area
+    return distance, b, c, along < 0
+
+
+def _between(corners: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    first = corners[:, 0]
+    return first + b[:, None] * (corners[:, 1] - first) + c[:, None] * (corners[:, 2] - first)
+
+
+def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
+    """Which sheet points [..., 2] lie on the decal: in its diamond or its rectangle. bool [...]."""
+    angle = np.deg2rad(decal.rotation_deg)
+    offset = sheet_mm - np.array(decal.center_mm)
+    x = offset @ np.array([np.cos(angle), np.sin(angle)])
+    y = offset @ np.array([-np.sin(angle), np.cos(angle)])
+    half_width, half_height = np.array(decal.size_mm) / 2
+    if decal.kind == "marker":
+        return np.abs(x) / half_width + np.abs(y) / half_height <= 1
+    return (np.abs(x) <= half_width) & (np.abs(y) <= half_height)
+
+
+def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
+    """The id target that the rays say is right, uint16 [H, W]."""
+    ids = np.where(hits.hit, 1, 0).astype(np.uint16)
+    chart = mesh.chart[mesh.triangles[hits.triangle, 0]]
+    outside = hits.hit & (hits.hole < 0)
+    following = 2
+    for decal in scene.decals:
+        if not decal.class_name:
+            continue
+        number = mesh.chart_index(decal.face)
+        x0, y0 = mesh.charts[number].rect_mm[:2]
+        ids[outside & (chart == number) & inside(decal, hits.atlas_mm - (x0, y0))] = following
+        following += 1
+    return ids
+
+
+def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
+    """The damage target that the rays say is right, uint16 [H, W]."""
+    order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5}
+    values, counts = [], dict.fromkeys(order, 0)
+    for damage in scene.damages:
+        counts[damage.kind] += 1
+        values.append(order[damage.kind] * 100 + counts[damage.kind])
+    target = np.where(hits.hit, 101, 0).astype(np.uint16)
+    most = np.full(target.shape, threshold_mm)
+    for damage, value in zip(scene.damages, values, strict=True):
+        amount = np.abs(fields.amount_mm(damage, hits.rest_mm))
+        more = hits.hit & (hits.hole < 0) & (amount > most)
+        target[more], most[more] = value, amount[more]
+    for i, value in enumerate(values):
+        target[hits.hole == i] = value
+    return target
+
+
+def box_of(mask: np.ndarray) -> tuple[int, int, int, int] | None:
+    """Tight box of a mask by looking at every pixel's coordinates."""
+    rows, columns = np.nonzero(mask)
+    if not rows.size:
+        return None
+    return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1

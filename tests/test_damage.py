@@ -1,0 +1,195 @@
+"""Damage: the shader against its numpy twin seen through Embree, and the sampled proportions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen import damage as fields
+from fastgen.classes import DAMAGE_CLASSES
+from fastgen.config import Config
+from fastgen.container import build_container
+from fastgen.errors import ConfigError
+from fastgen.generator import Generator
+from fastgen.scene import Scene
+from tests import oracle
+
+SIZE = (256, 256)
+DAMAGED = Config.from_values({"damage": {"probability": 1.0}})
+THRESHOLD_MM = DAMAGED.damage.mask_threshold_mm
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(DAMAGED, seed=21, size=SIZE) as made:
+        yield made
+
+
+def changes(labels):
+    """Pixels within one pixel of a place where `labels` changes."""
+    padded = np.pad(labels, 1, mode="edge")
+    height, width = labels.shape
+    around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
+    return np.any([a != labels for a in around], axis=0)
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, index):
+    scene = generator.scene(index)
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    for camera in scene.cameras:
+        sample = generator.render(scene=scene, camera=camera)
+        hits = oracle.cast(mesh, sample.view, scene)
+        expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
+        wrong = sample.damage != expected
+        assert wrong.mean() < 1e-3
+        # away from edges, only a centre right on a seam between two parts may fall between them
+        assert (wrong & ~changes(expected)).sum() <= 3
+        ids = oracle.object_ids(scene, mesh, hits)
+        assert ((sample.ids != ids) & ~changes(ids)).sum() <= 3
+        both = np.isfinite(sample.depth) & hits.hit & ~changes(expected)
+        error_m = np.abs(sample.depth[both] - hits.depth_m[both])
+        allowed_m = np.maximum(1e-3, 1e-3 * hits.depth_m[both])
+        # centres on a crease between facets may fall on either
+        assert (error_m <= allowed_m).mean() > 0.999
+
+
+def close_up(scene: Scene, kind: str) -> Scene:
+    """The scene with only its first damage of `kind`, and a camera right before it."""
+    damage = next(d for d in scene.damages if d.kind == kind)
+    origin, inward = np.array(damage.origin_mm), np.array(damage.inward)
+    place = origin - 2500 * inward + 150 * np.array(damage.along)
+    camera = replace(
+        scene.cameras[0], name="close", position_mm=tuple(place), target_mm=damage.origin_mm,
+        focal_mm=28.0,
+    )  # fmt: skip
+    return replace(scene, damages=(damage,), cameras=(camera,))
+
+
+def scene_with(generator, kind):
+    return next(
+        scene
+        for scene in map(generator.scene, range(200))
+        if any(damage.kind == kind for damage in scene.damages)
+    )
+
+
+@pytest.mark.parametrize("kind", DAMAGE_CLASSES)
+def test_every_kind_is_seen_whole_from_close_by(generator, kind):
+    scene = close_up(scene_with(generator, kind), kind)
+    sample = generator.render(scene=scene, camera="close")
+    value = fields.mask_values(scene.damages)[0]
+    assert (sample.damage == value).sum() > 200
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    hits = oracle.cast(mesh, sample.view, scene)
+    expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
+    assert (sample.damage != expected).mean() < 2e-3
+    item = next(o for o in sample.objects if o.class_name == kind)
+    assert item.bbox == oracle.box_of(sample.damage == value)
+
+
+def test_a_hole_shows_the_inside_and_never_the_sky(generator):
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    sample = generator.render(scene=scene, camera="close")
+    through = (sample.damage == 501) & (sample.depth > 3.5)
+    assert through.sum() > 50  # rim and sheet are at about 2.5 m, the far wall beyond 4 m
+    assert np.isfinite(sample.depth[through]).all()
+    assert (sample.ids[through] == 1).all()
+    around = sample.image[(sample.damage == 101)].mean()
+    assert sample.image[through].mean() < 0.6 * around
+
+
+def test_opposite_holes_let_the_sky_through(generator):
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    first = replace(scene.damages[0], size_mm=(300.0, 300.0), shape=(60.0, *[0.0] * 10))
+    inward = np.array(first.inward)
+    size = {"20": 6058, "40": 12192, "40HC": 12192, "45HC": 13716}[scene.container.kind]
+    across = 2438 if abs(inward[1]) > 0.5 else size
+    far = np.array(first.origin_mm) + (across - 30) * inward
+    second = replace(
+        first, origin_mm=tuple(far), inward=tuple(-inward), size_mm=(700.0, 700.0)
+    )  # fmt: skip
+    camera = replace(
+        scene.cameras[0],
+        position_mm=tuple(np.array(first.origin_mm) - 2500 * inward),
+        target_mm=first.origin_mm,
+    )
+    holed = replace(scene, damages=(first, second), cameras=(camera,))
+    sample = generator.render(scene=holed, camera="close")
+    assert sample.ids[128, 128] == 0
+    assert sample.damage[128, 128] == 501
+    assert np.isinf(sample.depth[128, 128])
+
+
+def test_undamaged_places_do_not_change(generator):
+    scene = generator.scene(3)
+    camera = scene.cameras[1]
+    damaged = generator.render(scene=scene, camera=camera)
+    sound = generator.render(scene=replace(scene, damages=()), camera=camera)
+    far = damaged.damage == sound.damage
+    same = (damaged.image == sound.image).all(axis=-1)
+    assert far.mean() > 0.5
+    assert same[far].mean() > 0.9
+
+
+def test_a_moved_point_lies_on_the_field():
+    """A concave damage by hand: a paraboloid-like bump, at its centre, half way and rim."""
+    damage = fields.Damage(
+        "concave", "front", (0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (2000, 1000), 80.0
+    )
+    points = np.array([[0, 0, 0], [500, 0, 0], [0, 0, 250], [1000, 0, 0], [0, 300, 0]], float)
+    assert fields.amount_mm(damage, points)[:4] == pytest.approx([80, 45, 45, 0])
+    assert 0 < fields.amount_mm(damage, points)[4] < 80
+    moved = fields.deform((damage,), points)
+    np.testing.assert_allclose(moved[0], [0, 80, 0])
+
+
+@pytest.fixture(scope="module")
+def many():
+    generator = Generator(seed=4)
+    return [generator.scene(i) for i in range(1500)]
+
+
+def within(count, n, p):
+    """Four standard deviations of a binomial: one run in 16,000 fails by chance."""
+    return abs(count - n * p) < 4 * math.sqrt(n * p * (1 - p))
+
+
+def test_two_scenes_in_five_are_damaged(many):
+    assert within(sum(bool(scene.damages) for scene in many), len(many), 0.4)
+
+
+def test_kinds_and_counts_are_uniform(many):
+    kinds = [damage.kind for scene in many for damage in scene.damages]
+    for kind in DAMAGE_CLASSES:
+        assert within(kinds.count(kind), len(kinds), 0.25)
+    counts = [len(scene.damages) for scene in many if scene.damages]
+    for count in range(1, 5):
+        assert within(counts.count(count), len(counts), 0.25)
+
+
+def test_damage_stays_in_its_ranges_and_on_the_container(many):
+    config = Config.preset().damage
+    for scene in many:
+        for damage in scene.damages:
+            ranges = getattr(config, damage.kind)
+            assert ranges.depth_mm.lo <= abs(damage.depth_mm) <= ranges.depth_mm.hi
+            assert abs(damage.origin_mm[0]) <= 13716 / 2
+            assert abs(damage.origin_mm[1]) <= 2438 / 2
+            assert 0 <= damage.origin_mm[2] <= 2896
+            axes = np.array([damage.along, damage.across, damage.inward])
+            np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-5)
+
+
+def test_scenes_with_damage_round_trip_through_json(many):
+    scene = next(scene for scene in many if len(scene.damages) > 2)
+    assert Scene.from_json(scene.to_json()) == scene
+
+
+def test_a_hundred_of_a_kind_is_refused():
+    config = Config.from_values(
+        {"damage": {"probability": 1, "count": [100, 100], "kinds": ["axis"]}}
+    )
+    with pytest.raises(ConfigError, match="more than 99 of kind axis"):
+        Generator(config).scene(0)

@@ -1,0 +1,104 @@
+"""Objects against brute force over the id image and projections of the rest mesh."""
+
+import numpy as np
+import pytest
+
+from fastgen.classes import MARKER_CLASSES
+from fastgen.errors import ConfigError
+from fastgen.generator import Generator
+from fastgen.labels import decal_of, visible_boxes
+from tests import oracle
+
+
+@pytest.fixture(scope="module")
+def samples():
+    with Generator(seed=11, size=(480, 360)) as generator:
+        return [
+            generator.render(index=i, camera=c) for i in range(4) for c in ("A", "B", "Cl", "Cr")
+        ]
+
+
+def test_boxes_and_areas_equal_brute_force_over_pixels(samples):
+    for sample in samples:
+        for item in sample.objects:
+            mask = sample.ids > 0 if item.class_name == "container" else sample.ids == item.id
+            assert item.bbox == oracle.box_of(mask)
+            assert item.area == mask.sum()
+
+
+def test_every_id_in_the_image_has_an_object_and_ids_are_unique(samples):
+    for sample in samples:
+        ids = [item.id for item in sample.objects]
+        assert len(ids) == len(set(ids))
+        assert set(np.unique(sample.ids)) - {0} <= set(ids)
+
+
+def test_objects_carry_class_text_and_running_instance(samples):
+    for sample in samples:
+        seen: dict[str, list[int]] = {}
+        for item in sample.objects[1:]:
+            decal = decal_of(sample.scene, item.id)
+            assert item.class_name == decal.class_name
+            assert item.text == " ".join(decal.lines)
+            assert item.class_name in (*MARKER_CLASSES, "text")
+            seen.setdefault(item.class_name, []).append(item.instance)
+        assert all(numbers == list(range(1, len(numbers) + 1)) for numbers in seen.values())
+
+
+def test_visible_boxes_lie_in_amodal_boxes(samples):
+    for sample in samples:
+        for item in sample.objects:
+            if item.bbox is None or item.amodal_bbox is None:
+                continue
+            x0, y0, x1, y1 = item.bbox
+            ax0, ay0, ax1, ay1 = item.amodal_bbox
+            assert x0 >= ax0 - 1
+            assert y0 >= ay0 - 1
+            assert x1 <= ax1 + 1
+            assert y1 <= ay1 + 1
+
+
+def test_truncated_means_the_amodal_box_leaves_the_image(samples):
+    found = {True: 0, False: 0}
+    for sample in samples:
+        for item in sample.objects:
+            if not item.area or item.amodal_bbox is None:
+                continue
+            x0, y0, x1, y1 = item.amodal_bbox
+            leaves = x0 < 0 or y0 < 0 or x1 > 480 or y1 > 360
+            assert item.truncated == leaves
+            found[leaves] += 1
+    assert found[False]
+
+
+def test_unoccluded_markers_are_nearly_fully_visible(samples):
+    fractions = [
+        item.visible_fraction
+        for sample in samples
+        for item in sample.objects
+        if item.class_name.startswith("C") and item.area > 400 and not item.truncated
+    ]
+    assert fractions
+    assert np.median(fractions) > 0.85
+
+
+def test_boxes_of_random_ids_equal_brute_force():
+    ids = np.random.default_rng(0).choice([0, 1, 2, 5, 9], size=(37, 53)).astype(np.uint16)
+    boxes, areas = visible_boxes(ids, 10)
+    for value in range(2, 10):
+        assert boxes[value] == oracle.box_of(ids == value)
+        assert areas[value] == (ids == value).sum()
+
+
+def test_bad_arguments_are_named():
+    with pytest.raises(ConfigError, match="size: 32x640"):
+        Generator(size=(32, 640))
+    with pytest.raises(ConfigError, match="seed: -1"):
+        Generator(seed=-1)
+    with Generator(size=(64, 64)) as generator:
+        with pytest.raises(ConfigError, match="camera: 'Cx' is unknown"):
+            generator.render(index=0, camera="Cx")
+        with pytest.raises(ConfigError, match=r"layer: 'rusty' is unknown \(did you mean rust"):
+            generator.render(index=0, layer="rusty")
+        with pytest.raises(ConfigError, match="either index or scene"):
+            generator.render()

@@ -1,0 +1,152 @@
+"""What the renderer draws against rays, algebra and itself at other sizes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.camera import view_of
+from fastgen.config import Config
+from fastgen.container import build_container
+from fastgen.generator import Generator
+from fastgen.gpu_mesh import facing_groups
+from tests import oracle
+
+CAMERAS = ("A", "B", "Cl", "Cr")
+SIZE = (320, 240)
+
+
+SOUND = Config.from_values({"damage": {"probability": 0}})
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(SOUND, seed=5, size=SIZE) as made:
+        yield made
+
+
+def rest_mesh(scene):
+    return build_container(scene.container.kind, scene.container.profiles)
+
+
+def near_edge(ids):
+    """Pixels within one pixel of a place where `ids` changes."""
+    padded = np.pad(ids, 1, mode="edge")
+    height, width = ids.shape
+    around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
+    return np.any([a != ids for a in around], axis=0)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, index):
+    sample = generator.render(index=index, camera=camera)
+    mesh = rest_mesh(sample.scene)
+    hits = oracle.cast(mesh, sample.view)
+    expected = oracle.object_ids(sample.scene, mesh, hits)
+    wrong = sample.ids != expected
+    assert wrong.mean() < 2e-4
+    assert not (wrong & ~near_edge(expected)).any()
+    both = hits.hit & (sample.ids > 0)
+    error = np.abs(sample.depth[both] - hits.depth_m[both]) / hits.depth_m[both]
+    # a pixel centre may fall on either side of an inner edge, hence a quantile and not all
+    assert np.quantile(error, 0.999) < 1e-5
+    assert np.isinf(sample.depth[sample.ids == 0]).all()
+
+
+def test_damage_is_the_sound_container_wherever_something_is_seen(generator):
+    sample = generator.render(index=3, camera="B")
+    np.testing.assert_array_equal(sample.damage, np.where(sample.ids > 0, 101, 0))
+
+
+def test_ids_do_not_depend_on_antialiasing():
+    frames = []
+    for antialiasing in ("none", "balanced", "high"):
+        with Generator(SOUND, seed=5, size=SIZE, antialiasing=antialiasing) as generator:
+            frames.append(generator.render(index=1, camera="Cr"))
+    for other in frames[1:]:
+        assert (frames[0].ids != other.ids).mean() < 2e-4
+        # the picture is the same but for its edges
+        difference = np.abs(frames[0].image.astype(int) - other.image.astype(int))
+        assert np.median(difference) == 0
+        assert difference.mean() < 6
+
+
+def test_antialiasing_approaches_a_fine_render_averaged_down():
+    """An image of 4 x 4 as many pixels, box-filtered in linear light, is the reference."""
+    fine = (4 * SIZE[0], 4 * SIZE[1])
+    with Generator(SOUND, seed=5, size=fine, antialiasing="none") as generator:
+        image = generator.render(index=1, camera="Cl").image
+    linear = np.where(image <= 10, image / 255 / 12.92, ((image / 255 + 0.055) / 1.055) ** 2.4)
+    reference = linear.reshape(SIZE[1], 4, SIZE[0], 4, 3).mean(axis=(1, 3))
+    errors = []
+    for antialiasing in ("none", "balanced"):
+        with Generator(SOUND, seed=5, size=SIZE, antialiasing=antialiasing) as generator:
+            sample = generator.render(index=1, camera="Cl")
+        edge = near_edge(sample.ids)
+        seen = (sample.image / 255.0) ** 2.2
+        errors.append(np.abs(seen - reference)[edge].mean())
+    assert errors[1] < 0.8 * errors[0]
+
+
+def test_the_same_scene_renders_to_the_same_bytes(generator):
+    first = generator.render(index=4, camera="A")
+    generator.render(index=5, camera="Cr")
+    again = generator.render(index=4, camera="A")
+    np.testing.assert_array_equal(first.image, again.image)
+    np.testing.assert_array_equal(first.ids, again.ids)
+
+
+def test_backends_agree_on_every_label():
+    frames = []
+    for backend in ("egl", "osmesa"):
+        with Generator(SOUND, seed=5, size=SIZE, backend=backend) as generator:
+            frames.append(generator.render(index=2, camera="B"))
+    assert (frames[0].ids != frames[1].ids).mean() < 1e-4
+    difference = np.abs(frames[0].image.astype(int) - frames[1].image.astype(int))
+    assert np.quantile(difference, 0.999) <= 1
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_faces_left_out_are_never_seen(generator, camera):
+    scene = generator.scene(index=6)
+    mesh = rest_mesh(scene)
+    position = scene.camera(camera).position_mm
+    kept = facing_groups(mesh, position)
+    hits = oracle.cast(mesh, view_of(scene.camera(camera), SIZE))
+    drawn = np.zeros(len(mesh.triangles), bool)
+    for name in kept:
+        drawn[mesh.groups[name]] = True
+    assert drawn[hits.triangle[hits.hit]].all()
+    assert not drawn.all()
+
+
+@pytest.mark.parametrize("size", [(64, 64), (100, 37 + 64), (1333, 800), (4096, 64)])
+def test_any_size_is_drawn_whole(size):
+    with Generator(SOUND, seed=5, size=size) as generator:
+        sample = generator.render(index=0, camera="Cr")
+    assert sample.image.shape == (size[1], size[0], 3)
+    assert sample.ids.shape == sample.depth.shape == sample.damage.shape == size[::-1]
+    assert (sample.ids > 0).any()
+
+
+def test_a_camera_inside_the_wall_crosses_the_near_plane_without_harm(generator):
+    scene = generator.scene(index=0)
+    camera = scene.camera("A")
+    close = replace(camera, position_mm=(0, -1400, 1200), target_mm=(2000, -1219, 1200))
+    sample = generator.render(scene=scene, camera=close)
+    assert np.isfinite(sample.depth[sample.ids > 0]).all()
+    assert (sample.ids > 0).mean() > 0.2
+
+
+def test_a_lone_marker_moves_no_other_pixel(generator):
+    """Removing a decal changes ids nowhere but where it was."""
+    scene = generator.scene(index=7)
+    sample = generator.render(scene=scene, camera="Cr")
+    bare = replace(scene, decals=tuple(d for d in scene.decals if d.kind != "marker"))
+    without = generator.render(scene=bare, camera="Cr")
+    markers = [o.id for o in sample.objects if o.class_name.startswith("C")]
+    np.testing.assert_array_equal((sample.ids > 0), (without.ids > 0))
+    covered = np.isin(sample.ids, markers)
+    same_text = (sample.ids > 1) & ~covered
+    np.testing.assert_array_equal(same_text, (without.ids > 1) & ~covered)

@@ -1,0 +1,187 @@
+"""Single GLSL functions run by themselves, against algebra and numpy."""
+
+import numpy as np
+import pytest
+
+from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE, dfg_table
+from fastgen.gl import open_context
+from fastgen.noise import NOISE_SIZE, noise_tiles
+from fastgen.programs import SCENE_BLOCK, VIEW_BLOCK, expand
+from fastgen.resources import shader_path
+
+HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'
+
+
+@pytest.fixture(scope="module")
+def gl():
+    with open_context() as made:
+        yield made
+
+
+def run(gl, body, inputs, textures=None):
+    """Evaluate `vec4 f(vec4 x)` of GLSL `body` at each row of inputs [N, 4]. Returns [N, 4]."""
+    ctx = gl.ctx
+    main = (
+        "\nuniform sampler2D inputs; layout(location = 0) out vec4 answer;\n"
+        "void main() { answer = f(texelFetch(inputs, ivec2(gl_FragCoord.xy), 0)); }\n"
+    )
+    program = ctx.program(
+        vertex_shader=expand(shader_path("fullscreen.vert").read_text()),
+        fragment_shader=expand(HEAD + body + main),
+    )
+    rows = np.ascontiguousarray(inputs, np.float32)
+    held = {
+        "inputs": ctx.texture((len(rows), 1), 4, rows.tobytes(), dtype="f4"),
+        **(textures or {}),
+    }
+    for unit, (name, texture) in enumerate(held.items()):
+        if name in program:
+            program[name] = unit
+        texture.use(unit)
+    target = ctx.texture((len(rows), 1), 4, dtype="f4")
+    frame = ctx.framebuffer([target])
+    frame.use()
+    ctx.disable(ctx.DEPTH_TEST)
+    ctx.vertex_array(program, []).render(ctx.TRIANGLES, vertices=3)
+    return np.frombuffer(target.read(), np.float32).reshape(-1, 4)
+
+
+def blocks(gl, **changed):
+    """Uniform blocks of zeros but for `changed`, bound."""
+    kept = []
+    for block in (SCENE_BLOCK, VIEW_BLOCK):
+        values = {
+            member[1]: np.zeros(4) if member[0] == "vec4" else 0.0 for member in block.members
+        }
+        for member in block.members:
+            size = {"vec2": 2, "vec3": 3, "vec4": 4, "mat4": 16}.get(member[0], 1)
+            values[member[1]] = changed.get(member[1], np.zeros(size))
+        buffer = gl.ctx.buffer(block.pack(values))
+        buffer.bind_to_uniform_block(block.binding)
+        kept.append(buffer)
+    return kept
+
+
+def white_light(gl):
+    """An environment that shines 1 from everywhere, and the real split-sum table."""
+    ctx = gl.ctx
+
+    def ones(size, layers):
+        return np.ones((layers, size, size, 4), np.float16).tobytes()
+
+    layers = len(ROUGHNESS_LEVELS)
+    table = dfg_table()
+    made = {
+        "specular_light": ctx.texture_array(
+            (SPECULAR_SIZE, SPECULAR_SIZE, layers), 4, ones(SPECULAR_SIZE, layers), dtype="f2"
+        ),
+        "irradiance_light": ctx.texture(
+            (IRRADIANCE_SIZE, IRRADIANCE_SIZE), 4, ones(IRRADIANCE_SIZE, 1), dtype="f2"
+        ),
+        "dfg_table": ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4"),
+    }
+    made["dfg_table"].repeat_x = made["dfg_table"].repeat_y = False
+    return made
+
+
+@pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
+def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
+    """Whatever the roughness and the angle, all light comes back: radiance 1, within 1 %."""
+    kept = blocks(gl, yaw=(1, 0), background_size=16)
+    roughness, cosine = np.meshgrid(np.linspace(0.05, 1, 20), np.linspace(0.05, 1, 20))
+    rows = np.stack([roughness, cosine, np.full_like(cosine, metallic), cosine], -1).reshape(-1, 4)
+    body = (
+        '#include "ibl.glsl"\n'
+        "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
+        " return vec4(lit(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view), 1.0); }"
+    )
+    out = run(gl, body, rows, white_light(gl))
+    np.testing.assert_allclose(out[:, :3], 1.0, atol=0.01)
+    del kept
+
+
+def test_no_surface_returns_more_than_falls_on_it(gl):
+    kept = blocks(gl, yaw=(1, 0), background_size=16)
+    rng = np.random.default_rng(0)
+    rows = np.c_[rng.uniform(0.05, 1, (500, 2)), rng.uniform(0, 1, (500, 2))]
+    body = (
+        '#include "ibl.glsl"\n'
+        "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
+        " return vec4(lit(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view), 1.0); }"
+    )
+    out = run(gl, body, rows, white_light(gl))
+    assert (out[:, 0] <= 1.01).all()
+    assert (out[:, 0] >= 0).all()
+    del kept
+
+
+def test_octahedral_mapping_equals_its_numpy_twin(gl):
+    from fastgen.prefilter import octahedral_encode
+
+    directions = np.random.default_rng(1).normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    body = (
+        "vec4 f(vec4 x) { vec2 uv = octahedral(x.xyz);"
+        " return vec4(uv, length(octahedral_direction(uv) - x.xyz), 0.0); }"
+    )
+    out = run(gl, body, np.c_[directions, np.zeros(400)])
+    np.testing.assert_allclose(out[:, :2], octahedral_encode(directions), atol=1e-6)
+    assert out[:, 2].max() < 1e-5
+
+
+def test_surface_keys_keep_chart_and_normal(gl):
+    directions = np.random.default_rng(2).normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions[:6] = np.r_[np.eye(3), -np.eye(3)]
+    charts = np.arange(400) * 2
+    body = (
+        "vec4 f(vec4 x) { uint key = pack_surface_key(uint(x.w), x.xyz);"
+        " return vec4(key_normal(key), float(key_chart(key))); }"
+    )
+    out = run(gl, body, np.c_[directions, charts])
+    np.testing.assert_array_equal(out[:, 3], charts)
+    assert np.abs(out[:, :3] - directions).max() < 2e-3
+    np.testing.assert_allclose(out[:6, :3], directions[:6], atol=1e-7)
+
+
+def test_srgb_coding_is_iec_61966(gl):
+    values = np.linspace(0, 1, 300)
+    encoded = np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1 / 2.4) - 0.055)
+    body = (
+        '#include "tone.glsl"\n'
+        "vec4 f(vec4 x) { vec3 e = srgb_encode(x.rgb); return vec4(e.r, srgb_decode(e).r, 0, 0); }"
+    )
+    out = run(gl, body, np.repeat(values[:, None], 4, 1))
+    np.testing.assert_allclose(out[:, 0], encoded, atol=2e-4)
+    np.testing.assert_allclose(out[:, 1], values, atol=2e-4)
+
+
+def test_tone_curve_keeps_order_and_range(gl):
+    greys = np.geomspace(1e-4, 1e5, 400)
+    body = '#include "tone.glsl"\nvec4 f(vec4 x) { return vec4(neutral_tone(x.rgb), 0); }'
+    out = run(gl, body, np.repeat(greys[:, None], 4, 1))[:, 0]
+    assert (np.diff(out) >= -1e-6).all()
+    assert out.min() >= 0
+    assert out.max() <= 1
+
+
+@pytest.mark.parametrize("coverage", [0.05, 0.2, 0.5])
+def test_a_noise_threshold_covers_the_same_share_at_every_distance(gl, coverage):
+    """What is rusty near by is as rusty from afar: no layer fades in or out, or shimmers."""
+    tiles = noise_tiles()
+    texture = gl.ctx.texture_array((NOISE_SIZE, NOISE_SIZE, 2), 4, tiles.levels[0].tobytes())
+    texture.build_mipmaps()
+    texture.filter = (gl.ctx.LINEAR_MIPMAP_LINEAR, gl.ctx.LINEAR)
+    kept = blocks(gl, noise_lost=tiles.lost_deviation.reshape(-1, 4))
+    points = np.random.default_rng(3).uniform(0, 1000, (4000, 2))
+    body = (
+        '#include "layers.glsl"\n'
+        "vec4 f(vec4 x) { NoiseSample n = read_noise(0, x.xy, 1000.0, x.z);"
+        " return vec4(covered(n.value.y, 1.0 - x.w, n.lost.y, 0.012), 0.0, 0.0, 0.0); }"
+    )
+    shares = []
+    for footprint in (0.5, 2.0, 8.0, 32.0, 128.0):
+        rows = np.c_[points, np.full(4000, footprint), np.full(4000, coverage)]
+        shares.append(run(gl, body, rows, {"noise_tiles": texture})[:, 0].mean())
+    np.testing.assert_allclose(shares, coverage, atol=0.05)
+    del kept
