@@ -1,0 +1,48 @@
+# `make dataset` and `make test` do all the set-up on a fresh Debian or Ubuntu machine.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
+SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
+
+.PHONY: setup dataset test lint clean system
+
+setup: $(VENV)/.installed
+
+# libGL libraries that rendering without a screen needs; libosmesa6 is gone from the newest releases
+system:
+	@if ldconfig -p | grep -q libEGL.so.1 && ldconfig -p | grep -q libOSMesa && \
+	    $(PYTHON) -c 'import ensurepip' 2>/dev/null; then :; \
+	elif command -v apt-get >/dev/null; then \
+	    if [ "$$(id -u)" != 0 ] && [ -z "$(SUDO)" ]; then \
+	        echo 'As root, run: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6 python3-venv'; \
+	        exit 1; fi; \
+	    $(SUDO) apt-get update -q && \
+	    $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
+	        libegl1 libegl-mesa0 libgl1-mesa-dri python3-venv && \
+	    { $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
+	        libosmesa6 || echo 'no libosmesa6 in this release: the osmesa backend will be missing'; }; \
+	else echo 'Install Mesa (EGL, DRI drivers, OSMesa) with your package manager.'; fi
+
+$(VENV)/.installed: $(SOURCES) | system
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo 'fastgen needs Python 3.11 or later: set PYTHON to one'; exit 1; }
+	[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check '.[dev]'
+	@touch $@
+
+dataset: setup
+	$(BIN)/fastgen generate dataset --images 48 --size 640x640
+	@echo 'Look at dataset/contact_sheet.png'
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/pytest -n 2
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info dataset

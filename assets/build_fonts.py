@@ -1,0 +1,73 @@
+"""Bakes assets/fonts/*.woff into one mosaic of signed-distance tiles. Run by hand:
+
+    python assets/build_fonts.py
+
+Needs Pillow and scipy. A tile is 64 x 64 and covers a square of 1.6 cap heights: the ink centred
+across it, the baseline 0.3 cap heights above its bottom; 0.5 lies on the outline and 0.15 cap
+heights make up the distance to 0 or 1.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy.ndimage import distance_transform_edt
+
+FOLDER = Path(__file__).parent / "fonts"
+CHARS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-./:,&'()+"
+TILE, OVERSAMPLING = 64, 12
+TILE_CAPS, BASELINE_CAPS, RANGE_CAPS = 1.6, 0.3, 0.3
+COLUMNS = 16
+
+
+def bake(path: Path) -> dict[str, tuple[np.ndarray, float, float, float]]:
+    """Tile, ink left, ink right and advance (cap heights) of every character of a font."""
+    side = TILE * OVERSAMPLING
+    cap_px = side / TILE_CAPS
+    probe = ImageFont.truetype(str(path), 1000)
+    _, top, _, _ = probe.getbbox("H", anchor="ls")
+    font = ImageFont.truetype(str(path), round(1000 * cap_px / -top))
+    baked = {}
+    for char in CHARS:
+        left, _, right, _ = font.getbbox(char, anchor="ls")
+        image = Image.new("L", (side, side))
+        pen = side / 2 - (left + right) / 2
+        ImageDraw.Draw(image).text(
+            (pen, side - BASELINE_CAPS * cap_px), char, fill=255, font=font, anchor="ls"
+        )
+        ink = np.asarray(image) > 127
+        distance = distance_transform_edt(ink) - distance_transform_edt(~ink)
+        value = 0.5 + distance / cap_px / RANGE_CAPS
+        tile = value.reshape(TILE, OVERSAMPLING, TILE, OVERSAMPLING).mean(axis=(1, 3))
+        pixels = np.rint(np.clip(tile, 0, 1) * 255).astype(np.uint8)
+        baked[char] = (pixels, left / cap_px, right / cap_px, font.getlength(char) / cap_px)
+    return baked
+
+
+def main() -> None:
+    """Write fonts/glyphs.png and fonts/glyphs.json."""
+    tiles: list[np.ndarray] = []
+    fonts = {}
+    for path in sorted(FOLDER.glob("*.woff")):
+        glyphs = {}
+        for char, (tile, left, right, advance) in bake(path).items():
+            glyphs[char] = {
+                "tile": len(tiles),
+                "ink": [round(left, 4), round(right, 4)],
+                "advance": round(advance, 4),
+            }
+            tiles.append(tile)
+        fonts[path.stem] = glyphs
+    rows = -(-len(tiles) // COLUMNS)
+    mosaic = np.zeros((rows * TILE, COLUMNS * TILE), np.uint8)
+    for i, tile in enumerate(tiles):
+        y, x = divmod(i, COLUMNS)
+        mosaic[y * TILE : (y + 1) * TILE, x * TILE : (x + 1) * TILE] = tile
+    Image.fromarray(mosaic).save(FOLDER / "glyphs.png", optimize=True)
+    text = json.dumps({"tiles": len(tiles), "fonts": fonts}, indent=1)
+    (FOLDER / "glyphs.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

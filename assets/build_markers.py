@@ -1,0 +1,297 @@
+"""Draws the 26 dangerous-goods markers as SVG and bakes them to PNG. Run by hand:
+
+    python assets/build_markers.py
+
+Needs fonttools and resvg-py. Colours, symbols and places follow the UN Model Regulations, chapter
+5.2.2.2: a square on its point, here inscribed in 1000 x 1000, the inner line 12.5 / 250 of a side
+from the edge, the class at the bottom corner. All symbols are drawn here from scratch.
+"""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import resvg_py
+from fontTools.pens.svgPathPen import SVGPathPen
+from fontTools.ttLib import TTFont
+
+ASSETS = Path(__file__).parent
+SIZE = 512
+RED, GREEN, BLUE, ORANGE, YELLOW = "#d2202e", "#00823f", "#0057a8", "#f07d1a", "#f6c900"
+WHITE, BLACK = "#ffffff", "#101010"
+FONT = TTFont(ASSETS / "fonts" / "archivo-narrow.woff")
+
+FLAME = (
+    "M508 120 C560 190 640 250 640 350 C640 372 634 392 624 408 C622 376 606 350 584 338 "
+    "C590 380 574 420 548 446 C556 400 540 352 500 322 C506 372 470 396 456 430 "
+    "C446 410 444 396 446 380 C420 400 410 428 412 458 C380 428 362 392 362 352 "
+    "C362 270 450 240 470 160 C492 178 500 200 500 226 C516 196 518 156 508 120 Z"
+)
+FLAME_BASE = '<rect x="352" y="476" width="296" height="22"/>'
+
+
+def words(text: str, x: float, y: float, height: float, color: str) -> str:
+    """`text` centred on x with its baseline at y, capitals `height` high, as an outline."""
+    glyphs, names = FONT.getGlyphSet(), FONT.getBestCmap()
+    scale = height / FONT["OS/2"].sCapHeight
+    widths = [glyphs[names[ord(c)]].width * scale for c in text]
+    pen_x, parts = x - sum(widths) / 2, []
+    for char, width in zip(text, widths, strict=True):
+        pen = SVGPathPen(glyphs)
+        glyphs[names[ord(char)]].draw(pen)
+        move = f"translate({pen_x:.1f} {y}) scale({scale:.4f} {-scale:.4f})"
+        parts.append(f'<path transform="{move}" d="{pen.getCommands()}"/>')
+        pen_x += width
+    return f'<g fill="{color}">{"".join(parts)}</g>'
+
+
+def width_of(text: str, height: float) -> float:
+    """Width of `text` when its capitals are `height` high."""
+    glyphs, names = FONT.getGlyphSet(), FONT.getBestCmap()
+    return sum(glyphs[names[ord(c)]].width for c in text) * height / FONT["OS/2"].sCapHeight
+
+
+def caption(text: str, color: str) -> str:
+    """The hazard in words below the middle, in two lines where one would be too small."""
+    head, _, tail = text.rpartition(" ")
+    lines = [head, tail] if width_of(text, 52) > 600 else [text]
+    parts = []
+    for i, line in enumerate(lines):
+        y = 612 + 74 * i
+        room = 2 * (950 - y) - 90
+        height = min(60.0, 60 * room / width_of(line, 60))
+        parts.append(words(line, 500, y, height, color))
+    return "".join(parts)
+
+
+def flame(color: str, dy: float = 0) -> str:
+    return f'<g fill="{color}" transform="translate(0 {dy})"><path d="{FLAME}"/>{FLAME_BASE}</g>'
+
+
+def bomb() -> str:
+    rays = "".join(
+        f'<path transform="rotate({a} 500 330)" d="M482 235 L500 {tip} L518 235 Z"/>'
+        for a, tip in [
+            (-75, 150),
+            (-45, 120),
+            (-20, 160),
+            (8, 110),
+            (35, 150),
+            (60, 120),
+            (85, 170),
+        ]
+    )
+    shards = "".join(
+        f'<path d="M{x} {y} l34 -14 l10 30 l-30 18 Z"/>'
+        for x, y in [(330, 210), (420, 160), (580, 170), (650, 250), (300, 330), (660, 350)]
+    )
+    return (
+        f'<g fill="{BLACK}"><circle cx="500" cy="355" r="82"/>{rays}{shards}'
+        '<path d="M400 455 h200 l24 22 h-248 Z"/></g>'
+    )
+
+
+def cylinder(color: str) -> str:
+    return (
+        f'<g fill="{color}" transform="rotate(-58 500 320)">'
+        '<rect x="452" y="225" width="96" height="270" rx="40"/>'
+        '<rect x="478" y="165" width="44" height="44" rx="8"/>'
+        '<rect x="462" y="145" width="76" height="22" rx="8"/></g>'
+    )
+
+
+def skull() -> str:
+    bones = "".join(
+        f'<g transform="rotate({a} 500 430)"><rect x="330" y="418" width="340" height="24"/>'
+        '<circle cx="330" cy="414" r="20"/><circle cx="330" cy="446" r="20"/>'
+        '<circle cx="670" cy="414" r="20"/><circle cx="670" cy="446" r="20"/></g>'
+        for a in (-20, 20)
+    )
+    return (
+        f'<g fill="{BLACK}">{bones}<path d="M500 160 C592 160 640 220 632 296 C628 334 606 344 600 '
+        "366 C596 392 588 402 560 402 L440 402 C412 402 404 392 400 366 C394 344 372 334 368 296 "
+        'C360 220 408 160 500 160 Z"/></g>'
+        f'<g fill="{WHITE}"><ellipse cx="446" cy="290" rx="36" ry="40"/>'
+        '<ellipse cx="554" cy="290" rx="36" ry="40"/><path d="M500 320 l20 40 h-40 Z"/>'
+        '<rect x="452" y="376" width="8" height="26"/><rect x="496" y="376" width="8" height="26"/>'
+        '<rect x="540" y="376" width="8" height="26"/></g>'
+    )
+
+
+def flame_over_circle() -> str:
+    return (
+        f'<g transform="translate(125 68) scale(0.75)"><path fill="{BLACK}" d="{FLAME}"/></g>'
+        f'<circle cx="500" cy="432" r="62" fill="none" stroke="{BLACK}" stroke-width="22"/>'
+        f'<rect x="400" y="512" width="200" height="18" fill="{BLACK}"/>'
+    )
+
+
+def trefoil(cy: float = 300) -> str:
+    blades = ""
+    for angle in (0, 120, 240):
+        blades += (
+            f'<path transform="rotate({angle} 500 {cy})" d="M{500 - 24.75} {cy - 42.9} '
+            f"A49.5 49.5 0 0 1 {500 + 24.75} {cy - 42.9} L{500 + 80} {cy - 138.6} "
+            f'A160 160 0 0 0 {500 - 80} {cy - 138.6} Z"/>'
+        )
+    turned = f'<g transform="rotate(180 500 {cy})">{blades}</g>'
+    scaled = f"translate(500 {cy}) scale(0.92) translate(-500 {-cy})"
+    return f'<g fill="{BLACK}" transform="{scaled}"><circle cx="500" cy="{cy}" r="30"/>{turned}</g>'
+
+
+def infectious() -> str:
+    rings = "".join(
+        f'<g transform="rotate({a} 500 330)"><path d="M500 330 C430 300 420 215 470 165 '
+        'C440 220 462 270 500 276 C538 270 560 220 530 165 C580 215 570 300 500 330 Z"/>'
+        "</g>"
+        for a in (0, 120, 240)
+    )
+    return (
+        f'<g fill="{BLACK}">{rings}<circle cx="500" cy="330" r="26"/></g>'
+        f'<circle cx="500" cy="330" r="92" fill="none" stroke="{BLACK}" stroke-width="20"/>'
+    )
+
+
+def corrosion() -> str:
+    tube = (
+        '<g transform="translate({x} {y}) rotate({a})"><rect x="-80" y="-22" width="160" '
+        'height="44" rx="20"/><rect x="70" y="-28" width="14" height="56"/></g>'
+    )
+    drops = "".join(
+        f'<path d="M{x} {y} q14 26 0 38 q-14 -12 0 -38 Z"/>'
+        for x, y in [(405, 268), (405, 320), (610, 268), (596, 320)]
+    )
+    return (
+        f'<g fill="{BLACK}">{tube.format(x=375, y=215, a=24)}{tube.format(x=630, y=215, a=156)}'
+        f'{drops}<path d="M250 372 h66 q10 22 26 0 h12 q14 30 30 0 h86 v34 h-220 Z"/>'
+        '<path d="M520 400 q20 -30 60 -34 q10 24 22 0 q14 26 28 2 l80 6 q34 8 40 40 l-150 6 '
+        'q-50 6 -80 -20 Z"/></g>'
+    )
+
+
+def stripes(count: int, color: str, upper_only: bool) -> str:
+    """Vertical stripes over the diamond; `count` dark ones with as wide gaps between."""
+    width = 1000 / (2 * count + 1)
+    height = 500 if upper_only else 1000
+    bars = "".join(
+        f'<rect x="{(2 * i + 1) * width:.1f}" y="0" width="{width:.1f}" height="{height}"/>'
+        for i in range(count)
+    )
+    return f'<g fill="{color}" clip-path="url(#inner)">{bars}</g>'
+
+
+def lower_half(color: str) -> str:
+    return f'<path fill="{color}" d="M0 500 L1000 500 L500 1000 Z"/>'
+
+
+def radioactive(bars: int, number: str) -> str:
+    marks = "".join(
+        f'<rect x="{655 + 28 * i}" y="552" width="16" height="60" fill="{RED}"/>'
+        for i in range(bars)
+    )
+    frame = f'fill="none" stroke="{BLACK}" stroke-width="8"'
+    box = f'<rect x="410" y="722" width="180" height="62" {frame}/>'
+    fields = words("CONTENTS", 500, 668, 30, BLACK) + words("ACTIVITY", 500, 710, 30, BLACK)
+    index = "" if number == "I" else box + words("TI", 450, 768, 32, BLACK)
+    line = f'<rect x="0" y="497" width="1000" height="8" fill="{BLACK}"/>'
+    return trefoil() + line + words("RADIOACTIVE", 458, 608, 50, BLACK) + marks + fields + index
+
+
+def fissile() -> str:
+    frame = f'fill="none" stroke="{BLACK}" stroke-width="10"'
+    box = f'<rect x="270" y="540" width="460" height="120" {frame}/>'
+    title = words("FISSILE", 500, 440, 130, BLACK)
+    lines = words("CRITICALITY", 415, 592, 36, BLACK) + words("SAFETY INDEX", 415, 642, 36, BLACK)
+    rule = f'<rect x="0" y="480" width="1000" height="10" fill="{BLACK}" clip-path="url(#inner)"/>'
+    return title + rule + box + lines
+
+
+def explosive(division: str, letter: str) -> str:
+    return words(division, 500, 440, 210, BLACK) + words(letter, 500, 690, 120, BLACK)
+
+
+def marker(field: str, ink: str, body: str, number: str, hazard: str = "", over: str = "") -> str:
+    """One SVG. over: a second field painted on the first, beneath the inner line."""
+    text = caption(hazard, ink) if hazard else ""
+    return (
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 1000">\n'
+        '<clipPath id="outer"><path d="M500 0 L1000 500 L500 1000 L0 500 Z"/></clipPath>'
+        '<clipPath id="inner"><path d="M500 50 L950 500 L500 950 L50 500 Z"/></clipPath>\n'
+        f'<g clip-path="url(#outer)"><rect width="1000" height="1000" fill="{field}"/>{over}'
+        f'<path d="M500 50 L950 500 L500 950 L50 500 Z" fill="none" stroke="{ink}" '
+        f'stroke-width="14"/>\n{body}{text}{words(number, 500, 880, 96 if len(number) == 1 else 76, ink)}</g>\n</svg>\n'
+    )
+
+
+def under_line(ink: str) -> str:
+    return f'<rect x="462" y="890" width="76" height="10" fill="{ink}"/>'
+
+
+def all_markers() -> dict[str, str]:
+    """SVG text of every class, in the order of fastgen.classes.MARKER_CLASSES."""
+    half_bars = stripes(7, BLACK, upper_only=True)
+    return {
+        "C1.1": marker(ORANGE, BLACK, bomb() + words("1.1 D", 500, 640, 110, BLACK), "1"),
+        "C1.2": marker(ORANGE, BLACK, explosive("1.4", "S"), "1"),
+        "C1.3": marker(ORANGE, BLACK, explosive("1.5", "D"), "1"),
+        "C1.4": marker(ORANGE, BLACK, explosive("1.6", "N"), "1"),
+        "C2.1": marker(RED, BLACK, flame(BLACK), "2", "FLAMMABLE GAS"),
+        "C2.2": marker(RED, WHITE, flame(WHITE), "2", "FLAMMABLE GAS"),
+        "C2.3": marker(GREEN, BLACK, cylinder(BLACK), "2", "NON-FLAMMABLE GAS"),
+        "C2.4": marker(GREEN, WHITE, cylinder(WHITE), "2", "NON-FLAMMABLE GAS"),
+        "C2.5": marker(WHITE, BLACK, skull(), "2", "TOXIC GAS"),
+        "C3.1": marker(RED, BLACK, flame(BLACK), "3", "FLAMMABLE LIQUID"),
+        "C3.2": marker(RED, WHITE, flame(WHITE), "3", "FLAMMABLE LIQUID"),
+        "C4.1": marker(WHITE, BLACK, flame(BLACK), "4", over=stripes(7, RED, upper_only=False)),
+        "C4.2": marker(WHITE, BLACK, flame(BLACK, -40), "4", over=lower_half(RED)),
+        "C4.3": marker(BLUE, BLACK, flame(BLACK), "4", "DANGEROUS WHEN WET"),
+        "C4.4": marker(BLUE, WHITE, flame(WHITE), "4", "DANGEROUS WHEN WET"),
+        "C5.1": marker(YELLOW, BLACK, flame_over_circle(), "5.1", "OXIDIZER"),
+        "C5.2": marker(
+            RED, BLACK, flame(BLACK, -40), "5.2", "ORGANIC PEROXIDE", lower_half(YELLOW)
+        ),
+        "C5.3": marker(
+            RED, BLACK, flame(WHITE, -40), "5.2", "ORGANIC PEROXIDE", lower_half(YELLOW)
+        ),
+        "C6.1": marker(WHITE, BLACK, skull(), "6", "TOXIC"),
+        "C6.2": marker(WHITE, BLACK, infectious(), "6", "INFECTIOUS SUBSTANCE"),
+        "C7.1": marker(WHITE, BLACK, radioactive(1, "I"), "7"),
+        "C7.2": marker(YELLOW, BLACK, radioactive(2, "II"), "7", over=lower_half(WHITE)),
+        "C7.3": marker(WHITE, BLACK, fissile(), "7"),
+        "C7.4": marker(YELLOW, BLACK, radioactive(3, "III"), "7", over=lower_half(WHITE)),
+        "C8.1": marker(WHITE, BLACK, corrosion(), "8", over=lower_half(BLACK)).replace(
+            words("8", 500, 880, 96, BLACK), words("8", 500, 880, 96, WHITE)
+        ),
+        "C9.1": marker(WHITE, BLACK, half_bars + under_line(BLACK), "9"),
+    }
+
+
+def bake(svg: str) -> np.ndarray:
+    """RGBA uint8 [SIZE, SIZE, 4]; the colour of the edge carries on into what is transparent."""
+    png = bytes(resvg_py.svg_to_bytes(svg_string=svg, width=SIZE, height=SIZE))
+    image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image.shape[:2] != (SIZE, SIZE):  # a drawing of another aspect is stretched to the square
+        image = cv2.resize(image, (SIZE, SIZE), interpolation=cv2.INTER_CUBIC)
+    alpha = image[..., 3:].astype(np.float32) / 255
+    color = image[..., :3].astype(np.float32)
+    known = (alpha > 0.5).astype(np.float32)
+    color, weight = color * known, known
+    while (weight == 0).any():
+        grown, spread = cv2.blur(color, (9, 9)), cv2.blur(weight, (9, 9))[..., None]
+        fresh = (weight == 0) & (spread > 0)
+        color = np.where(fresh, grown / np.maximum(spread, 1e-6), color)
+        weight = np.where(fresh, 1.0, weight)
+    return np.concatenate([np.rint(color).astype(np.uint8), image[..., 3:]], axis=2)
+
+
+def main() -> None:
+    """Write markers/*.svg and markers/*.png."""
+    for name, svg in all_markers().items():
+        (ASSETS / "markers" / f"{name}.svg").write_text(svg, encoding="utf-8")
+        cv2.imwrite(
+            str(ASSETS / "markers" / f"{name}.png"), bake(svg), [cv2.IMWRITE_PNG_COMPRESSION, 9]
+        )
+
+
+if __name__ == "__main__":
+    main()
