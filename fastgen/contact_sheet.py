@@ -1,0 +1,48 @@
+"""A contact sheet of a dataset, with the boxes as its label files on disk have them."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.overlay import draw_box
+from fastgen.sampling import SPLITS
+from fastgen.writers.encode import png, write
+
+_COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
+
+
+def write_contact_sheet(out: Path, path: Path) -> None:
+    """Draw up to 24 images of dataset `out`, spread evenly, into the PNG at `path`."""
+    images = sorted(p for split in SPLITS for p in (out / "images" / split).glob("*.jpg"))
+    images.sort(key=lambda p: p.stem)
+    count = min(len(images), _COLUMNS * _ROWS)
+    chosen = [images[i * len(images) // count] for i in range(count)]
+    rows = -(-count // _COLUMNS)
+    sheet = np.full((rows * _TILE_PX, _COLUMNS * _TILE_PX, 3), 32, np.uint8)
+    for i, image_path in enumerate(chosen):
+        y, x = i // _COLUMNS * _TILE_PX, i % _COLUMNS * _TILE_PX
+        tile = _tile(out, image_path)
+        sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
+    write(path, png(sheet))
+
+
+def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
+    image = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+    scale = _TILE_PX / max(image.shape[:2])
+    size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
+    tile = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    labels = out / "imdg/labels" / path.parent.name / f"{path.stem}.txt"
+    for line in labels.read_text(encoding="utf-8").splitlines():
+        index, *numbers = line.split()
+        x, y, width, height = (float(v) for v in numbers)
+        box = (
+            (x - width / 2) * size[0],
+            (y - height / 2) * size[1],
+            (x + width / 2) * size[0],
+            (y + height / 2) * size[1],
+        )
+        draw_box(tile, box, DETECTION_CLASSES[int(index)])
+    return np.asarray(tile, np.uint8)

@@ -1,0 +1,46 @@
+"""A progress line: images a second and time left, on a terminal; now and then a line elsewhere."""
+
+import sys
+import time
+from typing import TextIO
+
+_BAR = 28
+_QUIET_S = 15.0
+
+
+class Progress:
+    """Counts images toward a total. stream: where to draw, by default standard error."""
+
+    def __init__(self, total: int, done: int = 0, stream: TextIO | None = None) -> None:
+        self._total, self._done, self._first = total, done, done
+        self._stream = stream or sys.stderr
+        self._began = self._shown = time.monotonic()
+        self._live = self._stream.isatty()
+
+    def add(self, images: int) -> None:
+        """Count `images` more and redraw when it is time."""
+        self._done += images
+        now = time.monotonic()
+        if now - self._shown >= (0.1 if self._live else _QUIET_S):
+            self._shown = now
+            self._draw()
+
+    def close(self) -> None:
+        """Draw the last state."""
+        self._draw()
+        if self._live:
+            self._stream.write("\n")
+        self._stream.flush()
+
+    def _draw(self) -> None:
+        made = self._done - self._first
+        rate = made / max(time.monotonic() - self._began, 1e-9)
+        left_s = int((self._total - self._done) / rate) if rate > 0 else 0
+        filled = _BAR * self._done // max(self._total, 1)
+        bar = "#" * filled + "." * (_BAR - filled)
+        line = (
+            f"[{bar}] {self._done}/{self._total} images, {rate:.1f}/s, "
+            f"{left_s // 60}:{left_s % 60:02d} left"
+        )
+        self._stream.write(f"\r{line}\x1b[K" if self._live else f"{line}\n")
+        self._stream.flush()

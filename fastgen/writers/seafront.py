@@ -1,0 +1,183 @@
+"""The `seafront` layout: one folder a task of the paper, each in the form its trainers read."""
+
+import contextlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.config import LabelConfig
+from fastgen.labels import decal_of
+from fastgen.records import to_plain
+from fastgen.sample import Object, Sample
+from fastgen.sampling import SPLITS
+from fastgen.writers import coco, encode, yolo
+
+_CROP_MARGIN_PX = 3
+_LEGIBLE_FRACTION = 0.85
+_CORNER = 16
+"""labels.outline_mm puts this many points on each side of an outline."""
+
+_DOOR_FOLDERS = {"Cr": "door", "Cl": "no_door"}
+
+
+class SeafrontWriter:
+    """Writes OUT as docs/output.md lays it out. A sample's scene file comes last: it says the rest
+    is whole.
+
+    out: the dataset's folder. labels: which labels are written. version: of fastgen, for COCO info.
+    """
+
+    def __init__(self, out: Path, labels: LabelConfig, version: str) -> None:
+        self._out = out
+        self._labels = labels
+        self._version = version
+        for split in SPLITS:
+            for folder in (
+                f"images/{split}",
+                f"damage/masks/{split}",
+                f"damage/yolo/{split}",
+                f"imdg/labels/{split}",
+                f"text/{split}",
+                f"door/{split}/door",
+                f"door/{split}/no_door",
+                f"scenes/{split}",
+            ):
+                (out / folder).mkdir(parents=True, exist_ok=True)
+        beside = out / "imdg" / "images"
+        if not beside.is_symlink():
+            # trainers look for labels where `images` in an image's path reads `labels`;
+            # another worker may be faster
+            with contextlib.suppress(FileExistsError):
+                beside.symlink_to(Path("..") / "images")
+
+    def has(self, split: str, stem: str) -> bool:
+        """Whether a sample was written whole before."""
+        return (self._out / "scenes" / split / f"{stem}.json").is_file()
+
+    def add(self, sample: Sample, split: str, stem: str) -> None:
+        """Write all files of one sample, its scene file last."""
+        out, size = self._out, sample.view.size
+        image = out / "images" / split / f"{stem}.jpg"
+        encode.write(image, encode.jpeg(sample.image))
+        encode.write(out / "damage/masks" / split / f"{stem}.png", encode.png(sample.damage))
+        encode.write(out / "damage/yolo" / split / f"{stem}.txt", yolo.segmentation_lines(sample))
+        detections = yolo.detection_lines(sample.objects, size, self._labels.min_visible_px)
+        encode.write(out / "imdg/labels" / split / f"{stem}.txt", detections)
+        if folder := _DOOR_FOLDERS.get(sample.camera.name):
+            encode.link(image, out / "door" / split / folder / f"{stem}.jpg")
+        record = {
+            "stem": stem,
+            "split": split,
+            "camera": sample.camera.name,
+            "size": list(size),
+            "scene": to_plain(sample.scene),
+            "objects": [to_plain(item) for item in sample.objects],
+            "annotations": coco.annotations(sample),
+            "crops": self._crops(sample, split, stem),
+        }
+        path = out / "scenes" / split / f"{stem}.json"
+        encode.write(path, json.dumps(record, separators=(",", ":")))
+
+    def finish(self) -> dict[str, dict[str, int]]:
+        """Write the COCO files, text labels and data.yaml. Returns image and object counts."""
+        counts = {}
+        for split in SPLITS:
+            records = [
+                json.loads(path.read_text(encoding="utf-8"))
+                for path in sorted((self._out / "scenes" / split).glob("*.json"))
+            ]
+            self._write_coco(split, records)
+            crops = [crop for record in records for crop in record["crops"]]
+            lines = "".join(f"{crop['file']}\t{crop['text']}\n" for crop in crops)
+            encode.write(self._out / "text" / split / "labels.txt", lines)
+            counts[split] = {
+                "images": len(records),
+                "objects": sum(len(record["objects"]) for record in records),
+                "damages": sum(len(record["annotations"]) - 1 for record in records),
+                "crops": len(crops),
+            }
+        names = "".join(f"  {i}: {name}\n" for i, name in enumerate(DETECTION_CLASSES))
+        # no `path`: trainers take it relative to this file
+        head = "".join(f"{split}: images/{split}\n" for split in SPLITS)
+        encode.write(self._out / "imdg" / "data.yaml", f"{head}nc: 28\nnames:\n{names}")
+        return counts
+
+    def _write_coco(self, split: str, records: list[dict[str, Any]]) -> None:
+        images: list[dict[str, Any]] = []
+        found: list[dict[str, Any]] = []
+        for number, record in enumerate(records, start=1):
+            width, height = record["size"]
+            images.append(
+                {
+                    "id": number,
+                    "file_name": f"images/{split}/{record['stem']}.jpg",
+                    "width": width,
+                    "height": height,
+                    "license": 1,
+                }
+            )
+            for item in record["annotations"]:
+                found.append({"id": len(found) + 1, "image_id": number, **item})
+        dataset = {
+            "info": {
+                "description": "Synthetic shipping containers with damage masks",
+                "version": self._version,
+                "contributor": "fastgen",
+                "year": 2026,
+                "url": "",
+                "date_created": "",
+            },
+            "licenses": [
+                {
+                    "id": 1,
+                    "name": "CC0 1.0",
+                    "url": "https://creativecommons.org/publicdomain/zero/1.0/",
+                }
+            ],
+            "categories": coco.categories(),
+            "images": images,
+            "annotations": found,
+        }
+        text = json.dumps(dataset, separators=(",", ":"))
+        encode.write(self._out / "damage" / f"coco_{split}.json", text)
+
+    def _crops(self, sample: Sample, split: str, stem: str) -> list[dict[str, str]]:
+        made = []
+        width, height = sample.view.size
+        for item in sample.objects:
+            if item.class_name != "text" or not self._legible(sample, item):
+                continue
+            assert item.bbox is not None
+            x0, y0, x1, y1 = item.bbox
+            margin = _CROP_MARGIN_PX
+            crop = sample.image[
+                max(y0 - margin, 0) : min(y1 + margin, height),
+                max(x0 - margin, 0) : min(x1 + margin, width),
+            ]
+            name = f"{stem}_{item.instance}.png"
+            encode.write(self._out / "text" / split / name, encode.png(crop))
+            made.append({"file": name, "text": item.text})
+        return made
+
+    def _legible(self, sample: Sample, item: Object) -> bool:
+        """Large enough along both of its sides, hardly occluded, and not cut by the border."""
+        if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
+            return False
+        decal = decal_of(sample.scene, item.id)
+        outline = np.array(item.polygon).reshape(-1, 2)
+        corners = outline[[0, _CORNER, 2 * _CORNER, 3 * _CORNER]]
+        across = np.linalg.norm(corners[1] - corners[0]) / decal.size_mm[0]
+        up = np.linalg.norm(corners[3] - corners[0]) / decal.size_mm[1]
+        return bool(min(across, up) * decal.cap_mm >= self._labels.min_text_px)
+
+
+def remove_partial(out: Path) -> None:
+    """Clear away what an interrupted run left aside."""
+    for folder, _, files in os.walk(out):
+        for name in files:
+            if name.startswith(".") and name.endswith(".part"):
+                Path(folder, name).unlink(missing_ok=True)
