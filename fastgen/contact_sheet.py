@@ -16,10 +16,20 @@ _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
 def write_contact_sheet(out: Path, path: Path) -> None:
     """Draw up to 24 images of dataset `out`, spread evenly, into the PNG at `path`."""
-    images = sorted(p for split in SPLITS for p in (out / "images" / split).glob("*.jpg"))
-    images.sort(key=lambda p: p.stem)
+    images = [p for split in SPLITS for p in (out / "images" / split).glob("*.jpg")]
+    by_camera: dict[str, list[Path]] = {}
+    for image in sorted(images, key=lambda p: p.stem):
+        by_camera.setdefault(image.stem.split("_", 1)[1], []).append(image)
+    # a row of one camera after the other, each spread over the dataset
     count = min(len(images), _COLUMNS * _ROWS)
-    chosen = [images[i * len(images) // count] for i in range(count)]
+    share = -(-count // max(len(by_camera), 1))
+    chosen = [
+        views[i * len(views) // share]
+        for i in range(share)
+        for views in by_camera.values()
+        if share <= len(views)
+    ][:count] or images[:count]
+    count = len(chosen)
     rows = -(-count // _COLUMNS)
     sheet = np.full((rows * _TILE_PX, _COLUMNS * _TILE_PX, 3), 32, np.uint8)
     for i, image_path in enumerate(chosen):
@@ -30,10 +40,12 @@ def write_contact_sheet(out: Path, path: Path) -> None:
 
 
 def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
-    image = cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
+    stored = cv2.imread(str(path))
+    assert stored is not None, path
+    image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
-    tile = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     labels = out / "imdg/labels" / path.parent.name / f"{path.stem}.txt"
     for line in labels.read_text(encoding="utf-8").splitlines():
         index, *numbers = line.split()
@@ -45,4 +57,4 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
             (y + height / 2) * size[1],
         )
         draw_box(tile, box, DETECTION_CLASSES[int(index)])
-    return np.asarray(tile, np.uint8)
+    return tile

@@ -1,0 +1,173 @@
+"""The `fastgen` command."""
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import fastgen
+from fastgen import doctor, stats
+from fastgen.config import Config
+from fastgen.errors import ConfigError, FastgenError, OutputError
+from fastgen.export import export_glb
+from fastgen.generate import FORMATS, Job, generate, parse_split
+from fastgen.generator import Generator
+from fastgen.gl import BACKENDS
+from fastgen.overlay import label_colors, overlay
+from fastgen.programs import LAYERS
+from fastgen.records import nearest
+from fastgen.verify import verify
+from fastgen.writers.encode import jpeg, png, write
+
+SHOWN_LAYERS = (*LAYERS, "ids", "damage")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit code: 0 good, 1 faults found, 2 bad input."""
+    options = _parser().parse_args(arguments)
+    try:
+        code: int = options.run(options)
+    except FastgenError as error:
+        print(f"fastgen: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
+        return 130
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fastgen", description="Exactly labelled synthetic images of shipping containers."
+    )
+    parser.add_argument("--version", action="version", version=f"fastgen {fastgen.__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    make = commands.add_parser("generate", help="make a dataset, or finish one")
+    make.add_argument("out", metavar="OUT", type=Path)
+    make.add_argument("--images", type=int, required=True, metavar="N")
+    make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
+    make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
+    cores = len(os.sched_getaffinity(0))
+    make.add_argument("--workers", type=int, default=cores, metavar="K")
+    make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
+    make.add_argument(
+        "--split", metavar="NAME|a,b,c", help="train, val or test for all, or three fractions"
+    )
+    make.set_defaults(run=_generate)
+
+    show = commands.add_parser("show", help="render one image")
+    show.add_argument("--index", type=int, required=True, metavar="I")
+    show.add_argument("--camera", default="A")
+    show.add_argument("--layer", default="all", metavar="|".join(SHOWN_LAYERS))
+    show.add_argument("--overlay", action="store_true", help="draw boxes, names and damage")
+    show.add_argument("--size", default="640x640", metavar="WxH")
+    show.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
+    show.set_defaults(run=_show)
+
+    export = commands.add_parser("export", help="write one container as a GLB file")
+    export.add_argument("--index", type=int, required=True, metavar="I")
+    export.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
+    export.set_defaults(run=_export)
+
+    for command in (make, show, export):
+        command.add_argument("--seed", type=int, default=0, metavar="S")
+        command.add_argument("--preset", default="seafront")
+        command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
+        command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
+    for command in (make, show):
+        command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
+
+    for name, run, words in (
+        ("stats", _stats, "print what a dataset holds"),
+        ("verify", _verify, "check that a dataset is whole"),
+    ):
+        command = commands.add_parser(name, help=words)
+        command.add_argument("out", metavar="OUT", type=Path)
+        command.set_defaults(run=run)
+    commands.add_parser("doctor", help="try the OpenGL backends").set_defaults(run=_doctor)
+    return parser
+
+
+def _config(options: argparse.Namespace) -> Config:
+    preset = Config.preset(options.preset)
+    return Config.load(options.config, preset) if options.config else preset
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match:
+        raise ConfigError(f"size: {text!r} is no size; write WIDTHxHEIGHT, as in 640x640")
+    return int(match[1]), int(match[2])
+
+
+def _generate(options: argparse.Namespace) -> int:
+    config = parse_split(options.split, _config(options))
+    cameras = tuple(options.cameras.split(",")) if options.cameras else tuple(config.cameras)
+    job = Job(
+        out=options.out,
+        images=options.images,
+        config=config,
+        seed=options.seed,
+        size=_size(options.size),
+        cameras=cameras,
+        hdri_dir=options.hdri,
+        backend=options.backend,
+    )
+    manifest = generate(job, options.workers, options.format)
+    total = sum(split["images"] for split in manifest["counts"].values())
+    print(f"{total} images in {options.out}; look at {options.out / 'contact_sheet.png'}")
+    return 0
+
+
+def _show(options: argparse.Namespace) -> int:
+    layer = options.layer
+    if layer not in SHOWN_LAYERS:
+        raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, SHOWN_LAYERS)}")
+    encode = {".png": png, ".jpg": jpeg, ".jpeg": jpeg}.get(options.file.suffix.lower())
+    if encode is None:
+        raise ConfigError(f"{options.file}: give a file name that ends in .png or .jpg")
+    drawn = layer if layer in LAYERS else "all"
+    with Generator(
+        _config(options),
+        options.seed,
+        _size(options.size),
+        backend=options.backend,
+        hdri_dir=options.hdri,
+    ) as generator:
+        sample = generator.render(index=options.index, camera=options.camera, layer=drawn)
+    image = sample.image
+    if layer in ("ids", "damage"):
+        image = label_colors(sample.ids if layer == "ids" else sample.damage)
+    if options.overlay:
+        image = overlay(sample, image)
+    try:
+        write(options.file, encode(image))
+    except OSError as error:
+        raise OutputError(f"{options.file}: cannot be written ({error.strerror})") from None
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    generator = Generator(_config(options), options.seed, hdri_dir=options.hdri)
+    export_glb(generator.scene(options.index), options.file)
+    return 0
+
+
+def _stats(options: argparse.Namespace) -> int:
+    print(stats.report(options.out))
+    return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    faults = verify(options.out)
+    print("\n".join(faults) if faults else f"{options.out}: whole and consistent")
+    return 1 if faults else 0
+
+
+def _doctor(_: argparse.Namespace) -> int:
+    words, works = doctor.report()
+    print(words)
+    return 0 if works else 1
