@@ -11,7 +11,6 @@ import fastgen
 from fastgen import doctor, stats
 from fastgen.config import Config
 from fastgen.errors import ConfigError, FastgenError, OutputError
-from fastgen.export import export_glb
 from fastgen.generate import FORMATS, Job, generate, parse_split
 from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
@@ -151,6 +150,8 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
+    from fastgen.export import export_glb  # loads trimesh, which the other commands do without
+
     generator = Generator(_config(options), options.seed, hdri_dir=options.hdri)
     export_glb(generator.scene(options.index), options.file)
     return 0

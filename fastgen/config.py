@@ -73,7 +73,7 @@ class ContainerConfig:
         metadata=bounds(0.0, 1e6),
     )
     profiles: WallProfiles = field(default_factory=WallProfiles)
-    depth_scale: tuple[float, ...] = field(default=(0.92, 1.0, 1.08), metadata=bounds(0.2, 3.0))
+    depth_scale: tuple[float, ...] = field(default=(0.95, 1.06), metadata=bounds(0.2, 3.0))
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ class Renderer:
             damage: link(self._ctx, "geometry.vert", "geometry.frag", {}, damage=damage)
             for damage in DAMAGE_VARIANTS
         }
-        self._shading: _Kept[Shading] = _Kept(len(DAMAGE_VARIANTS) * len(LAYERS))
+        self._shading: _Kept[Shading] = _Kept(len(LAYERS))
         self._targets: _Kept[Targets] = _Kept(3)
         self._meshes: _Kept[GpuMesh] = _Kept(16)
         self._lights: _Kept[GpuLight] = _Kept(24)
@@ -146,9 +146,7 @@ class Renderer:
             scene,
             lambda: _SceneDecals(ctx, pack_decals(scene, mesh.mesh, self._art_layers, self._fonts)),
         )
-        shading = self._shading.get(
-            (layer, damage), lambda: Shading(ctx, self._samples_per_axis, layer, damage)
-        )
+        shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         exposure = metered_exposure(
             light_data, scene.environment.yaw_deg, view, camera, scene.surface.paint.albedo
@@ -191,7 +189,7 @@ class Renderer:
             textures["rest_points"] = targets.rest
         for name, texture in textures.items():
             texture.use(UNITS[name])
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)))
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)), damage)
         return targets
 
     def mesh(self, container: Container) -> Mesh:
@@ -240,7 +238,7 @@ def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
     size = base.shape[1]
     texture = ctx.texture_array((size, size, len(base)), 4, base.tobytes())
     texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
     return texture
 
 

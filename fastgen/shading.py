@@ -5,7 +5,7 @@ from typing import Any
 import moderngl
 
 from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link
-from fastgen.targets import Targets
+from fastgen.targets import Region, Targets
 
 UNITS = {
     "surface_keys": 0,
@@ -26,49 +26,71 @@ UNITS = {
 
 
 class Shading:
-    """The programs that shade one layer, a classifier and one program a pixel class."""
+    """The programs that shade one layer: a classifier, and one program a pixel class.
 
-    def __init__(
-        self, ctx: moderngl.Context, samples_per_axis: int, layer: str, damage: str
-    ) -> None:
+    They are linked when first needed, and scenes with and without damage share what they can.
+    """
+
+    def __init__(self, ctx: moderngl.Context, samples_per_axis: int, layer: str) -> None:
         self._ctx = ctx
-        variant = {"samples_per_axis": samples_per_axis, "layer": layer, "damage": damage}
-        self._programs = [link(ctx, "fullscreen.vert", "classify.frag", UNITS, **variant)]
-        for number, (name, traits) in enumerate(PIXEL_CLASSES.items()):
-            needless = {"sound": {"DAMAGE", "HOLES"}, "damaged": {"HOLES"}, "holed": set()}[damage]
-            if needless & set(traits) or (samples_per_axis == 1 and name.startswith("mixed")):
-                continue
-            program = link(ctx, "fullscreen.vert", "shade.frag", UNITS, pixel_class=name, **variant)
-            program["class_depth"] = number * CLASS_DEPTH_STEP
-            self._programs.append(program)
-        self._arrays = [ctx.vertex_array(program, []) for program in self._programs]
+        self._samples_per_axis = samples_per_axis
+        self._layer = layer
+        self._programs: dict[tuple[str, str], moderngl.Program] = {}
+        self._arrays: dict[tuple[str, str], moderngl.VertexArray] = {}
 
-    def draw(self, targets: Targets, region: tuple[int, int, int, int] | None) -> None:
+    def draw(self, targets: Targets, region: Region | None, damage: str) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
-        region: x, y, width and height of the pixels outside which there is only sky; None where
-        that is not known.
+        region: the pixels outside which there is only sky; None where that is not known.
+        damage: one of programs.DAMAGE_VARIANTS.
         """
         image = targets.image
         image.use()
         targets.clear_classes()
         self._ctx.enable_only(moderngl.DEPTH_TEST)
-        classify, sky, *surfaces = self._arrays
         self._ctx.scissor = region
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
-        classify.render(moderngl.TRIANGLES, vertices=3)
+        self._run("classify", damage)
         image.depth_mask = False
         self._ctx.depth_func = "=="
-        for array in surfaces:
-            array.render(moderngl.TRIANGLES, vertices=3)
+        for name, traits in PIXEL_CLASSES.items():
+            if name != "sky" and self._comes(name, traits, damage):
+                self._run(name, "holed" if "DAMAGE" in traits else "sound")
         self._ctx.scissor = None
-        sky.render(moderngl.TRIANGLES, vertices=3)
+        self._run("sky", "sound")
         image.depth_mask = True
         self._ctx.depth_func = "<"
 
+    def _comes(self, name: str, traits: tuple[str, ...], damage: str) -> bool:
+        """Whether the classifier of this variant may give any pixel this class."""
+        if self._samples_per_axis == 1 and name.startswith("mixed"):
+            return False
+        if "HOLES" in traits:
+            return damage == "holed"
+        return damage != "sound" or "DAMAGE" not in traits
+
+    def _run(self, name: str, damage: str) -> None:
+        key = (name, damage)
+        if key not in self._arrays:
+            variant: dict[str, Any] = {
+                "samples_per_axis": self._samples_per_axis,
+                "layer": self._layer,
+                "damage": damage,
+            }
+            fragment = "classify.frag"
+            if name != "classify":
+                fragment = "shade.frag"
+                variant["pixel_class"] = name
+            program = link(self._ctx, "fullscreen.vert", fragment, UNITS, **variant)
+            if name != "classify":
+                program["class_depth"] = list(PIXEL_CLASSES).index(name) * CLASS_DEPTH_STEP
+            self._programs[key] = program
+            self._arrays[key] = self._ctx.vertex_array(program, [])
+        self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
+
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [*self._arrays, *self._programs]
+        items: list[Any] = [*self._arrays.values(), *self._programs.values()]
         for item in items:
             item.release()

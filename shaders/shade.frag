@@ -56,24 +56,43 @@ Shaded sky(vec3 ray) {
     return Shaded(color, 0u, 0u, VOID_DEPTH);
 }
 
-Shaded shade(ivec2 sample_at, uint key, vec3 ray) {
+// all that the samples of one part within a pixel share: its layers, the point they are taken at
+struct Part {
+    SurfacePoint surface;
+    uint id;
+    uint damage;
+    float depth;
+    vec3 rest_mm;
+};
+
+Part part_at(ivec2 sample_at, uint key, vec3 view) {
     vec4 sheet = texelFetch(sheet_points, sample_at, 0);
     vec3 normal = key_normal(key);
-    vec3 view = -normalize(ray);
-    uint damage = SOUND_CONTAINER;
+    Part p;
+    p.damage = SOUND_CONTAINER;
+    p.depth = sheet.z;
     float scar = 0.0;
 #if WITH_DAMAGE
-    Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz, normal);
-    if (d.value != 0u) damage = d.value;
+    p.rest_mm = texelFetch(rest_points, sample_at, 0).xyz;
+    Damaged d = damage_at(p.rest_mm, normal);
+    if (d.value != 0u) p.damage = d.value;
     scar = d.scar;
     normal = d.normal;
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
     float footprint_mm = sheet.z * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-    SurfacePoint s = surface_at(key_chart(key), sheet.xy, footprint_mm, scar);
-    uint id = s.decal_id != 0u ? s.decal_id : CONTAINER_ID;
-    return Shaded(layer_color(s, normal, view), id, damage, sheet.z);
+    p.surface = surface_at(key_chart(key), sheet.xy, footprint_mm, scar);
+    p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
+    return p;
+}
+
+vec3 part_color(Part p, uint key, vec3 view) {
+    vec3 normal = key_normal(key);
+#if WITH_DAMAGE
+    normal = damage_at(p.rest_mm, normal).normal;
+#endif
+    return layer_color(p.surface, normal, view);
 }
 
 #if WITH_HOLES
@@ -105,45 +124,64 @@ void main() {
     Shaded s = sky(view_ray(center));
     vec3 color = s.color;
 #elif !WITH_MIXED
-    Shaded s = shade(middle, texelFetch(surface_keys, middle, 0).r, view_ray(center));
-    vec3 color = s.color;
+    uint key = texelFetch(surface_keys, middle, 0).r;
+    vec3 view = -normalize(view_ray(center));
+    Part p = part_at(middle, key, view);
+    Shaded s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
+    vec3 color = part_color(p, key, view);
 #else
-    // a tent filter over the samples on and between the neighbouring pixel centres: one round for
-    // each different surface, the centre's first
+    // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
+    // for each part of the container seen, the light once for each of its orientations
     uint keys[TENT_SAMPLES];
+    float sky_weight = 0.0;
     for (int i = 0; i < TENT_SAMPLES; ++i) {
         ivec2 at = middle + TENT_OFFSET[i];
         keys[i] = texelFetch(surface_keys, at, 0).r;
+        if (keys[i] == 0u) { sky_weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
 #if WITH_HOLES
         int hole = hole_at(texelFetch(rest_points, at, 0).xyz);
-        if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
+        if (keys[i] != TAKEN && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
 #endif
     }
-    Shaded s;
-    vec3 color = vec3(0.0);
-    float left = 1.0;
-    for (int round = 0; round < MAX_SURFACES && left > 0.001; ++round) {
+    bool sees_sky = keys[0] == TAKEN;
+    Shaded s = sky(view_ray(center));
+    vec3 color = sky_weight * s.color;
+    float done = sky_weight;
+    for (int part = 0; part < MAX_PARTS && done < 0.999; ++part) {
         int first = -1;
-        uint key = 0u;
-        float weight = 0.0;
-        for (int i = 0; i < TENT_SAMPLES; ++i) {
-            bool fresh = keys[i] != TAKEN;
-            if (fresh && first < 0) { first = i; key = keys[i]; }
-            if (fresh && keys[i] == key) { weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
-        }
-        left -= weight;
-        // what is left of a busy pixel counts with its last surface
-        if (round == MAX_SURFACES - 1) weight += left;
+        uint chart = 0u;
+        for (int i = 0; i < TENT_SAMPLES; ++i)
+            if (first < 0 && keys[i] != TAKEN) { first = i; chart = key_chart(keys[i]); }
         ivec2 offset = TENT_OFFSET[first];
         vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
-        Shaded one = shade(middle + offset, key, ray);
-        if (key == 0u) one = sky(ray);
+        vec3 view = -normalize(ray);
+        Part p = part_at(middle + offset, keys[first], view);
+        bool at_center = part == 0 && !sees_sky;
+        if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
+        bool more = true;
+        for (int side = 0; side < MAX_SIDES && more; ++side) {
+            uint key = TAKEN;
+            float weight = 0.0;
+            more = false;
+            for (int i = 0; i < TENT_SAMPLES; ++i) {
+                bool same_part = keys[i] != TAKEN && key_chart(keys[i]) == chart;
+                if (same_part && key == TAKEN) key = keys[i];
+                if (same_part && keys[i] == key) { weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
+                else more = more || same_part;
+            }
+            vec3 lit_color = part_color(p, key, view);
 #if WITH_HOLES
-        if (key_chart(key) == PORTAL_CHART) one = through_hole(middle + offset, key, ray);
+            if (chart == PORTAL_CHART) {
+                Shaded through = through_hole(middle + offset, key, ray);
+                lit_color = through.color;
+                if (at_center && side == 0) s = through;
+            }
 #endif
-        color += weight * one.color;
-        if (round == 0) s = one;
+            color += weight * lit_color;
+            done += weight;
+        }
     }
+    color /= done;   // of a busy pixel, what was not come to counts like the rest
 #endif
     out_color = vec4(srgb_encode(color), 1.0);
     out_labels = s.id | (s.damage << 16);

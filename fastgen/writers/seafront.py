@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fastgen.labels import decal_of
 from fastgen.records import to_plain
 from fastgen.sample import Object, Sample
 from fastgen.sampling import SPLITS
+from fastgen.scene import Scene
 from fastgen.writers import coco, encode, yolo
 
 _CROP_MARGIN_PX = 3
@@ -74,13 +76,13 @@ class SeafrontWriter:
             "split": split,
             "camera": sample.camera.name,
             "size": list(size),
-            "scene": to_plain(sample.scene),
-            "objects": [to_plain(item) for item in sample.objects],
+            "objects": [vars(item) for item in sample.objects],
             "annotations": coco.annotations(sample),
             "crops": self._crops(sample, split, stem),
         }
         path = out / "scenes" / split / f"{stem}.json"
-        encode.write(path, json.dumps(record, separators=(",", ":")))
+        text = json.dumps(record, separators=(",", ":"))
+        encode.write(path, f'{text[:-1]},"scene":{_scene_json(sample.scene)}}}')
 
     def finish(self) -> dict[str, dict[str, int]]:
         """Write the COCO files, text labels and data.yaml. Returns image and object counts."""
@@ -173,6 +175,12 @@ class SeafrontWriter:
         across = np.linalg.norm(corners[1] - corners[0]) / decal.size_mm[0]
         up = np.linalg.norm(corners[3] - corners[0]) / decal.size_mm[1]
         return bool(min(across, up) * decal.cap_mm >= self._labels.min_text_px)
+
+
+@lru_cache(maxsize=2)
+def _scene_json(scene: Scene) -> str:
+    """The scene as JSON text; all cameras of a scene share it."""
+    return json.dumps(to_plain(scene), separators=(",", ":"))
 
 
 def remove_partial(out: Path) -> None:
