@@ -186,7 +186,7 @@ def lower_half(color: str) -> str:
 
 def radioactive(bars: int, number: str) -> str:
     marks = "".join(
-        f'<rect x="{655 + 28 * i}" y="552" width="16" height="60" fill="{RED}"/>'
+        f'<rect x="{640 + 46 * i}" y="535" width="28" height="96" fill="{RED}"/>'
         for i in range(bars)
     )
     frame = f'fill="none" stroke="{BLACK}" stroke-width="8"'
@@ -194,7 +194,7 @@ def radioactive(bars: int, number: str) -> str:
     fields = words("CONTENTS", 500, 668, 30, BLACK) + words("ACTIVITY", 500, 710, 30, BLACK)
     index = "" if number == "I" else box + words("TI", 450, 768, 32, BLACK)
     line = f'<rect x="0" y="497" width="1000" height="8" fill="{BLACK}"/>'
-    return trefoil() + line + words("RADIOACTIVE", 458, 608, 50, BLACK) + marks + fields + index
+    return trefoil() + line + words("RADIOACTIVE", 425, 608, 50, BLACK) + marks + fields + index
 
 
 def fissile() -> str:

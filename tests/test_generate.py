@@ -1,0 +1,249 @@
+"""Whole datasets from the command line: complete, the same bytes, resumable, and clear errors."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from fastgen.cli import main
+from fastgen.config import Config
+from fastgen.sampling import split_of
+from fastgen.scene import Scene
+
+ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
+
+
+def run(out, *more):
+    return main(["generate", str(out), *ARGUMENTS, *more])
+
+
+def content(folder):
+    """Hash of every file by its relative name."""
+    return {
+        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "dataset"
+    assert run(out, "--workers", "2") == 0
+    return out
+
+
+def records(out):
+    return [json.loads(p.read_text()) for p in sorted(out.glob("scenes/*/*.json"))]
+
+
+def test_every_file_of_the_layout_is_there(dataset):
+    assert len(list(dataset.glob("images/*/*.jpg"))) == 14
+    for record in records(dataset):
+        split, stem = record["split"], record["stem"]
+        for name in (
+            f"images/{split}/{stem}.jpg",
+            f"damage/masks/{split}/{stem}.png",
+            f"damage/yolo/{split}/{stem}.txt",
+            f"imdg/labels/{split}/{stem}.txt",
+        ):
+            assert (dataset / name).is_file()
+    manifest = json.loads((dataset / "dataset.json").read_text())
+    assert sum(s["images"] for s in manifest["counts"].values()) == 14
+    assert manifest["seed"] == 3
+    assert "llvmpipe" in manifest["renderer"] or manifest["renderer"]
+    sheet = cv2.imread(str(dataset / "contact_sheet.png"))
+    assert sheet is not None
+
+
+def test_coco_ground_truth_scores_full_marks_against_itself(dataset):
+    for split in ("train", "val", "test"):
+        truth = COCO(str(dataset / f"damage/coco_{split}.json"))
+        if not truth.getAnnIds():
+            continue
+        found = [dict(a, score=1.0) for a in truth.dataset["annotations"]]
+        for kind in ("bbox", "segm"):
+            score = COCOeval(truth, truth.loadRes([dict(a) for a in found]), kind)
+            score.evaluate()
+            score.accumulate()
+            score.summarize()
+            assert score.stats[0] == pytest.approx(1.0)
+
+
+def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):
+    data = yaml.safe_load((dataset / "imdg/data.yaml").read_text())
+    assert len(data["names"]) == data["nc"] == 28
+    pairs = 0
+    for split in ("train", "val", "test"):
+        for image in (dataset / "imdg" / data[split]).glob("*.jpg"):
+            head, tail = str(image).rsplit("/images/", 1)
+            label = Path(f"{head}/labels/{tail}").with_suffix(".txt")
+            assert label.is_file()
+            pairs += 1
+    assert pairs == 14
+
+
+def test_door_folders_hold_the_two_ends(dataset):
+    for split in ("train", "val", "test"):
+        for folder, camera in (("door", "Cr"), ("no_door", "Cl")):
+            for path in (dataset / "door" / split / folder).iterdir():
+                assert path.stem.endswith(f"_{camera}")
+                assert path.read_bytes() == (dataset / "images" / split / path.name).read_bytes()
+
+
+def test_all_views_of_a_scene_share_a_split(dataset):
+    splits = {}
+    for record in records(dataset):
+        splits.setdefault(record["stem"].split("_")[0], set()).add(record["split"])
+    assert all(len(found) == 1 for found in splits.values())
+    drawn = [split_of(Config.preset(), 3, i) for i in range(2000)]
+    assert drawn.count("train") / 2000 == pytest.approx(0.7, abs=0.05)
+
+
+def test_scene_files_hold_the_scene(dataset):
+    for record in records(dataset)[:3]:
+        scene = Scene.from_json(json.dumps(record["scene"]))
+        assert scene.index == int(record["stem"].split("_")[0])
+
+
+def test_one_worker_makes_the_same_bytes_as_two(dataset, tmp_path):
+    assert run(tmp_path / "out", "--workers", "1") == 0
+    assert content(tmp_path / "out") == content(dataset)
+
+
+def test_running_again_restores_what_is_missing(dataset, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out, symlinks=True)
+    for path in sorted(out.glob("scenes/*/*.json"))[::3]:
+        path.unlink()
+    (out / "damage/coco_train.json").unlink()
+    assert run(out) == 0
+    assert content(out) == content(dataset)
+
+
+def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
+    deadline = time.monotonic() + 60
+    while len(list(out.glob("scenes/*/*.json"))) < 3 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    assert run(out) == 0
+    assert content(out) == content(dataset)
+
+
+def test_more_images_extend_a_dataset(dataset, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out, symlinks=True)
+    before = content(out / "images")
+    assert main(["generate", str(out), "--images", "17", *ARGUMENTS[2:]]) == 0
+    after = content(out / "images")
+    assert len(after) == 17
+    assert before.items() <= after.items()
+
+
+def test_verify_finds_faults_and_passes_sound_data(dataset, tmp_path, capsys):
+    assert main(["verify", str(dataset)]) == 0
+    for number, damage in enumerate(
+        (
+            lambda out: next(out.glob("images/*/*.jpg")).write_bytes(b"no jpeg"),
+            lambda out: next(out.glob("damage/masks/*/*.png")).unlink(),
+            lambda out: (out / "extra.txt").write_text("x"),
+            lambda out: next(out.glob("imdg/labels/*/*.txt")).write_text("3 1.2 0 0 0\n"),
+            lambda out: next(out.glob("scenes/*/*.json")).write_text("{}"),
+        )
+    ):
+        out = tmp_path / str(number)
+        shutil.copytree(dataset, out, symlinks=True)
+        damage(out)
+        capsys.readouterr()
+        assert main(["verify", str(out)]) == 1
+        assert capsys.readouterr().out.strip()
+
+
+def test_stats_counts_what_the_files_hold(dataset, capsys):
+    assert main(["stats", str(dataset)]) == 0
+    printed = capsys.readouterr().out
+    row = next(line for line in printed.splitlines() if line.startswith("container"))
+    assert sum(int(v) for v in row.split()[1:]) == 14
+
+
+def test_split_option_puts_all_in_one(tmp_path):
+    out = tmp_path / "out"
+    arguments = ["--images", "2", "--size", "64x64", "--cameras", "Cr", "--split", "val"]
+    assert main(["generate", str(out), *arguments]) == 0
+    assert len(list(out.glob("images/val/*.jpg"))) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["generate", "{out}", "--images", "0"], "images: 0 is out of range"),
+        (["generate", "{out}", "--images", "2", "--size", "10x10"], "size: 10x10 is out of range"),
+        (["generate", "{out}", "--images", "2", "--size", "huge"], "size: 'huge' is no size"),
+        (["generate", "{out}", "--images", "2", "--workers", "0"], "workers: 0 is out of range"),
+        (["generate", "{out}", "--images", "2", "--preset", "seafornt"], "did you mean seafront"),
+        (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
+        (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
+        (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),
+        (["generate", "{out}", "--images", "2", "--config", "{bad}"], "did you mean rust_coverage"),
+        (["generate", "{full}", "--images", "2"], "holds something else"),
+        (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
+        (["show", "--index", "0", "--layer", "rusty", "-o", "{out}.png"], "did you mean rust"),
+        (["show", "--index", "0", "-o", "{out}.gif"], "ends in .png or .jpg"),
+        (["verify", "{empty}"], "no readable dataset.json"),
+        (["stats", "{empty}"], "no dataset.json"),
+    ],
+)
+def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/notes.txt").write_text("mine")
+    (tmp_path / "bad.yaml").write_text("surface: {rust_coverag: [0, 1]}\n")
+    places = {name: str(tmp_path / name) for name in ("out", "empty", "full")}
+    filled = [a.format(**places, bad=tmp_path / "bad.yaml") for a in arguments]
+    assert main(filled) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: ")
+    assert error.count("\n") == 1
+    assert message in error
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_show_writes_every_layer(tmp_path):
+    seen = set()
+    for layer in ("all", "base", "tone", "ageing", "dirt", "rust", "decals", "normals", "ids"):
+        path = tmp_path / f"{layer}.png"
+        arguments = ["--index", "1", "--camera", "Cr", "--size", "128x128", "--layer", layer]
+        assert main(["show", *arguments, "--overlay", "-o", str(path)]) == 0
+        image = cv2.imread(str(path))
+        assert image.shape == (128, 128, 3)
+        assert np.ptp(image) > 0
+        seen.add(path.read_bytes())
+    assert len(seen) == 9
+
+
+def test_exported_glb_opens_with_the_right_size(tmp_path):
+    import trimesh
+
+    path = tmp_path / "box.glb"
+    config = tmp_path / "c.yaml"
+    config.write_text("container: {kinds: {'20': 1}}\ndamage: {probability: 0}\n")
+    arguments = ["--index", "0", "--config", str(config), "-o", str(path)]
+    assert main(["export", *arguments]) == 0
+    extents = trimesh.load(path).extents
+    np.testing.assert_allclose(sorted(extents), [2.438, 2.591, 6.058], atol=1e-4)

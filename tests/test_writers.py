@@ -1,0 +1,129 @@
+"""Encoders and label formats, read back by foreign readers."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+import simplejpeg
+from PIL import Image
+from pycocotools import mask as coco_mask
+
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.generator import Generator
+from fastgen.sample import Object
+from fastgen.writers import coco, encode, yolo
+
+
+def masks():
+    rng = np.random.default_rng(0)
+    yield np.zeros((7, 5), bool)
+    yield np.ones((7, 5), bool)
+    for _ in range(20):
+        yield rng.random((37, 23)) < rng.random()
+    big = np.zeros((700, 900), bool)
+    big[100:650, 50:880] = True
+    yield big
+
+
+def test_run_lengths_decode_in_pycocotools_to_the_same_mask():
+    for mask in masks():
+        made = coco.rle(mask)
+        packed = {"size": made["size"], "counts": made["counts"].encode()}
+        np.testing.assert_array_equal(coco_mask.decode(packed).astype(bool), mask)
+        assert coco_mask.area(packed) == mask.sum()
+        reference = coco_mask.encode(np.asfortranarray(mask.astype(np.uint8)))
+        assert reference["counts"].decode() == made["counts"]
+
+
+def test_masks_survive_png_in_16_bit(tmp_path):
+    mask = np.random.default_rng(1).choice([0, 101, 501, 65535], (33, 21)).astype(np.uint16)
+    encode.write(tmp_path / "mask.png", encode.png(mask))
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "mask.png")), mask)
+
+
+def test_images_keep_their_colour_order():
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[:, :32] = (200, 30, 20)
+    image[:, 32:] = (10, 60, 220)
+    for decoded in (
+        simplejpeg.decode_jpeg(encode.jpeg(image)),
+        cv2.cvtColor(
+            cv2.imdecode(np.frombuffer(encode.png(image), np.uint8), 1), cv2.COLOR_BGR2RGB
+        ),
+    ):
+        assert np.abs(decoded[10, 5].astype(int) - image[10, 5]).max() < 6
+        assert np.abs(decoded[10, 60].astype(int) - image[10, 60]).max() < 6
+
+
+def test_writing_leaves_nothing_aside(tmp_path):
+    encode.write(tmp_path / "a.txt", "one")
+    encode.write(tmp_path / "a.txt", "two")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "two"
+
+
+def test_links_hold_the_same_bytes(tmp_path):
+    encode.write(tmp_path / "a.jpg", b"bytes")
+    encode.link(tmp_path / "a.jpg", tmp_path / "b.jpg")
+    encode.link(tmp_path / "a.jpg", tmp_path / "b.jpg")
+    assert (tmp_path / "b.jpg").read_bytes() == b"bytes"
+
+
+def item(name, bbox, area=1000):
+    return Object(2, name, 1, bbox, None, area, 1.0, False, "", ())
+
+
+def test_yolo_boxes_are_centres_and_sizes_and_never_beyond_one():
+    text = yolo.detection_lines([item("C9.1", (0, 0, 100, 50)), item("text", None)], (100, 50), 12)
+    assert text == f"{DETECTION_CLASSES.index('C9.1')} 0.500000 0.500000 1.000000 1.000000\n"
+    for width in (3, 7, 97, 1333):
+        boxes = [item("text", (0, 0, w, 1)) for w in range(1, width + 1)]
+        lines = yolo.detection_lines(boxes, (width, 1), 1).splitlines()
+        numbers = [[float(v) for v in line.split()[1:]] for line in lines]
+        assert all(0 <= v <= 1 for row in numbers for v in row)
+        assert all(row[0] + row[2] / 2 <= 1 + 1e-6 for row in numbers)
+
+
+def test_small_objects_and_damage_stay_out_of_the_marker_labels():
+    things = [item("C1.1", (0, 0, 3, 3), area=9), item("axis", (0, 0, 30, 30))]
+    assert yolo.detection_lines(things, (100, 100), 12) == ""
+
+
+@pytest.fixture(scope="module")
+def samples():
+    with Generator(seed=2, size=(320, 320)) as generator:
+        damaged = [i for i in range(30) if generator.scene(i).damages][:4]
+        return [generator.render(index=i, camera=c) for i in damaged for c in ("A", "Cl", "Cr")]
+
+
+def test_coco_annotations_equal_the_mask(samples):
+    for sample in samples:
+        for annotation in coco.annotations(sample):
+            packed = dict(annotation["segmentation"])
+            packed["counts"] = packed["counts"].encode()
+            mask = coco_mask.decode(packed).astype(bool)
+            category = annotation["category_id"]
+            allowed = sample.damage > 0 if category == 1 else sample.damage // 100 == category
+            assert not (mask & ~allowed).any()
+            assert annotation["area"] == mask.sum() == coco_mask.area(packed)
+            assert annotation["bbox"] == coco_mask.toBbox(packed).astype(int).tolist()
+        seen = {v for v in np.unique(sample.damage) if v >= 200}
+        assert len(coco.annotations(sample)) == len(seen) + 1
+
+
+def test_yolo_outlines_fill_to_the_mask(samples):
+    for sample in samples:
+        lines = yolo.segmentation_lines(sample).splitlines()
+        index, *numbers = lines[0].split()
+        points = np.array(numbers, float).reshape(-1, 2) * 320 - 0.5
+        drawn = np.zeros(sample.damage.shape, np.uint8)
+        cv2.fillPoly(drawn, [np.rint(points).astype(np.int32)], 1)
+        mask = sample.damage > 0
+        assert index == "0"
+        assert (drawn.astype(bool) & mask).sum() / (drawn.astype(bool) | mask).sum() > 0.97
+
+
+def test_records_are_json_that_any_reader_takes(samples):
+    text = json.dumps(coco.annotations(samples[0]))
+    assert json.loads(text)
