@@ -21,8 +21,8 @@ DECAL_TEXELS = 5
 CELL_SLOTS = 8
 GLYPH_COLUMNS = 256
 
-_MARGIN_MM = 60.0
-"""Antialiasing reaches this far beyond a decal's edge: one footprint of the coarsest view."""
+_MARGIN_MM = 24.0
+"""Antialiasing reaches this far beyond a decal's edge: half a footprint of the coarsest view."""
 
 
 class SceneError(FastgenError):

@@ -16,6 +16,7 @@ from typing import Any
 
 from fastgen.config import Config, SplitConfig
 from fastgen.contact_sheet import write_contact_sheet
+from fastgen.environment import find_hdris, load_environment
 from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.generator import Generator
 from fastgen.progress import Progress
@@ -120,7 +121,11 @@ def _settings(job: Job, fmt: str) -> dict[str, Any]:
     from fastgen import __version__
 
     # validates seed and size without opening GL
-    names = Generator(job.config, job.seed, job.size, hdri_dir=job.hdri_dir).environments
+    generator = Generator(job.config, job.seed, job.size, hdri_dir=job.hdri_dir)
+    names = generator.environments
+    generator.scene(0)  # what only sampling can refuse is refused before anything is written
+    for path in find_hdris(job.hdri_dir) if job.hdri_dir else ():
+        load_environment(path)  # names a broken file now, and caches the light for the workers
     return {
         "version": __version__,
         "format": fmt,

@@ -57,7 +57,7 @@ DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 LONGEST_EDGE_MM = 160.0
 """No panel's mesh has longer edges (container.build_container's default and a little)."""
 
-DECAL_CELL_MM = 128.0
+DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 MAX_SAMPLES_PER_AXIS = 3
 

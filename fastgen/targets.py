@@ -38,9 +38,12 @@ class Targets:
         # an even number of samples has none at the pixel centre unless shifted by half a sample
         border = int(samples_per_axis == 2)
         fine = (size[0] * samples_per_axis + border, size[1] * samples_per_axis + border)
-        self.inner_row = fine[1]
-        stored = (fine[0], fine[1] * (1 + (damage == "holed")))
         limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
+        holed = damage == "holed"
+        # at 4096 rows the two views of a holed scene overlap by two rows rather than not fit
+        spare = max(2 * fine[1] - limit, 0) if holed else 0
+        self.inner_row = fine[1] - (spare if spare <= 2 else 0)
+        stored = (fine[0], fine[1] + self.inner_row if holed else fine[1])
         if max(stored) > limit:
             raise FastgenError(
                 f"size {size[0]}x{size[1]} with {samples_per_axis} samples an axis needs textures "

@@ -200,6 +200,7 @@ def test_split_option_puts_all_in_one(tmp_path):
         (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
         (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),
+        (["generate", "{out}", "--images", "2", "--hdri", "{broken}"], "photo.hdr"),
         (["generate", "{out}", "--images", "2", "--config", "{bad}"], "did you mean rust_coverage"),
         (["generate", "{full}", "--images", "2"], "holds something else"),
         (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
@@ -213,8 +214,10 @@ def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, 
     (tmp_path / "empty").mkdir()
     (tmp_path / "full").mkdir()
     (tmp_path / "full/notes.txt").write_text("mine")
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken/photo.hdr").write_text("no radiance here")
     (tmp_path / "bad.yaml").write_text("surface: {rust_coverag: [0, 1]}\n")
-    places = {name: str(tmp_path / name) for name in ("out", "empty", "full")}
+    places = {name: str(tmp_path / name) for name in ("out", "empty", "full", "broken")}
     filled = [a.format(**places, bad=tmp_path / "bad.yaml") for a in arguments]
     assert main(filled) == 2
     error = capsys.readouterr().err

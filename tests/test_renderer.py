@@ -130,6 +130,13 @@ def test_any_size_is_drawn_whole(size):
     assert (sample.ids > 0).any()
 
 
+def test_the_largest_holed_image_fits_the_driver():
+    config = Config.from_values({"damage": {"probability": 1, "kinds": ["perforation"]}})
+    with Generator(config, seed=5, size=(128, 4096)) as generator:
+        sample = generator.render(index=0, camera="Cr")
+    assert sample.ids.shape == (4096, 128)
+
+
 def test_a_camera_inside_the_wall_crosses_the_near_plane_without_harm(generator):
     scene = generator.scene(index=0)
     camera = scene.camera("A")
