@@ -54,8 +54,8 @@ PORTAL_CHART = 1000
 DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with a perforation among it."""
 
-LONGEST_EDGE_MM = 160.0
-"""No panel's mesh has longer edges (container.build_container's default and a little)."""
+REACH_MARGIN_MM = 40.0
+"""Pixels are filtered with their neighbours: this far around a damage they are shaded with it."""
 
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
@@ -170,7 +170,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "PI": f"{math.pi:.8f}",
         "DAMAGE_FADE_START_MM": f"{fields.FADE_START_MM:.1f}",
         "DAMAGE_FADE_END_MM": f"{fields.FADE_END_MM:.1f}",
-        "LONGEST_EDGE_MM": f"{LONGEST_EDGE_MM:.1f}",
+        "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
         "HOLE_REACH": f"{fields.HOLE_REACH}",
         "PORTAL_CHART": f"{PORTAL_CHART}u",
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},

@@ -2,6 +2,9 @@
 // llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
 #version 430 core
 #include "blocks.glsl"
+#if DAMAGED
+#include "damage.glsl"
+#endif
 
 uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
@@ -21,10 +24,13 @@ void main() {
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
     if (decal) ++found;
 #if DAMAGED
-    float near = key == 0u ? 0.0 : texelFetch(rest_points, middle, 0).w;
-    if (near > 0.0) found = mixed ? CLASS_MIXED_DAMAGED : CLASS_DAMAGED;
+    vec3 rest_mm = texelFetch(rest_points, middle, 0).xyz;
+    int near = 0;   // 1 near a damage, 2 near a hole
+    for (int i = 0; i < damage_count; ++i)
+        if (key != 0u && within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
+    if (near > 0) found = mixed ? CLASS_MIXED_DAMAGED : CLASS_DAMAGED;
 #if HOLED
-    if (near > 1.0) found = CLASS_HOLED;
+    if (near > 1) found = CLASS_HOLED;
 #endif
 #endif
     gl_FragDepth = CLASS_DEPTH_STEP * float(found);

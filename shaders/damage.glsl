@@ -1,5 +1,5 @@
 // vec3 deformed(vec3 p): where all damages move rest point p (mm, container frame); bool in_hole(i, p);
-// Damaged damage_at(p, n): what the shading needs there. The twin of fastgen/damage.py.
+// Damaged damage_at(p): what the shading needs there. The twin of fastgen/damage.py.
 
 float bump(float t) { float s = max(1.0 - t * t, 0.0); return s * s; }
 float bump_slope(float t) { return -4.0 * t * max(1.0 - t * t, 0.0); }
@@ -37,12 +37,12 @@ int hole_at(vec3 p) {
     return found;
 }
 
-// a superset of where damage i moves or marks anything: an edge of the mesh more on all sides
+// whether damage i may move or mark the surface at p, or a pixel beside it
 bool within_reach(int i, vec3 p) {
     vec3 q = abs(damage_local(i, p));
     vec2 reach = vec2(damage_along[i].w, damage_across[i].w);
     if (i < hole_count) reach = reach * HOLE_REACH + damage_shape[3 * i].x;
-    return all(lessThan(q, vec3(reach, DAMAGE_FADE_END_MM) + LONGEST_EDGE_MM));
+    return all(lessThan(q, vec3(reach, DAMAGE_FADE_END_MM) + REACH_MARGIN_MM));
 }
 
 struct Field {
@@ -107,30 +107,30 @@ vec3 deformed(vec3 p) {
 }
 
 struct Damaged {
-    vec3 normal;    // of the deformed surface
+    mat3 bend;      // derivative of the deformed by the rest position
     float scar;
     uint value;     // mask value of what moved this point most, above the threshold; 0 for none
 };
 
-Damaged damage_at(vec3 p, vec3 n) {
-    vec3 t = normalize(abs(n.z) < 0.9 ? cross(n, vec3(0.0, 0.0, 1.0)) : cross(n, vec3(1.0, 0.0, 0.0)));
-    vec3 b = cross(n, t);
-    vec3 moved_t = t;
-    vec3 moved_b = b;
-    Damaged d = Damaged(n, 0.0, 0u);
+Damaged damage_at(vec3 p) {
+    Damaged d = Damaged(mat3(1.0), 0.0, 0u);
     float most = damage_threshold_mm;
     for (int i = 0; i < damage_count; ++i) {
         Field f = damage_field(i, p);
         vec3 slope = f.slope.x * damage_along[i].xyz + f.slope.y * damage_across[i].xyz +
                      f.slope.z * damage_inward[i].xyz;
-        moved_t += damage_inward[i].xyz * dot(slope, t);
-        moved_b += damage_inward[i].xyz * dot(slope, b);
+        d.bend += outerProduct(damage_inward[i].xyz, slope);
         d.scar = max(d.scar, f.scar);
         if (abs(f.amount) > most) {
             most = abs(f.amount);
             d.value = uint(damage_shape[3 * i + 2].w);
         }
     }
-    d.normal = normalize(cross(moved_t, moved_b));
     return d;
+}
+
+// normals turn with the cofactors of the deformation
+vec3 bent_normal(mat3 bend, vec3 n) {
+    return normalize(n.x * cross(bend[1], bend[2]) + n.y * cross(bend[2], bend[0]) +
+                     n.z * cross(bend[0], bend[1]));
 }

@@ -8,9 +8,9 @@ flat in uint surface_key;
 layout(location = 0) out uint out_key;
 layout(location = 1) out vec4 out_sheet;   // sheet x, y in mm, depth in m, -
 #if DAMAGED
-in vec4 rest_mm;
+in vec3 rest_mm;
 
-layout(location = 2) out vec4 out_rest;    // rest position in mm; above 0 near a damage, above 1 a hole
+layout(location = 2) out vec4 out_rest;    // rest position in mm, -
 #endif
 
 void main() {
@@ -18,6 +18,6 @@ void main() {
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
     out_sheet = vec4(atlas_mm, 1.0 / gl_FragCoord.w, 0.0);
 #if DAMAGED
-    out_rest = rest_mm;
+    out_rest = vec4(rest_mm, 0.0);
 #endif
 }

@@ -17,7 +17,7 @@ layout(location = 4) in uint in_inner;   // one an instance: 0 the outer view, 1
 out vec2 atlas_mm;
 flat out uint surface_key;
 #if DAMAGED
-out vec4 rest_mm;                        // and what is near: 1 a damage, 2 a hole
+out vec3 rest_mm;
 #endif
 
 void main() {
@@ -25,10 +25,7 @@ void main() {
     surface_key = pack_surface_key(in_chart, in_normal);
     vec3 position_mm = in_position_mm;
 #if DAMAGED
-    float near = 0.0;
-    for (int i = 0; i < damage_count; ++i)
-        if (within_reach(i, in_position_mm)) near = max(near, i < hole_count ? 2.0 : 1.0);
-    rest_mm = vec4(in_position_mm, near);
+    rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
 #endif
     gl_Position = world_to_clip * vec4(position_mm * MM, 1.0);

@@ -62,7 +62,9 @@ struct Part {
     uint id;
     uint damage;
     float depth;
-    vec3 rest_mm;
+#if WITH_DAMAGE
+    mat3 bend;
+#endif
 };
 
 Part part_at(ivec2 sample_at, uint key, vec3 view) {
@@ -73,11 +75,11 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     p.depth = sheet.z;
     float scar = 0.0;
 #if WITH_DAMAGE
-    p.rest_mm = texelFetch(rest_points, sample_at, 0).xyz;
-    Damaged d = damage_at(p.rest_mm, normal);
+    Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
     if (d.value != 0u) p.damage = d.value;
     scar = d.scar;
-    normal = d.normal;
+    p.bend = d.bend;
+    normal = bent_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
@@ -90,7 +92,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 vec3 part_color(Part p, uint key, vec3 view) {
     vec3 normal = key_normal(key);
 #if WITH_DAMAGE
-    normal = damage_at(p.rest_mm, normal).normal;
+    normal = bent_normal(p.bend, normal);
 #endif
     return layer_color(p.surface, normal, view);
 }
