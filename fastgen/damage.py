@@ -88,18 +88,19 @@ def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]
     return moved
 
 
-def hole_corners_mm(damages: tuple[Damage, ...]) -> NDArray[np.float64]:
-    """Corners [8 * holes, 3] in mm of boxes that hold all perforations, torn or not yet."""
-    corners = []
-    for damage in damages:
-        if damage.kind == "perforation":
-            reach = damage.size_mm[0] / 2 * HOLE_REACH
-            for u in (-reach, reach):
-                for v in (-reach, reach):
-                    for w in (-60.0, damage.depth_mm + 120.0):
-                        axes = np.array([damage.along, damage.across, damage.inward])
-                        corners.append(np.array(damage.origin_mm) + (u, v, w) @ axes)
-    return np.array(corners)
+def corners_mm(damage: Damage) -> NDArray[np.float64]:
+    """Corners [8, 3] in mm of a box that holds all that a damage touches, before and after."""
+    u, v = damage.size_mm[0] / 2, damage.size_mm[1] / 2
+    depth = abs(damage.depth_mm) + 60.0
+    low, high = -depth, FADE_END_MM
+    if damage.kind == "perforation":
+        u = v = u * HOLE_REACH + damage.shape[0]
+    if damage.kind == "axis":
+        low, high = -v, v + depth
+    axes = np.array([damage.along, damage.across, damage.inward])
+    signs = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    inside = np.array([-u, -v, low]) + signs * np.array([2 * u, 2 * v, high - low])
+    return np.array(damage.origin_mm) + inside @ axes
 
 
 def variant(damages: tuple[Damage, ...]) -> str:

@@ -112,7 +112,8 @@ DAMAGE_BLOCK = Block(
         ("vec4", "damage_inward", MAX_DAMAGES),  # axis, depth
         ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape, and last the mask value
         ("int", "damage_count"),
-        ("int", "hole_count"),  # perforations come first
+        ("int", "hole_count"),  # perforations come first,
+        ("int", "dent_end"),  # then dents up to here
         ("float", "damage_threshold_mm"),
         ("int", "inner_row"),  # first row of the inner view in the sample targets
     ),

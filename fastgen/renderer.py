@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fastgen.artwork import art_images, glyph_tiles
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
-from fastgen.damage import hole_corners_mm, variant
+from fastgen.damage import corners_mm, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
 from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
@@ -160,13 +160,13 @@ class Renderer:
             self._damage_block.write(DAMAGE_BLOCK.pack(values))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
 
-        targets.begin_samples(
-            _region(view, hole_corners_mm(scene.damages)) if damage == "holed" else None
-        )
+        holes = [corners_mm(d) for d in scene.damages if d.kind == "perforation"]
+        targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
         # a dent may tilt a face into view that the rest mesh turns away
-        bent = {face for item in scene.damages for face in item.face.split(".")}
+        edges = [item.face for item in scene.damages if item.kind == "axis"]
+        bent = {face for edge in edges for face in edge.split(".")}
         mesh.draw(camera.position_mm, damage, bent)
         targets.end_samples()
 
@@ -189,7 +189,8 @@ class Renderer:
             textures["rest_points"] = targets.rest
         for name, texture in textures.items():
             texture.use(UNITS[name])
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)), damage)
+        near = [_region(view, corners_mm(item)) for item in scene.damages]
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)), damage, near)
         return targets
 
     def mesh(self, container: Container) -> Mesh:

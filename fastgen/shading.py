@@ -1,5 +1,6 @@
 """The passes over the image: pixels are sorted into classes, each is shaded by itself."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import moderngl
@@ -38,11 +39,17 @@ class Shading:
         self._programs: dict[tuple[str, str], moderngl.Program] = {}
         self._arrays: dict[tuple[str, str], moderngl.VertexArray] = {}
 
-    def draw(self, targets: Targets, region: Region | None, damage: str) -> None:
+    def draw(
+        self,
+        targets: Targets,
+        region: Region | None,
+        damage: str,
+        near_damage: Sequence[Region | None],
+    ) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
         region: the pixels outside which there is only sky; None where that is not known.
-        damage: one of programs.DAMAGE_VARIANTS.
+        damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch.
         """
         image = targets.image
         image.use()
@@ -51,7 +58,11 @@ class Shading:
         self._ctx.scissor = region
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
-        self._run("classify", damage)
+        self._run("classify", "sound")
+        for part in near_damage:
+            self._ctx.scissor = part or region
+            self._run("classify", damage)
+        self._ctx.scissor = region
         image.depth_mask = False
         self._ctx.depth_func = "=="
         for name, traits in PIXEL_CLASSES.items():

@@ -67,7 +67,8 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
 def damage_values(scene: Scene, threshold_mm: float, inner_row: int) -> Mapping[str, ArrayLike]:
     """All members of DAMAGE_BLOCK for `scene`, which has at least one damage."""
     valued = list(zip(scene.damages, mask_values(scene.damages), strict=True))
-    valued.sort(key=lambda pair: pair[0].kind != "perforation")  # holes first
+    order = ("perforation", "dented", "concave", "axis")
+    valued.sort(key=lambda pair: order.index(pair[0].kind))
     damages = [damage for damage, _ in valued]
     shape = np.zeros((len(damages), 12), np.float32)
     for row, (damage, value) in zip(shape, valued, strict=True):
@@ -81,6 +82,7 @@ def damage_values(scene: Scene, threshold_mm: float, inner_row: int) -> Mapping[
         "damage_shape": shape.reshape(-1, 4),
         "damage_count": len(damages),
         "hole_count": sum(damage.kind == "perforation" for damage in damages),
+        "dent_end": sum(damage.kind in ("perforation", "dented") for damage in damages),
         "damage_threshold_mm": threshold_mm,
         "inner_row": inner_row,
     }

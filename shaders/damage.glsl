@@ -100,9 +100,38 @@ Field damage_field(int i, vec3 p) {
                  scar * scar * step(0.5, fade));
 }
 
+float sheet_fade(float w) {
+    return 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(w));
+}
+
+// The damages come sorted by kind, and each kind has a loop of its own: a driver that runs all
+// sides of a branch would otherwise do four kinds' work for every damage.
 vec3 deformed(vec3 p) {
     vec3 moved = p;
-    for (int i = 0; i < damage_count; ++i) moved += damage_field(i, p).amount * damage_inward[i].xyz;
+    int i = 0;
+    for (; i < hole_count; ++i) {
+        vec3 q = damage_local(i, p);
+        float outside = length(q.xy) - hole_radius(i, atan(q.y, q.x));
+        float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
+        moved += damage_inward[i].w * rim * rim * sheet_fade(q.z) * damage_inward[i].xyz;
+    }
+    for (; i < dent_end; ++i) {
+        vec3 q = damage_local(i, p);
+        vec4 shape = damage_shape[3 * i];
+        float away = abs(q.y - fold_path(shape, damage_shape[3 * i + 1], q.x));
+        float along = q.x / damage_along[i].w;
+        float rest = max(1.0 - away / shape.x, 0.0);
+        float profile = mix(rest * sqrt(rest), bump(away / damage_across[i].w), shape.y);
+        float depth = damage_inward[i].w * max(1.0 - along * along, 0.0) * sheet_fade(q.z);
+        moved += depth * profile * damage_inward[i].xyz;
+    }
+    for (; i < damage_count; ++i) {
+        vec3 q = damage_local(i, p);
+        bool axis = int(damage_origin[i].w) == DAMAGE_AXIS;
+        float reach = (axis ? length(q.yz) : q.y) / damage_across[i].w;
+        float depth = damage_inward[i].w * bump(q.x / damage_along[i].w) * bump(reach);
+        moved += (axis ? depth : depth * sheet_fade(q.z)) * damage_inward[i].xyz;
+    }
     return moved;
 }
 
