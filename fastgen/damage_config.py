@@ -13,8 +13,8 @@ class AxisConfig:
     """An edge or corner post pushed in. reach_mm: how far its neighbours are dragged along."""
 
     length_mm: Range = field(default=Range(700, 1900), metadata=MM)
-    reach_mm: Range = field(default=Range(220, 480), metadata=MM)
-    depth_mm: Range = field(default=Range(45, 130), metadata=MM)
+    reach_mm: Range = field(default=Range(320, 650), metadata=MM)
+    depth_mm: Range = field(default=Range(110, 260), metadata=MM)
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class ConcaveConfig:
 
     length_mm: Range = field(default=Range(900, 2600), metadata=MM)
     width_mm: Range = field(default=Range(800, 2000), metadata=MM)
-    depth_mm: Range = field(default=Range(50, 140), metadata=MM)
+    depth_mm: Range = field(default=Range(110, 250), metadata=MM)
     outward: float = field(default=0.3, metadata=UNIT)
 
 
@@ -34,8 +34,8 @@ class DentedConfig:
 
     length_mm: Range = field(default=Range(600, 1700), metadata=MM)
     width_mm: Range = field(default=Range(180, 420), metadata=MM)
-    depth_mm: Range = field(default=Range(18, 50), metadata=MM)
-    crease_mm: Range = field(default=Range(30, 70), metadata=bounds(5, 1000, "mm"))
+    depth_mm: Range = field(default=Range(40, 90), metadata=MM)
+    crease_mm: Range = field(default=Range(35, 70), metadata=bounds(5, 1000, "mm"))
     sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
     amplitude_mm: Range = field(default=Range(25, 110), metadata=MM)
     wavelength_mm: Range = field(default=Range(280, 800), metadata=bounds(20, 1e5, "mm"))

@@ -8,8 +8,8 @@ import numpy as np
 
 from fastgen.mesh import Mesh
 
-BULGE_MM = 120.0
-"""How far damage may push a surface beyond the rest mesh."""
+_SLACK_MM = 120.0
+"""Frames stand back from the castings' plane (mesh.GROUP_SLACK_MM), and sheets may sag a little."""
 
 
 def facing_groups(mesh: Mesh, position_mm: Iterable[float]) -> list[str]:
@@ -17,12 +17,12 @@ def facing_groups(mesh: Mesh, position_mm: Iterable[float]) -> list[str]:
     low, high = mesh.bounds_mm
     x, y, z = position_mm
     ahead = {
-        "front": y < low[1] + BULGE_MM,
-        "back": y > high[1] - BULGE_MM,
-        "door": x > high[0] - BULGE_MM,
-        "no_door": x < low[0] + BULGE_MM,
-        "roof": z > high[2] - BULGE_MM,
-        "underside": z < low[2] + BULGE_MM,
+        "front": y < low[1] + _SLACK_MM,
+        "back": y > high[1] - _SLACK_MM,
+        "door": x > high[0] - _SLACK_MM,
+        "no_door": x < low[0] + _SLACK_MM,
+        "roof": z > high[2] - _SLACK_MM,
+        "underside": z < low[2] + _SLACK_MM,
     }
     return [name for name in mesh.groups if ahead.get(name, True)]
 

@@ -23,12 +23,12 @@ from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
-from fastgen.gpu_mesh import BULGE_MM, GpuMesh
+from fastgen.gpu_mesh import GpuMesh
 from fastgen.mesh import Mesh
 from fastgen.noise import noise_tiles
 from fastgen.programs import DAMAGE_BLOCK, DAMAGE_VARIANTS, LAYERS, SCENE_BLOCK, VIEW_BLOCK, link
 from fastgen.sample import Frame
-from fastgen.scene import Camera, Container, Scene
+from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets
@@ -165,8 +165,8 @@ class Renderer:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
         # a dent may tilt a face into view that the rest mesh turns away
-        edges = [item.face for item in scene.damages if item.kind == "axis"]
-        bent = {face for edge in edges for face in edge.split(".")}
+        tilted = [d.face for d in scene.damages if d.kind == "axis" or d.depth_mm < 0]
+        bent = {face for place in tilted for face in place.split(".")}
         mesh.draw(camera.position_mm, damage, bent)
         targets.end_samples()
 
@@ -190,7 +190,7 @@ class Renderer:
         for name, texture in textures.items():
             texture.use(UNITS[name])
         near = [_region(view, corners_mm(item)) for item in scene.damages]
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh)), damage, near)
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, scene.damages)), damage, near)
         return targets
 
     def mesh(self, container: Container) -> Mesh:
@@ -253,11 +253,12 @@ def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
 
 
-def _mesh_corners(mesh: Mesh) -> np.ndarray:
+def _mesh_corners(mesh: Mesh, damages: tuple[Damage, ...]) -> np.ndarray:
     """Corners [8, 3] of the box that holds `mesh`, bulges of damage included."""
+    bulge = sum(max(-damage.depth_mm, 0.0) for damage in damages)
     low, high = mesh.bounds_mm
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    return low - BULGE_MM + corners * (high - low + 2 * BULGE_MM)
+    return low - bulge + corners * (high - low + 2 * bulge)
 
 
 def _view_values(
