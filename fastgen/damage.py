@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, SEGMENTATION_CLASSES
-from fastgen.scene import Damage
+from fastgen.scene import Damage, Vec3
 
 Array = NDArray[np.floating]
 
@@ -19,6 +19,9 @@ FADE_START_MM, FADE_END_MM = 260.0, 520.0
 
 HOLE_REACH = 1.95
 """No outline strays farther than this many mean radii: the config holds 5 lobes to 0.19 each."""
+
+SLACK_MM = 150.0
+"""Corrugation and castings let a face be seen from this little behind its plane."""
 
 LOBES = 5
 """Harmonics of a hole's outline; more would be finer than the mesh and most pixels."""
@@ -108,6 +111,26 @@ def variant(damages: tuple[Damage, ...]) -> str:
     if not damages:
         return "sound"
     return "holed" if any(damage.kind == "perforation" for damage in damages) else "damaged"
+
+
+def may_be_seen(damage: Damage, position_mm: Vec3) -> bool:
+    """Whether a camera outside at `position_mm` may see what the damage did from outside.
+
+    A sheet pushed in is hidden from behind its plane; an edge from behind both of its faces.
+    """
+    if damage.depth_mm < 0:
+        return True
+    toward = np.array(position_mm) - np.array(damage.origin_mm)
+    # an edge's inward axis lies between two coordinate axes, a sheet's on one
+    outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
+    return max(outward) > -SLACK_MM
+
+
+def seen_damages(damages: tuple[Damage, ...], position_mm: Vec3) -> tuple[Damage, ...]:
+    """The damages that a frame from `position_mm` must draw; all of them where a hole shows the
+    inside, which every damage may have moved."""
+    seen = tuple(damage for damage in damages if may_be_seen(damage, position_mm))
+    return damages if variant(seen) == "holed" else seen
 
 
 def mask_values(damages: tuple[Damage, ...]) -> list[int]:

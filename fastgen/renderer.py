@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fastgen.artwork import art_images, glyph_tiles
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
-from fastgen.damage import corners_mm, variant
+from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
 from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
@@ -135,7 +135,8 @@ class Renderer:
         """As `render`, without reading back: the targets keep the image until the next draw."""
         ctx = self._ctx
         view = view_of(camera, size)
-        damage = variant(scene.damages)
+        damages = seen_damages(scene.damages, camera.position_mm)
+        damage = variant(damages)
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
@@ -156,16 +157,16 @@ class Renderer:
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
 
         if damage != "sound":
-            values = damage_values(scene, self._mask_threshold_mm, targets.inner_row)
+            values = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
             self._damage_block.write(DAMAGE_BLOCK.pack(values))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
 
-        holes = [corners_mm(d) for d in scene.damages if d.kind == "perforation"]
+        holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
         targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
         # a dent may tilt a face into view that the rest mesh turns away
-        tilted = [d.face for d in scene.damages if d.kind == "axis" or d.depth_mm < 0]
+        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}
         mesh.draw(camera.position_mm, damage, bent)
         targets.end_samples()
@@ -189,8 +190,8 @@ class Renderer:
             textures["rest_points"] = targets.rest
         for name, texture in textures.items():
             texture.use(UNITS[name])
-        near = [_region(view, corners_mm(item)) for item in scene.damages]
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, scene.damages)), damage, near)
+        near = [_region(view, corners_mm(item)) for item in damages]
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, damages)), damage, near)
         return targets
 
     def mesh(self, container: Container) -> Mesh:

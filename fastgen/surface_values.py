@@ -9,7 +9,7 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS
 from fastgen.programs import noise_deviation
-from fastgen.scene import Scene, Surface
+from fastgen.scene import Damage, Scene, Surface
 
 _TILE_OF_SCALE = 4.0
 """A noise tile spans this many of its pattern's typical lengths."""
@@ -64,9 +64,15 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
     }
 
 
-def damage_values(scene: Scene, threshold_mm: float, inner_row: int) -> Mapping[str, ArrayLike]:
-    """All members of DAMAGE_BLOCK for `scene`, which has at least one damage."""
-    valued = list(zip(scene.damages, mask_values(scene.damages), strict=True))
+def damage_values(
+    scene: Scene, shown: tuple[Damage, ...], threshold_mm: float, inner_row: int
+) -> Mapping[str, ArrayLike]:
+    """All members of DAMAGE_BLOCK for the damages of `scene` that are shown, at least one."""
+    valued = [
+        (damage, value)
+        for damage, value in zip(scene.damages, mask_values(scene.damages), strict=True)
+        if damage in shown
+    ]
     order = ("perforation", "dented", "concave", "axis")
     valued.sort(key=lambda pair: order.index(pair[0].kind))
     damages = [damage for damage, _ in valued]
