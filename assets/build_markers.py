@@ -51,14 +51,17 @@ def width_of(text: str, height: float) -> float:
     return sum(glyphs[names[ord(c)]].width for c in text) * height / FONT["OS/2"].sCapHeight
 
 
+def words_from(x: float, y: float, text: str, height: float) -> str:
+    """Black `text` that starts at x."""
+    return words(text, x + width_of(text, height) / 2, y, height, BLACK)
+
+
 def caption(text: str, color: str) -> str:
-    """The hazard in words below the middle, in two lines where one would be too small."""
-    head, _, tail = text.rpartition(" ")
-    lines = [head, tail] if width_of(text, 52) > 600 else [text]
+    """The hazard in words below the middle; a bar in `text` starts the second line."""
     parts = []
-    for i, line in enumerate(lines):
+    for i, line in enumerate(text.split("|")):
         y = 612 + 74 * i
-        room = 2 * (950 - y) - 90
+        room = 2 * (950 - y) - 120
         height = min(60.0, 60 * room / width_of(line, 60))
         parts.append(words(line, 500, y, height, color))
     return "".join(parts)
@@ -72,18 +75,27 @@ def bomb() -> str:
     rays = "".join(
         f'<path transform="rotate({a} 500 330)" d="M482 235 L500 {tip} L518 235 Z"/>'
         for a, tip in [
-            (-75, 150),
-            (-45, 120),
-            (-20, 160),
-            (8, 110),
-            (35, 150),
-            (60, 120),
+            (-75, 155),
+            (-45, 150),
+            (-20, 165),
+            (8, 115),
+            (35, 160),
+            (60, 150),
             (85, 170),
         ]
     )
     shards = "".join(
-        f'<path d="M{x} {y} l34 -14 l10 30 l-30 18 Z"/>'
-        for x, y in [(330, 210), (420, 160), (580, 170), (650, 250), (300, 330), (660, 350)]
+        f'<path transform="rotate({a} 500 330)" d="M484 {330 - r} l30 -8 l6 30 l-28 6 Z"/>'
+        for a, r in [
+            (-98, 185),
+            (-60, 180),
+            (-32, 195),
+            (-6, 205),
+            (21, 200),
+            (47, 190),
+            (73, 180),
+            (104, 180),
+        ]
     )
     return (
         f'<g fill="{BLACK}"><circle cx="500" cy="355" r="82"/>{rays}{shards}'
@@ -93,7 +105,7 @@ def bomb() -> str:
 
 def cylinder(color: str) -> str:
     return (
-        f'<g fill="{color}" transform="rotate(-58 500 320)">'
+        f'<g fill="{color}" transform="translate(15 30) rotate(-58 500 320)">'
         '<rect x="452" y="225" width="96" height="270" rx="40"/>'
         '<rect x="478" y="165" width="44" height="44" rx="8"/>'
         '<rect x="462" y="145" width="76" height="22" rx="8"/></g>'
@@ -120,23 +132,24 @@ def skull() -> str:
 
 def flame_over_circle() -> str:
     return (
+        '<g transform="translate(-50 -51) scale(1.1)">'
         f'<g transform="translate(125 68) scale(0.75)"><path fill="{BLACK}" d="{FLAME}"/></g>'
         f'<circle cx="500" cy="432" r="62" fill="none" stroke="{BLACK}" stroke-width="22"/>'
-        f'<rect x="400" y="512" width="200" height="18" fill="{BLACK}"/>'
+        f'<rect x="400" y="512" width="200" height="18" fill="{BLACK}"/></g>'
     )
 
 
-def trefoil(cy: float = 300) -> str:
-    blades = ""
-    for angle in (0, 120, 240):
-        blades += (
-            f'<path transform="rotate({angle} 500 {cy})" d="M{500 - 24.75} {cy - 42.9} '
-            f"A49.5 49.5 0 0 1 {500 + 24.75} {cy - 42.9} L{500 + 80} {cy - 138.6} "
-            f'A160 160 0 0 0 {500 - 80} {cy - 138.6} Z"/>'
-        )
-    turned = f'<g transform="rotate(180 500 {cy})">{blades}</g>'
-    scaled = f"translate(500 {cy}) scale(0.92) translate(-500 {-cy})"
-    return f'<g fill="{BLACK}" transform="{scaled}"><circle cx="500" cy="{cy}" r="30"/>{turned}</g>'
+def trefoil(cy: float = 290, r: float = 30) -> str:
+    """A disc of radius r and three blades from 1.5 r to 5 r; 49 CFR 172, appendix B."""
+    near, far = 1.5 * r, 5 * r
+    cos = 0.75**0.5
+    blade = (
+        f'd="M{500 - near / 2} {cy + near * cos:.1f} A{near} {near} 0 0 0 {500 + near / 2} '
+        f"{cy + near * cos:.1f} L{500 + far / 2} {cy + far * cos:.1f} "
+        f'A{far} {far} 0 0 1 {500 - far / 2} {cy + far * cos:.1f} Z"'
+    )
+    blades = "".join(f'<path transform="rotate({a} 500 {cy})" {blade}/>' for a in (0, 120, 240))
+    return f'<g fill="{BLACK}"><circle cx="500" cy="{cy}" r="{r}"/>{blades}</g>'
 
 
 def infectious() -> str:
@@ -147,25 +160,29 @@ def infectious() -> str:
         for a in (0, 120, 240)
     )
     return (
+        '<g transform="translate(-150 -91) scale(1.3)">'
         f'<g fill="{BLACK}">{rings}<circle cx="500" cy="330" r="26"/></g>'
-        f'<circle cx="500" cy="330" r="92" fill="none" stroke="{BLACK}" stroke-width="20"/>'
+        f'<circle cx="500" cy="330" r="92" fill="none" stroke="{BLACK}" stroke-width="20"/></g>'
     )
 
 
 def corrosion() -> str:
+    """Liquids spilling from two glass vessels and attacking a metal and a hand."""
     tube = (
-        '<g transform="translate({x} {y}) rotate({a})"><rect x="-80" y="-22" width="160" '
-        'height="44" rx="20"/><rect x="70" y="-28" width="14" height="56"/></g>'
+        '<path d="M0 -25 H150 V-33 H166 V33 H150 V25 H0 A25 25 0 0 1 0 -25 Z"/>'
+        f'<path fill="{WHITE}" d="M18 -13 H138 V-2 H18 Z"/>'
     )
     drops = "".join(
-        f'<path d="M{x} {y} q14 26 0 38 q-14 -12 0 -38 Z"/>'
-        for x, y in [(405, 268), (405, 320), (610, 268), (596, 320)]
+        f'<path d="M{x} {y} q16 28 0 42 q-16 -14 0 -42 Z"/>'
+        for x, y in [(328, 312), (340, 362), (672, 312), (660, 362)]
     )
     return (
-        f'<g fill="{BLACK}">{tube.format(x=375, y=215, a=24)}{tube.format(x=630, y=215, a=156)}'
-        f'{drops}<path d="M250 372 h66 q10 22 26 0 h12 q14 30 30 0 h86 v34 h-220 Z"/>'
-        '<path d="M520 400 q20 -30 60 -34 q10 24 22 0 q14 26 28 2 l80 6 q34 8 40 40 l-150 6 '
-        'q-50 6 -80 -20 Z"/></g>'
+        f'<g fill="{BLACK}"><g transform="translate(463 190) rotate(142)">{tube}</g>'
+        f'<g transform="translate(537 190) rotate(38) scale(1 -1)">{tube}</g>{drops}'
+        '<path d="M180 418 H296 Q300 444 318 438 Q334 452 348 440 Q366 444 372 418 H446 V458 H180 Z"/>'
+        '<path d="M822 404 L742 392 Q712 386 698 402 Q680 428 662 420 Q646 426 634 408 L576 416 '
+        "Q552 422 560 438 L640 442 L602 446 Q584 452 592 468 L704 470 Q762 466 822 450 "
+        'Z"/></g>'
     )
 
 
@@ -184,47 +201,92 @@ def lower_half(color: str) -> str:
     return f'<path fill="{color}" d="M0 500 L1000 500 L500 1000 Z"/>'
 
 
-def radioactive(bars: int, number: str) -> str:
+def bordered(color: str, half: str) -> str:
+    """The "upper" or "lower" half within the inner line; the field stays as a border around."""
+    tip = {"upper": 0, "lower": 1000}[half]
+    return f'<path fill="{color}" clip-path="url(#inner)" d="M0 500 L1000 500 L500 {tip} Z"/>'
+
+
+def frame(x: float, y: float, width: float, height: float, line: float) -> str:
+    return (
+        f'<rect x="{x}" y="{y}" width="{width}" height="{height}" fill="none" '
+        f'stroke="{BLACK}" stroke-width="{line}"/>'
+    )
+
+
+def rule(y: float, height: float) -> str:
+    """A line across, from inner line to inner line."""
+    return (
+        f'<rect x="0" y="{y}" width="1000" height="{height}" fill="{BLACK}" '
+        'clip-path="url(#inner)"/>'
+    )
+
+
+def radioactive(bars: int) -> str:
+    """Category I to III: as many red bars after the word, and an index box from II on."""
+    word = width_of("RADIOACTIVE", 44)
+    left = 500 - (word + 22 + 58 * bars - 24) / 2
     marks = "".join(
-        f'<rect x="{640 + 46 * i}" y="535" width="28" height="96" fill="{RED}"/>'
+        f'<rect x="{left + word + 22 + 58 * i:.1f}" y="526" width="34" height="104" fill="{RED}"/>'
         for i in range(bars)
     )
-    frame = f'fill="none" stroke="{BLACK}" stroke-width="8"'
-    box = f'<rect x="410" y="722" width="180" height="62" {frame}/>'
-    fields = words("CONTENTS", 500, 668, 30, BLACK) + words("ACTIVITY", 500, 710, 30, BLACK)
-    index = "" if number == "I" else box + words("TI", 450, 768, 32, BLACK)
-    line = f'<rect x="0" y="497" width="1000" height="8" fill="{BLACK}"/>'
-    return trefoil() + line + words("RADIOACTIVE", 425, 608, 50, BLACK) + marks + fields + index
+    fields = "".join(
+        words_from(310, y, text, 26) + f'<rect x="490" y="{y - 4}" width="200" height="4"/>'
+        for text, y in (("CONTENTS", 660), ("ACTIVITY", 698))
+    )
+    index = frame(356, 716, 288, 50, 6) + words_from(368, 750, "TRANSPORT INDEX", 20)
+    return (
+        trefoil()
+        + rule(497, 8)
+        + words_from(left, 600, "RADIOACTIVE", 44)
+        + marks
+        + fields
+        + (index if bars > 1 else "")
+    )
 
 
 def fissile() -> str:
-    frame = f'fill="none" stroke="{BLACK}" stroke-width="10"'
-    box = f'<rect x="270" y="540" width="460" height="120" {frame}/>'
-    title = words("FISSILE", 500, 440, 130, BLACK)
-    lines = words("CRITICALITY", 415, 592, 36, BLACK) + words("SAFETY INDEX", 415, 642, 36, BLACK)
-    rule = f'<rect x="0" y="480" width="1000" height="10" fill="{BLACK}" clip-path="url(#inner)"/>'
-    return title + rule + box + lines
+    box = frame(262, 545, 476, 124, 10)
+    title = words("FISSILE", 500, 440, 112, BLACK)
+    lines = words_from(282, 598, "CRITICALITY", 34) + words_from(282, 648, "SAFETY INDEX", 34)
+    return title + rule(485, 10) + box + lines
 
 
 def explosive(division: str, letter: str) -> str:
     return words(division, 500, 440, 210, BLACK) + words(letter, 500, 690, 120, BLACK)
 
 
-def marker(field: str, ink: str, body: str, number: str, hazard: str = "", over: str = "") -> str:
-    """One SVG. over: a second field painted on the first, beneath the inner line."""
+def marker(
+    field: str,
+    ink: str,
+    body: str,
+    number: str,
+    hazard: str = "",
+    over: str = "",
+    symbol_ink: str = "",
+) -> str:
+    """One SVG. ink: colour of number and words; symbol_ink: of the symbol where it differs.
+
+    The inner line has the symbol's colour in the upper half and the number's in the lower half
+    (UN Model Regulations 5.2.2.2.1.1.2). over: a second field, beneath the inner line.
+    """
     text = caption(hazard, ink) if hazard else ""
+    line = "M500 50 L950 500 L500 950 L50 500 Z"
+    height, baseline = (92, 884) if len(number) == 1 else (76, 866)
     return (
         '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 1000">\n'
         '<clipPath id="outer"><path d="M500 0 L1000 500 L500 1000 L0 500 Z"/></clipPath>'
-        '<clipPath id="inner"><path d="M500 50 L950 500 L500 950 L50 500 Z"/></clipPath>\n'
+        f'<clipPath id="inner"><path d="{line}"/></clipPath>'
+        '<clipPath id="upper"><rect width="1000" height="500"/></clipPath>\n'
         f'<g clip-path="url(#outer)"><rect width="1000" height="1000" fill="{field}"/>{over}'
-        f'<path d="M500 50 L950 500 L500 950 L50 500 Z" fill="none" stroke="{ink}" '
-        f'stroke-width="14"/>\n{body}{text}{words(number, 500, 880, 96 if len(number) == 1 else 76, ink)}</g>\n</svg>\n'
+        f'<g fill="none" stroke-width="14"><path d="{line}" stroke="{ink}"/>'
+        f'<path d="{line}" stroke="{symbol_ink or ink}" clip-path="url(#upper)"/></g>\n'
+        f"{body}{text}{words(number, 500, baseline, height, ink)}</g>\n</svg>\n"
     )
 
 
 def under_line(ink: str) -> str:
-    return f'<rect x="462" y="890" width="76" height="10" fill="{ink}"/>'
+    return f'<rect x="470" y="892" width="60" height="9" fill="{ink}"/>'
 
 
 def all_markers() -> dict[str, str]:
@@ -237,30 +299,31 @@ def all_markers() -> dict[str, str]:
         "C1.4": marker(ORANGE, BLACK, explosive("1.6", "N"), "1"),
         "C2.1": marker(RED, BLACK, flame(BLACK), "2", "FLAMMABLE GAS"),
         "C2.2": marker(RED, WHITE, flame(WHITE), "2", "FLAMMABLE GAS"),
-        "C2.3": marker(GREEN, BLACK, cylinder(BLACK), "2", "NON-FLAMMABLE GAS"),
-        "C2.4": marker(GREEN, WHITE, cylinder(WHITE), "2", "NON-FLAMMABLE GAS"),
+        "C2.3": marker(GREEN, BLACK, cylinder(BLACK), "2", "NON-FLAMMABLE|GAS"),
+        "C2.4": marker(GREEN, WHITE, cylinder(WHITE), "2", "NON-FLAMMABLE|GAS"),
         "C2.5": marker(WHITE, BLACK, skull(), "2", "TOXIC GAS"),
-        "C3.1": marker(RED, BLACK, flame(BLACK), "3", "FLAMMABLE LIQUID"),
-        "C3.2": marker(RED, WHITE, flame(WHITE), "3", "FLAMMABLE LIQUID"),
+        "C3.1": marker(RED, BLACK, flame(BLACK), "3", "FLAMMABLE|LIQUID"),
+        "C3.2": marker(RED, WHITE, flame(WHITE), "3", "FLAMMABLE|LIQUID"),
         "C4.1": marker(WHITE, BLACK, flame(BLACK), "4", over=stripes(7, RED, upper_only=False)),
         "C4.2": marker(WHITE, BLACK, flame(BLACK, -40), "4", over=lower_half(RED)),
-        "C4.3": marker(BLUE, BLACK, flame(BLACK), "4", "DANGEROUS WHEN WET"),
-        "C4.4": marker(BLUE, WHITE, flame(WHITE), "4", "DANGEROUS WHEN WET"),
+        "C4.3": marker(BLUE, BLACK, flame(BLACK), "4", "DANGEROUS|WHEN WET"),
+        "C4.4": marker(BLUE, WHITE, flame(WHITE), "4", "DANGEROUS|WHEN WET"),
         "C5.1": marker(YELLOW, BLACK, flame_over_circle(), "5.1", "OXIDIZER"),
         "C5.2": marker(
-            RED, BLACK, flame(BLACK, -40), "5.2", "ORGANIC PEROXIDE", lower_half(YELLOW)
+            RED, BLACK, flame(BLACK, -40), "5.2", "ORGANIC|PEROXIDE", lower_half(YELLOW)
         ),
         "C5.3": marker(
-            RED, BLACK, flame(WHITE, -40), "5.2", "ORGANIC PEROXIDE", lower_half(YELLOW)
+            *(RED, BLACK, flame(WHITE, -40), "5.2", "ORGANIC|PEROXIDE", lower_half(YELLOW)),
+            symbol_ink=WHITE,
         ),
         "C6.1": marker(WHITE, BLACK, skull(), "6", "TOXIC"),
-        "C6.2": marker(WHITE, BLACK, infectious(), "6", "INFECTIOUS SUBSTANCE"),
-        "C7.1": marker(WHITE, BLACK, radioactive(1, "I"), "7"),
-        "C7.2": marker(YELLOW, BLACK, radioactive(2, "II"), "7", over=lower_half(WHITE)),
+        "C6.2": marker(WHITE, BLACK, infectious(), "6", "INFECTIOUS|SUBSTANCE"),
+        "C7.1": marker(WHITE, BLACK, radioactive(1), "7"),
+        "C7.2": marker(WHITE, BLACK, radioactive(2), "7", over=bordered(YELLOW, "upper")),
         "C7.3": marker(WHITE, BLACK, fissile(), "7"),
-        "C7.4": marker(YELLOW, BLACK, radioactive(3, "III"), "7", over=lower_half(WHITE)),
-        "C8.1": marker(WHITE, BLACK, corrosion(), "8", over=lower_half(BLACK)).replace(
-            words("8", 500, 880, 96, BLACK), words("8", 500, 880, 96, WHITE)
+        "C7.4": marker(WHITE, BLACK, radioactive(3), "7", over=bordered(YELLOW, "upper")),
+        "C8.1": marker(
+            *(WHITE, WHITE, corrosion(), "8", "", bordered(BLACK, "lower")), symbol_ink=BLACK
         ),
         "C9.1": marker(WHITE, BLACK, half_bars + under_line(BLACK), "9"),
     }

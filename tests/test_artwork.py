@@ -52,7 +52,7 @@ def test_a_marker_fills_the_diamond_exactly(name):
 def test_fields_have_their_regulation_colours(name):
     images, layers = art_images()
     image = images[layers[name]].astype(int)
-    upper, lower = image[int(0.44 * 512), int(0.19 * 512)], image[int(0.56 * 512), int(0.14 * 512)]
+    upper, lower = image[int(0.44 * 512), int(0.15 * 512)], image[int(0.56 * 512), int(0.14 * 512)]
     assert np.abs(upper[:3] - FIELDS[name][0]).max() <= 12
     assert np.abs(lower[:3] - FIELDS[name][1]).max() <= 12
 
