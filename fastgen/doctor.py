@@ -1,14 +1,15 @@
 """Which OpenGL backends work on this machine, and what to install if none does."""
 
 import multiprocessing
+import signal
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from fastgen.errors import FastgenError
-from fastgen.gl import open_context
+from fastgen.gl import egl_devices, open_context
 
 _TIMEOUT_S = 30.0
-_MOST_DEVICES = 8
 
 
 @dataclass(frozen=True)
@@ -21,47 +22,68 @@ class Finding:
 
 
 def diagnose() -> list[Finding]:
-    """Try every EGL device and OSMesa, each in a process of its own: drivers may crash."""
-    findings = []
-    for index in range(_MOST_DEVICES):
-        finding = _probe("egl", index)
-        if not finding.works and index > 0:
-            break
-        findings.append(finding)
-    findings.append(_probe("osmesa", None))
-    return findings
+    """Try every EGL device and OSMesa, each in a process of its own: drivers crash and hang."""
+    listed, answer = _isolated(_egl_device_names)
+    if not listed:
+        findings = [Finding("egl", False, answer)]
+    elif not answer:  # then there is Mesa's surfaceless platform at most
+        findings = [Finding("egl", *_isolated(_renderer, "egl", None))]
+    else:
+        findings = [
+            Finding(name, *_isolated(_renderer, "egl", index)) for index, name in enumerate(answer)
+        ]
+    return [*findings, Finding("osmesa", *_isolated(_renderer, "osmesa", None))]
 
 
 def report() -> tuple[str, bool]:
     """What `fastgen doctor` prints, and whether anything works."""
     findings = diagnose()
-    lines = [f"{'ok  ' if f.works else 'FAIL'}  {f.name:14}  {f.words}" for f in findings]
+    width = max(len(finding.name) for finding in findings)
+    lines = [f"{'ok  ' if f.works else 'FAIL'}  {f.name:{width}}  {f.words}" for f in findings]
     works = any(finding.works for finding in findings)
     if not works:
         lines.append("Nothing renders here yet: follow one of the hints above.")
     return "\n".join(lines), works
 
 
-def _probe(backend: str, index: int | None) -> Finding:
-    name = backend if index is None else f"{backend} device {index}"
+def _egl_device_names() -> list[str]:
+    return [
+        f"egl device {index} ({'software' if device.software else 'hardware'})"
+        for index, device in enumerate(egl_devices())
+    ]
+
+
+def _renderer(backend: str, index: int | None) -> str:
+    with open_context(backend, index) as gl:
+        return f"{gl.renderer}, OpenGL {gl.version}"
+
+
+def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
+    """True and what `attempt` returns in a new process, or False and why it returned nothing."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_try, args=(backend, index, sender), daemon=True)
+    process = context.Process(target=_answer, args=(sender, attempt, arguments), daemon=True)
     process.start()
     sender.close()
     try:
-        works, words = receiver.recv() if receiver.poll(_TIMEOUT_S) else (False, "no answer")
+        if receiver.poll(_TIMEOUT_S):
+            answer: tuple[bool, Any] = receiver.recv()
+            return answer
+        return False, f"no answer within {_TIMEOUT_S:g} s: the driver hangs"
     except EOFError:
         process.join()
-        works, words = False, f"the driver crashed (exit code {process.exitcode})"
-    process.terminate()
-    process.join()
-    return Finding(name, works, words)
+        code = process.exitcode or 0
+        ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return False, f"the driver crashed ({ended})"
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
 
 
-def _try(backend: str, index: int | None, sender: Any) -> None:
+def _answer(sender: Any, attempt: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
     try:
-        with open_context(backend, index) as gl:
-            sender.send((True, f"{gl.renderer}, OpenGL {gl.version}"))
+        answer = True, attempt(*arguments)
     except FastgenError as error:
-        sender.send((False, str(error)))
+        answer = False, str(error)
+    sender.send(answer)

@@ -1,7 +1,9 @@
 """Contexts: both backends draw what geometry says, are released whole, and work in processes."""
 
+import itertools
 import multiprocessing
 import os
+import time
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from fastgen import doctor, gl
 from fastgen.errors import ConfigError, ContextError
 
 BACKENDS = ("egl", "osmesa")
+PAIRS = tuple(itertools.product(BACKENDS, repeat=2))
 
 VERTEX = "#version 430\nin vec2 p; void main() { gl_Position = vec4(p, 0.0, 1.0); }"
 FRAGMENT = "#version 430\nout uint id; void main() { id = 7u; }"
@@ -38,9 +41,38 @@ def test_a_triangle_covers_the_pixel_centres_inside_it(backend):
     np.testing.assert_array_equal(triangle(backend), expected())
 
 
-def test_backends_can_take_turns_in_one_process():
-    for backend in ("egl", "osmesa", "egl", "osmesa"):
-        np.testing.assert_array_equal(triangle(backend), expected())
+@pytest.mark.parametrize("pair", PAIRS)
+def test_contexts_alive_together_keep_their_own_objects(pair):
+    with gl.open_context(pair[0]) as first, gl.open_context(pair[1]) as second:
+        owned = []
+        for content, context in ((b"1111", first), (b"2222", second)):
+            context.make_current()
+            owned.append((context, context.ctx.buffer(content), content))
+        # the same name in both: had one context taken both buffers, the names would differ
+        assert owned[0][1].glo == owned[1][1].glo
+        for context, buffer, content in owned * 2:
+            context.make_current()
+            assert buffer.read() == content
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_releasing_one_context_leaves_the_current_one_at_work(pair):
+    first = gl.open_context(pair[0])
+    with gl.open_context(pair[1]) as second:
+        buffer = second.ctx.buffer(b"2222")
+        first.release()
+        assert buffer.read() == b"2222"
+        second.make_current()
+        assert buffer.read() == b"2222"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_released_context_says_so(backend):
+    context = gl.open_context(backend)
+    context.release()
+    context.release()
+    with pytest.raises(ContextError, match=f"{backend}: the context was released"):
+        context.make_current()
 
 
 def _resident_mb():
@@ -59,7 +91,8 @@ def test_500_contexts_leave_nothing_behind(backend):
     memory, files = _resident_mb(), len(os.listdir("/proc/self/fd"))
     _cycles(backend, 500)
     assert len(os.listdir("/proc/self/fd")) <= files
-    # a context holds several megabytes while it lives; a leaked one would add over a gigabyte
+    # a context holds 0.4 MB or more while it lives, so leaked ones would add 200 MB and over;
+    # the allocator's own wobble is a few
     assert _resident_mb() - memory < 30
 
 
@@ -69,9 +102,63 @@ def test_contexts_work_in_spawned_processes():
             np.testing.assert_array_equal(image, expected())
 
 
+def threads_added(backend, counts):
+    """How many threads this process gained by a context with each of `counts`, one by one."""
+    added = []
+    for count in counts:
+        before = len(os.listdir("/proc/self/task"))
+        gl.open_context(backend, threads=count)
+        added.append(len(os.listdir("/proc/self/task")) - before)
+    return added
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_the_first_thread_count_of_a_process_stands(backend, monkeypatch):
+    monkeypatch.delenv("LP_NUM_THREADS", raising=False)
+    runs = [(backend, (0,)), (backend, (3, 0, 9))]
+    with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
+        (alone,), (with_three, *later) = pool.starmap(threads_added, runs, chunksize=1)
+    assert with_three >= alone + 3
+    assert later == [0, 0]
+
+
+def test_hardware_comes_first_and_software_serves_where_it_fails(monkeypatch):
+    (software,) = (device for device in gl.egl_devices() if device.software)
+    broken = gl.EglDevice(handle=64, software=False)
+    tried = []
+    create = gl._Egl.create
+    monkeypatch.setattr(gl._Egl, "devices", lambda _: [software, broken])
+    monkeypatch.setattr(
+        gl._Egl, "create", lambda egl, device: tried.append(device) or create(egl, device)
+    )
+    gl.open_context("egl").release()
+    assert tried == [broken, software]
+    with pytest.raises(ContextError, match="device 1: eglGetPlatformDisplayEXT failed"):
+        gl.open_context("egl", device_index=1)
+
+
+def test_surfaceless_serves_where_no_device_is_listed(monkeypatch):
+    monkeypatch.setattr(gl._Egl, "devices", lambda _: [])
+    np.testing.assert_array_equal(triangle("egl"), expected())
+
+
 def test_unknown_backends_are_named_with_the_choices():
-    with pytest.raises(ConfigError, match="backend: 'elg' is unknown"):
+    with pytest.raises(ConfigError, match="'elg' is unknown; choose from auto, egl, osmesa"):
         gl.open_context("elg")
+
+
+@pytest.mark.parametrize("index", [-1, 99])
+def test_a_device_that_does_not_exist_is_named_and_nothing_stands_in_for_it(index):
+    with pytest.raises(ContextError, match=f"there is no device {index} among") as caught:
+        gl.open_context("auto", device_index=index)
+    assert "osmesa" not in str(caught.value)
+
+
+def test_osmesa_takes_no_device_and_threads_count_from_zero():
+    with pytest.raises(ConfigError, match="device_index: 0: osmesa has no devices"):
+        gl.open_context("osmesa", device_index=0)
+    with pytest.raises(ConfigError, match="threads: -1"):
+        gl.open_context("egl", threads=-1)
 
 
 def test_without_libraries_the_error_names_the_packages(monkeypatch):
@@ -79,13 +166,60 @@ def test_without_libraries_the_error_names_the_packages(monkeypatch):
         raise OSError(f"{name}: cannot open shared object file")
 
     monkeypatch.setattr(gl.ctypes, "CDLL", missing)
-    with pytest.raises(ContextError, match=r"apt-get install libegl1.*apt-get install libosmesa6"):
+    pattern = (
+        r"egl: libEGL\.so\.1: cannot open.* apt-get install libegl1 .*"
+        r"osmesa: libOSMesa\.so\.8: cannot open.* apt-get install libosmesa6 \(Mesa 25\.1"
+    )
+    with pytest.raises(ContextError, match=pattern):
         gl.open_context("auto")
 
 
 def test_doctor_tells_of_both_backends():
     words, works = doctor.report()
     assert works
-    assert "egl device 0" in words
-    assert "osmesa" in words
-    assert "llvmpipe" in words
+    lines = words.splitlines()
+    for name in ("egl device 0", "osmesa"):
+        assert any(line.startswith(f"ok    {name}") and "llvmpipe" in line for line in lines)
+
+
+def test_doctor_says_what_fails_on_an_old_driver(monkeypatch):
+    monkeypatch.setenv("MESA_GL_VERSION_OVERRIDE", "4.1")
+    words, works = doctor.report()
+    assert not works
+    assert words.count("FAIL") == 2
+    assert words.count("OpenGL 4.3 core") >= 2
+
+
+def test_doctor_names_the_packages_where_egl_finds_no_driver(monkeypatch):
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
+    egl, osmesa = doctor.diagnose()
+    assert not egl.works
+    assert f"apt-get install {gl.EGL_PACKAGES}" in egl.words
+    assert osmesa.works
+
+
+def three_devices():
+    return ["egl device 0", "egl device 1", "egl device 2"]
+
+
+def bad_driver(backend, index):
+    """Crashes on device 0, hangs on device 1, works on device 2; no OSMesa."""
+    if index == 0:
+        os.abort()
+    if index == 1:
+        time.sleep(60)
+    if backend == "osmesa":
+        raise ContextError("osmesa: none here")
+    return "a renderer"
+
+
+def test_doctor_survives_crashes_and_hangs_and_goes_on(monkeypatch):
+    monkeypatch.setattr(doctor, "_egl_device_names", three_devices)
+    monkeypatch.setattr(doctor, "_renderer", bad_driver)
+    monkeypatch.setattr(doctor, "_TIMEOUT_S", 3.0)
+    assert doctor.diagnose() == [
+        doctor.Finding("egl device 0", False, "the driver crashed (SIGABRT)"),
+        doctor.Finding("egl device 1", False, "no answer within 3 s: the driver hangs"),
+        doctor.Finding("egl device 2", True, "a renderer"),
+        doctor.Finding("osmesa", False, "osmesa: none here"),
+    ]
