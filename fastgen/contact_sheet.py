@@ -20,16 +20,15 @@ def write_contact_sheet(out: Path, path: Path) -> None:
     by_camera: dict[str, list[Path]] = {}
     for image in sorted(images, key=lambda p: p.stem):
         by_camera.setdefault(image.stem.split("_", 1)[1], []).append(image)
-    # a row of one camera after the other, each spread over the dataset
+    # one camera after the other, each spread over the dataset
     count = min(len(images), _COLUMNS * _ROWS)
     share = -(-count // max(len(by_camera), 1))
     chosen = [
-        views[i * len(views) // share]
+        views[i * len(views) // min(share, len(views))]
         for i in range(share)
         for views in by_camera.values()
-        if share <= len(views)
-    ][:count] or images[:count]
-    count = len(chosen)
+        if i < len(views)
+    ][:count]
     rows = -(-count // _COLUMNS)
     sheet = np.full((rows * _TILE_PX, _COLUMNS * _TILE_PX, 3), 32, np.uint8)
     for i, image_path in enumerate(chosen):

@@ -251,5 +251,6 @@ def _work(job: Job, version: str, tasks: Any, results: Any, whole_machine: bool)
         pass
     except (FastgenError, OSError) as error:
         results.put(("failed", f"{place}: {error}"))
-    except Exception:
-        results.put(("failed", f"{place}: {traceback.format_exc()}"))
+    except Exception as error:
+        traceback.print_exc()
+        results.put(("failed", f"{place}: {error!r} (our mistake: please report it)"))

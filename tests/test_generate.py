@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import queue
 import shutil
 import signal
 import subprocess
@@ -17,8 +18,11 @@ import yaml
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+from fastgen import generate
 from fastgen.cli import main
 from fastgen.config import Config
+from fastgen.generate import Job
+from fastgen.generator import Generator
 from fastgen.sampling import split_of
 from fastgen.scene import Scene
 
@@ -87,7 +91,8 @@ def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):
     assert len(data["names"]) == data["nc"] == 28
     pairs = 0
     for split in ("train", "val", "test"):
-        for image in (dataset / "imdg" / data[split]).glob("*.jpg"):
+        # ultralytics 8.4, check_det_dataset and img2label_paths: the folder is resolved first
+        for image in (dataset / "imdg" / data[split]).resolve().glob("*.jpg"):
             head, tail = str(image).rsplit("/images/", 1)
             label = Path(f"{head}/labels/{tail}").with_suffix(".txt")
             assert label.is_file()
@@ -123,12 +128,48 @@ def test_one_worker_makes_the_same_bytes_as_two(dataset, tmp_path):
     assert content(tmp_path / "out") == content(dataset)
 
 
-def test_running_again_restores_what_is_missing(dataset, tmp_path):
+def test_contact_sheet_shows_every_image_of_a_small_dataset(dataset):
+    sheet = cv2.imread(str(dataset / "contact_sheet.png"))
+    rows, columns = sheet.shape[0] // 400, sheet.shape[1] // 400
+    tiles = sheet.reshape(rows, 400, columns, 400, 3).swapaxes(1, 2).reshape(-1, 400 * 400 * 3)
+    assert sum(np.ptp(tile) > 0 for tile in tiles) == 14
+
+
+def test_crops_hold_the_text_that_the_labels_say(tmp_path):
+    out = tmp_path / "out"
+    arguments = ["--images", "3", "--size", "640x480", "--cameras", "Cl", "--split", "val"]
+    assert main(["generate", str(out), *arguments, "--seed", "3", "--workers", "1"]) == 0
+    labels = dict(
+        line.split("\t") for line in (out / "text/val/labels.txt").read_text().splitlines()
+    )
+    assert labels
+    assert set(labels) == {p.name for p in (out / "text/val").glob("*.png")}
+    for name, text in labels.items():
+        stem, instance = name.removesuffix(".png").rsplit("_", 1)
+        record = json.loads((out / f"scenes/val/{stem}.json").read_text())
+        (shown,) = [
+            o
+            for o in record["objects"]
+            if o["class_name"] == "text" and o["instance"] == int(instance)
+        ]
+        assert shown["text"] == text
+        x0, y0, x1, y1 = shown["bbox"]
+        crop = cv2.imread(str(out / "text/val" / name)).astype(int)
+        image = cv2.imread(str(out / f"images/val/{stem}.jpg")).astype(int)
+        inside = crop[3 : 3 + y1 - y0, 3 : 3 + x1 - x0]
+        assert np.abs(inside - image[y0:y1, x0:x1]).mean() < 6  # the image went through JPEG
+    assert main(["verify", str(out)]) == 0
+
+
+@pytest.mark.parametrize(
+    "lost",
+    ["scenes/*/*.json", "images/*/*.jpg", "imdg/*/*/*", "damage/*/*/*", "damage/*.json", "door/*"],
+)
+def test_running_again_restores_what_is_missing(dataset, tmp_path, lost):
     out = tmp_path / "out"
     shutil.copytree(dataset, out, symlinks=True)
-    for path in sorted(out.glob("scenes/*/*.json"))[::3]:
-        path.unlink()
-    (out / "damage/coco_train.json").unlink()
+    for path in sorted(out.glob(lost))[::5]:
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
     assert run(out) == 0
     assert content(out) == content(dataset)
 
@@ -156,23 +197,63 @@ def test_more_images_extend_a_dataset(dataset, tmp_path):
     assert before.items() <= after.items()
 
 
-def test_verify_finds_faults_and_passes_sound_data(dataset, tmp_path, capsys):
+def test_verify_passes_sound_data(dataset):
     assert main(["verify", str(dataset)]) == 0
-    for number, damage in enumerate(
-        (
-            lambda out: next(out.glob("images/*/*.jpg")).write_bytes(b"no jpeg"),
-            lambda out: next(out.glob("damage/masks/*/*.png")).unlink(),
-            lambda out: (out / "extra.txt").write_text("x"),
-            lambda out: next(out.glob("imdg/labels/*/*.txt")).write_text("3 1.2 0 0 0\n"),
-            lambda out: next(out.glob("scenes/*/*.json")).write_text("{}"),
-        )
-    ):
-        out = tmp_path / str(number)
-        shutil.copytree(dataset, out, symlinks=True)
-        damage(out)
-        capsys.readouterr()
-        assert main(["verify", str(out)]) == 1
-        assert capsys.readouterr().out.strip()
+
+
+def cut(path):
+    path.write_bytes(path.read_bytes()[:-2])
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("images/*/*.jpg", lambda p: p.write_bytes(b"no jpeg")),
+        ("images/*/*.jpg", cut),
+        ("imdg/images/*/*.jpg", lambda p: p.write_bytes(b"no jpeg")),
+        ("door/*/*/*.jpg", Path.unlink),
+        ("door/*/door", lambda p: (p / "x.jpg").write_bytes(b"x")),
+        ("damage/masks/*/*.png", Path.unlink),
+        ("damage/masks/*/*.png", lambda p: p.write_bytes(p.read_bytes()[:60])),
+        ("damage/yolo/*/*.txt", lambda p: p.write_text("0 0.1 0.1 0.2 0.1 0.2 1.1\n")),
+        ("damage/coco_train.json", lambda p: p.write_text(p.read_text().replace('s":"', 's":"0'))),
+        ("imdg/labels/*/*.txt", lambda p: p.write_text("3 1.2 0 0 0\n")),
+        ("imdg/labels/*/*.txt", lambda p: p.write_text("")),
+        ("imdg/data.yaml", Path.unlink),
+        ("text/train/labels.txt", lambda p: p.write_text("a.png\tABC\n")),
+        ("scenes/*/*.json", lambda p: p.write_text("{}")),
+        ("scenes/*/*.json", lambda p: p.write_text("[]")),
+        ("images/train", shutil.rmtree),
+        ("damage", lambda p: (p / "extra.txt").write_text("x")),
+    ],
+)
+def test_verify_names_the_spoilt_file(dataset, tmp_path, capsys, name, spoil):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out, symlinks=True)
+    spoilt = sorted(out.glob(name))[0]
+    spoil(spoilt)
+    assert main(["verify", str(out)]) == 1
+    assert spoilt.relative_to(out).as_posix() in capsys.readouterr().out
+
+
+def test_a_broken_renderer_stops_the_run_with_one_line(tmp_path, capsys, monkeypatch):
+    class Broken(Generator):
+        def render(self, *_, **__):
+            raise RuntimeError("no such luck")
+
+    monkeypatch.setattr(generate, "Generator", Broken)
+    job = Job(tmp_path, 1, Config.preset(), 0, (64, 64), ("A",), None, "auto")
+    tasks, results = queue.Queue(), queue.Queue()
+    for task in (0, None):
+        tasks.put(task)
+    generate._work(job, "test", tasks, results, False)
+    kind, words = list(results.queue)[-1]
+    assert kind == "failed"
+    assert words.startswith("scene 0, camera A: ")
+    assert "no such luck" in words
+    assert "\n" not in words
+    assert "Traceback" in capsys.readouterr().err
+    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
 
 
 def test_stats_counts_what_the_files_hold(dataset, capsys):
@@ -225,6 +306,24 @@ def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, 
     assert error.count("\n") == 1
     assert message in error
     assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["generate", "x", "--images", "many"],
+        ["generate", "x"],
+        ["show", "--index", "1.5", "-o", "x.png"],
+        ["paint"],
+    ],
+)
+def test_a_bad_command_line_gets_one_line_too(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: ")
+    assert error.count("\n") == 1
 
 
 def test_show_writes_every_layer(tmp_path):

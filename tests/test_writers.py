@@ -10,9 +10,12 @@ from PIL import Image
 from pycocotools import mask as coco_mask
 
 from fastgen.classes import DETECTION_CLASSES
+from fastgen.config import LabelConfig
 from fastgen.generator import Generator
 from fastgen.sample import Object
+from fastgen.scene import Camera
 from fastgen.writers import coco, encode, yolo
+from fastgen.writers.seafront import SeafrontWriter
 
 
 def masks():
@@ -70,6 +73,13 @@ def test_links_hold_the_same_bytes(tmp_path):
     assert (tmp_path / "b.jpg").read_bytes() == b"bytes"
 
 
+def test_linking_a_file_to_itself_keeps_it(tmp_path):
+    encode.write(tmp_path / "a.jpg", b"bytes")
+    encode.link(tmp_path / "a.jpg", tmp_path / "a.jpg")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.jpg"]
+    assert (tmp_path / "a.jpg").read_bytes() == b"bytes"
+
+
 def item(name, bbox, area=1000):
     return Object(2, name, 1, bbox, None, area, 1.0, False, "", ())
 
@@ -122,6 +132,19 @@ def test_yolo_outlines_fill_to_the_mask(samples):
         mask = sample.damage > 0
         assert index == "0"
         assert (drawn.astype(bool) & mask).sum() / (drawn.astype(bool) | mask).sum() > 0.97
+
+
+def test_an_image_of_nothing_has_no_annotation_and_counts_no_damage(tmp_path):
+    away = Camera("A", (0.0, -8000.0, 1000.0), (0.0, -20000.0, 1000.0), 14.5)
+    with Generator(seed=2, size=(64, 64)) as generator:
+        sample = generator.render(index=0, camera=away)
+    assert not sample.damage.any()
+    writer = SeafrontWriter(tmp_path, LabelConfig(), "test")
+    writer.add(sample, "train", "000000_A")
+    assert writer.has("train", "000000_A")
+    counts = writer.finish()["train"]
+    assert (counts["images"], counts["damages"], counts["crops"]) == (1, 0, 0)
+    assert (tmp_path / "imdg/labels/train/000000_A.txt").read_text() == ""
 
 
 def test_records_are_json_that_any_reader_takes(samples):

@@ -44,8 +44,12 @@ def write(path: Path, data: bytes | str) -> None:
 
 def link(source: Path, path: Path) -> None:
     """Make `path` a second name of `source`, or a copy where the file system has no links."""
-    path.unlink(missing_ok=True)
+    aside = path.with_name(f".{path.name}.part")
+    aside.unlink(missing_ok=True)
     try:
-        os.link(source, path)
+        os.link(source, aside)
     except OSError:
         write(path, source.read_bytes())
+        return
+    os.replace(aside, path)
+    aside.unlink(missing_ok=True)  # POSIX leaves it where both names are one file already

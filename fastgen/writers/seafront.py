@@ -1,6 +1,5 @@
 """The `seafront` layout: one folder a task of the paper, each in the form its trainers read."""
 
-import contextlib
 import json
 import os
 from functools import lru_cache
@@ -26,6 +25,29 @@ _CORNER = 16
 _DOOR_FOLDERS = {"Cr": "door", "Cl": "no_door"}
 
 
+def sample_files(split: str, stem: str) -> list[str]:
+    """Files of one sample relative to OUT, except its text crops, which its scene file names."""
+    found = [
+        f"images/{split}/{stem}.jpg",
+        # trainers resolve this folder and look for labels where `images` reads `labels`: a link
+        # in place of the folder would lead them out of imdg
+        f"imdg/images/{split}/{stem}.jpg",
+        f"imdg/labels/{split}/{stem}.txt",
+        f"damage/masks/{split}/{stem}.png",
+        f"damage/yolo/{split}/{stem}.txt",
+        f"scenes/{split}/{stem}.json",
+    ]
+    if folder := _DOOR_FOLDERS.get(stem.split("_", 1)[1]):
+        found.append(f"door/{split}/{folder}/{stem}.jpg")
+    return found
+
+
+def dataset_files() -> list[str]:
+    """Files relative to OUT that `finish` writes, over all samples."""
+    per_split = [(f"damage/coco_{split}.json", f"text/{split}/labels.txt") for split in SPLITS]
+    return ["imdg/data.yaml", *(name for names in per_split for name in names)]
+
+
 class SeafrontWriter:
     """Writes OUT as docs/output.md lays it out. A sample's scene file comes last: it says the rest
     is whole.
@@ -42,6 +64,7 @@ class SeafrontWriter:
                 f"images/{split}",
                 f"damage/masks/{split}",
                 f"damage/yolo/{split}",
+                f"imdg/images/{split}",
                 f"imdg/labels/{split}",
                 f"text/{split}",
                 f"door/{split}/door",
@@ -49,22 +72,24 @@ class SeafrontWriter:
                 f"scenes/{split}",
             ):
                 (out / folder).mkdir(parents=True, exist_ok=True)
-        beside = out / "imdg" / "images"
-        if not beside.is_symlink():
-            # trainers look for labels where `images` in an image's path reads `labels`;
-            # another worker may be faster
-            with contextlib.suppress(FileExistsError):
-                beside.symlink_to(Path("..") / "images")
 
     def has(self, split: str, stem: str) -> bool:
-        """Whether a sample was written whole before."""
-        return (self._out / "scenes" / split / f"{stem}.json").is_file()
+        """Whether a sample was written whole before, and none of its files has gone since."""
+        if not all((self._out / name).is_file() for name in sample_files(split, stem)):
+            return False
+        try:
+            text = (self._out / "scenes" / split / f"{stem}.json").read_text(encoding="utf-8")
+            crops = [crop["file"] for crop in json.loads(text)["crops"]]
+        except (ValueError, KeyError, TypeError):
+            return False
+        return all((self._out / "text" / split / name).is_file() for name in crops)
 
     def add(self, sample: Sample, split: str, stem: str) -> None:
         """Write all files of one sample, its scene file last."""
         out, size = self._out, sample.view.size
         image = out / "images" / split / f"{stem}.jpg"
         encode.write(image, encode.jpeg(sample.image))
+        encode.link(image, out / "imdg/images" / split / f"{stem}.jpg")
         encode.write(out / "damage/masks" / split / f"{stem}.png", encode.png(sample.damage))
         encode.write(out / "damage/yolo" / split / f"{stem}.txt", yolo.segmentation_lines(sample))
         detections = yolo.detection_lines(sample.objects, size, self._labels.min_visible_px)
@@ -99,7 +124,9 @@ class SeafrontWriter:
             counts[split] = {
                 "images": len(records),
                 "objects": sum(len(record["objects"]) for record in records),
-                "damages": sum(len(record["annotations"]) - 1 for record in records),
+                "damages": sum(
+                    item["category_id"] > 1 for record in records for item in record["annotations"]
+                ),
                 "crops": len(crops),
             }
         names = "".join(f"  {i}: {name}\n" for i, name in enumerate(DETECTION_CLASSES))
