@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from fastgen.lettering import layout
 from fastgen.markings_config import MarkingsConfig
 from fastgen.records import Range, nearest
 from fastgen.scene import Color, Decal, Vec2
+from fastgen.weights import parts, weight_lines
 
 Streams = Callable[[str], np.random.Generator]
 Flats = Mapping[str, Sequence[tuple[float, float]]]
@@ -30,13 +31,8 @@ _DARK: Color = (0.018, 0.018, 0.02)
 _COLORED: tuple[Color, ...] = ((0.7, 0.45, 0.02), (0.45, 0.02, 0.02), (0.02, 0.08, 0.35))
 _YELLOW: Color = (0.72, 0.47, 0.01)
 
+_HIGH_CUBE_SIGNS = ("height_sign", "height_triangle")
 _REC_709 = np.array([0.2126, 0.7152, 0.0722])
-
-_TARE_KG = {"20": 2200, "40": 3740, "40HC": 3900, "45HC": 4820}
-_GROSS_KG = {"20": 30480, "40": 30480, "40HC": 32500, "45HC": 34000}
-_CUBE_M3 = {"20": 33.2, "40": 67.7, "40HC": 76.3, "45HC": 86.0}
-_LB_PER_KG = 1 / 0.45359237
-_CUBIC_FEET_PER_M3 = 35.3146667
 
 
 @dataclass
@@ -113,7 +109,7 @@ def sample_decals(
         markers += _markers(config, faces[face], streams(f"markers.{face}"))
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
-        drawn += _stickers(config, sheet, streams(f"stickers.{sheet.face}"))
+        drawn += _stickers(config, kind, sheet, streams(f"stickers.{sheet.face}"))
     return (*drawn, *markers)
 
 
@@ -164,14 +160,7 @@ def _text(
 
 
 def _placed(decal: Decal, sheet: _Sheet, center: Vec2, class_name: str = "") -> Decal:
-    return Decal(
-        **{
-            **decal.__dict__,
-            "face": sheet.face,
-            "center_mm": center,
-            "class_name": class_name,
-        }
-    )
+    return replace(decal, face=sheet.face, center_mm=center, class_name=class_name)
 
 
 def _identifier_lines(identifier: Identifier, form: int) -> tuple[str, ...]:
@@ -199,19 +188,20 @@ def _identifiers(
     for number in range(count):
         upright = sheet.face != "roof" and rng.random() < config.vertical
         on_flat = sheet.face == "no_door" and bool(flats)
+        slim = on_flat or sheet.face == "door"
         cap = _between(rng, config.cap_mm)
-        if on_flat and rng.random() < 0.6:
-            upright = True
-            cap = config.cap_mm.lo
-        i = style.identifier
+        upright = upright or (on_flat and rng.random() < 0.6)
         if upright:
-            lines: tuple[str, ...] = (f"{i.owner}{i.serial}{i.check}",)
-            cap = min(cap, _tenth((sheet.size[1] - 2 * _EDGE_MM) / 15.5))
-            cap = max(cap, config.cap_mm.lo)
-        else:
-            lines = _identifier_lines(i, int(rng.integers(3)))
+            tallest = _tenth((sheet.size[1] - 2 * _EDGE_MM) / 15.5)  # 11 letters take 14.5 caps
+            cap = config.cap_mm.lo if slim else max(min(cap, tallest), config.cap_mm.lo)
+        i = style.identifier
+        lines = _identifier_lines(i, int(rng.integers(3)))
+        if upright:
+            # a flat, or a door leaf beside its weights, has room for one column: the code is below
+            column = f"{i.owner}{i.serial}{i.check}"
+            lines = (f"{column} {i.size_type}",) if slim else (column, i.size_type)
         decal = _text(lines, cap, style, round(float(rng.uniform(*config.text_wear)), 3), upright)
-        x = Range(0.86, 1.0) if number == 0 else Range(0.0, 0.12)
+        x = Range(0.99 if slim and upright else 0.86, 1.0) if number == 0 else Range(0.0, 0.12)
         center = None
         if upright and on_flat:
             center = _on_flat(sheet, decal.size_mm, flats, rng)
@@ -233,35 +223,26 @@ def _on_flat(
     return None
 
 
-def weight_lines(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
-    """The weights panel: gross, tare, net and capacity, in kilograms and pounds, cubic measures."""
-    gross = _GROSS_KG[kind] + int(rng.integers(-2, 3)) * 10
-    tare = _TARE_KG[kind] + int(rng.integers(-20, 21)) * 10
-    rows = [("MAX GROSS", gross), ("TARE", tare), ("NET", gross - tare)]
-    lines = [f"{name} {kg} KG {round(kg * _LB_PER_KG)} LB" for name, kg in rows]
-    cube = _CUBE_M3[kind] + round(float(rng.uniform(-0.4, 0.4)), 1)
-    lines.append(f"CU.CAP. {cube:.1f} CU.M {round(cube * _CUBIC_FEET_PER_M3)} CU.FT")
-    return tuple(lines)
-
-
 def _weights(
     config: MarkingsConfig, kind: str, door: _Sheet, style: _Style, streams: Streams
 ) -> list[Decal]:
     rng = streams("weights")
     lines = weight_lines(kind, rng)
     wear = round(float(rng.uniform(*config.text_wear)), 3)
-    decal = _text(lines, _between(rng, config.weights_cap_mm), style, wear)
-    available = door.size[0] / 2 - _EDGE_MM - 40
-    if decal.size_mm[0] > available:  # a leaf holds it in two lines an entry
-        halves = tuple(part for line in lines for part in _halves(line))
-        decal = _text(halves, config.weights_cap_mm.lo, style, wear)
-    center = door.place(decal.size_mm, rng, Range(0.9, 1.0), Range(0.25, 0.75))
-    return [_placed(decal, door, center)] if center else []
-
-
-def _halves(line: str) -> tuple[str, str]:
-    words = line.split(" ")
-    return " ".join(words[:-2]), " ".join(words[-2:])
+    # beside an upright identifier a leaf holds it in two or three lines an entry
+    halves, thirds = (tuple(p for line in lines for p in parts(line, n)) for n in (2, 3))
+    cap = _between(rng, config.weights_cap_mm)
+    leaf = door.size[0] / 2 + _GAP_MM
+    least = config.weights_cap_mm.lo
+    for rows, height in ((lines, cap), (halves, cap), (halves, least), (thirds, least)):
+        decal = _text(rows, height, style, wear)
+        room = door.size[0] - 2 * _EDGE_MM - decal.size_mm[0]
+        start = (leaf - _EDGE_MM) / room if room > 0 else 1.0
+        if start < 1.0:
+            center = door.place(decal.size_mm, rng, Range(start, 1.0), Range(0.25, 0.75))
+            if center:
+                return [_placed(decal, door, center)]
+    return []
 
 
 def _brand(
@@ -288,12 +269,8 @@ def _brand(
                 albedo=style.albedo,
                 wear=0.1,
             )
-            made.append(mark)
-            made.append(
-                _placed(
-                    word, sheet, (center[0], _tenth(center[1] - size[1] / 2 + word.size_mm[1] / 2))
-                )
-            )
+            low = _tenth(center[1] - size[1] / 2 + word.size_mm[1] / 2)
+            made += [mark, _placed(word, sheet, (center[0], low))]
     if rng.random() < config.main_text.get(sheet.face, 0.0):
         line = str(rng.choice(style.brand.main_texts))
         text = _text((line,), _between(rng, Range(70, 130 if small else 240)), style, 0.2)
@@ -303,11 +280,15 @@ def _brand(
     return made
 
 
-def _stickers(config: MarkingsConfig, sheet: _Sheet, rng: np.random.Generator) -> list[Decal]:
+def _stickers(
+    config: MarkingsConfig, kind: str, sheet: _Sheet, rng: np.random.Generator
+) -> list[Decal]:
     """Plates and stickers that are no markers, none of them labelled."""
     if sheet.face == "roof":
         return []
     known = {n: s for n, s in stickers().items() if not s.where or sheet.face in s.where}
+    if not kind.endswith("HC"):
+        known = {n: s for n, s in known.items() if n not in _HIGH_CUBE_SIGNS}
     low, high = config.stickers_per_face
     wanted = [n for n, s in known.items() if s.always]
     free = sorted(set(known) - set(wanted))
@@ -373,8 +354,9 @@ def _markers(config: MarkingsConfig, sheet: _Sheet, rng: np.random.Generator) ->
     tilts = rng.uniform(*config.marker_tilt_deg, size=count)
     wears = rng.uniform(*config.marker_wear, size=count)
     while count > 0:
-        # what tilting adds to the diamond's width and height
-        step = diagonal * 1.002 + math.sqrt(2) * gap
+        # a square turned by t reaches side / 2 * (cos t + sin t) toward its neighbour
+        tilt = math.radians(float(np.abs(tilts).max()))
+        step = diagonal * (math.cos(tilt) + math.sin(tilt)) + math.sqrt(2) * gap
         offsets = np.array(rhombus_offsets(count, step, step))
         low_corner, high_corner = offsets.min(axis=0), offsets.max(axis=0)
         size = tuple(float(v) + diagonal * 1.01 for v in high_corner - low_corner)

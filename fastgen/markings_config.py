@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from fastgen.errors import ConfigError
 from fastgen.records import Range, bounds
 
 UNIT = bounds(0.0, 1.0)
@@ -43,3 +44,13 @@ class MarkingsConfig:
     stickers_per_face: tuple[int, int] = field(default=(0, 4), metadata=bounds(0, 100))
     sticker_wear: Range = field(default=Range(0.0, 0.5), metadata=UNIT)
     height_marks: float = field(default=0.85, metadata=UNIT)
+
+    def __post_init__(self) -> None:
+        """Hold each pair of counts to its order, which no single bound can express."""
+        for name in ("markers_per_face", "stickers_per_face"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise ConfigError(
+                    f"markings.{name}: the lowest value {low} is above the highest {high}; "
+                    "swap them"
+                )

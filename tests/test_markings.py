@@ -13,8 +13,9 @@ from fastgen.container import build_container
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.lettering import layout
-from fastgen.markings import rhombus_offsets, weight_lines
+from fastgen.markings import rhombus_offsets
 from fastgen.sampling import sheet_sizes
+from fastgen.weights import weight_lines
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +54,18 @@ def test_labelled_things_never_overlap(scenes):
                 assert all(apart(a, b) for b in shapes[:i])
 
 
+def test_neighbours_in_the_pattern_clear_each_other_however_they_tilt():
+    values = {"marker_tilt_deg": [-15, 15], "marker_gap_mm": [1, 1], "markers_per_face": [4, 8]}
+    generator = Generator(Config.from_values({"markings": values}), seed=2)
+    for index in range(30):
+        decals = generator.scene(index).decals
+        for face in ("front", "back"):
+            shapes = [corners(d) for d in decals if d.face == face and d.kind == "marker"]
+            assert len(shapes) > 1
+            for i, a in enumerate(shapes):
+                assert all(apart(a, b) for b in shapes[:i])
+
+
 def test_everything_lies_on_its_sheet(scenes):
     for scene in scenes:
         mesh = build_container(scene.container.kind, scene.container.profiles)
@@ -76,7 +89,67 @@ def test_one_identifier_is_on_every_face_and_the_same(scenes):
         texts = [d for d in scene.decals if d.class_name == "text"]
         letters = {d.text.replace(" ", "")[:11] for d in texts}
         assert len(letters) == 1
-        assert {d.face for d in texts} >= {"front", "back", "no_door"}
+        assert {d.face for d in texts} == {"front", "back", "door", "no_door", "roof"}
+
+
+def test_mean_counts_a_face_are_those_the_configuration_asks_for(scenes):
+    config = Config.preset().markings
+    walls = [d for s in scenes for d in s.decals if d.face != "roof"]
+    markers = sum(d.kind == "marker" for d in walls) / (4 * len(scenes))
+    texts = sum(d.class_name == "text" for d in walls) / (4 * len(scenes))
+    # uniform from low to high; four deviations of the mean of 1,000 faces
+    low, high = config.markers_per_face
+    deviation = math.sqrt(((high - low + 1) ** 2 - 1) / 12 / (4 * len(scenes)))
+    assert markers == pytest.approx((low + high) / 2, abs=4 * deviation)
+    # one a wall, and another on two of four with its probability
+    p = config.second_identifier
+    deviation = math.sqrt(p * (1 - p) / (2 * len(scenes))) / 2
+    assert texts == pytest.approx(1 + p / 2, abs=4 * deviation)
+
+
+def test_only_markers_and_identifiers_bear_a_label(scenes):
+    for decal in (d for s in scenes for d in s.decals):
+        if decal.kind == "marker":
+            assert decal.class_name == decal.art in MARKER_CLASSES
+        else:
+            letters = decal.text.replace(" ", "")
+            reads_as_identifier = letters[3:4] == "U" and letters[4:11].isdigit()
+            assert decal.class_name == ("text" if reads_as_identifier else "")
+
+
+def test_every_identifier_ends_in_the_size_type_code_of_its_kind(scenes):
+    codes = {"20": "22G1", "40": "42G1", "40HC": "45G1", "45HC": "L5G1"}
+    upright = 0
+    for scene in scenes:
+        for decal in (d for d in scene.decals if d.class_name == "text"):
+            assert decal.text.split()[-1] == codes[scene.container.kind]
+            upright += decal.vertical
+    assert upright > len(scenes)
+
+
+def test_every_container_bears_its_weights_on_the_right_door_leaf(scenes):
+    for scene in scenes:
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        panels = [d for d in scene.decals if d.text.startswith("MAX GROSS")]
+        assert [d.face for d in panels] == ["door"]
+        assert corners(panels[0])[:, 0].min() > sheet_sizes(mesh)["door"][0] / 2
+
+
+def test_only_high_cubes_warn_of_their_height(scenes):
+    signs = {"height_sign", "height_triangle", "stripes"}
+    for scene in scenes:
+        if not scene.container.kind.endswith("HC"):
+            assert not signs & {d.art for d in scene.decals}
+    assert signs <= {d.art for s in scenes for d in s.decals}
+
+
+def test_columns_on_the_end_wall_stand_on_outer_flats(scenes):
+    for scene in scenes:
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        middles = [(a + b) / 2 for a, b in mesh.flats["no_door"]]
+        for decal in scene.decals:
+            if decal.vertical and decal.face == "no_door":
+                assert min(abs(decal.center_mm[0] - m) for m in middles) < 0.1
 
 
 def test_letters_are_as_high_as_the_standard_asks(scenes):
@@ -136,6 +209,12 @@ def test_unknown_characters_and_fonts_are_named():
     config = Config.from_values({"markings": {"fonts": ["comic"]}})
     with pytest.raises(ConfigError, match="unknown font 'comic'"):
         Generator(config).scene(0)
+
+
+@pytest.mark.parametrize("name", ["markers_per_face", "stickers_per_face"])
+def test_counts_in_the_wrong_order_are_refused(name):
+    with pytest.raises(ConfigError, match=f"markings.{name}: .* 5 is above the highest 2; swap"):
+        Config.from_values({"markings": {name: [5, 2]}})
 
 
 def test_owner_codes_are_four_letters_ending_in_u():

@@ -1,0 +1,29 @@
+"""The weights panel of a container's door, as made-up but plausible figures."""
+
+import numpy as np
+
+# common makers' values for each kind, not a standard
+_TARE_KG = {"20": 2200, "40": 3740, "40HC": 3900, "45HC": 4820}
+_GROSS_KG = {"20": 30480, "40": 30480, "40HC": 32500, "45HC": 34000}
+_CUBE_M3 = {"20": 33.2, "40": 67.7, "40HC": 76.3, "45HC": 86.0}
+_LB_PER_KG = 1 / 0.45359237
+_CUBIC_FEET_PER_M3 = 35.3146667
+
+
+def weight_lines(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
+    """The weights panel: gross, tare, net and capacity, in kilograms and pounds, cubic measures."""
+    gross = _GROSS_KG[kind] + int(rng.integers(-2, 3)) * 10
+    tare = _TARE_KG[kind] + int(rng.integers(-20, 21)) * 10
+    rows = [("MAX GROSS", gross), ("TARE", tare), ("NET", gross - tare)]
+    lines = [f"{name} {kg} KG {round(kg * _LB_PER_KG)} LB" for name, kg in rows]
+    cube = _CUBE_M3[kind] + round(float(rng.uniform(-0.4, 0.4)), 1)
+    lines.append(f"CU.CAP. {cube:.1f} CU.M {round(cube * _CUBIC_FEET_PER_M3)} CU.FT")
+    return tuple(lines)
+
+
+def parts(line: str, count: int) -> tuple[str, ...]:
+    """An entry broken into 2 (name and metric, imperial) or 3 (name, metric, imperial) lines."""
+    words = line.split(" ")
+    name, metric, imperial = words[:-4], words[-4:-2], words[-2:]
+    rows = (name + metric, imperial) if count == 2 else (name, metric, imperial)
+    return tuple(" ".join(row) for row in rows)
