@@ -24,6 +24,7 @@ from fastgen import Config, Generator
 from fastgen.camera import view_of
 from fastgen.labels import label
 from fastgen.sample import Sample
+from fastgen.visibility import Shot
 from fastgen.writers.encode import jpeg, png
 from fastgen.writers.seafront import SeafrontWriter
 
@@ -56,7 +57,8 @@ def stages(backend: str, size: tuple[int, int], scenes: int) -> dict[str, float]
                 frame = targets.read()
                 t2 = time.perf_counter()
                 view = view_of(camera, size)
-                objects = label(frame, scene, view, renderer.mesh(scene.container))
+                mesh = renderer.mesh(scene.container)
+                objects = label(Shot(frame, scene, view, mesh, config))
                 t3 = time.perf_counter()
                 jpeg(frame.image)
                 png(frame.damage)

@@ -54,14 +54,20 @@ class View:
         safe = np.where(depth > 1e-9, depth, np.nan)
         return view[..., :2] / safe[..., None] * self.focal_px + np.array(self.center_px), depth
 
-    def rays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Origin [3] in mm and unit directions [H, W, 3] of the rays through all pixel centres."""
+    def rays(
+        self, pixels: NDArray[np.floating] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origin [3] in mm and unit directions [..., 3] of the rays through `pixels` [..., 2].
+
+        By default those are all pixel centres, [H, W, 2].
+        """
         width, height = self.size
-        x = (np.arange(width) + 0.5 - width / 2) / self.focal_px
-        y = (np.arange(height) + 0.5 - height / 2) / self.focal_px
-        rays = np.stack(np.broadcast_arrays(x[None, :], y[:, None], 1.0), axis=-1)
-        directions = rays @ self.rotation
-        return self.position_m / MM, directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        if pixels is None:
+            x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+            pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        across = (np.asarray(pixels, np.float64) - self.center_px) / self.focal_px
+        rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1) @ self.rotation
+        return self.position_m / MM, rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
     def clip_matrix(self) -> NDArray[np.float64]:
         """World metres to OpenGL clip space, float64 [4, 4].

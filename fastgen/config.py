@@ -124,10 +124,16 @@ class SplitConfig:
 
 @dataclass(frozen=True)
 class LabelConfig:
-    """When a label is written. min_visible_px: objects with fewer visible pixels are not listed
-    in the marker labels. min_text_px: height in pixels below which a text is no legible crop."""
+    """What becomes of objects that are hard to see.
+
+    min_visible_px, min_visible_fraction: objects with fewer visible pixels, or a smaller visible
+    part of what they would cover alone, are marked ignored: formats with ignore regions list them
+    as such, others leave them out. min_text_px: height in pixels below which a text is no legible
+    crop.
+    """
 
     min_visible_px: int = field(default=12, metadata=bounds(1, 1e6, "pixels"))
+    min_visible_fraction: float = field(default=0.05, metadata=UNIT)
     min_text_px: float = field(default=10.0, metadata=bounds(1.0, 1e4, "pixels"))
 
 

@@ -16,6 +16,7 @@ from fastgen.renderer import Renderer
 from fastgen.sample import Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Camera, Scene
+from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 
@@ -124,7 +125,8 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        objects = label(frame, scene, view, renderer.mesh(scene.container))
+        mesh = renderer.mesh(scene.container)
+        objects = label(Shot(frame, scene, view, mesh, self.config))
         return Sample(
             image=frame.image,
             ids=frame.ids,

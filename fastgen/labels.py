@@ -6,16 +6,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.camera import View
-from fastgen.damage import mask_values
+from fastgen.camera import MM, NEAR_M
+from fastgen.container import KINDS
+from fastgen.coverage import Canvas, boxes, canvases, project
+from fastgen.damage import deform
+from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
+from fastgen.facets import Facets, decal_facets, highest, lowest, mesh_facets
 from fastgen.mesh import Mesh
 from fastgen.programs import CONTAINER_ID
-from fastgen.sample import Box, Frame, Object
+from fastgen.sample import Box, Keypoint, Object
 from fastgen.scene import Decal, Scene
+from fastgen.visibility import Shot, float_box, mask_box, visibility
 
 _EDGE_POINTS = 16
 """Points along each side of a decal's outline, which follows the corrugation."""
+
+CASTINGS = tuple(
+    f"{end}_{side}_{level}"
+    for end in ("no_door", "door")
+    for side in ("front", "back")
+    for level in ("bottom", "top")
+)
+"""Names of a container's keypoints: the outer corners of its eight corner castings."""
 
 
 def decal_of(scene: Scene, object_id: int) -> Decal:
@@ -26,38 +39,44 @@ def decal_of(scene: Scene, object_id: int) -> Decal:
     return scene.decals[ids.index(object_id)]
 
 
-def label(frame: Frame, scene: Scene, view: View, mesh: Mesh) -> list[Object]:
-    """All labelled objects of `scene` in one image, those of which nothing is visible included."""
-    height, width = frame.ids.shape
-    objects = [_container(frame, view, mesh), *_damages(frame, scene)]
+def label(shot: Shot) -> list[Object]:
+    """All labelled objects of one image, those of which nothing is visible included."""
+    return [_container(shot), *damage_objects(shot), *_decals(shot)]
+
+
+def _decals(shot: Shot) -> list[Object]:
+    frame, scene, view, mesh = shot.frame, shot.scene, shot.view, shot.mesh
     ids = np.array(object_ids(scene), np.int64)
     labelled = np.flatnonzero(ids)
     if not labelled.size:
-        return objects
-    boxes, areas = visible_boxes(frame.ids, int(ids.max()) + 1)
+        return []
+    count = len(labelled)
+    seen_boxes, areas = visible_boxes(frame.ids, int(ids.max()) + 1)
+    seen = project(_decal_facets(scene, mesh), view)
+    bounds = boxes(seen.pixels, seen.owner, count)
+    alone = canvases(seen.pixels, seen.owner, count)
     pixels, depth = view.project(_outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
+    objects = []
     for row, i in enumerate(labelled):
         decal, object_id = scene.decals[i], int(ids[i])
         counts[decal.class_name] = counts.get(decal.class_name, 0) + 1
-        ahead = bool((depth[row] > 0).all())
-        points = pixels[row]
+        outline = np.round(pixels[row], 2) if (depth[row] > 0).all() else np.zeros((0, 2))
         area = int(areas[object_id])
-        low, high = points.min(axis=0), points.max(axis=0)
-        whole = abs(cv2.contourArea(points.astype(np.float32))) if ahead else 0.0
-        outside = not ahead or (low < 0).any() or high[0] > width or high[1] > height
         objects.append(
             Object(
                 id=object_id,
                 class_name=decal.class_name,
                 instance=counts[decal.class_name],
-                bbox=boxes[object_id],
-                amodal_bbox=_floats(low, high) if ahead else None,
+                bbox=seen_boxes[object_id],
+                amodal_bbox=float_box(bounds[row]),
                 area=area,
-                visible_fraction=min(area / whole, 1.0) if whole > 0 else 0.0,
-                truncated=bool(area) and bool(outside),
                 text=decal.text,
-                polygon=tuple(np.round(points, 2).ravel().tolist()) if ahead else (),
+                polygon=tuple(outline.ravel().tolist()),
+                # from the outline's corners in the order in which the eye finds them
+                quad=tuple(outline[[48, 32, 16, 0]].ravel().tolist()) if outline.size else (),
+                reading=("vertical" if decal.vertical else "horizontal") if decal.text else "",
+                **visibility(shot, alone[row], frame.ids, object_id, area),
             )
         )
     return objects
@@ -81,22 +100,31 @@ def visible_boxes(
     np.minimum.at(y0, found, rows)
     np.maximum.at(x1, found, columns + 1)
     np.maximum.at(y1, found, rows + 1)
-    boxes: list[Box | None] = [
+    found_boxes: list[Box | None] = [
         (int(x0[i]), int(y0[i]), int(x1[i]), int(y1[i])) if areas[i] else None for i in range(count)
     ]
-    return boxes, areas
+    return found_boxes, areas
+
+
+@lru_cache(maxsize=4)
+def _decal_facets(scene: Scene, mesh: Mesh) -> Facets:
+    """The cameras of a scene share them."""
+    return decal_facets(scene, mesh)
 
 
 @lru_cache(maxsize=4)
 def _outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """Outlines [N, points, 3] of the labelled decals; the cameras of a scene share them."""
-    return np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
+    """Outlines [N, points, 3] of the labelled decals after damage."""
+    rest = np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
+    return deform(scene.damages, rest)
 
 
 def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
-    """World points [4 * _EDGE_POINTS, 3] in mm along a decal's edge on the sheet.
+    """World points [4 * _EDGE_POINTS, 3] in mm along a decal's edge on the sheet, at rest.
 
     A marker's edge is the diamond inscribed in its rectangle, other decals' the rectangle itself.
+    It starts at the lowest corner of a diamond, the lower left one of a rectangle, and goes round
+    counter-clockwise from outside.
     """
     half = np.array(decal.size_mm) / 2
     if decal.kind == "marker":
@@ -113,76 +141,62 @@ def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
     return np.asarray(positions, np.float64)
 
 
-def _damages(frame: Frame, scene: Scene) -> list[Object]:
-    """Damages by their mask value, which is also their id; it marks the damage target, not the ids.
-
-    What is hidden of a damage, or lies outside the image, is not known here: its amodal box is
-    left open and its visible fraction says only whether anything is seen.
-    """
-    objects = []
-    for damage, value in zip(scene.damages, mask_values(scene.damages), strict=True):
-        mask = frame.damage == value
-        bbox = _mask_box(mask)
-        height, width = mask.shape
-        at_border = bbox is not None and (0 in bbox[:2] or bbox[2] == width or bbox[3] == height)
-        objects.append(
-            Object(
-                id=value,
-                class_name=damage.kind,
-                instance=value % 100,
-                bbox=bbox,
-                amodal_bbox=None,
-                area=int(np.count_nonzero(mask)),
-                visible_fraction=float(bbox is not None),
-                truncated=at_border,
-                text="",
-                polygon=(),
-            )
-        )
-    return objects
-
-
-def _container(frame: Frame, view: View, mesh: Mesh) -> Object:
-    """The container's box spans its decals too: what lies on it is part of it."""
-    seen = frame.ids > 0
-    low, high = mesh.bounds_mm
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    pixels, depth = view.project(low + corners * (high - low))
-    ahead = bool((depth > 0).all())
-    area = int(np.count_nonzero(seen))
-    fraction, outside = 0.0, True
-    amodal = None
-    polygon: tuple[float, ...] = ()
-    if ahead:
-        hull = cv2.convexHull(pixels.astype(np.float32))
-        whole = cv2.contourArea(hull)
-        fraction = min(area / whole, 1.0) if whole > 0 else 0.0
-        amodal = _floats(pixels.min(axis=0), pixels.max(axis=0))
-        outside = amodal[0] < 0 or amodal[1] < 0
-        outside |= amodal[2] > view.size[0] or amodal[3] > view.size[1]
-        polygon = tuple(np.round(hull.reshape(-1), 2).astype(float).tolist())
+def _container(shot: Shot) -> Object:
+    """The container's pixels are also those of its decals: what lies on it is part of it."""
+    frame, scene, view, mesh = shot.frame, shot.scene, shot.view, shot.mesh
+    shown = frame.ids > 0
+    area = int(np.count_nonzero(shown))
+    pixels, depth = view.project(_container_points(scene, mesh))
+    x, y = pixels.T.copy()
+    bounds = np.array([x.min(), y.min(), x.max(), y.max()])
+    alone = Canvas(np.zeros((0, 0), bool), (0, 0), 1)
+    if depth.min() < NEAR_M or min(bounds[:2]) < 0 or (bounds[2:] > view.size).any():
+        # what is seen needs no counting: only what reaches beyond the image
+        seen = project(mesh_facets(scene, mesh, list(mesh.groups), 0), view)
+        (bounds,) = boxes(seen.pixels, seen.owner, 1)
+        low, high = lowest(seen.pixels), highest(seen.pixels)
+        beyond = seen.faces & ((low < 0) | (high > view.size)).any(axis=1)
+        (alone,) = canvases(seen.pixels[beyond], seen.owner[beyond], 1)
+    castings, polygon = _castings(shot)
     return Object(
         id=CONTAINER_ID,
         class_name="container",
         instance=1,
-        bbox=_mask_box(seen),
-        amodal_bbox=amodal,
+        bbox=mask_box(shown),
+        amodal_bbox=float_box(bounds),
         area=area,
-        visible_fraction=fraction,
-        truncated=bool(area) and outside,
-        text="",
         polygon=polygon,
+        keypoints=castings,
+        **visibility(shot, alone, shown, True, area),
     )
 
 
-def _mask_box(mask: NDArray[np.bool_]) -> Box | None:
-    """Tight box of a mask [H, W], None where it is empty."""
-    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-    if not rows.size:
-        return None
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+@lru_cache(maxsize=4)
+def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
+    """All vertices [V, 3] in mm after damage, each once."""
+    return deform(scene.damages, mesh.points_mm)
 
 
-def _floats(low: np.ndarray, high: np.ndarray) -> tuple[float, float, float, float]:
-    x0, y0, x1, y1 = (round(float(v), 3) for v in (*low, *high))
-    return x0, y0, x1, y1
+def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
+    """The castings' outer corners in the order of CASTINGS, and the polygon around them.
+
+    A convex body's corner is seen where any of the planes that meet in it faces the camera.
+    """
+    kind = KINDS[shot.scene.container.kind]
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
+    rest = signs * np.array([kind.length_mm / 2, kind.width_mm / 2, kind.height_mm])
+    corners = deform(shot.scene.damages, rest)
+    pixels, depth = shot.view.project(corners)
+    outward = np.where(signs == 0, -1, signs)
+    faces = np.any((shot.view.position_m / MM - corners) * outward > 0, axis=1)
+    inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
+    found: list[Keypoint] = [
+        (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
+        for (x, y), face, within in zip(
+            pixels.tolist(), faces.tolist(), inside.tolist(), strict=True
+        )
+    ]
+    if depth.min() <= 0:
+        return tuple(found), ()
+    hull = cv2.convexHull(pixels.astype(np.float32))
+    return tuple(found), tuple(np.round(hull.reshape(-1), 2).astype(float).tolist())

@@ -102,6 +102,10 @@ class Mesh:
                 f"chart {name!r}: no such part of the container; panels are {', '.join(FACES)}"
             ) from None
 
+    def chart_triangles(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Numbers [T] of the triangles of chart `number`, and their sheet corners [T, 3, 2]."""
+        return self._of_chart[number]
+
     def sheet_to_surface(
         self, chart_name: str, sheet_mm: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -127,8 +131,23 @@ class Mesh:
         return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
 
     @cached_property
+    def points_mm(self) -> NDArray[np.float64]:
+        """Positions [P, 3] of all vertices, those that coincide only once."""
+        return np.unique(self.positions_mm, axis=0).astype(np.float64)
+
+    @cached_property
     def _numbers(self) -> dict[str, int]:
         return {chart.name: i for i, chart in enumerate(self.charts)}
+
+    @cached_property
+    def _of_chart(self) -> list[tuple[NDArray[np.int64], NDArray[np.float64]]]:
+        of_triangle = self.chart[self.triangles[:, 0]]
+        found = []
+        for number, chart in enumerate(self.charts):
+            index = np.flatnonzero(of_triangle == number)
+            corners = self.atlas_mm[self.triangles[index]].astype(np.float64)
+            found.append((index, corners - chart.rect_mm[:2]))
+        return found
 
     @cached_property
     def _locators(self) -> dict[int, "_Locator"]:
@@ -153,9 +172,8 @@ class _Locator:
 
     @staticmethod
     def of(mesh: Mesh, number: int) -> "_Locator":
-        x0, y0, width, height = mesh.charts[number].rect_mm
-        triangles = np.flatnonzero(mesh.chart[mesh.triangles[:, 0]] == number)
-        corners = mesh.atlas_mm[mesh.triangles[triangles]].astype(np.float64) - (x0, y0)
+        width, height = mesh.charts[number].rect_mm[2:]
+        triangles, corners = mesh.chart_triangles(number)
         a, b, c = corners.transpose(1, 0, 2)
         inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2))
         to_weights = np.concatenate([inverse, -(inverse @ a[:, :, None])], axis=2)

@@ -26,17 +26,26 @@ class Frame:
     depth: NDArray[np.float32]
 
 
+Keypoint = tuple[float, float, int]
+"""x, y in pixels and COCO's flag: 0 outside the image (x = y = 0), 1 hidden, 2 visible."""
+
+
 @dataclass(frozen=True)
 class Object:
-    """One labelled thing in one image.
+    """One labelled thing in one image. Pixel coordinates as in camera.py.
 
     id: its value in the id target. instance: 1, 2, ... within its class and scene.
-    bbox: tight box of its visible pixels, None where nothing is visible. amodal_bbox: box of the
-    whole thing, neither occluded nor cut by the image border, in float pixels; None where part of
-    it lies behind the camera. area: visible pixels. visible_fraction: visible pixels over those it
-    would cover alone in an unbounded image, 0..1. truncated: the image border cuts it.
-    text: what it reads, '' for other things. polygon: projected outline, x0, y0, x1, y1, ... in
-    pixels, of the whole thing; empty where part of it lies behind the camera.
+    bbox: tight box of its visible pixels, None where nothing is visible. amodal_bbox: exact bounds
+    of the whole thing beyond the near plane, neither occluded nor cut by the image border, in float
+    pixels; None where nothing of it is. area: visible pixels. visible_fraction: visible pixels over
+    those it would cover alone in an unbounded image, 0..1. truncated: some of it is seen and some
+    lies beyond the image. occluded: some of it is seen and something hides more of it than a pixel
+    or two of its edge. ignored: too little is seen to train on, see LabelConfig.
+    text: what it reads, '' for other things. polygon: projected outline, x0, y0, x1, y1, ... of the
+    whole thing; empty for damages and where part of it lies behind the camera. quad: four corners
+    of a decal in the order upper left, upper right, lower right, lower left as it is read (of a
+    marker left, top, right, bottom). reading: 'horizontal', or 'vertical' for letters below one
+    another; '' without text. keypoints: the container's casting corners, see labels.CASTINGS.
     """
 
     id: int
@@ -47,8 +56,13 @@ class Object:
     area: int
     visible_fraction: float
     truncated: bool
-    text: str
-    polygon: tuple[float, ...]
+    occluded: bool = False
+    ignored: bool = False
+    text: str = ""
+    polygon: tuple[float, ...] = ()
+    quad: tuple[float, ...] = ()
+    reading: str = ""
+    keypoints: tuple[Keypoint, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,14 +33,20 @@ class Hits:
         return self.triangle >= 0
 
 
-def cast(mesh: Mesh, view: View, scene: Scene | None = None) -> Hits:
-    """First outside that each pixel centre sees; through a hole of `scene`, the first inside."""
+def cast(
+    mesh: Mesh, view: View, scene: Scene | None = None, pixels: np.ndarray | None = None
+) -> Hits:
+    """First outside that each pixel centre sees; through a hole of `scene`, the first inside.
+
+    pixels [..., 2]: other places in the image to look through.
+    """
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
     moved = fields.deform(damages, rest)
     # Embree sees metres around the origin, where its float32 is finest
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
-    start, rays = view.rays()
+    start, rays = view.rays(pixels)
+    shape = rays.shape[:-1]
     rays = rays.reshape(-1, 3)
     count = len(rays)
     seen = np.full(count, -1)
@@ -78,7 +84,6 @@ def cast(mesh: Mesh, view: View, scene: Scene | None = None) -> Hits:
         atlas[at] = _between(atlas_corners, b[ends], c[ends])
         depth[at] = view.to_view(start + distance[ends, None] * ray[ends])[:, 2]
         active = active[~(ends | leaves)]
-    shape = (view.size[1], view.size[0])
     return Hits(
         seen.reshape(shape),
         hole.reshape(shape),

@@ -1,0 +1,217 @@
+"""Are the labels exact, and what does the paper's way of making them cost?
+
+    python bench/label_accuracy.py [--scenes 500] [--size 256] [--chart docs/label_accuracy.png]
+
+Compares ids, damage and depth with rays that Embree casts through every pixel centre at the mesh
+deformed in numpy (tests/oracle.py), over random scenes and hard views. A pixel that differs must
+lie within 0.01 px of an edge: rays around it then disagree with one another too. Then makes the
+boxes of markers as seafront.txt 3.3.1 does, by a binary mask render and connected components for
+each marker, on the same scenes.
+"""
+
+import argparse
+import os
+import statistics
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import cv2
+import matplotlib.pyplot as plt
+import numpy as np
+
+from fastgen import Config, Generator
+from fastgen.classes import MARKER_CLASSES
+from fastgen.container import build_container
+from fastgen.mesh import Mesh
+from fastgen.scene import Camera, Decal, Scene
+from tests import oracle
+
+EDGE_PX = 0.01
+_AROUND = 24
+COUNTS = (1, 2, 4, 8, 16, 32)
+
+
+def hard_cameras(scene: Scene, mesh: Mesh) -> Iterator[Camera]:
+    """Grazing along a wall, markers of a few pixels, cut by the border, through the near plane."""
+    low, high = mesh.bounds_mm
+    x, y, z = float(high[0]), float(low[1]), float(high[2])
+    yield Camera("grazing", (x + 1500, y - 130, z / 2), (-x, y + 150, z / 2), 28.0)
+    yield Camera("far", (2000, y - 45000, 3000), (0, y, z / 2), 20.0)
+    yield Camera("near plane", (0, y - 105, z / 2), (1500, y, z / 2), 14.0)
+    decals = [d for d in scene.decals if d.class_name and d.face == "front"]
+    for decal in decals[:1]:
+        (px, py, pz), *_ = mesh.sheet_to_surface("front", decal.center_mm)[0]
+        yield Camera("cut", (px + 900, py - 2000, pz), (px + 900, py, pz), 40.0)
+
+
+def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) -> Counter[str]:
+    """Pixels compared, pixels that differ, and those that no edge explains."""
+    sample = generator.render(scene=scene, camera=camera)
+    threshold = generator.config.damage.mask_threshold_mm
+
+    def truth(pixels: np.ndarray | None = None) -> np.ndarray:
+        hits = oracle.cast(mesh, sample.view, scene, pixels)
+        ids = oracle.object_ids(scene, mesh, hits).astype(np.int64)
+        depth = np.where(hits.hit, np.rint(hits.depth_m * 1e4), -1).astype(np.int64)
+        return np.stack([ids, oracle.damage_values(scene, hits, threshold), depth], axis=-1)
+
+    found = truth()
+    labels = (sample.ids != found[..., 0]) | (sample.damage != found[..., 1])
+    depth_m = np.where(found[..., 2] < 0, np.inf, found[..., 2] / 1e4)
+    both = np.isfinite(depth_m) & np.isfinite(sample.depth)
+    gap = np.abs(np.where(both, sample.depth, 0) - np.where(both, depth_m, 0))
+    deep = both & (gap > np.maximum(1e-3, 1e-3 * np.where(both, depth_m, 0)))
+    rows, columns = np.nonzero(labels | deep)
+    unexplained = 0
+    if rows.size:
+        turn = np.arange(_AROUND) * 2 * np.pi / _AROUND
+        around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * EDGE_PX
+        centers = np.stack([columns, rows], axis=-1) + 0.5
+        near = truth(centers[:, None] + around)
+        here = found[rows, columns]
+        same_labels = (near[..., :2] == here[:, None, :2]).all(axis=(1, 2))
+        # a jump in depth is an edge too, that of one part before another
+        jump = np.ptp(np.concatenate([near[..., 2], here[:, None, 2]], axis=1), axis=1) > 20
+        unexplained = int((same_labels & ~jump).sum())
+    return Counter(
+        pixels=labels.size,
+        labels=int(labels.sum()),
+        depth=int(deep.sum()),
+        unexplained=unexplained,
+    )
+
+
+def exactness(scenes: int, side: int) -> None:
+    """Print the counts for random scenes and for each kind of hard view."""
+    config = Config.from_values({"damage": {"probability": 0.5}})
+    totals: dict[str, Counter[str]] = {}
+    with Generator(config, seed=2024, size=(side, side)) as generator:
+        for index in range(scenes):
+            scene = generator.scene(index)
+            mesh = build_container(scene.container.kind, scene.container.profiles)
+            cameras = list(scene.cameras)
+            if index < max(scenes // 10, 4):
+                cameras += hard_cameras(scene, mesh)
+            for camera in cameras:
+                name = "rig" if camera in scene.cameras else camera.name
+                totals.setdefault(name, Counter()).update(
+                    differences(generator, scene, camera, mesh)
+                )
+    print(
+        f"{'views':12}{'pixels':>12}{'labels differ':>15}{'depth differs':>15}{'unexplained':>13}"
+    )
+    for name, t in totals.items():
+        print(f"{name:12}{t['pixels']:12d}{t['labels']:15d}{t['depth']:15d}{t['unexplained']:13d}")
+
+
+def with_markers(scene: Scene, count: int) -> Scene:
+    """`scene` with `count` markers that touch one another on its door, and nothing else on it."""
+    decals = []
+    for i in range(count):
+        row, column = divmod(i, 8)
+        name = MARKER_CLASSES[i % len(MARKER_CLASSES)]
+        center = (260 + column * 240 + 120 * (row % 2), 300 + row * 240)
+        decals.append(Decal("marker", name, "door", center, (250, 250), art=name))
+    return replace(scene, decals=tuple(decals), damages=())
+
+
+def masks_one_by_one(
+    generator: Generator, scene: Scene, camera: str
+) -> list[list[tuple[int, ...]]]:
+    """The paper's way: for each marker its own binary render, then components' boxes."""
+    found = []
+    for decal in (d for d in scene.decals if d.kind == "marker"):
+        alone = replace(scene, decals=(decal,))
+        mask = (generator.render(scene=alone, camera=camera, layer="decals").ids >= 2).astype("u1")
+        _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        boxes = [(int(x), int(y), int(x + w), int(y + h)) for x, y, w, h, _ in stats[1:]]
+        found.append(boxes)
+    return found
+
+
+def against_the_paper(scenes: int, chart: Path) -> None:
+    """Print and draw time against number of markers, and how often components mislead."""
+    ours: dict[int, float] = {}
+    theirs: dict[int, float] = {}
+    with Generator(Config.preset(), seed=5, size=(640, 640)) as generator:
+        bases = [generator.scene(i) for i in range(3)]
+        for count in COUNTS:
+            views = [with_markers(base, count) for base in bases]
+            taken: dict[str, list[float]] = {"ours": [], "theirs": []}
+            for view in views * 3:
+                began = time.perf_counter()
+                generator.render(scene=view, camera="Cr")
+                middle = time.perf_counter()
+                masks_one_by_one(generator, view, "Cr")
+                taken["ours"].append(middle - began)
+                taken["theirs"].append(time.perf_counter() - began)
+            ours[count] = statistics.median(taken["ours"]) * 1e3
+            theirs[count] = statistics.median(taken["theirs"]) * 1e3
+    print(f"\n{'markers':>8}{'one draw, ms':>14}{'a draw a marker, ms':>21}")
+    for count in COUNTS:
+        print(f"{count:8d}{ours[count]:14.1f}{theirs[count]:21.1f}")
+    outcomes = component_outcomes(scenes)
+    total = sum(outcomes.values())
+    print(f"\nboxes from connected components, {total} visible markers of {scenes} scenes")
+    for name, number in outcomes.most_common():
+        print(f"{name:34}{number:7d}  {number / total:.2%}")
+    _draw(ours, theirs, outcomes, chart)
+
+
+def component_outcomes(scenes: int) -> Counter[str]:
+    """What the largest component's box makes of each visible marker, at 640x640."""
+    outcomes: Counter[str] = Counter()
+    with Generator(Config.preset(), seed=77, size=(640, 640)) as generator:
+        for index in range(scenes):
+            for camera in generator.config.cameras:
+                sample = generator.render(index=index, camera=camera)
+                for item in sample.objects:
+                    if item.class_name not in MARKER_CLASSES or item.bbox is None:
+                        continue
+                    mask = (sample.ids == item.id).astype(np.uint8)
+                    _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+                    x, y, w, h, _ = max(stats[1:], key=lambda row: row[4])
+                    if (x, y, x + w, y + h) == item.bbox:
+                        outcomes["right"] += 1
+                    else:
+                        outcomes["split, the largest part's box"] += 1
+    return outcomes
+
+
+def _draw(
+    ours: dict[int, float], theirs: dict[int, float], outcomes: Counter[str], chart: Path
+) -> None:
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
+    left.plot(list(ours), list(ours.values()), "o-", label="ids in the same draw")
+    left.plot(list(theirs), list(theirs.values()), "s-", label="a mask render for each marker")
+    left.set(xlabel="markers in the image", ylabel="ms an image, 640x640", ylim=(0, None))
+    left.legend()
+    total = sum(outcomes.values())
+    names = list(outcomes)
+    right.barh(names, [100 * outcomes[name] / total for name in names])
+    right.set(xlabel="% of visible markers, box by connected components")
+    figure.tight_layout()
+    chart.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(chart, dpi=110)
+
+
+def main() -> None:
+    """Print both comparisons and draw the chart."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=500)
+    parser.add_argument("--size", type=int, default=256)
+    parser.add_argument("--chart", type=Path, default=Path("docs/label_accuracy.png"))
+    options = parser.parse_args()
+    exactness(options.scenes, options.size)
+    against_the_paper(max(options.scenes // 10, 2), options.chart)
+
+
+if __name__ == "__main__":
+    main()

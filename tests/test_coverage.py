@@ -1,0 +1,238 @@
+"""Amodal boxes and visible fractions against rays through the pixels of a much larger image."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from fastgen import damage as fields
+from fastgen.camera import View
+from fastgen.config import Config
+from fastgen.coverage import Canvas, canvases
+from fastgen.facets import clip
+from fastgen.generator import Generator
+from fastgen.labels import decal_of
+from fastgen.scene import Camera
+from tests import oracle
+
+SIZE = (200, 150)
+PAD = 160
+
+
+def unbounded(view):
+    """The same camera with PAD pixels more on each side."""
+    return View(
+        view.rotation, view.position_m, view.focal_px, (SIZE[0] + 2 * PAD, SIZE[1] + 2 * PAD)
+    )
+
+
+def all_hits(mesh, triangles, view, damages):
+    """Every meeting of every pixel's ray with some triangles: ray, rest point, atlas point."""
+    rest = mesh.positions_mm.astype(np.float64)
+    moved = fields.deform(damages, rest)
+    part = mesh.triangles[triangles]
+    body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, part, process=False))
+    start, rays = view.rays()
+    rays = rays.reshape(-1, 3)
+    starts = np.broadcast_to(start * 1e-3, rays.shape)
+    found, ray = body.intersects_id(starts, rays, multiple_hits=True, max_hits=60)
+    corners = part[found]
+    _, b, c, _ = oracle._meet(moved[corners], start, rays[ray])
+    atlas = mesh.atlas_mm[corners].astype(np.float64)
+    return ray, oracle._between(rest[corners], b, c), oracle._between(atlas, b, c)
+
+
+def dense(decal, mesh, damages):
+    """Points all over a decal in the world after damage, most of them along its edge."""
+    coarse, fine = np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 6001)
+    points = [np.stack(np.meshgrid(coarse, coarse), axis=-1).reshape(-1, 2)]
+    for side in (-0.5, 0.5):
+        points += [np.stack(p, axis=1) for p in ((fine, 0 * fine + side), (0 * fine + side, fine))]
+        points += [np.stack([fine, side - np.sign(side) * np.abs(fine)], axis=1)]
+    points = np.concatenate(points) * decal.size_mm
+    angle = np.deg2rad(decal.rotation_deg)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    sheet = points @ turn.T + np.array(decal.center_mm)
+    sheet = sheet[oracle.inside(decal, sheet)]
+    return fields.deform(damages, mesh.sheet_to_surface(decal.face, sheet)[0])
+
+
+def near(count, truth):
+    """Equal but for centres that lie on an edge to within rounding."""
+    return abs(count - truth) <= max(2, 0.004 * truth)
+
+
+@pytest.fixture(scope="module")
+def generator():
+    config = Config.from_values({"damage": {"probability": 1.0}})
+    with Generator(config, seed=31, size=SIZE) as made:
+        yield made
+
+
+def views(generator):
+    """Cameras of the rig, and two from which much leaves the image."""
+    for index in range(3):
+        scene = generator.scene(index)
+        if index == 1:
+            scene = dataclasses.replace(scene, damages=())
+        close = Camera("near", (2500, -2600, 1900), (1500, -1000, 1300), 24.0)
+        for camera in (*scene.cameras, close):
+            yield generator.render(scene=scene, camera=camera)
+        mesh = generator._renderer.mesh(scene.container)
+        for decal in [d for d in scene.decals if d.class_name and d.face == "front"][:3]:
+            (x, y, z), *_ = mesh.sheet_to_surface("front", decal.center_mm)[0]
+            # 4 m before it, the image is 3.6 m wide: its border goes through the decal
+            cut = Camera("cut", (x + 1800, y - 4000, z), (x + 1800, y, z), 40.0)
+            yield generator.render(scene=scene, camera=cut)
+
+
+def test_decals_cover_what_rays_say(generator):
+    seen = cut = 0
+    for sample in views(generator):
+        mesh = generator._renderer.mesh(sample.scene.container)
+        view = unbounded(sample.view)
+        hits = {}
+        for item in (o for o in sample.objects if o.class_name == "text" or o.class_name[0] == "C"):
+            decal = decal_of(sample.scene, item.id)
+            number = mesh.chart_index(decal.face)
+            if number not in hits:
+                part = np.flatnonzero(mesh.chart[mesh.triangles[:, 0]] == number)
+                hits[number] = all_hits(mesh, part, view, sample.scene.damages)
+            ray, _, atlas = hits[number]
+            on = oracle.inside(decal, atlas - mesh.charts[number].rect_mm[:2])
+            covered = np.zeros(view.size[::-1], bool)
+            covered.ravel()[ray[on]] = True
+            x0, y0, x1, y1 = item.amodal_bbox or (0, 0, 0, 0)
+            if min(x0, y0) < -PAD or x1 > SIZE[0] + PAD or y1 > SIZE[1] + PAD:
+                continue
+            if item.area:
+                assert near(round(item.area / item.visible_fraction), covered.sum())
+                outside = covered.copy()
+                outside[PAD:-PAD, PAD:-PAD] = False
+                assert item.truncated == (outside.sum() > 0) or outside.sum() < 3
+                hidden = covered.sum() - outside.sum() - item.area
+                assert item.occluded == (hidden > 2) or hidden < 0.02 * item.area
+                seen += 1
+                cut += item.truncated
+            if item.amodal_bbox:
+                points = dense(decal, mesh, sample.scene.damages)
+                pixels, depth = sample.view.project(points)
+                if depth.min() > 0.2:
+                    truth = np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
+                    # damage bends between the vertices too; what is drawn is straight there
+                    limit = 2.0 if sample.scene.damages else 0.05
+                    assert np.abs(truth - [x0, y0, x1, y1]).max() < limit
+    assert seen > 60
+    assert cut > 3
+
+
+def test_damages_cover_what_rays_say(generator):
+    seen = 0
+    threshold = generator.config.damage.mask_threshold_mm
+    for sample in views(generator):
+        mesh = generator._renderer.mesh(sample.scene.container)
+        view = unbounded(sample.view)
+        everything = np.arange(len(mesh.triangles))
+        ray, rest, _ = all_hits(mesh, everything, view, sample.scene.damages)
+        for item, damage in zip(sample.objects[1:], sample.scene.damages, strict=False):
+            assert item.class_name == damage.kind
+            if not item.area:
+                continue
+            part = np.abs(fields.amount_mm(damage, rest)) > threshold
+            part |= fields.in_hole(damage, rest)
+            covered = np.zeros(view.size[::-1], bool)
+            covered.ravel()[ray[part]] = True
+            box = np.array(oracle.box_of(covered)) - PAD
+            if box.min() <= -PAD or (box[2:] >= np.array(SIZE) + PAD).any():
+                continue
+            assert near(round(item.area / item.visible_fraction), covered.sum())
+            assert np.abs(box - np.array(item.amodal_bbox)).max() <= 1
+            seen += 1
+    assert seen > 8
+
+
+def test_the_container_covers_its_silhouette(generator):
+    cut = 0
+    for sample in views(generator):
+        mesh = generator._renderer.mesh(sample.scene.container)
+        whole = oracle.cast(mesh, unbounded(sample.view), dataclasses.replace(sample.scene)).hit
+        container = sample.objects[0]
+        box = np.array(oracle.box_of(whole)) - PAD
+        if box.min() <= -PAD or (box[2:] >= np.array(SIZE) + PAD).any():
+            continue
+        assert near(round(container.area / container.visible_fraction), whole.sum())
+        assert np.abs(box - np.array(container.amodal_bbox)).max() < 1.01
+        cut += container.truncated
+    assert cut
+
+
+def test_casting_corners_are_seen_as_rays_see_them(generator):
+    flags = set()
+    for sample in views(generator):
+        mesh = generator._renderer.mesh(sample.scene.container)
+        low, high = mesh.bounds_mm.__iter__()
+        moved = fields.deform(sample.scene.damages, mesh.positions_mm)
+        body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
+        eye = sample.view.position_m
+        for number, (x, y, flag) in enumerate(sample.objects[0].keypoints):
+            corner = [(low, high)[number >> 2 & 1][0], (low, high)[number >> 1 & 1][1]]
+            corner = np.array([*corner, (low, high)[number & 1][2]], np.float64)
+            corner = fields.deform(sample.scene.damages, corner)
+            pixel, depth = sample.view.project(corner)
+            inside = depth > 0 and (pixel >= 0).all() and (pixel < SIZE).all()
+            assert (flag > 0) == inside
+            if not inside:
+                continue
+            assert np.abs(pixel - (x, y)).max() < 1.0
+            # a point just outside the corner is seen where nothing stands in the way
+            point = corner * 1e-3 + 2e-3 * np.sign(corner - (0, 0, high[2] / 2))
+            ray = point - eye
+            reach = np.linalg.norm(ray)
+            where, _, _ = body.intersects_location([eye], [ray / reach])
+            free = not len(where) or np.linalg.norm(where - eye, axis=1).min() > reach
+            assert (flag == 2) == free
+            flags.add(flag)
+    assert flags == {1, 2}
+
+
+def test_clipping_halves_a_square():
+    square = np.array([[[0.0, 0], [2, 0], [2, 2], [0, 2]]])
+    half, left = clip(square, square[..., 0] - 1.5)
+    assert left.all()
+    assert half.shape == (1, 4, 2)
+    assert {tuple(p) for p in half[0]} == {(1.5, 0), (2, 0), (2, 2), (1.5, 2)}
+    none, left = clip(square, square[..., 0] - 3)
+    assert len(none) == 0
+    assert not left.any()
+
+
+def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
+    rng = np.random.default_rng(3)
+    corners = rng.uniform(-20, 60, (50, 3, 2))
+    owner = np.repeat(np.arange(5), 10)
+    found = canvases(corners, owner, 5)
+    columns, rows = np.meshgrid(np.arange(-30, 80) + 0.5, np.arange(-30, 80) + 0.5)
+    for number, canvas in enumerate(found):
+        truth = np.zeros(columns.shape, bool)
+        for a, b, c in corners[owner == number]:
+            sides = [
+                (q[0] - p[0]) * (rows - p[1]) - (q[1] - p[1]) * (columns - p[0])
+                for p, q in ((a, b), (b, c), (c, a))
+            ]
+            truth |= np.all(np.array(sides) >= 0, axis=0) | np.all(np.array(sides) <= 0, axis=0)
+        assert canvas.area == truth.sum()
+        image = np.zeros((40, 50), np.uint8)
+        image[10:, :] = 1
+        hidden, beyond = canvas.split(image, 1)
+        assert beyond == truth.sum() - truth[30:70, 30:80].sum()
+        assert hidden == truth[30:40, 30:80].sum()
+
+
+def test_enormous_objects_are_counted_to_a_thousandth():
+    square = np.array([[[-9e4, -8e4], [7e4, -8e4], [7e4, 9e4], [-9e4, 9e4]]])
+    (canvas,) = canvases(square, np.zeros(1, np.int64), 1)
+    assert canvas.scale > 1
+    assert canvas.area == pytest.approx(16e4 * 17e4, rel=1e-3)
+    assert isinstance(canvas, Canvas)
