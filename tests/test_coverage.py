@@ -51,7 +51,7 @@ def dense(decal, mesh, damages):
     for side in (-0.5, 0.5):
         points += [np.stack(p, axis=1) for p in ((fine, 0 * fine + side), (0 * fine + side, fine))]
         points += [np.stack([fine, side - np.sign(side) * np.abs(fine)], axis=1)]
-    points = np.concatenate(points) * decal.size_mm
+    points = np.concatenate(points) * (1 - 1e-9) * decal.size_mm
     angle = np.deg2rad(decal.rotation_deg)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     sheet = points @ turn.T + np.array(decal.center_mm)
