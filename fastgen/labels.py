@@ -35,7 +35,7 @@ def label(frame: Frame, scene: Scene, view: View, mesh: Mesh) -> list[Object]:
     if not labelled.size:
         return objects
     boxes, areas = visible_boxes(frame.ids, int(ids.max()) + 1)
-    pixels, depth = view.project(_outlines_mm(scene, mesh))
+    pixels, depth = view.project(outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
     for row, i in enumerate(labelled):
         decal, object_id = scene.decals[i], int(ids[i])
@@ -88,7 +88,7 @@ def visible_boxes(
 
 
 @lru_cache(maxsize=4)
-def _outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
+def outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
     """Outlines [N, points, 3] of the labelled decals; the cameras of a scene share them."""
     return np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
 
