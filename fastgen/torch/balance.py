@@ -1,6 +1,7 @@
 """How often each class comes, counted on scenes alone, without GL; and weights that even it out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -80,7 +81,9 @@ def class_weights(
 
 def _count_damages(counts: NDArray[np.int64], scene: Scene, camera: Camera, view: View) -> None:
     for damage in scene.damages:
-        if may_be_seen(damage, camera.position_mm) and _inside(view, np.array(damage.origin_mm)):
+        # the rim of a bulge may show from behind its face, too little to count on
+        flat = replace(damage, depth_mm=abs(damage.depth_mm))
+        if may_be_seen(flat, camera.position_mm) and _inside(view, np.array(damage.origin_mm)):
             counts[SEGMENTATION_CLASSES.index(damage.kind)] += 1
 
 
