@@ -5,6 +5,7 @@ import multiprocessing
 import pickle
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -215,12 +216,11 @@ def test_shuffled_orders_change_with_the_epoch_and_are_the_same_on_all_ranks():
     assert sorted(orders[0]) == sorted(orders[1]) == list(range(23))
 
 
-def _distributed(rank, store, results):
+def _distributed_rank(rank, store, results):
     torch.distributed.init_process_group(
         "gloo", init_method=f"file://{store}", rank=rank, world_size=2
     )
-    with_sampler = list(ShardSampler(dataset()))
-    results.put((with_sampler, stream().part))
+    results.put((list(ShardSampler(dataset())), stream().part))
     torch.distributed.destroy_process_group()
 
 
@@ -228,7 +228,7 @@ def test_torch_distributed_gives_rank_and_world_size(tmp_path):
     fork = multiprocessing.get_context("fork")
     results = fork.Queue()
     arguments = (tmp_path / "store", results)
-    ranks = [fork.Process(target=_distributed, args=(rank, *arguments)) for rank in (0, 1)]
+    ranks = [fork.Process(target=_distributed_rank, args=(rank, *arguments)) for rank in (0, 1)]
     for process in ranks:
         process.start()
     found = sorted(results.get(timeout=60) for _ in ranks)
@@ -308,6 +308,20 @@ def test_images_equal_plain_renders_after_gl_was_opened_here(renders, context, w
         np.testing.assert_array_equal(image.numpy(), render)
     np.testing.assert_array_equal(data[5][0].numpy(), renders[5])
     data.close()
+
+
+def test_threads_have_contexts_of_their_own(renders):
+    data = dataset(length=6, split=None)
+
+    def in_thread(positions):
+        images = [data[p][0].numpy() for p in positions]
+        data.close()
+        return images
+
+    with ThreadPoolExecutor(2) as pool:
+        halves = list(pool.map(in_thread, [(0, 1, 2), (3, 4, 5)]))
+    for image, render in zip(itertools.chain(*halves), renders, strict=True):
+        np.testing.assert_array_equal(image, render)
 
 
 def test_a_stream_in_forked_workers_gives_the_same_bytes(renders):
@@ -453,7 +467,7 @@ def test_counts_without_gl_come_near_those_of_rendered_labels():
     data.close()
     counted = class_counts("imdg", seed=6, scenes=6).numpy()
     assert counted[0] == rendered[0] == 24
-    assert abs(counted.sum() - rendered.sum()) < 0.05 * rendered.sum()
+    assert abs(counted.sum() - rendered.sum()) < 0.1 * rendered.sum()
     assert np.abs(counted - rendered)[2:].max() <= 2
 
 
@@ -520,6 +534,8 @@ def test_bad_ranks_states_and_batches_are_named():
         dataset().set_epoch(-1)
     with pytest.raises(ConfigError, match="state: was taken with another length"):
         Loader(dataset(24)).load_state_dict(Loader(dataset(23)).state_dict())
+    with pytest.raises(ConfigError, match="state: has no 'position'"):
+        Loader(dataset()).load_state_dict({"epoch": 1})
     with pytest.raises(IndexError, match="position 23"):
         dataset()[23]
 

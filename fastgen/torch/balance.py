@@ -33,7 +33,8 @@ def class_counts(
 
     Nothing is rendered: a marker or text counts where its outline faces the camera, covers at
     least labels.min_visible_px pixels and has its middle in the image, a damage where its face
-    may be seen and its middle is in the image. What stands before it is not looked at.
+    may be seen and its middle is in the image. What stands before it is not looked at, so that
+    markers come out some percent high.
     Raises ConfigError for text, which has no classes.
     """
     names = class_names(task)

@@ -99,6 +99,7 @@ class ContainerDataset(Dataset[Item]):
             "split": split,
             "fixed": fixed,
             "all_views": all_views,
+            "antialiasing": antialiasing,
             "config": self.config.to_plain(),
         }
 

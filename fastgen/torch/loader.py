@@ -123,8 +123,11 @@ class Loader:
 
         Raises ConfigError where it is of a loader that makes other samples, naming what differs.
         """
-        ours = self.state_dict()["made"]
-        for key, value in ours.items():
+        ours = self.state_dict()
+        for key in ours:
+            if key not in state:
+                raise ConfigError(f"state: has no {key!r}; give what state_dict returned")
+        for key, value in ours["made"].items():
             if state["made"].get(key) != value:
                 raise ConfigError(f"state: was taken with another {key}; make the loader alike")
         self._items.set_epoch(state["epoch"])
