@@ -19,9 +19,10 @@ from fastgen.torch.plan import (
     config_of,
     positions,
     shard,
+    whole,
 )
 from fastgen.torch.rendering import LocalGenerator
-from fastgen.torch.targets import Collate, Item, check_form, collate_of, item
+from fastgen.torch.targets import Collate, Item, check_form, collate_of, item_of
 
 Curriculum = Callable[[int], Config | Mapping[str, Any]]
 Transforms = Callable[[Any, Any], Item]
@@ -33,9 +34,9 @@ MAX_LENGTH = EPOCH_SCENES // 100
 class ContainerDataset(Dataset[Item]):
     """Map-style: item i of `length` is rendered when asked for, the same bytes in every process.
 
-    task: damage, imdg, text or door; what image and target hold says targets.item. config, seed,
-    size, backend, hdri_dir, antialiasing, device_index: as for Generator. length: images of an
-    epoch over all ranks. cameras: names, by default all of the rig that the task can use.
+    task: damage, imdg, text or door; targets.item_of says what image and target hold. config,
+    seed, size, backend, hdri_dir, antialiasing, device_index: as for Generator. length: images of
+    an epoch over all ranks. cameras: names, by default all of the rig that the task can use.
     split: 'train', 'val' or 'test' as `fastgen generate` deals scenes out, None for all scenes.
     fixed: whether every epoch has the same scenes, as a validation set should; else each has new
     ones. all_views: whether each scene is seen by all cameras in turn, or by one. form:
@@ -110,10 +111,9 @@ class ContainerDataset(Dataset[Item]):
 
     def set_epoch(self, epoch: int) -> None:
         """Go to an epoch, 0 or more, between two passes over the data."""
-        if epoch != int(epoch) or epoch < 0:
-            raise ConfigError(f"epoch: {epoch!r} is not a whole number of 0 or more")
-        config_of(self.curriculum, self.config, int(epoch))  # refused here, not in a worker
-        self._epoch.fill_(int(epoch))
+        epoch = whole("epoch", epoch, 0)
+        config_of(self.curriculum, self.config, epoch)  # refused here, not in a worker
+        self._epoch.fill_(epoch)
 
     @property
     def collate(self) -> Collate:
@@ -137,13 +137,13 @@ class ContainerDataset(Dataset[Item]):
         return generator.render(scene=last[1], camera=camera)
 
     def item(self, position: int, epoch: int | None = None) -> Item:
-        """Image and target at a position, 0 or more, transforms applied; see targets.item."""
+        """Image and target at a position, 0 or more, transforms applied; see targets.item_of."""
         epoch = self.epoch if epoch is None else epoch
         sample = self.sample(position, epoch)
         names = list(self.config.cameras)
         image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
         labels = self.config_at(epoch).labels
-        made = item(sample, self.task, self.form, labels, image_id, self.as_float)
+        made = item_of(sample, self.task, self.form, labels, image_id, self.as_float)
         return self.transforms(*made) if self.transforms else made
 
     def config_at(self, epoch: int) -> Config:
@@ -195,7 +195,7 @@ class ContainerStream(IterableDataset[Item]):
         self.items = ContainerDataset(task, config, seed, size, known, cameras, **options)
         self.length = None if length is None else int(length)
         self.part = shard(rank, world_size)
-        self.batch_size = batch_size
+        self.batch_size = whole("batch_size", batch_size, 1)
         self._start = torch.zeros(1, dtype=torch.int64).share_memory_()
 
     @property

@@ -8,7 +8,7 @@ from torch.utils.data import DataLoader, Sampler
 from fastgen.errors import ConfigError
 from fastgen.sampling import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
-from fastgen.torch.plan import shard
+from fastgen.torch.plan import shard, whole
 from fastgen.torch.targets import Collate
 
 
@@ -72,10 +72,8 @@ class Loader:
         collate_fn: Collate | None = None,
         **options: Any,
     ) -> None:
-        if batch_size != int(batch_size) or batch_size < 1:
-            raise ConfigError(f"batch_size: {batch_size!r} is not a whole number of 1 or more")
         self.dataset = dataset
-        self.batch_size, self.drop_last = int(batch_size), drop_last
+        self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
         self._shuffle = shuffle
         self._sampler: ShardSampler | None = None
         if isinstance(dataset, ContainerStream):

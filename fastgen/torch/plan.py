@@ -107,6 +107,13 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
     return made
 
 
+def whole(name: str, value: int, least: int) -> int:
+    """`value` as it is. Raises ConfigError naming it where it is no whole number from `least` on."""
+    if value != int(value) or value < least:
+        raise ConfigError(f"{name}: {value!r} is not a whole number of {least} or more")
+    return int(value)
+
+
 def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
     """(rank, world size) as given, else of torch.distributed where it runs, else (0, 1).
 

@@ -21,7 +21,7 @@ from fastgen.writers import coco, yolo
 from fastgen.writers.seafront import DOOR_FOLDERS
 
 Item = tuple[Any, Any]
-"""(image, target) of one sample; what each holds depends on task and form, see `item`."""
+"""(image, target) of one sample; what each holds depends on task and form, see `item_of`."""
 
 Collate = Callable[[Sequence[Item]], Any]
 
@@ -64,7 +64,7 @@ def image_tensor(pixels: NDArray[np.uint8], as_float: bool = False) -> torch.Ten
     return image.float() / 255 if as_float else image
 
 
-def item(
+def item_of(
     sample: Sample, task: str, form: str, labels: LabelConfig, image_id: int, as_float: bool
 ) -> Item:
     """Image and target of one sample.
@@ -107,7 +107,7 @@ def collate_lists(batch: Sequence[Item]) -> tuple[list[Any], list[Any]]:
 
 
 def collate_yolo(batch: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Images [B, 3, H, W], and targets float32 [M, 6]: number in the batch, then as in `item`."""
+    """Images [B, 3, H, W], and targets float32 [M, 6]: number in the batch, then `item_of`'s."""
     rows = [
         torch.cat([torch.full((len(target), 1), float(number)), target], dim=1)
         for number, (_, target) in enumerate(batch)
