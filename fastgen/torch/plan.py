@@ -108,7 +108,7 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
 
 
 def whole(name: str, value: int, least: int) -> int:
-    """`value` as it is. Raises ConfigError naming it where it is no whole number from `least` on."""
+    """`value` if it is a whole number of `least` or more. Raises ConfigError naming it if not."""
     if value != int(value) or value < least:
         raise ConfigError(f"{name}: {value!r} is not a whole number of {least} or more")
     return int(value)
