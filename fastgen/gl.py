@@ -11,6 +11,7 @@ from typing import Any, Protocol, Self
 
 import moderngl
 
+from fastgen import gl_forks
 from fastgen.errors import ConfigError, ContextError
 
 BACKENDS = ("auto", "egl", "osmesa")
@@ -292,10 +293,17 @@ def _open_egl(device_index: int | None) -> GLContext:
         )
     failures = []
     for device in tries:
+        where = f"device {devices.index(device)}" if device else "surfaceless"
+        software = device is None or device.software
+        if not gl_forks.usable(f"egl {where}"):
+            failures.append(f"{where}: {gl_forks.REASON}")
+            if software:
+                continue  # the same rasterizer is reached by another display
+            break
+        gl_forks.opened(f"egl {where}", software)
         try:
             return GLContext(_EglContext(egl, device), "egl")
         except ContextError as error:
-            where = f"device {devices.index(device)}" if device else "surfaceless"
             failures.append(f"{where}: {error}")
     raise ContextError(
         f"egl: no context with OpenGL 4.3 core ({', '.join(failures)}); "
@@ -305,6 +313,9 @@ def _open_egl(device_index: int | None) -> GLContext:
 
 class _OSMesaContext:
     def __init__(self) -> None:
+        if not gl_forks.usable("osmesa"):
+            raise ContextError(f"osmesa: {gl_forks.REASON}")
+        gl_forks.opened("osmesa", software=True)
         self._library = _osmesa_library()
         self._library.OSMesaCreateContextAttribs.restype = _POINTER
         self._library.OSMesaCreateContextAttribs.argtypes = [_POINTER, _POINTER]

@@ -55,7 +55,7 @@ def _decals(shot: Shot) -> list[Object]:
     seen = project(_decal_facets(scene, mesh), view)
     bounds = boxes(seen.pixels, seen.owner, count)
     alone = canvases(seen.pixels, seen.owner, count)
-    pixels, depth = view.project(_outlines_mm(scene, mesh))
+    pixels, depth = view.project(outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
     objects = []
     for row, i in enumerate(labelled):
@@ -113,8 +113,8 @@ def _decal_facets(scene: Scene, mesh: Mesh) -> Facets:
 
 
 @lru_cache(maxsize=4)
-def _outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """Outlines [N, points, 3] of the labelled decals after damage."""
+def outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
+    """Outlines [N, points, 3] of the labelled decals after damage; a scene's cameras share them."""
     rest = np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
     return deform(scene.damages, rest)
 

@@ -197,7 +197,7 @@ def _boxes(path: Path, record: Record, least_px: int) -> list[str]:
     wanted = [
         (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
         for item in record["objects"]
-        if item["class_name"] in DETECTION_CLASSES and item["bbox"] and item["area"] >= least_px
+        if item["class_name"] in DETECTION_CLASSES and item["bbox"] and not item["ignored"]
     ]
     return [] if sorted(held) == sorted(wanted) else ["differs from the scene file's objects"]
 

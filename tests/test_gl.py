@@ -4,6 +4,7 @@ import itertools
 import multiprocessing
 import os
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -100,6 +101,61 @@ def test_contexts_work_in_spawned_processes():
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         for image in pool.map(triangle, BACKENDS):
             np.testing.assert_array_equal(image, expected())
+
+
+def _send(connection, work, *arguments):
+    try:
+        connection.send(work(*arguments))
+    except ContextError as error:
+        connection.send(str(error))
+
+
+def in_fork(work, *arguments):
+    """What `work` returns in a forked child, or its ContextError's words; fails if it hangs."""
+    fork = multiprocessing.get_context("fork")
+    ours, theirs = fork.Pipe()
+    child = fork.Process(target=_send, args=(theirs, work, *arguments))
+    child.start()
+    answered = ours.poll(20)
+    if not answered:
+        child.kill()
+    child.join()
+    assert answered, "the child hangs"
+    return ours.recv()
+
+
+def parent_and_child(backend, wanted, threads):
+    """A triangle drawn here, then one in a child forked off meanwhile, which asks for `wanted`."""
+    os.environ["LP_NUM_THREADS"] = threads
+    here = triangle(backend)
+    child = in_fork(triangle, wanted)
+    return here, child, triangle(backend)
+
+
+FORKS = (
+    ("egl", "egl", "2"),
+    ("egl", "osmesa", "2"),
+    ("osmesa", "auto", "2"),
+    ("osmesa", "osmesa", "0"),  # without threads nothing is lost
+)
+
+
+@pytest.mark.parametrize(("backend", "wanted", "threads"), FORKS)
+def test_a_child_forked_from_a_process_with_a_context_draws(backend, wanted, threads):
+    for image in spawned(parent_and_child, backend, wanted, threads):
+        np.testing.assert_array_equal(image, expected())
+
+
+def test_a_forked_child_that_has_no_display_left_says_so():
+    _, words, _ = spawned(parent_and_child, "osmesa", "osmesa", "2")
+    assert "osmesa: was opened before this process was forked" in words
+    assert "spawn or forkserver" in words
+
+
+def spawned(work, *arguments):
+    """What `work` returns in a fresh process, which may have children."""
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(work, *arguments).result()
 
 
 def threads_added(backend, counts):

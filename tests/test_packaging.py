@@ -47,3 +47,8 @@ def test_every_shader_and_asset_is_in_the_wheel(names):
 
 def test_no_tests_or_caches_travel(names):
     assert not [n for n in names if n.startswith("tests") or "__pycache__" in n]
+
+
+def test_every_module_is_in_the_wheel(names):
+    modules = {str(p.relative_to(ROOT)) for p in (ROOT / "fastgen").rglob("*.py")}
+    assert modules <= set(names)

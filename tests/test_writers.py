@@ -80,24 +80,24 @@ def test_linking_a_file_to_itself_keeps_it(tmp_path):
     assert (tmp_path / "a.jpg").read_bytes() == b"bytes"
 
 
-def item(name, bbox, area=1000):
-    return Object(2, name, 1, bbox, None, area, 1.0, False, "", ())
+def item(name, bbox, ignored=False):
+    return Object(2, name, 1, bbox, None, 1000, 1.0, False, ignored=ignored)
 
 
 def test_yolo_boxes_are_centres_and_sizes_and_never_beyond_one():
-    text = yolo.detection_lines([item("C9.1", (0, 0, 100, 50)), item("text", None)], (100, 50), 12)
+    text = yolo.detection_lines([item("C9.1", (0, 0, 100, 50)), item("text", None)], (100, 50))
     assert text == f"{DETECTION_CLASSES.index('C9.1')} 0.500000 0.500000 1.000000 1.000000\n"
     for width in (3, 7, 97, 1333):
         boxes = [item("text", (0, 0, w, 1)) for w in range(1, width + 1)]
-        lines = yolo.detection_lines(boxes, (width, 1), 1).splitlines()
+        lines = yolo.detection_lines(boxes, (width, 1)).splitlines()
         numbers = [[float(v) for v in line.split()[1:]] for line in lines]
         assert all(0 <= v <= 1 for row in numbers for v in row)
         assert all(row[0] + row[2] / 2 <= 1 + 1e-6 for row in numbers)
 
 
-def test_small_objects_and_damage_stay_out_of_the_marker_labels():
-    things = [item("C1.1", (0, 0, 3, 3), area=9), item("axis", (0, 0, 30, 30))]
-    assert yolo.detection_lines(things, (100, 100), 12) == ""
+def test_ignored_objects_and_damage_stay_out_of_the_marker_labels():
+    things = [item("C1.1", (0, 0, 3, 3), ignored=True), item("axis", (0, 0, 30, 30))]
+    assert yolo.detection_lines(things, (100, 100)) == ""
 
 
 @pytest.fixture(scope="module")

@@ -1,12 +1,13 @@
 """COCO masks and annotations. Format: cocodataset.org, 'Data format', and its mask API's notes."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import SEGMENTATION_CLASSES
-from fastgen.sample import Sample
+from fastgen.sample import Box, Sample
 
 
 def rle(mask: NDArray[np.bool_]) -> dict[str, Any]:
@@ -41,28 +42,32 @@ def _packed(counts: NDArray[np.int64]) -> str:
     return text.astype(np.uint8).tobytes().decode("ascii")
 
 
-def annotations(sample: Sample) -> list[dict[str, Any]]:
-    """The container and each visible damage: category, box (x, y, width, height), area and mask.
+def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_]]]:
+    """Category, tight box and mask [H, W] of the container and of each visible damage.
 
     The container's mask spans its damages: they are part of it.
     """
-    found = []
     for value in (0, *np.unique(sample.damage[sample.damage >= 200]).tolist()):
         mask = sample.damage == value if value else sample.damage > 0
         columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
         if not rows.size:
             continue
-        x, y = int(columns[0]), int(rows[0])
-        found.append(
-            {
-                "category_id": int(value) // 100 if value else 1,
-                "bbox": [x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y],
-                "area": int(np.count_nonzero(mask)),
-                "segmentation": rle(mask),
-                "iscrowd": 0,
-            }
-        )
-    return found
+        box = (int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+        yield int(value) // 100 if value else 1, box, mask
+
+
+def annotations(sample: Sample) -> list[dict[str, Any]]:
+    """Each of `instances` as COCO tells it: category, box (x, y, width, height), area and mask."""
+    return [
+        {
+            "category_id": category,
+            "bbox": [x0, y0, x1 - x0, y1 - y0],
+            "area": int(np.count_nonzero(mask)),
+            "segmentation": rle(mask),
+            "iscrowd": 0,
+        }
+        for category, (x0, y0, x1, y1), mask in instances(sample)
+    ]
 
 
 def categories() -> list[dict[str, Any]]:

@@ -6,23 +6,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.config import LabelConfig
-from fastgen.labels import decal_of
+from fastgen.crops import text_crops
 from fastgen.records import to_plain
-from fastgen.sample import Object, Sample
+from fastgen.sample import Sample
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene
 from fastgen.writers import coco, encode, yolo
 
-_CROP_MARGIN_PX = 3
-_LEGIBLE_FRACTION = 0.85
-_CORNER = 16
-"""labels.outline_mm puts this many points on each side of an outline."""
-
-_DOOR_FOLDERS = {"Cr": "door", "Cl": "no_door"}
+DOOR_FOLDERS = {"Cr": "door", "Cl": "no_door"}
+"""Folder of the door task that a camera's images go to."""
 
 
 def sample_files(split: str, stem: str) -> list[str]:
@@ -37,7 +31,7 @@ def sample_files(split: str, stem: str) -> list[str]:
         f"damage/yolo/{split}/{stem}.txt",
         f"scenes/{split}/{stem}.json",
     ]
-    if folder := _DOOR_FOLDERS.get(stem.split("_", 1)[1]):
+    if folder := DOOR_FOLDERS.get(stem.split("_", 1)[1]):
         found.append(f"door/{split}/{folder}/{stem}.jpg")
     return found
 
@@ -92,9 +86,9 @@ class SeafrontWriter:
         encode.link(image, out / "imdg/images" / split / f"{stem}.jpg")
         encode.write(out / "damage/masks" / split / f"{stem}.png", encode.png(sample.damage))
         encode.write(out / "damage/yolo" / split / f"{stem}.txt", yolo.segmentation_lines(sample))
-        detections = yolo.detection_lines(sample.objects, size, self._labels.min_visible_px)
+        detections = yolo.detection_lines(sample.objects, size)
         encode.write(out / "imdg/labels" / split / f"{stem}.txt", detections)
-        if folder := _DOOR_FOLDERS.get(sample.camera.name):
+        if folder := DOOR_FOLDERS.get(sample.camera.name):
             encode.link(image, out / "door" / split / folder / f"{stem}.jpg")
         record = {
             "stem": stem,
@@ -176,32 +170,11 @@ class SeafrontWriter:
 
     def _crops(self, sample: Sample, split: str, stem: str) -> list[dict[str, str]]:
         made = []
-        width, height = sample.view.size
-        for item in sample.objects:
-            if item.class_name != "text" or not self._legible(sample, item):
-                continue
-            assert item.bbox is not None
-            x0, y0, x1, y1 = item.bbox
-            margin = _CROP_MARGIN_PX
-            crop = sample.image[
-                max(y0 - margin, 0) : min(y1 + margin, height),
-                max(x0 - margin, 0) : min(x1 + margin, width),
-            ]
+        for item, pixels in text_crops(sample, self._labels.min_text_px):
             name = f"{stem}_{item.instance}.png"
-            encode.write(self._out / "text" / split / name, encode.png(crop))
+            encode.write(self._out / "text" / split / name, encode.png(pixels))
             made.append({"file": name, "text": item.text})
         return made
-
-    def _legible(self, sample: Sample, item: Object) -> bool:
-        """Large enough along both of its sides, hardly occluded, and not cut by the border."""
-        if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
-            return False
-        decal = decal_of(sample.scene, item.id)
-        outline = np.array(item.polygon).reshape(-1, 2)
-        corners = outline[[0, _CORNER, 2 * _CORNER, 3 * _CORNER]]
-        across = np.linalg.norm(corners[1] - corners[0]) / decal.size_mm[0]
-        up = np.linalg.norm(corners[3] - corners[0]) / decal.size_mm[1]
-        return bool(min(across, up) * decal.cap_mm >= self._labels.min_text_px)
 
 
 @lru_cache(maxsize=2)

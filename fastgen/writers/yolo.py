@@ -7,25 +7,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.sample import Object, Sample
+from fastgen.sample import Box, Object, Sample
 
 
-def detection_lines(objects: Iterable[Object], size: tuple[int, int], min_visible_px: int) -> str:
-    """A line an object of the marker task: class, box centre x, y, width, height.
+def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
+    """Class, object and visible box of what is labelled in the marker task, ignored ones left out:
+    the format cannot tell them from the rest."""
+    return [
+        (DETECTION_CLASSES.index(item.class_name), item, item.bbox)
+        for item in objects
+        if item.class_name in DETECTION_CLASSES
+        and item.bbox is not None
+        and not item.ignored
+    ]
 
-    Objects with fewer visible pixels than min_visible_px are left out.
-    """
-    width, height = size
-    lines = []
-    for item in objects:
-        if item.class_name not in DETECTION_CLASSES or item.bbox is None:
-            continue
-        if item.area < min_visible_px:
-            continue
-        x0, y0, x1, y1 = item.bbox
-        box = ((x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height)
-        lines.append(_line(DETECTION_CLASSES.index(item.class_name), box))
-    return "".join(lines)
+
+def normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Centre x, y, width and height of a pixel box as shares of an image of (width, height)."""
+    (x0, y0, x1, y1), (width, height) = box, size
+    return (x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height
+
+
+def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:
+    """A line for each of `detections`: class, box centre x, y, width, height."""
+    found = detections(objects)
+    return "".join(_line(index, normalised(box, size)) for index, _, box in found)
 
 
 def segmentation_lines(sample: Sample) -> str:

@@ -1,0 +1,160 @@
+"""Loader: a DataLoader that shares positions among ranks and resumes at the very next sample."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from torch.utils.data import DataLoader, Sampler
+
+from fastgen.errors import ConfigError
+from fastgen.sampling import stream
+from fastgen.torch.datasets import ContainerDataset, ContainerStream
+from fastgen.torch.plan import shard, whole
+from fastgen.torch.targets import Collate
+
+
+class ShardSampler(Sampler[int]):
+    """Positions of one rank: each position comes exactly once over all ranks, none is padded.
+
+    dataset: decides length, epoch and seed. rank, world_size: by default torch.distributed's where
+    it runs, else all is ours. shuffle: a new order each epoch, the same on all ranks.
+    start: where passes begin in this order, counted over all ranks.
+    """
+
+    def __init__(
+        self,
+        dataset: ContainerDataset,
+        rank: int | None = None,
+        world_size: int | None = None,
+        shuffle: bool = False,
+    ) -> None:
+        self.part = shard(rank, world_size)
+        self.start = 0
+        self._dataset, self._shuffle = dataset, shuffle
+
+    def __len__(self) -> int:
+        """Positions of this rank in a whole epoch."""
+        rank, world_size = self.part
+        return len(range(rank, len(self._dataset), world_size))
+
+    def __iter__(self) -> Iterator[int]:
+        data = self._dataset
+        places = range(len(data))
+        if self._shuffle:
+            order = stream(data.seed, data.epoch, "order").permutation(len(data)).tolist()
+            places = order
+        rank, world_size = self.part
+        return iter(places[self.start + rank :: world_size])
+
+
+class Loader:
+    """Batches of a ContainerDataset or ContainerStream, and where in the epoch they have come to.
+
+    batch_size: items of this rank in a batch. shuffle: for datasets; a stream has its order.
+    drop_last: leave out an incomplete last batch. rank, world_size: for datasets, as for
+    ShardSampler; a stream has its own. collate_fn: by default the one that fits the task.
+    options: what else DataLoader takes: num_workers, persistent_workers, pin_memory,
+    prefetch_factor, multiprocessing_context, timeout, worker_init_fn, generator.
+
+    `state_dict` counts what was handed out, not what workers have fetched ahead; loading it into a
+    Loader made alike goes on with the next sample. Batch size, workers and number of ranks may
+    differ then. All ranks may load the state of rank 0.
+    """
+
+    def __init__(
+        self,
+        dataset: ContainerDataset | ContainerStream,
+        batch_size: int = 8,
+        *,
+        shuffle: bool = False,
+        drop_last: bool = False,
+        rank: int | None = None,
+        world_size: int | None = None,
+        collate_fn: Collate | None = None,
+        **options: Any,
+    ) -> None:
+        self.dataset = dataset
+        self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
+        self._shuffle = shuffle
+        self._sampler: ShardSampler | None = None
+        if isinstance(dataset, ContainerStream):
+            if shuffle or rank is not None or world_size is not None:
+                raise ConfigError("shuffle, rank, world_size: a stream has its own; leave them out")
+            dataset.batch_size = self.batch_size
+            self._items, self._part = dataset.items, dataset.part
+            self._length = dataset.length
+        else:
+            self._sampler = ShardSampler(dataset, rank, world_size, shuffle)
+            self._items, self._part = dataset, self._sampler.part
+            self._length = dataset.length
+        self._start = 0
+        self._position = 0
+        self._loader: DataLoader[Any] = DataLoader(
+            dataset,
+            batch_size=self.batch_size,
+            sampler=self._sampler,
+            drop_last=drop_last,
+            collate_fn=collate_fn or self._items.collate,
+            **options,
+        )
+
+    @property
+    def epoch(self) -> int:
+        """The epoch that batches are of."""
+        return self._items.epoch
+
+    def set_epoch(self, epoch: int) -> None:
+        """Go to an epoch before a pass; going to the one that was loaded keeps the place in it."""
+        if epoch != self.epoch:
+            self._start = self._position = 0
+            self._items.set_epoch(epoch)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Plain values: epoch, position after the last sample handed out, and what was made."""
+        return {
+            "epoch": self.epoch,
+            "position": self._position,
+            "made": {**self._items.description, "length": self._length, "shuffle": self._shuffle},
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Let the next pass go on where `state` was taken.
+
+        Raises ConfigError where it is of a loader that makes other samples, naming what differs.
+        """
+        ours = self.state_dict()
+        for key in ours:
+            if key not in state:
+                raise ConfigError(f"state: has no {key!r}; give what state_dict returned")
+        for key, value in ours["made"].items():
+            if state["made"].get(key) != value:
+                raise ConfigError(f"state: was taken with another {key}; make the loader alike")
+        self._items.set_epoch(state["epoch"])
+        self._start = self._position = state["position"]
+
+    def __len__(self) -> int:
+        """Batches of this rank in a whole epoch. Raises TypeError where there is no end."""
+        if self._length is None:
+            raise TypeError("this loader has no end; give its stream a length")
+        return self._batches_in(0)
+
+    def __iter__(self) -> Iterator[Any]:
+        start, self._start = self._start, 0
+        self._position = start
+        if isinstance(self.dataset, ContainerStream):
+            self.dataset.start_at(start)
+        elif self._sampler is not None:
+            self._sampler.start = start
+        return self._run(start)
+
+    def _run(self, start: int) -> Iterator[Any]:
+        for number, batch in enumerate(self._loader, start=1):
+            self._position = start + number * self.batch_size * self._part[1]
+            if self._length is not None and number >= self._batches_in(start):
+                self._position = self._length
+            yield batch
+
+    def _batches_in(self, start: int) -> int:
+        """Batches of this rank from a position on to the epoch's end."""
+        assert self._length is not None
+        items = len(range(start + self._part[0], self._length, self._part[1]))
+        return items // self.batch_size if self.drop_last else -(-items // self.batch_size)

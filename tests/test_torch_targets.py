@@ -1,0 +1,167 @@
+"""Targets of each task as the files of `fastgen generate` say, and class counts as rendered."""
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from fastgen import Config, Generator
+from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.config import LabelConfig
+from fastgen.torch import (
+    ContainerDataset,
+    Loader,
+    class_counts,
+    class_names,
+    class_weights,
+    collate_yolo,
+)
+from fastgen.writers.seafront import SeafrontWriter
+
+SMALL = (64, 64)
+
+
+def view(task, position=0, size=(320, 320), **options):
+    """A dataset's item, and the Sample that it comes from."""
+    data = ContainerDataset(task, seed=2, size=size, length=40, **options)
+    made = data[position], data.sample(position)
+    data.close()
+    return made
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Files of one image of 640x640 that `fastgen generate` would leave, and its Sample."""
+    out = tmp_path_factory.mktemp("written")
+    with Generator(seed=2, size=(640, 640)) as generator:
+        sample = generator.render(index=1, camera="Cr")
+    SeafrontWriter(out, LabelConfig(), "test").add(sample, "train", "000001_Cr")
+    return out
+
+
+def _damaged():
+    config = Config.from_values({"damage": {"probability": 1.0, "count": [4, 4]}})
+    return view("damage", position=4, config=config)
+
+
+def test_damage_boxes_and_areas_are_those_of_their_masks():
+    (image, target), sample = _damaged()
+    assert image.shape == (3, 320, 320)
+    masks = target["masks"].numpy()
+    assert masks.dtype == np.uint8
+    assert len(masks) > 1
+    for mask, box, area in zip(masks, target["boxes"].tolist(), target["area"], strict=True):
+        y, x = np.nonzero(mask)
+        assert box == [x.min(), y.min(), x.max() + 1, y.max() + 1]
+        assert area == len(x)
+    names = [SEGMENTATION_CLASSES[label - 1] for label in target["labels"]]
+    assert names[0] == "container"
+    for mask, label in zip(masks[1:], target["labels"].tolist()[1:], strict=True):
+        assert set(np.unique(sample.damage[mask > 0]) // 100) == {label}
+    np.testing.assert_array_equal(masks[0] > 0, sample.damage > 0)
+    assert (target["boxes"].dtype, target["labels"].dtype) == (torch.float32, torch.int64)
+    assert target["iscrowd"].tolist() == [0] * len(masks)
+
+
+def test_an_image_without_anything_has_empty_targets_of_the_right_shape():
+    rig = {"face": "front", "focal_mm": 2000, "distance_mm": 9e5, "target_shift_mm": 1e5}
+    away = Config.from_values({"cameras": {"A": rig}})
+    (_, target), _ = view("damage", size=SMALL, config=away)
+    assert target["boxes"].shape == (0, 4)
+    assert target["masks"].shape == (0, 64, 64)
+    (image, rows), _ = view("imdg", size=SMALL, config=away, form="yolo")
+    assert rows.shape == (0, 5)
+    assert collate_yolo([(image, rows), (image, rows)])[1].shape == (0, 6)
+
+
+def test_marker_targets_of_both_forms_are_what_the_label_file_says(written):
+    lines = (written / "imdg/labels/train/000001_Cr.txt").read_text().splitlines()
+    file = np.array([[float(v) for v in line.split()] for line in lines])
+    (_, rows), _ = view("imdg", position=7, size=(640, 640), form="yolo")
+    np.testing.assert_allclose(rows.numpy(), file, atol=1e-6)
+    (_, target), sample = view("imdg", position=7, size=(640, 640))
+    assert (sample.scene.index, sample.camera.name) == (1, "Cr")
+    assert target["image_id"] == 7
+    assert target["labels"].tolist() == [int(row[0]) + 1 for row in file]
+    centre, extent = file[:, 1:3] * 640, file[:, 3:] * 640
+    corners = np.hstack([centre - extent / 2, centre + extent / 2])
+    np.testing.assert_allclose(target["boxes"].numpy(), corners, atol=1e-3)
+
+
+def test_yolo_batches_name_the_image_of_each_row():
+    data = ContainerDataset("imdg", seed=2, size=SMALL, length=40, form="yolo")
+    alone = [data[p][1] for p in range(3)]
+    images, rows = next(iter(Loader(data, batch_size=3)))
+    data.close()
+    assert images.shape == (3, 3, 64, 64)
+    for number, target in enumerate(alone):
+        assert torch.equal(rows[rows[:, 0] == number, 1:], target)
+
+
+def test_text_crops_are_the_files_and_their_strings(written):
+    lines = sorted((written / "text/train").glob("*.png"), key=lambda p: int(p.stem.split("_")[2]))
+    data = ContainerDataset("text", seed=2, size=(640, 640), length=40)
+    position = 7
+    crops, texts = data.collate([data[position]])
+    sample = data.sample(position)
+    data.close()
+    assert len(crops) == len(texts) == len(lines) > 0
+    by_instance = {item.instance: item.text for item in sample.objects if item.class_name == "text"}
+    for crop, text, path in zip(crops, texts, lines, strict=True):
+        np.testing.assert_array_equal(crop.numpy().transpose(1, 2, 0), np.asarray(Image.open(path)))
+        assert text == by_instance[int(path.stem.split("_")[2])]
+
+
+def test_door_labels_are_an_image_folders(written):
+    folders = sorted(p.name for p in (written / "door/train").iterdir())
+    data = ContainerDataset("door", seed=2, size=SMALL, length=4)
+    labels = {data.locate(p)[1]: data[p][1] for p in range(4)}
+    images, batch = data.collate([data[0], data[1]])
+    data.close()
+    assert class_names("door") == tuple(folders)
+    assert (written / "door/train" / folders[labels["Cr"]] / "000001_Cr.jpg").exists()
+    assert set(labels) == {"Cl", "Cr"}
+    assert batch.tolist() == [labels["Cl"], labels["Cr"]]
+    assert images.dtype == torch.uint8
+
+
+def test_transforms_get_image_and_target_and_floats_lie_in_0_to_1():
+    def mirror(image, target):
+        return image.flip(-1), {**target, "mirrored": True}
+
+    (plain, _), _ = view("imdg", size=SMALL)
+    (image, target), _ = view("imdg", size=SMALL, as_float=True, transforms=mirror)
+    assert target["mirrored"]
+    assert image.dtype == torch.float32
+    np.testing.assert_allclose(image.numpy() * 255, plain.flip(-1).numpy(), atol=1e-4)
+
+
+def test_counts_without_gl_come_near_those_of_rendered_labels():
+    data = ContainerDataset("imdg", seed=6, length=24, form="yolo")
+    rendered = np.zeros(len(DETECTION_CLASSES))
+    for position in range(24):
+        np.add.at(rendered, data[position][1][:, 0].long().numpy(), 1)
+    data.close()
+    counted = class_counts("imdg", seed=6, scenes=6).numpy()
+    assert counted[0] == rendered[0] == 24
+    assert abs(counted.sum() - rendered.sum()) < 0.1 * rendered.sum()
+    assert np.abs(counted - rendered)[2:].max() <= 2
+
+
+def test_damage_counts_without_gl_come_near_those_of_rendered_masks():
+    config = Config.from_values({"damage": {"probability": 1.0}})
+    data = ContainerDataset("damage", config, seed=6, size=(320, 320), length=80, form="yolo")
+    rendered = np.zeros(len(SEGMENTATION_CLASSES))
+    for position in range(80):
+        np.add.at(rendered, data[position][1][:, 0].long().numpy(), 1)
+    data.close()
+    counted = class_counts("damage", config, seed=6, size=(320, 320), scenes=20).numpy()
+    assert counted[0] == rendered[0] == 80
+    assert abs(counted.sum() - rendered.sum()) < 0.1 * (rendered.sum() - 80)
+
+
+def test_weights_even_the_classes_out():
+    counts = class_counts("damage", scenes=60).double()
+    weights = class_weights("damage", scenes=60).double()
+    shares = counts * weights
+    np.testing.assert_allclose(shares, np.full(5, counts.sum() / 5), rtol=1e-5)
