@@ -20,8 +20,8 @@ import torch
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
+from fastgen.encode import jpeg, write
 from fastgen.torch import ContainerDataset, class_names, collate_yolo
-from fastgen.writers.encode import jpeg, write
 
 WARM_STEPS = 5
 

@@ -37,6 +37,17 @@ class View:
         """Principal point (x, y) in pixels: the middle of the image."""
         return self.size[0] / 2, self.size[1] / 2
 
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """Camera matrix float64 [3, 3] from view space to pixels; Hartley and Zisserman, 6.1."""
+        x, y = self.center_px
+        return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1]])
+
+    @property
+    def translation_mm(self) -> NDArray[np.float64]:
+        """The world's origin in view space, float64 [3]; with `rotation` the container's pose."""
+        return -self.rotation @ self.position_m / MM
+
     def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
         """World points [..., 3] in mm to view space [..., 3] in metres."""
         points_m = np.asarray(points_mm, np.float64) * MM

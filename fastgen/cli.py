@@ -11,15 +11,17 @@ from typing import NoReturn
 import fastgen
 from fastgen import doctor, stats
 from fastgen.config import Config
+from fastgen.encode import jpeg, png, write
 from fastgen.errors import ConfigError, FastgenError, OutputError
-from fastgen.generate import FORMATS, Job, generate, parse_split
+from fastgen.formats import SEAFRONT, known_formats
+from fastgen.generate import CONTACT_SHEET, generate, parse_split
 from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
 from fastgen.records import nearest
+from fastgen.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.verify import verify
-from fastgen.writers.encode import jpeg, png, write
 
 SHOWN_LAYERS = (*LAYERS, "ids", "damage")
 
@@ -53,13 +55,16 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     make = commands.add_parser("generate", help="make a dataset, or finish one")
-    make.add_argument("out", metavar="OUT", type=Path)
+    make.add_argument("out", metavar="OUT", help="a folder, or an address such as s3://...")
     make.add_argument("--images", type=int, required=True, metavar="N")
     make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
     make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
     cores = len(os.sched_getaffinity(0))
     make.add_argument("--workers", type=int, default=cores, metavar="K")
     make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
+    extra = ",".join(sorted(set(known_formats()) - set(SEAFRONT)))
+    make.add_argument("--also", default="", metavar=extra, help="further files for each image")
+    make.add_argument("--shard", type=int, metavar="SCENES", help="scenes committed together")
     make.add_argument(
         "--split", metavar="NAME|a,b,c", help="train, val or test for all, or three fractions"
     )
@@ -92,7 +97,7 @@ def _parser() -> argparse.ArgumentParser:
         ("verify", _verify, "check that a dataset is whole"),
     ):
         command = commands.add_parser(name, help=words)
-        command.add_argument("out", metavar="OUT", type=Path)
+        command.add_argument("out", metavar="OUT")
         command.set_defaults(run=run)
     commands.add_parser("doctor", help="try the OpenGL backends").set_defaults(run=_doctor)
     return parser
@@ -113,6 +118,7 @@ def _size(text: str) -> tuple[int, int]:
 def _generate(options: argparse.Namespace) -> int:
     config = parse_split(options.split, _config(options))
     cameras = tuple(options.cameras.split(",")) if options.cameras else tuple(config.cameras)
+    shard = options.shard if options.shard is not None else SHARD_SCENES.get(options.format, 1)
     job = Job(
         out=options.out,
         images=options.images,
@@ -122,11 +128,17 @@ def _generate(options: argparse.Namespace) -> int:
         cameras=cameras,
         hdri_dir=options.hdri,
         backend=options.backend,
+        fmt=options.format,
+        formats=tuple(filter(None, options.also.split(","))),
+        shard_scenes=shard,
     )
-    manifest = generate(job, options.workers, options.format)
+    manifest = generate(job, options.workers)
     total = sum(split["images"] for split in manifest["counts"].values())
-    print(f"{total} images in {options.out}; look at {options.out / 'contact_sheet.png'}")
-    return 0
+    look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
+    print(f"{total} images in {options.out}{look}")
+    for each in manifest["failed"]:
+        print(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
+    return 1 if manifest["failed"] else 0
 
 
 def _show(options: argparse.Namespace) -> int:
@@ -166,7 +178,7 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _stats(options: argparse.Namespace) -> int:
-    print(stats.report(options.out))
+    print(stats.report(Path(options.out)))
     return 0
 
 

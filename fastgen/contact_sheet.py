@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.overlay import draw_box
 from fastgen.sampling import SPLITS
-from fastgen.writers.encode import png, write
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
 
-def write_contact_sheet(out: Path, path: Path) -> None:
-    """Draw up to 24 images of dataset `out`, spread evenly, into the PNG at `path`."""
+def contact_sheet(out: Path) -> NDArray[np.uint8]:
+    """Up to 24 images of the dataset in folder `out`, spread evenly, as one picture [H, W, 3]."""
     images = [p for split in SPLITS for p in (out / "images" / split).glob("*.jpg")]
     by_camera: dict[str, list[Path]] = {}
     for image in sorted(images, key=lambda p: p.stem):
@@ -35,7 +34,7 @@ def write_contact_sheet(out: Path, path: Path) -> None:
         y, x = i // _COLUMNS * _TILE_PX, i % _COLUMNS * _TILE_PX
         tile = _tile(out, image_path)
         sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
-    write(path, png(sheet))
+    return sheet
 
 
 def _tile(out: Path, path: Path) -> NDArray[np.uint8]:

@@ -8,9 +8,9 @@ import trimesh
 from fastgen.camera import MM
 from fastgen.container import build_container
 from fastgen.damage import deform
+from fastgen.encode import write
 from fastgen.errors import OutputError
 from fastgen.scene import Scene
-from fastgen.writers.encode import write
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""

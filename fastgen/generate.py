@@ -1,82 +1,107 @@
-"""A whole dataset: scenes handed out to worker processes, files written, the rest gathered up.
+"""A whole dataset: shards handed out to processes, files committed, the rest gathered up.
 
-Which files come is decided by (config, seed, index, cameras) alone, so any number of workers makes
-the same bytes, and running again on the same folder makes only what is missing.
+Which files come is decided by the job alone, so any number of workers makes the same bytes, and
+running again on the same place makes only what is missing.
 """
 
 import json
-import multiprocessing
 import os
-import queue
-import traceback
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from fastgen import workers
 from fastgen.config import Config, SplitConfig
-from fastgen.contact_sheet import write_contact_sheet
+from fastgen.contact_sheet import contact_sheet
+from fastgen.encode import png
 from fastgen.environment import find_hdris, load_environment
-from fastgen.errors import ConfigError, FastgenError, OutputError
+from fastgen.errors import ConfigError, OutputError
+from fastgen.formats import SEAFRONT, Record, formats_of
 from fastgen.generator import Generator
 from fastgen.progress import Progress
 from fastgen.records import nearest
-from fastgen.sampling import SPLITS, split_of
-from fastgen.writers.encode import write
-from fastgen.writers.seafront import SeafrontWriter, remove_partial
+from fastgen.sampling import SPLITS
+from fastgen.shards import (
+    ATTEMPTS,
+    FORMATS,
+    Job,
+    Maker,
+    Task,
+    digest,
+    manifest_path,
+    stem_of,
+)
+from fastgen.storage import Folder, Remote, storage_of
 
-FORMATS = ("seafront",)
 MANIFEST = "dataset.json"
 CONTACT_SHEET = "contact_sheet.png"
-_POLL_S = 0.5
+
+Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
+"""Makes the shards of `tasks` and reports on the way; see `run_here`."""
 
 
-@dataclass(frozen=True)
-class Job:
-    """What to generate. images counts images, not scenes; size is (width, height)."""
+def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[str, Any]:
+    """Make or finish the dataset at job.out; returns what dataset.json says.
 
-    out: Path
-    images: int
-    config: Config
-    seed: int
-    size: tuple[int, int]
-    cameras: tuple[str, ...]
-    hdri_dir: str | None
-    backend: str
-
-
-def generate(job: Job, workers: int, fmt: str = "seafront") -> dict[str, Any]:
-    """Make or finish the dataset in job.out; returns what dataset.json says.
-
-    Raises OutputError when the folder holds something else, was made with other settings, or a
-    worker fails; ConfigError for values that cannot be.
+    runner: where shards are made; by default in worker_count processes of this machine.
+    Raises OutputError when the place holds something else, was made with other settings, cannot be
+    written or is another run's; ConfigError for values that cannot be.
     """
-    job = _checked(job, workers, fmt)
-    settings = _settings(job, fmt)
-    _claim(job.out, settings)
-    writer = SeafrontWriter(job.out, job.config.labels, settings["version"])
-    remove_partial(job.out)
-    per_scene = len(job.cameras)
-    scenes = range(-(-job.images // per_scene))
-    missing = [i for i in scenes if _missing(job, writer, i)]
-    todo = sum(len(_missing(job, writer, i)) for i in missing)
-    made_by: dict[str, str] = {}
-    if missing:
-        progress = Progress(job.images, job.images - todo)
-        made_by = _run(job, missing, min(workers, len(missing)), progress, settings["version"])
-        progress.close()
-    counts = writer.finish()
-    old = json.loads((job.out / MANIFEST).read_text(encoding="utf-8"))
-    made_by = made_by or {key: old.get(key, "") for key in ("backend", "renderer")}
-    manifest = {**settings, **made_by, "counts": counts}
-    write(job.out / MANIFEST, json.dumps(manifest, indent=1))
-    write_contact_sheet(job.out, job.out / CONTACT_SHEET)
-    return manifest
+    job = _checked(job, worker_count)
+    settings = _settings(job)
+    storage = storage_of(job.out)
+    if isinstance(storage, Folder):
+        _make_folder(storage.root)
+    with storage.locked():
+        old = _claim(storage, job, settings)
+        present = storage.sizes()
+        tasks = [Task(i) for i in range(job.shard_count) if not _is_made(job, storage, present, i)]
+        names = ("backend", "renderer")
+        made_by: dict[str, str] = {key: old[key] for key in names if key in old}
+        if tasks:
+            todo = sum(len(job.wanted(task.shard)) for task in tasks)
+            progress = Progress(job.images, job.images - todo)
+
+            def on_report(kind: str, value: Any) -> None:
+                if kind == "images":
+                    progress.add(value)
+                elif kind == "made by":
+                    made_by.update(value)
+
+            try:
+                (runner or run_here(worker_count))(job, tasks, on_report)
+            finally:
+                progress.close()
+        return _finish(job, storage, settings, made_by)
 
 
-def stem_of(index: int, camera: str) -> str:
-    """File name, without its ending, of scene `index` seen by `camera`."""
-    return f"{index:06d}_{camera}"
+def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Maker) -> Runner:
+    """A runner with so many processes on this machine."""
+
+    def run(job: Job, tasks: list[Task], on_report: Callable[[str, Any], None]) -> None:
+        deaths: Counter[int] = Counter()
+
+        def on_death(task: Task, place: int | None, ended: str) -> Task:
+            first = job.wanted(task.shard)[0][0]
+            scene = first if place is None else place
+            deaths[scene] += 1
+            if deaths[scene] < ATTEMPTS:
+                return task
+            if place is None:
+                raise OutputError(
+                    f"worker processes die before they render anything ({ended}); try "
+                    f"fastgen doctor; what is written stays good"
+                )
+            reason = f"the process that rendered it died ({ended})"
+            return replace(task, skip={**task.skip, scene: reason})
+
+        whole = worker_count >= len(os.sched_getaffinity(0))
+        arguments = (job, whole)
+        workers.run(maker, arguments, tasks, worker_count, on_report, on_death, hang_s)
+
+    return run
 
 
 def parse_split(text: str | None, config: Config) -> Config:
@@ -102,22 +127,27 @@ def parse_split(text: str | None, config: Config) -> Config:
     return Config.from_values({**plain, "split": asdict(SplitConfig(**shares))})
 
 
-def _checked(job: Job, workers: int, fmt: str) -> Job:
-    if job.images < 1:
-        raise ConfigError(f"images: {job.images} is out of range; give 1 or more")
-    if workers < 1:
-        raise ConfigError(f"workers: {workers} is out of range; give 1 or more")
-    if fmt not in FORMATS:
-        raise ConfigError(f"format: {fmt!r} is unknown{nearest(fmt, FORMATS)}")
+def _checked(job: Job, worker_count: int) -> Job:
+    for name, value in (
+        ("images", job.images),
+        ("workers", worker_count),
+        ("shard", job.shard_scenes),
+    ):
+        if value < 1:
+            raise ConfigError(f"{name}: {value} is out of range; give 1 or more")
+    if job.fmt not in FORMATS:
+        raise ConfigError(f"format: {job.fmt!r} is unknown{nearest(job.fmt, FORMATS)}")
     for name in job.cameras:
         if name not in job.config.cameras:
             raise ConfigError(f"cameras: {name!r} is unknown{nearest(name, job.config.cameras)}")
     if not job.cameras or len(set(job.cameras)) != len(job.cameras):
         raise ConfigError("cameras: name at least one, and each only once")
-    return job
+    formats_of(job.formats)
+    names = dict.fromkeys((*SEAFRONT, *job.formats))
+    return replace(job, formats=tuple(names))
 
 
-def _settings(job: Job, fmt: str) -> dict[str, Any]:
+def _settings(job: Job) -> dict[str, Any]:
     from fastgen import __version__
 
     # validates seed and size without opening GL
@@ -126,131 +156,153 @@ def _settings(job: Job, fmt: str) -> dict[str, Any]:
     generator.scene(0)  # what only sampling can refuse is refused before anything is written
     for path in find_hdris(job.hdri_dir) if job.hdri_dir else ():
         load_environment(path)  # names a broken file now, and caches the light for the workers
-    return {
+    settings = {
         "version": __version__,
-        "format": fmt,
+        "format": job.fmt,
+        "formats": list(job.formats),
         "seed": job.seed,
         "size": list(job.size),
         "cameras": list(job.cameras),
         "environments": list(names),
+        "shard_scenes": job.shard_scenes,
         "config": job.config.to_plain(),
     }
+    plain: dict[str, Any] = json.loads(json.dumps(settings))
+    return plain
 
 
-def _claim(out: Path, settings: dict[str, Any]) -> None:
-    """Make the folder ours, or see that it is and was made alike."""
-    path = out / MANIFEST
+def _make_folder(root: Path) -> None:
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        if not path.exists():
-            if any(out.iterdir()):
+        root.mkdir(parents=True, exist_ok=True)
+        if not (root / MANIFEST).exists() and any(root.iterdir()):
+            left = [path.name for path in root.iterdir() if not path.name.startswith(".")]
+            if left:
                 raise OutputError(
-                    f"{out}: holds something else (no {MANIFEST}); give an empty or new folder"
+                    f"{root}: holds something else (no {MANIFEST}); give an empty or new folder"
                 )
-            write(path, json.dumps(settings, indent=1))
-            return
-        old = json.loads(path.read_text(encoding="utf-8"))
     except FileExistsError:
-        raise OutputError(f"{out}: is a file; give a folder") from None
+        raise OutputError(f"{root}: is a file; give a folder") from None
     except OSError as error:
-        raise OutputError(f"{out}: cannot be written ({error.strerror})") from None
+        raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
+
+
+def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Make the place ours, or see that it is and was made alike; what dataset.json said before."""
+    where = f"{job.out}/{MANIFEST}"
+    try:
+        old: dict[str, Any] = json.loads(storage.read(MANIFEST))
+    except FileNotFoundError:
+        if storage.sizes():
+            raise OutputError(
+                f"{job.out}: holds something else (no {MANIFEST}); give an empty or new place"
+            ) from None
+        storage.write(MANIFEST, [json.dumps(settings, indent=1).encode()])
+        return {}
     except ValueError:
-        raise OutputError(f"{path}: is damaged; remove the folder or give another") from None
-    for key, value in json.loads(json.dumps(settings)).items():
+        raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
+    for key, value in settings.items():
         if old.get(key) != value:
             raise OutputError(
-                f"{out}: was made with another {key}; repeat its settings to resume, "
+                f"{job.out}: was made with another {key}; repeat its settings to resume, "
                 f"or give another folder"
             )
+    return old
 
 
-def _missing(job: Job, writer: SeafrontWriter, index: int) -> list[str]:
-    """Cameras of scene `index` that are wanted and not there yet."""
-    first = index * len(job.cameras)
-    wanted = job.cameras[: max(0, min(len(job.cameras), job.images - first))]
-    split = split_of(job.config, job.seed, index)
-    return [name for name in wanted if not writer.has(split, stem_of(index, name))]
-
-
-def _run(
-    job: Job, indices: Sequence[int], workers: int, progress: Progress, version: str
-) -> dict[str, str]:
-    """Let worker processes render scenes. Returns backend and renderer that made them."""
-    # a context made before a fork hangs its children, so processes start afresh
-    context = multiprocessing.get_context("spawn")
-    tasks: Any = context.Queue()
-    results: Any = context.Queue()
-    for index in (*indices, *[None] * workers):
-        tasks.put(index)
-    whole_machine = workers >= len(os.sched_getaffinity(0))
-    processes = [
-        context.Process(
-            target=_work, args=(job, version, tasks, results, whole_machine), daemon=True
-        )
-        for _ in range(workers)
-    ]
-    for process in processes:
-        process.start()
-    made_by: dict[str, str] = {}
-    finished = 0
+def _is_made(job: Job, storage: Folder | Remote, present: Mapping[str, int], shard: int) -> bool:
+    """Whether a shard is there with all that is wanted of it, and none of it has gone since."""
     try:
-        while finished < workers:
-            try:
-                kind, value = results.get(timeout=_POLL_S)
-            except queue.Empty:
-                dead = [p for p in processes if p.exitcode not in (None, 0)]
-                if dead:
-                    raise OutputError(
-                        f"a worker process died (exit code {dead[0].exitcode}); what is written "
-                        f"stays good: run the same command again to go on"
-                    ) from None
-                continue
-            if kind == "images":
-                progress.add(value)
-            elif kind == "made by":
-                made_by = value
-            elif kind == "end":
-                finished += 1
-            else:
-                raise OutputError(value)
-    finally:
-        for process in processes:
-            if finished < workers:
-                process.terminate()
-            process.join()
-        for channel in (tasks, results):
-            channel.cancel_join_thread()
-            channel.close()
-    return made_by
+        manifest = json.loads(storage.read(manifest_path(shard)))
+        wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
+        files = manifest["files"].items()
+        whole = all(present.get(path) == size for path, (size, _) in files)
+        return whole and manifest["images"] == wanted
+    except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
+        return False
 
 
-def _work(job: Job, version: str, tasks: Any, results: Any, whole_machine: bool) -> None:
-    """One worker process: scenes from `tasks` until None, reports to `results`."""
-    if whole_machine:
-        # one process a core is faster than llvmpipe's threads; it reads this at its first context
-        os.environ.setdefault("LP_NUM_THREADS", "0")
-    place = "start"
-    try:
-        writer = SeafrontWriter(job.out, job.config.labels, version)
-        with Generator(
-            job.config, job.seed, job.size, backend=job.backend, hdri_dir=job.hdri_dir
-        ) as generator:
-            made_by = {"backend": generator.used_backend, "renderer": generator.renderer_name}
-            results.put(("made by", made_by))
-            for index in iter(tasks.get, None):
-                place = f"scene {index}"
-                scene = generator.scene(index)
-                split = split_of(job.config, job.seed, index)
-                for name in _missing(job, writer, index):
-                    place = f"scene {index}, camera {name}"
-                    sample = generator.render(scene=scene, camera=name)
-                    writer.add(sample, split, stem_of(index, name))
-                    results.put(("images", 1))
-        results.put(("end", None))
-    except KeyboardInterrupt:
-        pass
-    except (FastgenError, OSError) as error:
-        results.put(("failed", f"{place}: {error}"))
-    except Exception as error:
-        traceback.print_exc()
-        results.put(("failed", f"{place}: {error!r} (our mistake: please report it)"))
+def _finish(
+    job: Job, storage: Folder | Remote, settings: dict[str, Any], made_by: dict[str, str]
+) -> dict[str, Any]:
+    """Write the files over all samples, and dataset.json, which seals everything, last."""
+    shards: dict[str, str] = {}
+    failed: list[dict[str, Any]] = []
+    counts = {
+        split: Counter({"images": 0, "objects": 0, "damages": 0, "crops": 0}) for split in SPLITS
+    }
+    for shard in range(job.shard_count):
+        data = storage.read(manifest_path(shard))
+        shards[str(shard)] = digest(data)
+        manifest = json.loads(data)
+        failed += manifest["failed"]
+        for record in manifest["records"]:
+            counts[record["split"]].update(_counts(record))
+    files: dict[str, list[Any]] = {}
+
+    def put(path: str, pieces: Iterable[bytes]) -> None:
+        sums = _Sums(pieces)
+        storage.write(path, sums)
+        files[path] = sums.entry()
+
+    if job.fmt == "seafront":
+        for split in SPLITS:
+            storage.make_folders([f"images/{split}", f"scenes/{split}"])
+            for each in formats_of(job.formats):
+                storage.make_folders(each.folders(split))
+                for path, content in each.dataset_files(split, _records(job, storage, split)):
+                    put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
+        if isinstance(storage, Folder):
+            put(CONTACT_SHEET, [png(contact_sheet(storage.root))])
+    result = {
+        **settings,
+        **made_by,
+        "counts": {split: dict(count) for split, count in counts.items()},
+        "failed": failed,
+        "files": files,
+        "shards": shards,
+    }
+    storage.write(MANIFEST, [sealed(result)])
+    return result
+
+
+class _Sums:
+    """Passes pieces on, and adds up their size and hash."""
+
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        import hashlib
+
+        self._pieces, self._size, self._hash = pieces, 0, hashlib.sha256()
+
+    def __iter__(self) -> Iterator[bytes]:
+        for piece in self._pieces:
+            self._size += len(piece)
+            self._hash.update(piece)
+            yield piece
+
+    def entry(self) -> list[Any]:
+        return [self._size, self._hash.hexdigest()]
+
+
+def sealed(manifest: Mapping[str, Any]) -> bytes:
+    """dataset.json with a hash of itself as its last line."""
+    text = json.dumps(manifest, indent=1)
+    return f'{text[:-2]},\n "digest": "{digest(text.encode())}"\n}}'.encode()
+
+
+def _records(job: Job, storage: Folder | Remote, split: str) -> Callable[[], Iterator[Record]]:
+    def through() -> Iterator[Record]:
+        for shard in range(job.shard_count):
+            manifest = json.loads(storage.read(manifest_path(shard)))
+            yield from (record for record in manifest["records"] if record["split"] == split)
+
+    return through
+
+
+def _counts(record: Record) -> dict[str, int]:
+    facts = record["facts"]
+    return {
+        "images": 1,
+        "objects": len(facts["imdg"]),
+        "damages": sum(item["category_id"] > 1 for item in facts["damage"]),
+        "crops": len(facts["text"]),
+    }

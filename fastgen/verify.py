@@ -1,7 +1,6 @@
-"""Is a dataset whole, and do its files agree with each other?"""
+"""`fastgen verify`: every file of a dataset present, unchanged, and consistent with its labels."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -9,156 +8,152 @@ import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
 
+from fastgen import coco
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import FastgenError, OutputError
+from fastgen.formats import Record
+from fastgen.generate import MANIFEST
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene
-from fastgen.writers import coco
-from fastgen.writers.seafront import dataset_files, sample_files
+from fastgen.shards import digest, manifest_path
+from fastgen.storage import Folder, Remote, storage_of
 
-Record = dict[str, Any]
-"""What a scene file holds."""
+Place = Folder | Remote
 
 
-def verify(out: Path) -> list[str]:
-    """Every fault found, one line each; empty when all is well.
+def verify(out: str) -> list[str]:
+    """Faults found in the dataset at `out`, each a line that names a file; empty when all is well.
 
-    Raises OutputError when `out` is no dataset at all.
+    Raises OutputError when `out` is no dataset.
     """
+    storage = storage_of(out)
     try:
-        manifest = json.loads((out / "dataset.json").read_text(encoding="utf-8"))
-        least_px = manifest["config"]["labels"]["min_visible_px"]
+        text = storage.read(MANIFEST)
+        manifest = json.loads(text)
+        manifest["config"], manifest["shard_scenes"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise OutputError(f"{out}: no readable dataset.json; give a dataset's folder") from None
-    faults: list[str] = []
-    if "counts" not in manifest:
-        faults.append("dataset.json: the dataset is not finished; run generate again")
-    wanted = {"dataset.json", "contact_sheet.png", *dataset_files()}
-    present = {path.relative_to(out).as_posix() for path in out.rglob("*") if not path.is_dir()}
-    records: dict[str, dict[str, Record]] = {}
-    for split in SPLITS:
-        stems = sorted(path.stem for path in (out / "scenes" / split).glob("*.json"))
-        counted = manifest.get("counts", {}).get(split, {}).get("images", len(stems))
-        if counted != len(stems):
-            faults.append(f"scenes/{split}: {len(stems)} samples, dataset.json says {counted}")
-        records[split] = {}
-        for stem in stems:
-            wanted.update(sample_files(split, stem))
-            record = _record(out, split, stem, faults)
-            if record is not None:
-                records[split][stem] = record
-                wanted.update(f"text/{split}/{crop['file']}" for crop in record["crops"])
-    faults += [f"{name}: missing" for name in sorted(wanted - present)]
-    faults += [f"{name}: does not belong here" for name in sorted(present - wanted)]
-    for split in SPLITS:
-        annotations = _annotations(out, split, records[split], faults)
-        faults += _text_labels(out, split, records[split])
-        for stem, record in records[split].items():
-            if present.issuperset(sample_files(split, stem)):
-                faults += _sample(out, split, stem, record, least_px)
-                faults += _damage(out, split, stem, record, annotations)
+        raise OutputError(f"{out}: no readable {MANIFEST}; give a dataset's folder") from None
+    if "digest" not in manifest:
+        return [f"{MANIFEST}: the dataset is not finished; run generate again"]
+    if not _is_sealed(text):
+        return [f"{MANIFEST}: was changed after it was written"]
+    faults = [
+        f"scene {each['scene']} is missing: it failed ({each['error']})"
+        for each in manifest["failed"]
+    ]
+    present = dict(storage.sizes())
+    present.pop(MANIFEST, None)
+    shards = []
+    for number, hashed in manifest["shards"].items():
+        path = manifest_path(int(number))
+        data = _intact(storage, present, path, None, hashed, faults)
+        if data is not None:
+            shards.append(json.loads(data))
+    broken: set[str] = set()
+    listed = [manifest["files"], *(shard["files"] for shard in shards)]
+    for path, (size, hashed) in (entry for files in listed for entry in files.items()):
+        if _intact(storage, present, path, size, hashed, faults) is None:
+            broken.add(path)
+    if len(shards) == len(manifest["shards"]):
+        faults += [f"{path}: does not belong here" for path in sorted(present)]
+    if manifest["format"] == "seafront":
+        records = [record for shard in shards for record in shard["records"]]
+        faults += _consistency(storage, records, broken)
     return faults
 
 
-def _record(out: Path, split: str, stem: str, faults: list[str]) -> Record | None:
-    """A scene file's content, or None and a fault when it is damaged."""
-    name = f"scenes/{split}/{stem}.json"
-    try:
-        record: Record = json.loads((out / name).read_text(encoding="utf-8"))
-        from_plain(Scene, record["scene"], "scene")
-        width, height = record["size"]
-        held = (record["stem"], record["split"], int(width) > 0, int(height) > 0)
-        if held != (stem, split, True, True):
-            raise ValueError(f"is of {held[1]}/{held[0]}, {width}x{height}")
-        for item in record["objects"]:
-            _ = item["class_name"], item["bbox"], item["area"]
-        for crop in record["crops"]:
-            _ = crop["file"], crop["text"]
-    except (OSError, ValueError, KeyError, TypeError, FastgenError) as error:
-        faults.append(f"{name}: cannot be read ({error!r})")
+def _is_sealed(text: bytes) -> bool:
+    """Whether the hash in the last line of dataset.json is that of the rest."""
+    head, _, tail = text.rpartition(b',\n "digest": "')
+    wanted = digest(head + b"\n}")
+    return tail.decode(errors="replace") == f'{wanted}"\n}}'
+
+
+def _intact(
+    storage: Place,
+    present: dict[str, int],
+    path: str,
+    size: int | None,
+    hashed: str,
+    faults: list[str],
+) -> bytes | None:
+    """A file's content where it is as it was written, else None and a fault. Ticks it off."""
+    if path not in present:
+        faults.append(f"{path}: missing")
         return None
-    return record
-
-
-def _annotations(
-    out: Path, split: str, records: dict[str, Record], faults: list[str]
-) -> dict[str, list[dict[str, Any]]] | None:
-    """COCO annotations by stem; None and a fault when they cannot be read."""
-    name = f"damage/coco_{split}.json"
-    try:
-        data = json.loads((out / name).read_text(encoding="utf-8"))
-        stems = {image["id"]: Path(image["file_name"]).stem for image in data["images"]}
-        sizes = {stems[image["id"]]: [image["width"], image["height"]] for image in data["images"]}
-        found: dict[str, list[dict[str, Any]]] = {stem: [] for stem in stems.values()}
-        for item in data["annotations"]:
-            _ = item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"]
-            found[stems[item["image_id"]]].append(item)
-    except FileNotFoundError:
-        return None  # reported as missing
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        faults.append(f"{name}: cannot be read ({error!r})")
+    found = present.pop(path)
+    if size is not None and found != size:
+        faults.append(f"{path}: changed ({found} bytes, {size} were written)")
         return None
-    for stem, record in records.items():
-        if sizes.get(stem) != record["size"]:
-            faults.append(f"{name}: {stem}: size {sizes.get(stem)}, scene file {record['size']}")
-    return found
+    data = storage.read(path)
+    if digest(data) != hashed:
+        faults.append(f"{path}: changed")
+        return None
+    return data
 
 
-def _text_labels(out: Path, split: str, records: dict[str, Record]) -> list[str]:
-    name = f"text/{split}/labels.txt"
-    crops = [crop for record in records.values() for crop in record["crops"]]
+def _consistency(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
+    """Whether labels agree with one another, among files that are as they were written."""
     faults = []
-    for crop in crops:
-        path = out / "text" / split / crop["file"]
-        if path.is_file() and cv2.imread(str(path)) is None:
-            faults.append(f"text/{split}/{crop['file']}: not a whole PNG")
-    wanted = "".join(f"{crop['file']}\t{crop['text']}\n" for crop in crops)
-    if (out / name).is_file() and (out / name).read_bytes() != wanted.encode():
-        faults.append(f"{name}: differs from the crops that the scene files list")
+    for record in records:
+        split, stem = record["split"], record["stem"]
+        names = {
+            "image": f"images/{split}/{stem}.jpg",
+            "scene": f"scenes/{split}/{stem}.json",
+            "mask": f"damage/masks/{split}/{stem}.png",
+            "outlines": f"damage/yolo/{split}/{stem}.txt",
+            "boxes": f"imdg/labels/{split}/{stem}.txt",
+        }
+        if broken.isdisjoint(names.values()):
+            data = {key: storage.read(path) for key, path in names.items()}
+            faults += [f"{names[key]}: {fault}" for key, fault in _sample(data, record)]
+    for split in SPLITS:
+        name = f"damage/coco_{split}.json"
+        wanted = [
+            item for record in records if record["split"] == split
+            for item in record["facts"]["damage"]
+        ]  # fmt: skip
+        if name not in broken and not _lists(storage.read(name), wanted):
+            faults.append(f"{name}: differs from the shards' records")
     return faults
 
 
-def _sample(out: Path, split: str, stem: str, record: Record, least_px: int) -> list[str]:
-    """Image, its second names and the marker labels of one sample."""
+def _lists(text: bytes, wanted: list[dict[str, Any]]) -> bool:
+    found = json.loads(text)["annotations"]
+    return [{k: v for k, v in item.items() if k not in ("id", "image_id")} for item in found] == (
+        wanted
+    )
+
+
+def _sample(data: dict[str, bytes], record: Record) -> list[tuple[str, str]]:
+    """Which of one sample's files says what it should not, and how."""
     width, height = record["size"]
-    image_name = f"images/{split}/{stem}.jpg"
-    data = (out / image_name).read_bytes()
     faults = []
     try:
         # strict: a file cut short is otherwise filled up with grey
-        whole = simplejpeg.decode_jpeg(data, strict=True).shape == (height, width, 3)
+        whole = simplejpeg.decode_jpeg(data["image"], strict=True).shape == (height, width, 3)
     except ValueError:
         whole = False
     if not whole:
-        faults.append(f"{image_name}: not a whole JPEG of {width}x{height}")
-    for other in sample_files(split, stem):
-        if other.endswith(".jpg") and (out / other).read_bytes() != data:
-            faults.append(f"{other}: differs from {image_name}")
-    boxes = f"imdg/labels/{split}/{stem}.txt"
-    return [*faults, *(f"{boxes}: {fault}" for fault in _boxes(out / boxes, record, least_px))]
-
-
-def _damage(
-    out: Path,
-    split: str,
-    stem: str,
-    record: Record,
-    annotations: dict[str, list[dict[str, Any]]] | None,
-) -> list[str]:
-    """Mask, outlines and COCO annotations of one sample."""
-    outlines, mask_name = f"damage/yolo/{split}/{stem}.txt", f"damage/masks/{split}/{stem}.png"
-    faults = [f"{outlines}: {fault}" for fault in _outlines(out / outlines)]
-    width, height = record["size"]
-    mask = cv2.imread(str(out / mask_name), cv2.IMREAD_UNCHANGED)
+        faults.append(("image", f"not a whole JPEG of {width}x{height}"))
+    scene = json.loads(data["scene"])
+    try:
+        from_plain(Scene, scene["scene"], "scene")
+    except FastgenError as error:
+        faults.append(("scene", str(error)))
+    if not _same_boxes(_rows(data["boxes"]), scene):
+        faults.append(("boxes", "differs from the scene file's objects"))
+    faults += [("outlines", fault) for fault in _outline_faults(_rows(data["outlines"]))]
+    mask = cv2.imdecode(np.frombuffer(data["mask"], np.uint8), cv2.IMREAD_UNCHANGED)
     if mask is None or mask.shape != (height, width) or mask.dtype != np.uint16:
-        faults.append(f"{mask_name}: not a whole 16-bit PNG of {width}x{height}")
-    elif annotations is not None and not _equals_mask(mask, annotations.get(stem, [])):
-        faults.append(f"damage/coco_{split}.json: {stem}: differs from {mask_name}")
+        faults.append(("mask", f"not a whole 16-bit PNG of {width}x{height}"))
+    elif not _same_masks(mask, record["facts"]["damage"]):
+        faults.append(("mask", "differs from the COCO annotations"))
     return faults
 
 
-def _equals_mask(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
+def _same_masks(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
     """Category, area, box and run lengths of every annotation, derived again from the mask."""
     parts = [(1, mask > 0)] if mask.any() else []
     parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= 200])]
@@ -175,37 +170,28 @@ def _equals_mask(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
     return sorted(seen, key=repr) == sorted(held, key=repr)
 
 
-def _rows(path: Path) -> list[tuple[int, list[float]]] | None:
-    """Lines of a YOLO file as class and numbers; None when it is something else."""
-    try:
-        lines = [line.split() for line in path.read_text(encoding="utf-8").splitlines()]
-        return [(int(index), [float(v) for v in values]) for index, *values in lines]
-    except ValueError:
-        return None
+def _rows(text: bytes) -> list[tuple[int, list[float]]]:
+    """Lines of a YOLO file as class and numbers."""
+    lines = [line.split() for line in text.decode().splitlines()]
+    return [(int(index), [float(v) for v in values]) for index, *values in lines]
 
 
-def _boxes(path: Path, record: Record, least_px: int) -> list[str]:
+def _same_boxes(rows: list[tuple[int, list[float]]], scene: dict[str, Any]) -> bool:
     """The marker labels are the visible boxes of the scene file's objects, to 0.1 pixel."""
-    rows = _rows(path)
-    if rows is None or any(len(v) != 4 or not 0 <= i < len(DETECTION_CLASSES) for i, v in rows):
-        return ["cannot be read"]
-    width, height = record["size"]
+    width, height = scene["size"]
     held = []
     for index, (x, y, w, h) in rows:
         edges = ((x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width)
         held.append((index, [round(v, 1) for v in (*edges, (y + h / 2) * height)]))
     wanted = [
         (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
-        for item in record["objects"]
+        for item in scene["objects"]
         if item["class_name"] in DETECTION_CLASSES and item["bbox"] and not item["ignored"]
     ]
-    return [] if sorted(held) == sorted(wanted) else ["differs from the scene file's objects"]
+    return sorted(held) == sorted(wanted)
 
 
-def _outlines(path: Path) -> list[str]:
-    rows = _rows(path)
-    if rows is None:
-        return ["cannot be read"]
+def _outline_faults(rows: list[tuple[int, list[float]]]) -> list[str]:
     faults = []
     for index, values in rows:
         if not 0 <= index < len(SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-import queue
 import shutil
 import signal
 import subprocess
@@ -18,13 +17,15 @@ import yaml
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from fastgen import generate
+from fastgen import shards
 from fastgen.cli import main
 from fastgen.config import Config
-from fastgen.generate import Job
+from fastgen.generate import generate
 from fastgen.generator import Generator
 from fastgen.sampling import split_of
 from fastgen.scene import Scene
+from fastgen.shards import Job, Maker
+from fastgen.storage import storage_of
 
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
 
@@ -176,15 +177,18 @@ def test_running_again_restores_what_is_missing(dataset, tmp_path, lost):
 
 def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
+    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS, "--shard", "1"]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, start_new_session=True)
     deadline = time.monotonic() + 60
-    while len(list(out.glob("scenes/*/*.json"))) < 3 and time.monotonic() < deadline:
-        time.sleep(0.05)
+    while len(list(out.glob("shards/*.json"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-    assert run(out) == 0
-    assert content(out) == content(dataset)
+    assert run(out, "--shard", "1") == 0
+    assert run(tmp_path / "whole", "--shard", "1") == 0
+    assert content(out) == content(tmp_path / "whole")
+    images = {k: v for k, v in content(dataset).items() if k.startswith("images")}
+    assert images.items() <= content(out).items()
 
 
 def test_more_images_extend_a_dataset(dataset, tmp_path):
@@ -236,24 +240,79 @@ def test_verify_names_the_spoilt_file(dataset, tmp_path, capsys, name, spoil):
     assert spoilt.relative_to(out).as_posix() in capsys.readouterr().out
 
 
-def test_a_broken_renderer_stops_the_run_with_one_line(tmp_path, capsys, monkeypatch):
-    class Broken(Generator):
-        def render(self, *_, **__):
-            raise RuntimeError("no such luck")
+def test_a_scene_that_always_fails_is_told_of_and_the_rest_goes_on(tmp_path, capfd, monkeypatch):
+    asked = []
 
-    monkeypatch.setattr(generate, "Generator", Broken)
-    job = Job(tmp_path, 1, Config.preset(), 0, (64, 64), ("A",), None, "auto")
-    tasks, results = queue.Queue(), queue.Queue()
-    for task in (0, None):
-        tasks.put(task)
-    generate._work(job, "test", tasks, results, False)
-    kind, words = list(results.queue)[-1]
-    assert kind == "failed"
-    assert words.startswith("scene 0, camera A: ")
-    assert "no such luck" in words
-    assert "\n" not in words
-    assert "Traceback" in capsys.readouterr().err
-    assert not [p for p in tmp_path.rglob("*") if p.is_file()]
+    class Broken(Generator):
+        def render(self, *, scene, camera):
+            asked.append(scene.index)
+            if scene.index == 1:
+                raise RuntimeError("no such luck")
+            return super().render(scene=scene, camera=camera)
+
+    def run_inside(job, tasks, on_report):
+        maker = Maker(job, False, on_report)
+        for task in tasks:
+            maker(task)
+
+    monkeypatch.setattr(shards, "Generator", Broken)
+    job = Job(str(tmp_path / "out"), 6, Config.preset(), 0, (64, 64), ("A", "Cr"), None, "auto")
+    made = generate(job, 1, runner=run_inside)
+    assert asked.count(1) == 3
+    (failed,) = made["failed"]
+    assert (failed["scene"], failed["seed"]) == (1, 0)
+    assert "no such luck" in failed["error"]
+    assert sum(split["images"] for split in made["counts"].values()) == 4
+    assert "Traceback" in capfd.readouterr().err
+    assert main(["verify", str(tmp_path / "out")]) == 1
+    assert "scene 1 is missing: it failed" in capfd.readouterr().out
+    # a later run tries again
+    monkeypatch.undo()
+    assert generate(job, 1, runner=run_inside)["failed"] == []
+    assert main(["verify", str(tmp_path / "out")]) == 0
+
+
+def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out)
+    with storage_of(out).locked():
+        assert run(out) == 2
+    assert "another run works on this folder" in capsys.readouterr().err
+    assert run(out) == 0
+
+
+def test_ctrl_c_stops_cleanly_and_the_run_goes_on_later(dataset, tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while not (out / "dataset.json").exists():
+        time.sleep(0.02)
+    time.sleep(1.0)
+    os.killpg(process.pid, signal.SIGINT)
+    error = process.communicate(timeout=30)[1]
+    assert process.returncode == 130
+    assert error.splitlines()[-1] == "fastgen: stopped; run the same command again to go on"
+    assert "Traceback" not in error
+    assert not [p for p in out.iterdir() if p.name.startswith(".")]
+    assert run(out) == 0
+    assert content(out) == content(dataset)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_verify_finds_any_single_flipped_byte(dataset, tmp_path, capsys, seed):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out)
+    rng = np.random.default_rng(seed)
+    files = sorted(p for p in out.rglob("*") if p.is_file() and p.stat().st_size)
+    path = out / "dataset.json" if seed < 3 else files[rng.integers(len(files))]
+    data = bytearray(path.read_bytes())
+    data[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+    path.unlink()
+    path.write_bytes(data)
+    code = main(["verify", str(out)])
+    said = capsys.readouterr()
+    assert code > 0
+    assert path.name in said.out + said.err
 
 
 def test_stats_counts_what_the_files_hold(dataset, capsys):
@@ -280,6 +339,8 @@ def test_split_option_puts_all_in_one(tmp_path):
         (["generate", "{out}", "--images", "2", "--preset", "seafornt"], "did you mean seafront"),
         (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
+        (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
+        (["generate", "{out}", "--images", "2", "--shard", "0"], "shard: 0 is out of range"),
         (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),
         (["generate", "{out}", "--images", "2", "--hdri", "{broken}"], "photo.hdr"),
         (["generate", "{out}", "--images", "2", "--config", "{bad}"], "did you mean rust_coverage"),

@@ -9,13 +9,13 @@ import simplejpeg
 from PIL import Image
 from pycocotools import mask as coco_mask
 
+from fastgen import coco, encode
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.config import LabelConfig
+from fastgen.formats import Item, assemble, damage, known_formats, yolo
 from fastgen.generator import Generator
 from fastgen.sample import Object
 from fastgen.scene import Camera
-from fastgen.writers import coco, encode, yolo
-from fastgen.writers.seafront import SeafrontWriter
 
 
 def masks():
@@ -66,20 +66,6 @@ def test_writing_leaves_nothing_aside(tmp_path):
     assert (tmp_path / "a.txt").read_text() == "two"
 
 
-def test_links_hold_the_same_bytes(tmp_path):
-    encode.write(tmp_path / "a.jpg", b"bytes")
-    encode.link(tmp_path / "a.jpg", tmp_path / "b.jpg")
-    encode.link(tmp_path / "a.jpg", tmp_path / "b.jpg")
-    assert (tmp_path / "b.jpg").read_bytes() == b"bytes"
-
-
-def test_linking_a_file_to_itself_keeps_it(tmp_path):
-    encode.write(tmp_path / "a.jpg", b"bytes")
-    encode.link(tmp_path / "a.jpg", tmp_path / "a.jpg")
-    assert [p.name for p in tmp_path.iterdir()] == ["a.jpg"]
-    assert (tmp_path / "a.jpg").read_bytes() == b"bytes"
-
-
 def item(name, bbox, ignored=False):
     return Object(2, name, 1, bbox, None, 1000, 1.0, False, ignored=ignored)
 
@@ -107,9 +93,14 @@ def samples():
         return [generator.render(index=i, camera=c) for i in damaged for c in ("A", "Cl", "Cr")]
 
 
+def item_of(sample):
+    return Item(sample, "train", f"000000_{sample.camera.name}", 0, LabelConfig())
+
+
 def test_coco_annotations_equal_the_mask(samples):
     for sample in samples:
-        for annotation in coco.annotations(sample):
+        _, found = damage.FORMAT.sample_files(item_of(sample))
+        for annotation in found:
             packed = dict(annotation["segmentation"])
             packed["counts"] = packed["counts"].encode()
             mask = coco_mask.decode(packed).astype(bool)
@@ -119,13 +110,14 @@ def test_coco_annotations_equal_the_mask(samples):
             assert annotation["area"] == mask.sum() == coco_mask.area(packed)
             assert annotation["bbox"] == coco_mask.toBbox(packed).astype(int).tolist()
         seen = {v for v in np.unique(sample.damage) if v >= 200}
-        assert len(coco.annotations(sample)) == len(seen) + 1
+        assert len(found) == len(seen) + 1
 
 
 def test_yolo_outlines_fill_to_the_mask(samples):
     for sample in samples:
-        lines = yolo.segmentation_lines(sample).splitlines()
-        index, *numbers = lines[0].split()
+        files, _ = damage.FORMAT.sample_files(item_of(sample))
+        (lines,) = [data.decode() for path, data in files.items() if path.endswith(".txt")]
+        index, *numbers = lines.splitlines()[0].split()
         points = np.array(numbers, float).reshape(-1, 2) * 320 - 0.5
         drawn = np.zeros(sample.damage.shape, np.uint8)
         cv2.fillPoly(drawn, [np.rint(points).astype(np.int32)], 1)
@@ -134,19 +126,21 @@ def test_yolo_outlines_fill_to_the_mask(samples):
         assert (drawn.astype(bool) & mask).sum() / (drawn.astype(bool) | mask).sum() > 0.97
 
 
-def test_an_image_of_nothing_has_no_annotation_and_counts_no_damage(tmp_path):
+def test_an_image_of_nothing_has_files_and_no_annotation():
     away = Camera("A", (0.0, -8000.0, 1000.0), (0.0, -20000.0, 1000.0), 14.5)
     with Generator(seed=2, size=(64, 64)) as generator:
         sample = generator.render(index=0, camera=away)
     assert not sample.damage.any()
-    writer = SeafrontWriter(tmp_path, LabelConfig(), "test")
-    writer.add(sample, "train", "000000_A")
-    assert writer.has("train", "000000_A")
-    counts = writer.finish()["train"]
-    assert (counts["images"], counts["damages"], counts["crops"]) == (1, 0, 0)
-    assert (tmp_path / "imdg/labels/train/000000_A.txt").read_text() == ""
+    files, record = assemble(item_of(sample), list(known_formats().values()))
+    assert files["imdg/labels/train/000000_A.txt"] == b""
+    assert b"<object>" not in files["voc/Annotations/000000_A.xml"]
+    assert {name: bool(facts) for name, facts in record["facts"].items()} == {
+        name: name == "bop" for name in known_formats()
+    }
+    assert record["facts"]["bop"]["gt"] == []
 
 
 def test_records_are_json_that_any_reader_takes(samples):
-    text = json.dumps(coco.annotations(samples[0]))
-    assert json.loads(text)
+    files, record = assemble(item_of(samples[0]), list(known_formats().values()))
+    assert json.loads(json.dumps(record)) == record
+    assert json.loads(files["scenes/train/000000_A.json"])["objects"]

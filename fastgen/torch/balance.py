@@ -13,12 +13,12 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.damage import may_be_seen
 from fastgen.errors import ConfigError
+from fastgen.formats.door import DOOR_FOLDERS
 from fastgen.generator import Generator
 from fastgen.labels import outlines_mm
 from fastgen.scene import Camera, Scene
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import DOOR_CLASSES, class_names
-from fastgen.writers.seafront import DOOR_FOLDERS
 
 
 def class_counts(

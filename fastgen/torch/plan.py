@@ -8,10 +8,10 @@ import torch
 
 from fastgen.config import Config
 from fastgen.errors import ConfigError
+from fastgen.formats.door import DOOR_FOLDERS
 from fastgen.records import nearest
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
-from fastgen.writers.seafront import DOOR_FOLDERS
 
 EPOCH_SCENES = 10**9
 """Scenes of epoch e count up from e times this, so that no two epochs share one."""

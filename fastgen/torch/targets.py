@@ -15,10 +15,11 @@ from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config import LabelConfig
 from fastgen.crops import text_crops
 from fastgen.errors import ConfigError
+from fastgen.formats import yolo
+from fastgen.formats.damage import instances
+from fastgen.formats.door import DOOR_FOLDERS
 from fastgen.records import nearest
 from fastgen.sample import Box, Sample
-from fastgen.writers import coco, yolo
-from fastgen.writers.seafront import DOOR_FOLDERS
 
 Item = tuple[Any, Any]
 """(image, target) of one sample; what each holds depends on task and form, see `item_of`."""
@@ -141,7 +142,8 @@ def _damages(sample: Sample) -> list[_Found]:
     """Class from 0, box, visible pixels and mask of the container and each damage."""
     return [
         (category - 1, box, int(np.count_nonzero(mask)), mask)
-        for category, box, mask in coco.instances(sample)
+        for category, box, mask, ignored in instances(sample)
+        if not ignored
     ]
 
 

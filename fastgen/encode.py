@@ -40,16 +40,3 @@ def write(path: Path, data: bytes | str) -> None:
     aside = path.with_name(f".{path.name}.part")
     aside.write_bytes(data.encode() if isinstance(data, str) else data)
     os.replace(aside, path)
-
-
-def link(source: Path, path: Path) -> None:
-    """Make `path` a second name of `source`, or a copy where the file system has no links."""
-    aside = path.with_name(f".{path.name}.part")
-    aside.unlink(missing_ok=True)
-    try:
-        os.link(source, aside)
-    except OSError:
-        write(path, source.read_bytes())
-        return
-    os.replace(aside, path)
-    aside.unlink(missing_ok=True)  # POSIX leaves it where both names are one file already

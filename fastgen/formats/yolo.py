@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.sample import Box, Object, Sample
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.sample import Box, Object
 
 
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
@@ -16,9 +16,7 @@ def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
     return [
         (DETECTION_CLASSES.index(item.class_name), item, item.bbox)
         for item in objects
-        if item.class_name in DETECTION_CLASSES
-        and item.bbox is not None
-        and not item.ignored
+        if item.class_name in DETECTION_CLASSES and item.bbox is not None and not item.ignored
     ]
 
 
@@ -31,36 +29,19 @@ def normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, fl
 def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:
     """A line for each of `detections`: class, box centre x, y, width, height."""
     found = detections(objects)
-    return "".join(_line(index, normalised(box, size)) for index, _, box in found)
+    return "".join(line(index, normalised(box, size)) for index, _, box in found)
 
 
-def segmentation_lines(sample: Sample) -> str:
-    """A line an instance of the damage task: class and one polygon around all its parts.
-
-    Holes cannot be told in this format and are filled; the PNG and COCO masks keep them.
-    """
-    height, width = sample.damage.shape
-    lines = []
-    for value in (0, *np.unique(sample.damage[sample.damage >= 200]).tolist()):
-        mask = sample.damage == value if value else sample.damage > 0
-        polygon = _outline(mask)
-        if len(polygon) < 3:
-            continue
-        points = np.clip((polygon + 0.5) / (width, height), 0, 1)
-        index = int(value) // 100 - 1 if value else 0
-        assert index < len(SEGMENTATION_CLASSES)
-        lines.append(_line(index, points.ravel().tolist()))
-    return "".join(lines)
-
-
-def _line(index: int, values: Iterable[float]) -> str:
+def line(index: int, values: Iterable[float]) -> str:
+    """One label: class, then numbers clipped to 0..1."""
     return f"{index} " + " ".join(f"{min(max(v, 0.0), 1.0):.6f}" for v in values) + "\n"
 
 
-def _outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     """One closed polygon [N, 2] of pixel indices around all parts of a mask.
 
-    Parts are joined by a bridge between their nearest corners, there and back.
+    Parts are joined by a bridge between their nearest corners, there and back. Holes cannot be told
+    in a polygon and are filled.
     """
     found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     parts = [cv2.approxPolyDP(c, 0.7, True)[:, 0].astype(np.float64) for c in found]

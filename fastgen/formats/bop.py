@@ -1,0 +1,98 @@
+"""BOP for the container's pose: millimetres, row-major matrices, pixel centres at whole numbers.
+
+Format: bop_toolkit, docs/bop_datasets_format.md. One BOP scene a split; image ids count the images
+of the whole dataset. Full silhouettes (`mask`) are not written, `scene_gt_info.json` has their
+boxes and pixel counts.
+"""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fastgen.container import KINDS, WallProfiles, build_container
+from fastgen.encode import png
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
+from fastgen.formats.depth import depth_mm
+from fastgen.programs import CONTAINER_ID
+from fastgen.sampling import SPLITS
+
+OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
+"""obj_id of each kind of container."""
+
+
+class _Bop(Format):
+    name = "bop"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        sample = item.sample
+        folder = f"bop/{item.split}/000000"
+        name = f"{item.number:06d}"
+        files: Files = {
+            f"{folder}/rgb/{name}.jpg": Same(item.image_path),
+            f"{folder}/depth/{name}.png": png(depth_mm(sample.depth)),
+        }
+        thing = next(thing for thing in sample.objects if thing.id == CONTAINER_ID)
+        intrinsics = sample.view.intrinsics.copy()
+        intrinsics[:2, 2] -= 0.5
+        camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}
+        if thing.bbox is None or thing.amodal_bbox is None:
+            return files, {"id": item.number, "camera": camera, "gt": [], "info": []}
+        visible = np.asarray(sample.damage > 0, np.uint8) * np.uint8(255)
+        files[f"{folder}/mask_visib/{name}_000000.png"] = png(visible)
+        gt = {
+            "cam_R_m2c": sample.view.rotation.ravel().tolist(),
+            "cam_t_m2c": sample.view.translation_mm.tolist(),
+            "obj_id": OBJECT_IDS[sample.scene.container.kind],
+        }
+        info = {
+            "bbox_obj": _corner_and_size(thing.amodal_bbox),
+            "bbox_visib": _corner_and_size(thing.bbox),
+            "px_count_all": round(thing.area / thing.visible_fraction),
+            "px_count_valid": int(np.count_nonzero(visible)),
+            "px_count_visib": thing.area,
+            "visib_fract": thing.visible_fraction,
+        }
+        return files, {"id": item.number, "camera": camera, "gt": [gt], "info": [info]}
+
+    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+        for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
+            yield f"bop/{split}/000000/scene_{name}.json", _by_image(records, key)
+        if split == SPLITS[0]:
+            yield from _models()
+
+
+def _by_image(records: Records, key: str) -> Iterator[str]:
+    yield "{"
+    for count, record in enumerate(records()):
+        fact = record["facts"]["bop"]
+        yield f'{"," if count else ""}\n"{fact["id"]}": {json.dumps(fact[key])}'
+    yield "}\n"
+
+
+def _models() -> Iterator[tuple[str, bytes]]:
+    """Each kind of container with nominal corrugation, in its own frame, in mm."""
+    import trimesh
+
+    infos = {}
+    for kind, number in OBJECT_IDS.items():
+        mesh = build_container(kind, WallProfiles())
+        low, high = (np.asarray(bound, float) for bound in mesh.bounds_mm)
+        infos[str(number)] = {
+            "diameter": float(np.linalg.norm(high - low)),
+            **{f"min_{axis}": float(value) for axis, value in zip("xyz", low, strict=True)},
+            **{f"size_{axis}": float(v) for axis, v in zip("xyz", high - low, strict=True)},
+        }
+        body = trimesh.Trimesh(mesh.positions_mm, mesh.triangles, process=False)
+        data: bytes = body.export(file_type="ply")  # type: ignore[assignment]
+        yield f"bop/models/obj_{number:06d}.ply", data
+    yield "bop/models/models_info.json", json.dumps(infos, indent=1).encode()
+
+
+def _corner_and_size(box: tuple[float, float, float, float]) -> list[float]:
+    x0, y0, x1, y1 = box
+    return [x0, y0, x1 - x0, y1 - y0]
+
+
+FORMAT = _Bop()

@@ -1,0 +1,41 @@
+"""The container's eight corner castings as COCO keypoints, and its pose."""
+
+from typing import Any
+
+from fastgen import coco
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, view_values
+from fastgen.labels import CASTINGS
+from fastgen.programs import CONTAINER_ID
+
+_EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
+
+CATEGORIES = [{"id": 1, "name": "container", "keypoints": list(CASTINGS), "skeleton": _EDGES}]
+
+
+class _Container(Format):
+    name = "container"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        sample = item.sample
+        thing = next(thing for thing in sample.objects if thing.id == CONTAINER_ID)
+        if thing.bbox is None:
+            return {}, []
+        pose = view_values(sample.view)
+        found = {
+            **coco.annotation(1, thing.bbox, sample.damage > 0, thing.ignored),
+            "keypoints": [value for point in thing.keypoints for value in point],
+            "num_keypoints": sum(flag > 0 for *_, flag in thing.keypoints),
+            "kind": sample.scene.container.kind,
+            "rotation": pose["rotation"],
+            "translation_mm": pose["translation_mm"],
+            "intrinsics": pose["intrinsics"],
+        }
+        return {}, [found]
+
+    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+        words = "Corner castings of synthetic shipping containers, and the containers' poses"
+        text = coco.file_text(words, CATEGORIES, records, self.name)
+        yield f"container/coco_{split}.json", text
+
+
+FORMAT = _Container()

@@ -1,0 +1,16 @@
+"""The id target as 16-bit PNG: 0 void, 1 container, else the id of an Object in the scene file."""
+
+from typing import Any
+
+from fastgen.encode import png
+from fastgen.formats import Files, Format, Item
+
+
+class _Ids(Format):
+    name = "ids"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        return {f"ids/{item.split}/{item.stem}.png": png(item.sample.ids)}, None
+
+
+FORMAT = _Ids()

@@ -1,0 +1,36 @@
+"""KITTI's 2-D object labels: 15 columns an object, those of three dimensions left unknown as its
+development kit says to; what is ignored is a DontCare region. Geiger et al. 2012."""
+
+from typing import Any
+
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.formats import Files, Format, Item, Same
+
+_UNKNOWN = "-1 -1 -1 -1000 -1000 -1000 -10"
+"""Dimensions, location and rotation_y: their order is yaw only, which no tilted camera fits."""
+
+
+class _Kitti(Format):
+    name = "kitti"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        lines = []
+        for thing in item.sample.objects:
+            if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
+                continue
+            box = " ".join(f"{value:.2f}" for value in thing.bbox)
+            state = f"{thing.class_name} {float(thing.truncated):.2f} {int(thing.occluded)} -10"
+            head = "DontCare -1 -1 -10" if thing.ignored else state
+            lines.append(f"{head} {box} {_UNKNOWN}\n")
+        view = item.sample.view
+        rows = ((*row, 0.0) for row in view.intrinsics.tolist())
+        matrix = " ".join(f"{value:.9e}" for row in rows for value in row)
+        folder = f"kitti/{item.split}"
+        return {
+            f"{folder}/image_2/{item.stem}.jpg": Same(item.image_path),
+            f"{folder}/label_2/{item.stem}.txt": "".join(lines).encode(),
+            f"{folder}/calib/{item.stem}.txt": f"P2: {matrix}\n".encode(),
+        }, None
+
+
+FORMAT = _Kitti()

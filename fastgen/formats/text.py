@@ -1,0 +1,35 @@
+"""Text recognition: crops of legible identifiers, and a line `file<TAB>text` for each."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from fastgen.crops import text_crops
+from fastgen.encode import png
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records
+
+
+class _Text(Format):
+    name = "text"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        files: Files = {}
+        found = []
+        for thing, pixels in text_crops(item.sample, item.rules.min_text_px):
+            name = f"{item.stem}_{thing.instance}.png"
+            files[f"text/{item.split}/{name}"] = png(pixels)
+            found.append({"file": name, "text": thing.text})
+        return files, found
+
+    def folders(self, split: str) -> Sequence[str]:
+        return (f"text/{split}",)
+
+    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+        lines = (
+            f"{crop['file']}\t{crop['text']}\n"
+            for record in records()
+            for crop in record["facts"][self.name]
+        )
+        yield f"text/{split}/labels.txt", lines
+
+
+FORMAT = _Text()

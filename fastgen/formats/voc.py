@@ -1,0 +1,52 @@
+"""Pascal VOC: an XML file an image. Pixels count from 1 and boxes include their last one; VOC2012
+development kit, section 7."""
+
+from typing import Any
+from xml.etree import ElementTree
+
+from fastgen.classes import DETECTION_CLASSES
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
+
+
+class _Voc(Format):
+    name = "voc"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        width, height = item.sample.view.size
+        root = ElementTree.Element("annotation")
+        _add(root, "folder", "JPEGImages")
+        _add(root, "filename", f"{item.stem}.jpg")
+        size = ElementTree.SubElement(root, "size")
+        for name, value in (("width", width), ("height", height), ("depth", 3)):
+            _add(size, name, value)
+        _add(root, "segmented", 0)
+        for thing in item.sample.objects:
+            if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
+                continue
+            x0, y0, x1, y1 = thing.bbox
+            each = ElementTree.SubElement(root, "object")
+            _add(each, "name", thing.class_name)
+            _add(each, "pose", "Unspecified")
+            _add(each, "truncated", int(thing.truncated))
+            _add(each, "occluded", int(thing.occluded))
+            _add(each, "difficult", int(thing.ignored))
+            box = ElementTree.SubElement(each, "bndbox")
+            edges = (("xmin", x0 + 1), ("ymin", y0 + 1), ("xmax", x1), ("ymax", y1))
+            for name, value in edges:
+                _add(box, name, value)
+        ElementTree.indent(root)
+        return {
+            f"voc/JPEGImages/{item.stem}.jpg": Same(item.image_path),
+            f"voc/Annotations/{item.stem}.xml": ElementTree.tostring(root),
+        }, None
+
+    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+        lines = (f"{record['stem']}\n" for record in records())
+        yield f"voc/ImageSets/Main/{split}.txt", lines
+
+
+def _add(parent: ElementTree.Element, name: str, value: object) -> None:
+    ElementTree.SubElement(parent, name).text = str(value)
+
+
+FORMAT = _Voc()

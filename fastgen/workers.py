@@ -1,0 +1,133 @@
+"""Processes that work on tasks, may crash or hang, and are then replaced.
+
+Each has a pipe of its own: a queue's lock dies with the process that holds it.
+"""
+
+import multiprocessing
+import signal
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterable
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from fastgen.errors import FastgenError, OutputError
+
+Setup = Callable[..., Callable[[Any], None]]
+"""Called in the worker with its arguments and a `report` function; returns what does a task."""
+
+HANG_S = 300.0
+"""A worker that has said nothing for so long hangs; the slowest step known takes a hundredth."""
+
+_POLL_S = 1.0
+
+
+class _Worker:
+    """One process, what it is at and when it last said something."""
+
+    def __init__(self, setup: Setup, arguments: tuple[Any, ...]) -> None:
+        # a context made before a fork hangs its children, so processes start afresh
+        context = multiprocessing.get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, setup, arguments), daemon=True)
+        self.process.start()
+        theirs.close()
+        self.task: Any = None
+        self.place: Any = None
+        self.heard = time.monotonic()
+
+    def give(self, task: Any) -> None:
+        self.task, self.place = task, None
+        self.heard = time.monotonic()
+        self.pipe.send(task)
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def run(
+    setup: Setup,
+    arguments: tuple[Any, ...],
+    tasks: Iterable[Any],
+    count: int,
+    on_report: Callable[[str, Any], None],
+    on_death: Callable[[Any, Any, str], Any],
+    hang_s: float = HANG_S,
+) -> None:
+    """Have `count` processes do all tasks.
+
+    on_report: gets what workers report, but for 'at', which names the place that a task is at.
+    on_death: gets the task of a worker that crashed or hung, its place and how it ended; returns
+    the task to try instead, or raises. Raises OutputError with a worker's own words where it met
+    an error that no repetition mends. No process outlives the call.
+    """
+    waiting = deque(tasks)
+    workers = [_Worker(setup, arguments) for _ in range(min(count, len(waiting)))]
+    try:
+        for worker in workers:
+            worker.give(waiting.popleft())
+        while busy := [worker for worker in workers if worker.task is not None]:
+            wait([worker.pipe for worker in busy], timeout=_POLL_S)
+            for worker in busy:
+                ended = _listen(worker, on_report, hang_s)
+                if ended:
+                    waiting.appendleft(on_death(worker.task, worker.place, ended))
+                    worker.stop()
+                    workers[workers.index(worker)] = worker = _Worker(setup, arguments)
+                if (ended or worker.task is None) and waiting:
+                    worker.give(waiting.popleft())
+    finally:
+        for worker in workers:
+            worker.stop()
+
+
+def _listen(worker: _Worker, on_report: Callable[[str, Any], None], hang_s: float) -> str:
+    """Hear a worker out; how it ended, or '' while it lives."""
+    try:
+        while worker.pipe.poll():
+            kind, value = worker.pipe.recv()
+            worker.heard = time.monotonic()
+            if kind == "failed":
+                raise OutputError(value)
+            if kind == "done":
+                worker.task = None
+            elif kind == "at":
+                worker.place = value
+            else:
+                on_report(kind, value)
+    except (EOFError, ConnectionResetError):
+        worker.process.join()
+        code = worker.process.exitcode or 0
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    if worker.task is not None and time.monotonic() - worker.heard > hang_s:
+        return f"no sign of life for {hang_s:g} s"
+    return ""
+
+
+def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
+    """One worker process: tasks from the pipe until the parent ends it."""
+    # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    place: Any = "start"
+
+    def report(kind: str, value: Any) -> None:
+        nonlocal place
+        if kind == "at":
+            place = f"scene {value}"
+        pipe.send((kind, value))
+
+    try:
+        work = setup(*arguments, report)
+        while True:
+            work(pipe.recv())
+            pipe.send(("done", None))
+    except EOFError:
+        pass  # the parent is gone
+    except (FastgenError, OSError) as error:
+        pipe.send(("failed", str(error)))
+    except Exception as error:
+        traceback.print_exc()
+        pipe.send(("failed", f"{place}: {error!r} (our mistake: please report it)"))

@@ -1,0 +1,66 @@
+"""A run whose workers write made-up bytes at once, to be killed; see test_storage.py.
+
+    python tests/crash_run.py OUT SCENES WORKERS [FAULT]
+
+FAULT: 'crash' or 'hang': what scene 5 does to its worker each time it is rendered.
+"""
+
+import os
+import random
+import sys
+import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import numpy as np
+import simplejpeg
+
+from fastgen.config import Config
+from fastgen.formats import SEAFRONT
+from fastgen.generate import generate, run_here
+from fastgen.sampling import split_of
+from fastgen.shards import Job, Maker, stem_of
+from fastgen.storage import storage_of
+
+FAULTY_SCENE = 5
+
+
+class QuickMaker(Maker):
+    """Makes shards as Maker does, of bytes that depend on the index alone."""
+
+    fault = ""
+
+    def __init__(self, job, whole_machine, report):
+        self._job, self._report, self._formats = job, report, ()
+        self._storage = storage_of(job.out)
+        report("made by", {"backend": "none", "renderer": "none"})
+
+    def _image(self, index, camera):
+        if index == FAULTY_SCENE and os.environ.get("FAULT") == "crash":
+            os.abort()
+        if index == FAULTY_SCENE and os.environ.get("FAULT") == "hang":
+            time.sleep(3600)
+        time.sleep(0.004)
+        split, stem = split_of(self._job.config, self._job.seed, index), stem_of(index, camera)
+        pixels = np.full((64, 64, 3), index % 256, np.uint8)
+        files = {
+            f"images/{split}/{stem}.jpg": simplejpeg.encode_jpeg(pixels),
+            f"imdg/labels/{split}/{stem}.txt": b"",
+            f"scenes/{split}/{stem}.json": random.Random(index).randbytes(2000 + index),
+        }
+        facts = {"damage": [], "imdg": [], "container": [], "text": [], "door": None}
+        record = {"stem": stem, "split": split, "size": [64, 64], "facts": facts}
+        return files, record
+
+
+def make(out, scenes, workers, hang_s=60.0):
+    """Run the job; what dataset.json says."""
+    config = Config.preset()
+    job = Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
+    assert SEAFRONT
+    return generate(job, workers, run_here(workers, hang_s, QuickMaker))
+
+
+if __name__ == "__main__":
+    make(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))

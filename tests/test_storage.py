@@ -1,0 +1,172 @@
+"""Nothing is lost: killed processes, dead and hung workers, full disks, vanished folders."""
+
+import contextlib
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from fastgen import storage
+from fastgen.errors import OutputError
+from fastgen.formats import Same
+from fastgen.storage import Folder, storage_of
+from fastgen.workers import run
+from tests.crash_run import FAULTY_SCENE, make
+
+SCENES = 40
+SCRIPT = str(Path(__file__).parent / "crash_run.py")
+
+
+def content(folder):
+    return {
+        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole") / "out"
+    make(out, SCENES, 2)
+    return out
+
+
+def is_sound(out):
+    """No file that a manifest lists is anything but what it says."""
+    for path in out.glob("shards/*.json"):
+        for name, (size, digest) in json.loads(path.read_text())["files"].items():
+            data = (out / name).read_bytes()
+            assert (len(data), hashlib.sha256(data).hexdigest()) == (size, digest)
+
+
+def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_path):
+    rng = random.Random(4)
+    out = tmp_path / "out"
+    kills = 0
+    rounds = 0
+    while kills < 50:
+        rounds += 1
+        command = [sys.executable, SCRIPT, str(out), str(SCENES), str(rng.choice([1, 2, 3]))]
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
+        time.sleep(rng.uniform(0.05, 2.2))
+        with contextlib.suppress(psutil.NoSuchProcess, ProcessLookupError):
+            if rng.random() < 0.5:
+                os.killpg(process.pid, signal.SIGKILL)
+                kills += 1
+            else:  # one of its processes: a worker is replaced, the parent takes all with it
+                family = psutil.Process(process.pid).children(recursive=True)
+                victim = rng.choice([psutil.Process(process.pid), *family])
+                victim.kill()
+                kills += 1
+                time.sleep(rng.uniform(0.0, 0.3))
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        is_sound(out)
+        if (out / "dataset.json").exists() and "digest" in (out / "dataset.json").read_text():
+            assert content(out).items() >= content(whole).items()
+            out = tmp_path / f"out{rounds}"
+    make(out, SCENES, 2)
+    assert content(out) == content(whole)
+
+
+def test_a_scene_that_kills_its_worker_is_given_up_and_no_other(whole, tmp_path, monkeypatch):
+    monkeypatch.setenv("FAULT", "crash")
+    made = make(tmp_path / "out", SCENES, 2)
+    (failed,) = made["failed"]
+    assert failed["scene"] == FAULTY_SCENE
+    assert "SIGABRT" in failed["error"]
+    assert sum(split["images"] for split in made["counts"].values()) == SCENES - 1
+    monkeypatch.delenv("FAULT")
+    assert make(tmp_path / "out", SCENES, 2)["failed"] == []
+    assert content(tmp_path / "out") == content(whole)
+
+
+def test_a_scene_that_hangs_its_worker_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setenv("FAULT", "hang")
+    made = make(tmp_path / "out", 8, 2, hang_s=4.0)
+    (failed,) = made["failed"]
+    assert failed["scene"] == FAULTY_SCENE
+    assert "no sign of life" in failed["error"]
+
+
+def test_links_and_files_are_committed_together(tmp_path):
+    place = Folder(tmp_path)
+    for _ in range(2):
+        place.commit({"a/x.bin": b"bytes", "b/y.bin": Same("a/x.bin")}, "test")
+        assert (tmp_path / "b/y.bin").read_bytes() == b"bytes"
+        assert place.sizes() == {"a/x.bin": 5, "b/y.bin": 5}
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b"]
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(storage, "_flush", full)
+    with pytest.raises(OutputError, match=r"cannot be written .No space left on device"):
+        Folder(tmp_path).commit({"a/x.bin": b"bytes"}, "test")
+    assert not list(tmp_path.rglob("*"))
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError, match=r"dataset.json: cannot be written"):
+        Folder(tmp_path).write("dataset.json", [b"{}"])
+    assert not list(tmp_path.rglob("*"))
+
+
+def test_a_small_disk_stops_the_run_with_one_line(tmp_path):
+    """On a real file system of 1 MB where this user may mount one, else by a limit on file size."""
+    code = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500));"
+        f"sys.argv[1:] = ['{tmp_path / 'out'}', '8', '1'];"
+        f"import runpy; runpy.run_path('{SCRIPT}', run_name='__main__')"
+    )
+    # SIGXFSZ is ignored by Python, so that writes fail as on a full disk
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "cannot be written" in done.stderr
+    left = [p for p in (tmp_path / "out").rglob("*") if p.is_file()]
+    assert not [p for p in left if p.name.endswith(".part") or ".aside" in str(p)]
+
+
+def test_unknown_addresses_are_named():
+    with pytest.raises(OutputError, match="nowhere://bucket"):
+        storage_of("nowhere://bucket/x")
+
+
+def test_tasks_are_done_once_each_by_any_number_of_workers():
+    for count in (1, 3):
+        seen = []
+
+        def hear(_, value, seen=seen):
+            seen.append(value)
+
+        run(_setup, (), range(7), count, hear, None)
+        assert sorted(seen) == list(range(7))
+
+
+def _setup(report):
+    return lambda task: report("images", task)
+
+
+def test_a_workers_error_reaches_the_caller_in_its_own_words():
+    with pytest.raises(OutputError, match=r"scene 3: .*no such luck"):
+        run(_broken, (), [3], 1, lambda *_: None, None)
+
+
+def _broken(report):
+    def work(task):
+        report("at", task)
+        raise RuntimeError("no such luck")
+
+    return work
