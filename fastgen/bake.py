@@ -1,6 +1,7 @@
 """A container's material layers baked into textures, by the GLSL that shades images."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -51,13 +52,10 @@ def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
     return width, height
 
 
-def bake_atlas(
-    ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str, layer: str = "all"
-) -> Atlas:
+def bake_atlas(ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str) -> Atlas:
     """Bake all texels of `mesh`. The scene's textures and uniform blocks are bound already.
 
-    damage: one of programs.DAMAGE_VARIANTS. layer: as for Renderer.render; a single layer's
-    base colour is what that layer's image shows.
+    damage: one of programs.DAMAGE_VARIANTS. Raises ConfigError where texel_mm does not fit.
     """
     width, height = atlas_size(mesh, texel_mm)
     program = link(
@@ -65,7 +63,6 @@ def bake_atlas(
         "bake.vert",
         "bake.frag",
         UNITS,
-        layer=layer,
         damage="sound" if damage == "sound" else "damaged",
         pixel_class="decal" if damage == "sound" else "damaged",
     )
@@ -74,7 +71,9 @@ def bake_atlas(
     vertices["p"], vertices["a"], vertices["c"] = mesh.positions_mm, mesh.atlas_mm, mesh.chart
     vertex_buffer = ctx.buffer(vertices.tobytes())
     index_buffer = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
-    content = (vertex_buffer, "3f 2f 1u", "in_position_mm", "in_atlas_mm", "in_chart")
+    # without damage no texel asks for its rest position
+    rest = ["in_position_mm"] if damage != "sound" else []
+    content = (vertex_buffer, "3f 2f 1u" if rest else "12x 2f 1u", *rest, "in_atlas_mm", "in_chart")
     array = ctx.vertex_array(program, [content], index_buffer)
     targets = [ctx.renderbuffer((_TILE, _TILE), 4) for _ in range(2)]
     depth = ctx.depth_renderbuffer((_TILE, _TILE))
@@ -97,17 +96,20 @@ def bake_atlas(
                 texels = np.frombuffer(data, np.uint8).reshape(_TILE, _TILE, 4)
                 part = image[y : y + _TILE, x : x + _TILE]
                 part[:] = texels[: part.shape[0], : part.shape[1]]
-    for item in (tile, *targets, depth, array, vertex_buffer, index_buffer, program):
+    items: list[Any] = [tile, *targets, depth, array, vertex_buffer, index_buffer, program]
+    for item in items:
         item.release()
 
-    covered = images[0][..., 3] > 0
-    filled = [np.where(covered[..., None], i[..., :3], i[covered][:, :3].mean(0)) for i in images]
-    base_color, surface = (image[::-1].astype(np.uint8) for image in filled)
+    # what no part covers is seen in coarse mip levels only
+    empty = images[0][..., 3] == 0
+    for image in images:
+        image[empty] = np.median(image[~empty], axis=0)
+    base_color, surface = (np.ascontiguousarray(image[::-1, :, :3]) for image in images)
     return Atlas(base_color, surface, texel_mm)
 
 
 def _gutter_texels(texel_mm: float) -> NDArray[np.float64]:
-    """Shifts [GUTTER_STEPS, 2] in texels that fill half the gap between parts, nearer ones first."""
+    """Shifts [GUTTER_STEPS, 2] in texels, within half the gap between parts, nearer ones first."""
     reach = GUTTER_MM / 2 / texel_mm
     around = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
     near, far = min(1.0, reach), min(2.0, reach)

@@ -142,15 +142,12 @@ class Generator:
             objects=objects,
         )
 
-    def bake(self, scene: Scene, texel_mm: float = 4.0, layer: str = "all") -> Atlas:
+    def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
 
-        layer: 'all', or the base colour of one material layer by itself. Raises ConfigError for a
-        texel so small that the atlas would pass bake.MAX_ATLAS.
+        Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
         """
-        if layer not in LAYERS:
-            raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
-        return self._open().bake(scene, texel_mm, layer)
+        return self._open().bake(scene, texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""

@@ -183,7 +183,7 @@ class Renderer:
         shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, damages)), damage, near)
         return targets
 
-    def bake(self, scene: Scene, texel_mm: float, layer: str = "all") -> Atlas:
+    def bake(self, scene: Scene, texel_mm: float) -> Atlas:
         """The material of the whole container of `scene` as textures, see bake.Atlas."""
         mesh = self._mesh(scene.container)
         damage = variant(scene.damages)
@@ -194,7 +194,7 @@ class Renderer:
             self._damage_block.write(DAMAGE_BLOCK.pack(values))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
         self._bind_surface(scene, mesh)
-        return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage, layer)
+        return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""

@@ -14,10 +14,11 @@
 #include "material.glsl"
 #if WITH_DAMAGE
 #include "damage.glsl"
+
+in vec3 rest_mm;
 #endif
 
 in vec2 atlas_mm;
-in vec3 rest_mm;
 flat in uint chart;
 
 uniform float texel_mm;
