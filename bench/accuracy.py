@@ -16,7 +16,8 @@ import argparse
 import hashlib
 import os
 import subprocess
-from dataclasses import dataclass, replace
+from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
@@ -29,12 +30,13 @@ from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
 from fastgen import Config, Generator
-from fastgen.environment import bundled_hdris
+from fastgen.environment import bundled_hdris, find_hdris
 from fastgen.export import export_glb
-from fastgen.scene import Scene
+from fastgen.sample import Sample
 
 CAMERAS = ("A", "B", "Cl", "Cr")
 MIN_COINCIDENCE = 0.999
+STEP_M = 0.15
 OCCLUDED = 0.8  # ambient occlusion below this is a corner or the valley of a wave
 
 Array = NDArray[np.floating]
@@ -53,7 +55,7 @@ class Reference:
 
 
 def neutral_tone(color: Array) -> Array:
-    """Khronos PBR Neutral tone curve, the twin of shaders/tone.glsl; linear rgb [..., 3] in, out."""
+    """Khronos PBR Neutral tone curve, twin of shaders/tone.glsl; linear [..., 3] in and out."""
     start, desaturation = 0.8 - 0.04, 0.15
     low = color.min(axis=-1, keepdims=True)
     color = color - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
@@ -70,6 +72,11 @@ def srgb_encode(color: Array) -> Array:
     color = np.clip(color, 0.0, 1.0)
     curve = 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(color <= 0.0031308, 12.92 * color, curve)
+
+
+def srgb_decode(color: Array) -> Array:
+    """sRGB [..., 3] in 0..1 to linear in 0..1."""
+    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 
 class References:
@@ -143,11 +150,13 @@ class Comparison:
 
 
 def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:
-    """Pixels beside a step of 20 mm or more in depth, or a change of object."""
+    """Pixels beside a change of object, or a step in depth larger than a wall's waves."""
     near = np.where(np.isfinite(depth_m), depth_m, 1e3)
     found = np.zeros(ids.shape, bool)
     for axis in (0, 1):
-        step = (np.abs(np.diff(near, axis=axis)) > 0.02) | (np.diff(ids.astype(int), axis=axis) != 0)
+        step = (np.abs(np.diff(near, axis=axis)) > STEP_M) | (
+            np.diff(ids.astype(int), axis=axis) != 0
+        )
         for side in ((1, 0), (0, 1)):
             pad = [(0, 0), (0, 0)]
             pad[axis] = side
@@ -159,9 +168,8 @@ def stops_over(test: Array, reference: Array) -> float:
     """Median stops by which displayed linear light of pixels [N, 3] exceeds the reference's."""
     if not len(test):
         return float("nan")
-    light, expected = (np.where(i <= 0.04045, i / 12.92, ((i + 0.055) / 1.055) ** 2.4).mean(-1)
-                       for i in (test, reference))  # fmt: skip
-    return float(np.median(np.log2((light + 1e-4) / (expected + 1e-4))))
+    light, expected = (srgb_decode(image).mean(axis=-1) + 1e-4 for image in (test, reference))
+    return float(np.median(np.log2(light / expected)))
 
 
 def picture(test: Array, reference: Array, error: Array) -> NDArray[np.uint8]:
@@ -173,32 +181,58 @@ def picture(test: Array, reference: Array, error: Array) -> NDArray[np.uint8]:
     return np.asarray(row * 255 + 0.5, np.uint8)[..., ::-1]
 
 
-def without(scene: Scene, damage: bool) -> Scene:
-    """`scene`, where damage is False without its damages."""
-    return scene if damage else replace(scene, damages=())
+def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
+    """Masks [H, W] of the parts of an image in which errors have causes of their own."""
+    inside = sample.ids > 0
+    edges = borders(sample.ids, sample.depth)
+    plain = inside & ~edges & (sample.ids == 1)
+    return {
+        "sky": ~inside & ~edges,
+        "edges": edges,
+        "markers and text": ~edges & (sample.ids > 1),
+        "open sheet": plain & (openness >= OCCLUDED),
+        "occluded sheet": plain & (openness < OCCLUDED),
+    }
+
+
+def table(title: str, rows: list[tuple[float, ...]]) -> None:
+    """Print the mean and the worst of (FLIP, SSIM, PSNR) whole and object, a row a scene."""
+    values = np.array(rows)
+    worst = [values[:, i].max() if i % 3 == 0 else values[:, i].min() for i in range(6)]
+    for name, six in (("mean", values.mean(axis=0)), ("worst", worst)):
+        words = [f"{v:7.2f}" if i % 3 == 2 else f"{v:7.4f}" for i, v in enumerate(six)]
+        print(f"{title:8s} {name:5s}  whole {' '.join(words[:3])}   object {' '.join(words[3:])}")
 
 
 def main() -> None:
-    """Print a table of measures, and write a picture a scene."""
+    """Print the measures of each scene and over all, and write a picture a scene."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--scenes", type=int, default=8)
     parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--size", default="320x320")
     parser.add_argument("--samples", type=int, default=256)
-    parser.add_argument("--noise-scenes", type=int, default=2, help="rendered twice")
+    parser.add_argument("--noise-scenes", type=int, default=2, help="how many to render twice")
     parser.add_argument("--antialiasing", default="balanced")
     parser.add_argument("--blender-python", type=Path)
+    parser.add_argument("--hdri", help="folder of .hdr and .exr files to light with")
     parser.add_argument("--references", type=Path, default=Path(__file__).parent / "references")
     parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder of pictures")
     options = parser.parse_args()
     width, height = (int(side) for side in options.size.split("x"))
     references = References(options.references, options.blender_python, options.samples)
     options.out.mkdir(parents=True, exist_ok=True)
-    glb = options.references / "scene.glb"
     hdris = bundled_hdris()
-    rows, parts, floors = [], [], []
+    if options.hdri:
+        hdris = {path.stem: path for path in find_hdris(options.hdri)}
+    glb = options.references / "scene.glb"
+    rows, floors = [], []
+    shares: dict[str, list[tuple[float, ...]]] = defaultdict(list)
     with Generator(
-        Config.preset(), options.seed, (width, height), antialiasing=options.antialiasing
+        Config.preset(),
+        options.seed,
+        (width, height),
+        hdri_dir=options.hdri,
+        antialiasing=options.antialiasing,
     ) as generator:
         for index in range(options.scenes):
             scene = generator.scene(index)
@@ -211,44 +245,48 @@ def main() -> None:
             exposure = generator.exposure(scene, camera)
             expected = srgb_encode(neutral_tone(exposure * reference.radiance))
             ours = sample.image / 255.0
+
             inside = sample.ids > 0
             same = float((inside == reference.inside).mean())
             both = inside & reference.inside
-            apart = np.abs(sample.depth - reference.depth_m)[both] / sample.depth[both]
-            if same < MIN_COINCIDENCE:
-                print(f"{index} {name}: silhouettes coincide in {same:.2%} only: not comparable")
-            compared = Comparison.of(expected, ours)
-            everywhere = np.ones_like(inside)
-            whole, body = compared.measures(everywhere), compared.measures(inside)
-            rows.append((*whole, *body))
-            edges = borders(sample.ids, sample.depth)
-            open_ = reference.openness >= OCCLUDED
-            masks = {
-                "sky": ~inside & ~edges,
-                "edges": edges,
-                "open sheet": inside & ~edges & open_,
-                "occluded sheet": inside & ~edges & ~open_,
-            }
-            parts.append(
-                [
-                    (part.mean(), (compared.flip_map * part).mean(), stops_over(ours[part], expected[part]))
-                    for part in masks.values()
-                ]
-            )
+            apart_m = np.abs(sample.depth - reference.depth_m)[both]
             print(
-                f"{index} {name:2s} {scene.environment.name:11s} same {same:.3%} "
-                f"depth p99 {np.quantile(apart, 0.99):.1e}  whole FLIP {whole[0]:.4f} SSIM {whole[1]:.4f} "
-                f"PSNR {whole[2]:.1f}  object FLIP {body[0]:.4f} SSIM {body[1]:.4f} PSNR {body[2]:.1f}  "
-                + "  ".join(f"{k} {s:+.2f}" for k, (_, _, s) in zip(masks, parts[-1], strict=True)),
-                flush=True,
+                f"{index} {name:2s} {scene.environment.name:11s} silhouettes coincide in "
+                f"{same:.3%}, 99 % of depths to {np.quantile(apart_m, 0.99) * 1e3:.3f} mm"
             )
-            cv2.imwrite(str(options.out / f"{index}_{name}.png"), picture(ours, expected, compared.flip_map))
+            if same < MIN_COINCIDENCE:
+                raise SystemExit("the two do not see the same geometry: not comparable")
+
+            compared = Comparison.of(expected, ours)
+            rows.append((*compared.measures(inside | True), *compared.measures(inside)))
+            table("", rows[-1:])
+            total = float(compared.flip_map.sum())
+            for part, mask in divided(sample, reference.openness).items():
+                error = float(compared.flip_map[mask].sum())
+                stops = stops_over(ours[mask], expected[mask])
+                shares[part].append((float(mask.sum()), error, error / total, stops))
+            cv2.imwrite(
+                str(options.out / f"{index}_{name}.png"),
+                picture(ours, expected, compared.flip_map),
+            )
             if index < options.noise_scenes:
                 second = references.get(glb, name, hdri, 2)
                 again = srgb_encode(neutral_tone(exposure * second.radiance))
                 floor = Comparison.of(expected, again)
-                floors.append((*floor.measures(everywhere), *floor.measures(inside)))
+                floors.append((*floor.measures(inside | True), *floor.measures(inside)))
     glb.unlink()
+    print(f"\n{len(rows)} scenes, {width}x{height}, {options.samples} samples: FLIP, SSIM, PSNR dB")
+    table("ours", rows)
+    if floors:
+        table("noise", floors)
+    for part, listed in shares.items():
+        pixels, error, share, stops = np.array(listed).T
+        mean = error.sum() / max(pixels.sum(), 1)
+        print(
+            f"{part:17s} {pixels.sum() / (len(rows) * width * height):5.1%} of pixels, "
+            f"{np.mean(share):5.1%} of error, FLIP {mean:.4f}, brighter than Cycles by "
+            f"{np.nanmean(stops):+.2f} stops ({np.nanmin(stops):+.2f} to {np.nanmax(stops):+.2f})"
+        )
 
 
 if __name__ == "__main__":
