@@ -9,7 +9,7 @@ container's pixels. Cycles' own noise is the same measure between two of its ren
 seeds. Before that, silhouettes and depths through the pixel centres must coincide. References are
 kept in bench/references and made again only where scene, size, samples or seed differ.
 
-Also needs `pip install flip-evaluator scikit-image`.
+Also needs what `pip install '.[accuracy]'` brings.
 """
 
 import argparse

@@ -273,6 +273,15 @@ def test_the_same_scene_makes_the_same_file(generator, torn, tmp_path):
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
+def test_baking_leaves_the_next_frame_as_it_was(generator, torn):
+    scene, _ = torn
+    before = generator.render(scene=scene, camera="B")
+    generator.bake(scene, 32.0)
+    after = generator.render(scene=scene, camera="B")
+    np.testing.assert_array_equal(before.image, after.image)
+    np.testing.assert_array_equal(before.damage, after.damage)
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
