@@ -199,7 +199,10 @@ def table(title: str, rows: list[tuple[float, ...]]) -> None:
     """Print the mean and the worst of (FLIP, SSIM, PSNR) whole and object, a row a scene."""
     values = np.array(rows)
     worst = [values[:, i].max() if i % 3 == 0 else values[:, i].min() for i in range(6)]
-    for name, six in (("mean", values.mean(axis=0)), ("worst", worst)):
+    lines = (
+        [("mean", values.mean(axis=0)), ("worst", worst)] if len(rows) > 1 else [("", values[0])]
+    )
+    for name, six in lines:
         words = [f"{v:7.2f}" if i % 3 == 2 else f"{v:7.4f}" for i, v in enumerate(six)]
         print(f"{title:8s} {name:5s}  whole {' '.join(words[:3])}   object {' '.join(words[3:])}")
 
