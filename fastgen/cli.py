@@ -13,9 +13,10 @@ from fastgen import doctor, stats
 from fastgen.config import Config
 from fastgen.encode import jpeg, png, write
 from fastgen.errors import ConfigError, FastgenError, OutputError
+from fastgen.export import export_glb
 from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
-from fastgen.generator import Generator
+from fastgen.generator import Generator, find_camera
 from fastgen.gl import BACKENDS
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
@@ -79,8 +80,11 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
     show.set_defaults(run=_show)
 
-    export = commands.add_parser("export", help="write one container as a GLB file")
+    export = commands.add_parser("export", help="write one scene as a GLB file")
     export.add_argument("--index", type=int, required=True, metavar="I")
+    export.add_argument("--camera", help="default: all of the scene")
+    export.add_argument("--texel-mm", type=float, default=4.0, metavar="MM", help="of the textures")
+    export.add_argument("--size", default="640x640", metavar="WxH", help="what the cameras take")
     export.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
     export.set_defaults(run=_export)
 
@@ -89,7 +93,6 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--preset", default="seafront")
         command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
         command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
-    for command in (make, show):
         command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
 
     for name, run, words in (
@@ -170,10 +173,18 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from fastgen.export import export_glb  # loads trimesh, which the other commands do without
-
-    generator = Generator(_config(options), options.seed, hdri_dir=options.hdri)
-    export_glb(generator.scene(options.index), options.file)
+    if options.file.suffix.lower() != ".glb":
+        raise ConfigError(f"{options.file}: give a file name that ends in .glb")
+    with Generator(
+        _config(options),
+        options.seed,
+        _size(options.size),
+        backend=options.backend,
+        hdri_dir=options.hdri,
+    ) as generator:
+        scene = generator.scene(options.index)
+        cameras = [find_camera(scene, options.camera)] if options.camera else None
+        export_glb(generator, scene, options.file, cameras, options.texel_mm)
     return 0
 
 

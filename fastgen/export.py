@@ -1,46 +1,131 @@
-"""A scene's container as a GLB file, for Blender and others: deformed geometry and atlas UVs."""
+"""A scene as a GLB file, for Blender and others: damaged container, baked atlas, cameras, light.
 
+What glTF has no place for stands in `extras`: of the scene the environment and the Scene itself,
+of each camera node the exposure.
+"""
+
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import trimesh
 
-from fastgen.camera import MM
+import fastgen
+from fastgen.bake import atlas_size
+from fastgen.camera import MM, view_of
 from fastgen.container import build_container
-from fastgen.damage import deform
-from fastgen.encode import write
+from fastgen.damage import variant
+from fastgen.damaged_mesh import DamagedMesh, damaged_mesh
+from fastgen.encode import png, write
 from fastgen.errors import OutputError
-from fastgen.scene import Scene
+from fastgen.generator import Generator
+from fastgen.gltf import Glb
+from fastgen.programs import INSIDE_ALBEDO
+from fastgen.records import to_plain
+from fastgen.scene import Camera, Scene
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""
 
+SHEET_MM = 2.0
+"""Thickness of the steel: where there are holes, the inside lies this far behind the outside."""
 
-def export_glb(scene: Scene, path: Path) -> None:
-    """Write the container in metres, y up, with its paint's base colour and its UV atlas.
+_FLOOR_SLOPE = 0.7
+"""What faces up more than this on the inside is the wooden floor."""
 
-    Holes of perforations stay closed, and no decal texture is baked yet. Raises OutputError when
-    the file cannot be written.
+
+def export_glb(
+    generator: Generator,
+    scene: Scene,
+    path: Path,
+    cameras: Iterable[Camera] | None = None,
+    texel_mm: float = 4.0,
+) -> None:
+    """Write `scene` as glTF in metres, y up, with cameras for images of the generator's size.
+
+    cameras: by default all of the scene. texel_mm: width of a texel of the baked atlas. Scenes
+    with holes get insides, of one colour for the floor and one for the rest. Raises ConfigError
+    for a texel too small, OutputError when the file cannot be written.
     """
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: no folder {path.parent}; make it first")
     mesh = build_container(scene.container.kind, scene.container.profiles)
-    positions = deform(scene.damages, mesh.positions_mm) * MM @ _Y_UP.T
-    material = trimesh.visual.material.PBRMaterial(
-        name=scene.surface.paint.name,
-        baseColorFactor=[*scene.surface.paint.albedo, 1.0],
-        metallicFactor=0.0,
-        roughnessFactor=scene.surface.paint.roughness,
+    atlas_size(mesh, texel_mm)  # refuses a bad size before any work
+    body = damaged_mesh(mesh, scene.damages)
+    atlas = generator.bake(scene, texel_mm)
+    glb = Glb(f"fastgen {fastgen.__version__}")
+    painted = glb.add_material(
+        {
+            "name": scene.surface.paint.name,
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": glb.add_texture("base_color", png(atlas.base_color))},
+                "metallicRoughnessTexture": {
+                    "index": glb.add_texture("surface", png(atlas.surface))
+                },
+            },
+        }
     )
-    uv = mesh.atlas_mm / np.array(mesh.atlas_size_mm)
-    body = trimesh.Trimesh(
-        positions,
-        mesh.triangles,
-        process=False,
-        visual=trimesh.visual.TextureVisuals(uv=uv, material=material),
+    glb.add_mesh(
+        "container",
+        painted,
+        body.triangles,
+        {
+            "POSITION": body.positions_mm * MM @ _Y_UP.T,
+            "NORMAL": body.normals @ _Y_UP.T,
+            "TEXCOORD_0": atlas.uv(body.atlas_mm),
+        },
     )
-    whole = trimesh.Scene()
-    whole.add_geometry(body, node_name="container", geom_name="container")
-    data = whole.export(file_type="glb")
+    if variant(scene.damages) == "holed":
+        _add_inside(glb, body)
+    for camera in scene.cameras if cameras is None else cameras:
+        _add_camera(glb, generator, scene, camera)
+    data = glb.data(
+        {
+            "environment": {
+                "name": scene.environment.name,
+                "yaw_deg": scene.environment.yaw_deg,
+                "convention": "z up: radiance(d) = map(Rz(-yaw) d), the map's middle is +x",
+            },
+            "scene": to_plain(scene),
+        }
+    )
     try:
         write(path, data)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def _add_inside(glb: Glb, body: DamagedMesh) -> None:
+    """The backs of all triangles, as the renderer shows them through holes."""
+    positions = (body.positions_mm - SHEET_MM * body.normals) * MM @ _Y_UP.T
+    up = -body.normals[body.triangles].mean(axis=1)[:, 2]
+    parts = {"wood": up > _FLOOR_SLOPE, "primer": up <= _FLOOR_SLOPE}
+    for name, chosen in parts.items():
+        plain = {
+            "baseColorFactor": [*INSIDE_ALBEDO[name], 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 1.0,
+        }
+        material = glb.add_material({"name": f"inside_{name}", "pbrMetallicRoughness": plain})
+        used, triangles = np.unique(body.triangles[chosen][:, ::-1], return_inverse=True)
+        glb.add_mesh(
+            f"inside_{name}",
+            material,
+            triangles.reshape(-1, 3),
+            {"POSITION": positions[used], "NORMAL": -body.normals[used] @ _Y_UP.T},
+        )
+
+
+def _add_camera(glb: Glb, generator: Generator, scene: Scene, camera: Camera) -> None:
+    width, height = generator.size
+    view = view_of(camera, generator.size)
+    right, down, forward = view.rotation
+    pose = np.eye(4)
+    pose[:3, :3] = _Y_UP @ np.stack([right, -down, -forward], axis=1)
+    pose[:3, 3] = _Y_UP @ view.position_m
+    extras: dict[str, Any] = {
+        "exposure": generator.exposure(scene, camera),
+        "size": [width, height],
+    }
+    yfov = 2 * float(np.arctan(height / 2 / view.focal_px))
+    glb.add_camera(camera.name, yfov, width / height, pose, extras)

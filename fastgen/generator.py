@@ -4,6 +4,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
+from fastgen.bake import Atlas
 from fastgen.camera import view_of
 from fastgen.config import Config
 from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
@@ -22,6 +23,14 @@ MIN_SIZE, MAX_SIZE = 64, 4096
 
 ANTIALIASING = {"none": 1, "balanced": 2, "high": 3}
 """Samples along each axis of a pixel by quality."""
+
+
+def find_camera(scene: Scene, name: str) -> Camera:
+    """The camera of `scene` called `name`. Raises ConfigError that names the nearest one."""
+    names = [camera.name for camera in scene.cameras]
+    if name not in names:
+        raise ConfigError(f"camera: {name!r} is unknown{nearest(name, names)}")
+    return scene.camera(name)
 
 
 class Generator:
@@ -118,10 +127,7 @@ class Generator:
             assert index is not None
             scene = self.scene(index)
         if isinstance(camera, str):
-            names = [c.name for c in scene.cameras]
-            if camera not in names:
-                raise ConfigError(f"camera: {camera!r} is unknown{nearest(camera, names)}")
-            camera = scene.camera(camera)
+            camera = find_camera(scene, camera)
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
@@ -137,6 +143,17 @@ class Generator:
             view=view,
             objects=objects,
         )
+
+    def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
+        """All material layers of a scene's container as textures; texel_mm: width of a texel.
+
+        Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
+        """
+        return self._open().bake(scene, texel_mm)
+
+    def exposure(self, scene: Scene, camera: Camera) -> float:
+        """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
+        return self._open().exposure(scene, camera, self.size)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""

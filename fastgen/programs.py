@@ -61,6 +61,12 @@ DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 MAX_SAMPLES_PER_AXIS = 3
 
+GUTTER_STEPS = 17
+"""Times that a part is laid on a baked atlas: itself, then shifted for two rings of texels."""
+
+INSIDE_ALBEDO = {"wood": (0.22, 0.14, 0.08), "primer": (0.30, 0.31, 0.29)}
+"""Linear albedo of what a hole shows: the floor, and all else."""
+
 _NOISE_LEVELS = NOISE_SIZE.bit_length()
 
 SCENE_BLOCK = Block(
@@ -147,6 +153,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "MIN_ROUGHNESS": "0.045",
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
+        **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
         "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",
         "SPECULAR_LAYERS": f"{len(levels):.1f}",
         "IRRADIANCE_SIZE": f"{environment.IRRADIANCE_SIZE:.1f}",
@@ -164,6 +171,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "CLASS_DEPTH_STEP": CLASS_DEPTH_STEP,
         "CLASS": list(PIXEL_CLASSES).index(pixel_class),
         **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
+        "GUTTER_STEPS": GUTTER_STEPS,
         "MAX_PARTS": 3,
         "MAX_SIDES": 4,
         "DAMAGED": int(damage != "sound"),

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastgen.artwork import art_images, glyph_tiles
+from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
@@ -143,15 +144,9 @@ class Renderer:
         mesh = self._mesh(scene.container)
         light_data = self._light_of(scene.environment.name)
         light = self._lights.get(scene.environment.name, lambda: GpuLight(ctx, light_data))
-        decals = self._scenes.get(
-            scene,
-            lambda: _SceneDecals(ctx, pack_decals(scene, mesh.mesh, self._art_layers, self._fonts)),
-        )
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
-        exposure = metered_exposure(
-            light_data, scene.environment.yaw_deg, view, camera, scene.surface.paint.albedo
-        )
+        exposure = self.exposure(scene, camera, size)
         self._view_block.write(VIEW_BLOCK.pack(_view_values(scene, view, targets, exposure)))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
@@ -178,6 +173,45 @@ class Renderer:
             "irradiance_light": light.irradiance,
             "background_light": light.background,
             "dfg_table": self._dfg,
+        }
+        if targets.rest is not None:
+            textures["rest_points"] = targets.rest
+        for name, texture in textures.items():
+            texture.use(UNITS[name])
+        self._bind_surface(scene, mesh)
+        near = [_region(view, corners_mm(item)) for item in damages]
+        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, damages)), damage, near)
+        return targets
+
+    def bake(self, scene: Scene, texel_mm: float) -> Atlas:
+        """The material of the whole container of `scene` as textures, see bake.Atlas."""
+        mesh = self._mesh(scene.container)
+        damage = variant(scene.damages)
+        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
+        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        if damage != "sound":
+            values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
+            self._damage_block.write(DAMAGE_BLOCK.pack(values))
+            self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
+        self._bind_surface(scene, mesh)
+        return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
+
+    def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
+        """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
+        light = self._light_of(scene.environment.name)
+        paint = scene.surface.paint.albedo
+        view = view_of(camera, size)
+        return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
+
+    def _bind_surface(self, scene: Scene, mesh: GpuMesh) -> None:
+        """Bind what the material layers read."""
+        decals = self._scenes.get(
+            scene,
+            lambda: _SceneDecals(
+                self._ctx, pack_decals(scene, mesh.mesh, self._art_layers, self._fonts)
+            ),
+        )
+        textures: dict[str, Any] = {
             "noise_tiles": self._noise,
             "art": self._art,
             "glyph_tiles": self._tiles,
@@ -186,13 +220,8 @@ class Renderer:
             "decal_table": decals.table,
             "glyph_table": decals.glyphs,
         }
-        if targets.rest is not None:
-            textures["rest_points"] = targets.rest
         for name, texture in textures.items():
             texture.use(UNITS[name])
-        near = [_region(view, corners_mm(item)) for item in damages]
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, damages)), damage, near)
-        return targets
 
     def mesh(self, container: Container) -> Mesh:
         """The rest mesh of a container, as it is drawn."""

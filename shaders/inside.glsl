@@ -2,11 +2,9 @@
 // Little light gets in: a share of the average around, more toward the floor under a high hole.
 
 vec3 inside(vec3 normal, vec3 rest_mm) {
-    const vec3 wood = vec3(0.22, 0.14, 0.08);
-    const vec3 primer = vec3(0.30, 0.31, 0.29);
     bool floor_ = normal.z > 0.7;
     vec3 around = 0.5 * (diffuse_radiance(vec3(0.0, 0.0, 1.0)) + diffuse_radiance(vec3(0.0, 0.0, -1.0)));
     float board = floor_ ? 0.85 + 0.15 * step(0.04, fract(rest_mm.y / 140.0)) : 1.0;
     float fall = 0.6 + 0.4 * abs(normal.z) + 0.15 * normal.x;
-    return INSIDE_LIGHT * around * (floor_ ? wood : primer) * board * fall;
+    return INSIDE_LIGHT * around * (floor_ ? INSIDE_WOOD : INSIDE_PRIMER) * board * fall;
 }

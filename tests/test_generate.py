@@ -398,15 +398,3 @@ def test_show_writes_every_layer(tmp_path):
         assert np.ptp(image) > 0
         seen.add(path.read_bytes())
     assert len(seen) == 9
-
-
-def test_exported_glb_opens_with_the_right_size(tmp_path):
-    import trimesh
-
-    path = tmp_path / "box.glb"
-    config = tmp_path / "c.yaml"
-    config.write_text("container: {kinds: {'20': 1}}\ndamage: {probability: 0}\n")
-    arguments = ["--index", "0", "--config", str(config), "-o", str(path)]
-    assert main(["export", *arguments]) == 0
-    extents = trimesh.load(path).extents
-    np.testing.assert_allclose(sorted(extents), [2.438, 2.591, 6.058], atol=1e-4)

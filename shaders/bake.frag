@@ -1,0 +1,37 @@
+// The material at a texel of the atlas, unlit: the layers that shade.frag lights, for export.
+#version 430 core
+#include "blocks.glsl"
+#include "octahedral.glsl"
+#include "tone.glsl"
+#include "ibl.glsl"
+#include "layers.glsl"
+#include "ageing.glsl"
+#include "dirt.glsl"
+#include "rust.glsl"
+#include "scratches.glsl"
+#include "wear.glsl"
+#include "decal.glsl"
+#include "material.glsl"
+#if WITH_DAMAGE
+#include "damage.glsl"
+
+in vec3 rest_mm;
+#endif
+
+in vec2 atlas_mm;
+flat in uint chart;
+
+uniform float texel_mm;
+
+layout(location = 0) out vec4 out_albedo;    // sRGB-encoded; alpha 1 where a part lies
+layout(location = 1) out vec4 out_surface;   // -, roughness, metallic, as glTF orders them
+
+void main() {
+    float scar = 0.0;
+#if WITH_DAMAGE
+    scar = damage_at(rest_mm).scar;
+#endif
+    Material m = surface_at(chart, atlas_mm, texel_mm, scar).material;
+    out_albedo = vec4(srgb_encode(m.albedo), 1.0);
+    out_surface = vec4(1.0, m.roughness, m.metallic, 1.0);
+}

@@ -1,0 +1,312 @@
+"""What `fastgen export` writes, read back by trimesh and hit with Embree rays."""
+
+import json
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from fastgen.camera import view_of
+from fastgen.cli import main
+from fastgen.config import Config
+from fastgen.container import build_container
+from fastgen.damage import in_hole
+from fastgen.damaged_mesh import damaged_mesh
+from fastgen.errors import ConfigError
+from fastgen.export import export_glb
+from fastgen.generator import Generator
+from fastgen.scene import Camera, Scene
+
+SIZE = (320, 240)
+TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
+
+TORN = Config.from_values(
+    {"container": {"kinds": {"20": 1}}, "damage": {"probability": 1, "count": [4, 4]}}
+)
+
+
+def tree_of(path):
+    """The JSON part of a GLB, by the layout in section 4.4 of the glTF 2.0 specification."""
+    data = path.read_bytes()
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    size, kind = struct.unpack_from("<I4s", data, 12)
+    assert kind == b"JSON"
+    return json.loads(data[20 : 20 + size])
+
+
+class Exported:
+    """An exported file as rays see it: z up, metres."""
+
+    def __init__(self, path):
+        self.tree = tree_of(path)
+        loaded = trimesh.load(path, process=False)
+        self.parts = dict(loaded.geometry)
+        bodies = []
+        for part in self.parts.values():
+            bodies.append(trimesh.Trimesh(part.vertices @ TO_Z_UP.T, part.faces, process=False))
+        self.outside = bodies[0]
+        self.whole = trimesh.util.concatenate(bodies)
+        self.visual = self.parts["container"].visual
+
+    def rays(self, name):
+        """Origin and directions [H * W, 3] through all pixel centres, from the glTF camera."""
+        node = next(n for n in self.tree["nodes"] if n["name"] == name and "camera" in n)
+        lens = self.tree["cameras"][node["camera"]]["perspective"]
+        width, height = node["extras"]["size"]
+        pose = np.array(node["matrix"]).reshape(4, 4).T
+        top = np.tan(lens["yfov"] / 2)
+        x = ((np.arange(width) + 0.5) / width * 2 - 1) * top * lens["aspectRatio"]
+        y = (1 - (np.arange(height) + 0.5) / height * 2) * top
+        local = np.stack(np.broadcast_arrays(x[None], y[:, None], -1.0), axis=-1).reshape(-1, 3)
+        return TO_Z_UP @ pose[:3, 3], local @ pose[:3, :3].T @ TO_Z_UP.T
+
+    def first_hits(self, name, body):
+        """Triangle of `body` (-1: none) and depth along the axis, [H * W] each."""
+        origin, rays = self.rays(name)
+        origins = np.tile(origin, (len(rays), 1))
+        lengths = np.linalg.norm(rays, axis=1, keepdims=True)
+        triangle = RayMeshIntersector(body).intersects_first(origins, rays / lengths)
+        corners = body.triangles[triangle]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = ((corners[:, 0] - origin) * normal).sum(1) / (rays * normal).sum(1)
+        return triangle, np.where(triangle >= 0, depth, np.inf)
+
+    def texel(self, image, name):
+        """Bilinear texture values [H * W, C] that the rays of a camera meet, NaN where none."""
+        triangle, depth = self.first_hits(name, self.outside)
+        origin, rays = self.rays(name)
+        points = origin + np.where(triangle >= 0, depth, 0)[:, None] * rays
+        weights = trimesh.triangles.points_to_barycentric(self.outside.triangles[triangle], points)
+        uv = np.einsum("rc,rck->rk", weights, self.visual.uv[self.outside.faces[triangle]])
+        pixels = np.asarray(image, float)
+        height, width = pixels.shape[:2]
+        # trimesh counts v upward, rows go down
+        place = np.stack([uv[:, 0] * width, (1 - uv[:, 1]) * height], axis=1) - 0.5
+        place = np.clip(np.nan_to_num(place), 0, (width - 1.001, height - 1.001))
+        x, y = np.floor(place).astype(int).T
+        right, down = (place % 1).T[:, :, None]
+        above = pixels[y, x] * (1 - right) + pixels[y, x + 1] * right
+        below = pixels[y + 1, x] * (1 - right) + pixels[y + 1, x + 1] * right
+        return np.where(triangle[:, None] >= 0, above * (1 - down) + below * down, np.nan)
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(TORN, seed=2, size=SIZE, antialiasing="none") as made:
+        yield made
+
+
+def holes(scene):
+    return [d for d in scene.damages if d.kind == "perforation"]
+
+
+@pytest.fixture(scope="module")
+def torn(generator, tmp_path_factory):
+    """A container with at least one hole, and its file.
+
+    No hole is in the door: the renderer shows sky there in place of what torn gear would hide.
+    """
+    scenes = (generator.scene(index) for index in range(50))
+    scene = next(s for s in scenes if {d.face for d in holes(s)} & {"front", "back"})
+    scene = replace(scene, damages=tuple(d for d in scene.damages if d.face != "door"))
+    path = tmp_path_factory.mktemp("export") / "torn.glb"
+    export_glb(generator, scene, path, texel_mm=8.0)
+    return scene, Exported(path)
+
+
+def head_on(scene: Scene, face_y: float, x_mm: float, z_mm: float) -> Camera:
+    """A camera that sees the front 4 mm a pixel, straight on, at (x, z) on it."""
+    distance_mm = 6000.0
+    focal_mm = distance_mm / (4.0 * SIZE[0]) * 36.0
+    position = (x_mm, face_y - distance_mm, z_mm)
+    return Camera("straight", position, (x_mm, face_y, z_mm), focal_mm)
+
+
+def bare(scene: Scene) -> Scene:
+    """`scene` without any layer but its paint and decals, and without damage."""
+    surface = scene.surface
+    surface = replace(
+        surface,
+        paint=replace(surface.paint, tone_variation=0.0),
+        ageing=replace(surface.ageing, strength=0.0),
+        dirt=replace(surface.dirt, strength=0.0),
+        rust=replace(surface.rust, coverage=0.0),
+        scratches=replace(surface.scratches, coverage=0.0),
+    )
+    return replace(scene, surface=surface, damages=())
+
+
+@pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
+def test_rays_at_the_exported_geometry_see_the_renderers_silhouette(generator, torn, camera):
+    scene, exported = torn
+    sample = generator.render(scene=scene, camera=camera)
+    triangle, _ = exported.first_hits(camera, exported.whole)
+    wrong = (triangle >= 0).reshape(sample.ids.shape) != (sample.ids > 0)
+    assert wrong.mean() < 5e-4
+
+
+@pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
+def test_rays_at_the_exported_geometry_meet_it_at_the_rendered_depth(generator, torn, camera):
+    scene, exported = torn
+    sample = generator.render(scene=scene, camera=camera)
+    triangle, depth = exported.first_hits(camera, exported.whole)
+    both = (triangle >= 0) & (sample.ids.ravel() > 0)
+    error = np.abs(depth[both] - sample.depth.ravel()[both])
+    # insides lie the thickness of the steel deeper than what the renderer shows through a hole
+    assert np.quantile(error, 0.995) < 3e-3
+
+
+def test_holes_are_open_to_a_millimetre(torn):
+    scene, _ = torn
+    hole = holes(scene)[0]
+    rest = build_container(scene.container.kind, scene.container.profiles)
+    flat = replace(hole, depth_mm=0.0)
+    cut = damaged_mesh(rest, (flat,))
+    body = RayMeshIntersector(trimesh.Trimesh(cut.positions_mm, cut.triangles, process=False))
+    whole = RayMeshIntersector(trimesh.Trimesh(rest.positions_mm, rest.triangles, process=False))
+    reach = np.linspace(-hole.size_mm[0], hole.size_mm[0], 161)
+    u, v = (axis.ravel() for axis in np.meshgrid(reach, reach))
+    along, across, inward = (np.array(a) for a in (hole.along, hole.across, hole.inward))
+    start = np.array(hole.origin_mm) + u[:, None] * along + v[:, None] * across - 600 * inward
+    rays = np.tile(inward, (len(start), 1))
+    distance = []
+    for caster in (body, whole):
+        triangle = caster.intersects_first(start, rays)
+        mesh = caster.mesh
+        corners = mesh.triangles[triangle]
+        normal = mesh.face_normals[triangle]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = ((corners[:, 0] - start) * normal).sum(1) / (rays * normal).sum(1)
+        distance.append(np.where(triangle >= 0, depth, np.inf))
+    open_here = distance[0] > distance[1] + 1e-3
+    point = start + np.where(np.isfinite(distance[1]), distance[1], 0)[:, None] * rays
+    shrunk, grown = (
+        in_hole(replace(hole, size_mm=(hole.size_mm[0] + d, hole.size_mm[1] + d)), point)
+        for d in (-2.0, 2.0)
+    )
+    hit = np.isfinite(distance[1])
+    assert shrunk[hit].any()
+    assert open_here[hit & shrunk].all()
+    assert not open_here[hit & ~grown].any()
+
+
+def test_normals_of_a_dented_wall_are_those_of_its_triangles(generator):
+    scenes = (generator.scene(index) for index in range(50))
+    damages = next(d for s in scenes for d in s.damages if d.kind == "concave")
+    rest = build_container("20", generator.scene(0).container.profiles)
+    bent = damaged_mesh(rest, (damages,))
+    body = trimesh.Trimesh(bent.positions_mm, bent.triangles, process=False)
+    given = bent.normals[bent.triangles].mean(axis=1)
+    cosine = (body.face_normals * given).sum(1) / np.linalg.norm(given, axis=1)
+    area = body.area_faces
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1)) @ area / area.sum()) < 0.5
+
+
+def test_base_color_is_what_the_renderer_shows_unlit(generator, tmp_path):
+    scene = bare(generator.scene(0))
+    names = [d for d in scene.decals if d.face == "front"]
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    place, _ = mesh.sheet_to_surface("front", names[0].center_mm)
+    camera = head_on(scene, float(mesh.bounds_mm[0][1]), float(place[0, 0]), float(place[0, 2]))
+    path = tmp_path / "bare.glb"
+    export_glb(generator, scene, path, [camera], texel_mm=2.0)
+    exported = Exported(path)
+    sample = generator.render(scene=scene, camera=camera, layer="decals")
+    baked = exported.texel(exported.visual.material.baseColorTexture.convert("RGB"), "straight")
+    shown = sample.image.reshape(-1, 3).astype(float)
+    seen = (sample.ids.ravel() > 0) & np.isfinite(baked[:, 0])
+    assert np.ptp(shown[seen], axis=0).max() > 60
+    error = np.abs(baked - shown)[seen].max(axis=1)
+    # of 255; footprints differ by the slant of the corrugation, which blurs edges differently
+    assert np.quantile(error, 0.95) <= 1.0
+    assert error.mean() < 0.6
+
+
+def test_roughness_is_what_the_renderer_shows_unlit(generator, tmp_path):
+    scene = replace(generator.scene(0), damages=())
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    camera = head_on(scene, float(mesh.bounds_mm[0][1]), 0.0, 1300.0)
+    path = tmp_path / "rough.glb"
+    export_glb(generator, scene, path, [camera], texel_mm=4.0)
+    exported = Exported(path)
+    sample = generator.render(scene=scene, camera=camera, layer="reflection")
+    texture = exported.visual.material.metallicRoughnessTexture.convert("RGB")
+    baked = exported.texel(texture, "straight")[:, 1]
+    shown = sample.image[..., 0].ravel().astype(float)
+    error = np.abs(baked - shown)[np.isfinite(baked)]
+    assert np.ptp(shown) > 10
+    assert error.mean() < 2.0
+
+
+def test_the_file_keeps_scene_light_and_exposure(generator, torn):
+    scene, exported = torn
+    extras = exported.tree["scenes"][0]["extras"]
+    assert Scene.from_json(json.dumps(extras["scene"])) == scene
+    assert extras["environment"]["name"] == scene.environment.name
+    assert extras["environment"]["yaw_deg"] == scene.environment.yaw_deg
+    nodes = {n["name"]: n for n in exported.tree["nodes"] if "camera" in n}
+    assert set(nodes) == {camera.name for camera in scene.cameras}
+    for camera in scene.cameras:
+        expected = generator.exposure(scene, camera)
+        assert nodes[camera.name]["extras"]["exposure"] == expected
+
+
+def test_gltf_cameras_look_through_the_renderers_pixels(torn):
+    scene, exported = torn
+    for camera in scene.cameras:
+        origin, rays = exported.rays(camera.name)
+        pixels, depth = view_of(camera, SIZE).project((origin + 3 * rays) * 1e3)
+        grid = np.stack(np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5), axis=-1)
+        np.testing.assert_allclose(pixels, grid.reshape(-1, 2), atol=1e-4)
+        np.testing.assert_allclose(depth, 3.0, atol=1e-6)
+
+
+def test_the_same_scene_makes_the_same_file(generator, torn, tmp_path):
+    scene, _ = torn
+    for name in ("a.glb", "b.glb"):
+        export_glb(generator, scene, tmp_path / name, texel_mm=16.0)
+    assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
+
+
+def test_baking_leaves_the_next_frame_as_it_was(generator, torn):
+    scene, _ = torn
+    before = generator.render(scene=scene, camera="B")
+    generator.bake(scene, 32.0)
+    after = generator.render(scene=scene, camera="B")
+    np.testing.assert_array_equal(before.image, after.image)
+    np.testing.assert_array_equal(before.damage, after.damage)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["-o", "box.obj"], "box.obj: give a file name that ends in .glb"),
+        (["-o", "box.glb", "--camera", "Cx"], "camera: 'Cx' is unknown"),
+        (["-o", "box.glb", "--texel-mm", "0"], "texel_mm: 0 is not a size"),
+        (["-o", "box.glb", "--texel-mm", "nan"], "texel_mm: nan is not a size"),
+        (["-o", "box.glb", "--texel-mm", "0.5"], "or more for this container"),
+        (["-o", "none/box.glb"], "no folder none"),
+        (["-o", "box.glb", "--size", "9x9"], "size: 9x9 is out of range"),
+    ],
+)
+def test_bad_input_gets_one_line(arguments, named, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "--index", "0", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert named in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_texel_that_an_error_proposes_fits(generator, tmp_path):
+    scene = generator.scene(0)
+    with pytest.raises(ConfigError, match="give ") as caught:
+        export_glb(generator, scene, tmp_path / "box.glb", texel_mm=0.01)
+    proposed = float(str(caught.value).split("give ")[1].split()[0])
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    assert max(mesh.atlas_size_mm) / proposed <= 8192
