@@ -1,8 +1,11 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Self
+
+import numpy as np
 
 from fastgen.camera import view_of
 from fastgen.config import Config
@@ -10,7 +13,7 @@ from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, loa
 from fastgen.errors import ConfigError
 from fastgen.gl import GLContext, open_context
 from fastgen.labels import label
-from fastgen.programs import LAYERS
+from fastgen.programs import LAYERS, SPREADER_ID
 from fastgen.records import nearest
 from fastgen.renderer import Renderer
 from fastgen.sample import Sample
@@ -124,7 +127,10 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        objects = label(frame, scene, view, renderer.mesh(scene.container))
+        # objects are the container and what is on it: the spreader is nothing but in their way
+        container = np.where(frame.ids == SPREADER_ID, 0, frame.ids).astype(np.uint16)
+        mesh = renderer.mesh(scene.container)
+        objects = label(replace(frame, ids=container), scene, view, mesh)
         return Sample(
             image=frame.image,
             ids=frame.ids,
