@@ -128,7 +128,7 @@ class SpreaderConfig:
     """How often a container hangs on a crane's spreader, and what that looks like.
 
     flippers_down: probability of each side that its gather guides are lowered. gap_mm: from the
-    castings to the spreader, drawn in whole steps of 5 mm.
+    castings to the spreader, drawn in whole steps of 10 mm.
     """
 
     probability: float = field(default=0.9, metadata=UNIT)

@@ -38,9 +38,9 @@ from fastgen.programs import (
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.spreader import build_spreader
+from fastgen.spreader import body_and_cables_mm, build_spreader
 from fastgen.surface_values import damage_values, scene_values
-from fastgen.targets import Region, Targets
+from fastgen.targets import Region, Targets, bands
 
 
 class _Releasable(Protocol):
@@ -204,10 +204,12 @@ class Renderer:
         for name, texture in textures.items():
             texture.use(UNITS[name])
         near = [_region(view, corners_mm(item)) for item in damages]
-        corners = _mesh_corners(mesh.mesh, damages)
+        boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
         if spreader is not None:
-            corners = np.concatenate([corners, _mesh_corners(spreader.mesh, ())])
-        shading.draw(targets, _region(view, corners), damage, near)
+            # apart, for the cables are high and narrow
+            body, cables = (_box_corners(b) for b in body_and_cables_mm(spreader.mesh))
+            boxes = [np.concatenate([*boxes, body]), cables]
+        shading.draw(targets, bands([_region(view, box) for box in boxes]), damage, near)
         return targets
 
     def mesh(self, container: Container) -> Mesh:
@@ -290,10 +292,12 @@ def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
 
 
-def _mesh_corners(mesh: Mesh, damages: tuple[Damage, ...]) -> np.ndarray:
-    """Corners [8, 3] of the box that holds `mesh`, bulges of damage included."""
+def _box_corners(
+    bounds_mm: tuple[np.ndarray, np.ndarray], damages: tuple[Damage, ...] = ()
+) -> np.ndarray:
+    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included."""
     bulge = sum(max(-damage.depth_mm, 0.0) for damage in damages)
-    low, high = mesh.bounds_mm
+    low, high = bounds_mm
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     return low - bulge + corners * (high - low + 2 * bulge)
 

@@ -167,7 +167,7 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     lowered = streams("spreader.flippers").random(2) < c.flippers_down
     low, high = c.gap_mm
     # few different gaps, so that few shapes are built
-    gap = 5.0 * round(_between(streams("spreader.gap"), c.gap_mm) / 5)
+    gap = 10.0 * round(_between(streams("spreader.gap"), c.gap_mm) / 10)
     return Spreader(
         present=bool(streams("spreader").random() < c.probability),
         albedo=linear_color(str(streams("spreader.color").choice(c.colors))),

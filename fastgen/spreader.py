@@ -7,11 +7,16 @@ for at 10 m a pixel is 12 mm or more and no bolt is seen.
 
 from functools import lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastgen.container_layout import KINDS
 from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
-from fastgen.spreader_parts import Hang, cables, ends, flippers, frame, headblock
+from fastgen.spreader_parts import CABLES, Hang, cables, ends, flippers, frame, headblock
 from fastgen.unfold import assemble
+
+Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 GAP_LIMITS_MM = (0.0, 200.0)
 """Higher up, the twistlocks would hang free."""
@@ -33,6 +38,15 @@ def build_spreader(
     if not low <= gap_mm <= high:
         raise ConfigError(f"spreader gap_mm: {gap_mm:g} is outside {low:g} to {high:g} mm")
     return _built(kind, flippers_down, gap_mm)
+
+
+@lru_cache(maxsize=128)
+def body_and_cables_mm(mesh: Mesh) -> tuple[Bounds, Bounds]:
+    """Lowest and highest coordinates [3] in mm of a spreader without its cables, and of these."""
+    cables = mesh.chart == mesh.chart_index(CABLES)
+    parts = mesh.positions_mm[~cables], mesh.positions_mm[cables]
+    body, falls = ((points.min(axis=0), points.max(axis=0)) for points in parts)
+    return body, falls
 
 
 @lru_cache(maxsize=128)

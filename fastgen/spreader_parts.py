@@ -15,6 +15,9 @@ from fastgen.container_layout import ContainerKind
 from fastgen.container_parts import ring
 from fastgen.unfold import Patch, Sheet, beside, box, prism
 
+CABLES = "spreader.cables"
+"""Name of the cables' chart."""
+
 CABLE_LENGTH_MM = 12000.0
 """What is drawn of the hoist cables: beyond the upper edge of every usual picture."""
 
@@ -119,9 +122,7 @@ def ends(hang: Hang) -> list[Sheet]:
             for y in (-_BEAM_Y_MM - 135, -_BEAM_Y_MM + 135, _BEAM_Y_MM - 135, _BEAM_Y_MM + 135)
         ]
         sheets += [
-            _painted(f"spreader.telescope.{name}", beside(beams)),
-            _painted(f"spreader.end.{name}", beam),
-            _painted(f"spreader.housings.{name}", beside([*housings, *gussets])),
+            _painted(f"spreader.end.{name}", beside([beam, *beams, *housings, *gussets])),
             Sheet(f"spreader.locks.{name}", "roof", "cable", "frame", beside(locks)),
         ]
     return sheets
@@ -132,16 +133,13 @@ def flippers(hang: Hang, down: tuple[bool, bool]) -> list[Sheet]:
 
     down: those of the front and of the back side.
     """
-    sheets = []
     half = np.array([hang.kind.length_mm / 2, hang.kind.width_mm / 2])
-    for name, side, lowered in zip(("front", "back"), _SIGNS, down, strict=True):
-        patches: list[Patch] = []
+    patches: list[Patch] = []
+    for side, lowered in zip(_SIGNS, down, strict=True):
         for end in _SIGNS:
-            signs = np.array([end, side])
             for across in (0, 1):  # the axis that the plate stands across
-                patches.extend(_guide(hang, half, signs, across, lowered))
-        sheets.append(_painted(f"spreader.flippers.{name}", beside(patches)))
-    return sheets
+                patches.extend(_guide(hang, half, np.array([end, side]), across, lowered))
+    return [_painted("spreader.flippers", beside(patches))]
 
 
 def headblock(hang: Hang) -> list[Sheet]:
@@ -177,10 +175,8 @@ def headblock(hang: Hang) -> list[Sheet]:
                 stations = _around(middle, 18.0)
                 cheeks.append(prism(ring(plate), stations, 1, capped=(True, True)))
     return [
-        _painted("spreader.headblock", beside(beams)),
-        _painted("spreader.headblock.cross", beside([*cross, *feet])),
+        _painted("spreader.headblock", beside([*beams, *cross, *feet, *cheeks])),
         Sheet("spreader.basket", "roof", "galvanized", "frame", basket),
-        _painted("spreader.cheeks", beside(cheeks)),
         Sheet("spreader.sheaves", "roof", "cable", "frame", beside(sheaves)),
     ]
 
@@ -199,7 +195,7 @@ def cables(hang: Hang) -> list[Sheet]:
         for side in _SIGNS
         for turn in _SIGNS
     ]
-    return [Sheet("spreader.cables", "roof", "cable", "frame", beside(falls))]
+    return [Sheet(CABLES, "roof", "cable", "frame", beside(falls))]
 
 
 def _painted(name: str, patch: Patch) -> Sheet:
