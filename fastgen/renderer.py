@@ -38,7 +38,7 @@ from fastgen.programs import (
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.spreader import body_and_cables_mm, build_spreader
+from fastgen.spreader import build_spreader, tier_bounds_mm
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
 
@@ -206,9 +206,8 @@ class Renderer:
         near = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
         if spreader is not None:
-            # apart, for the cables are high and narrow
-            body, cables = (_box_corners(b) for b in body_and_cables_mm(spreader.mesh))
-            boxes = [np.concatenate([*boxes, body]), cables]
+            frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
+            boxes = [np.concatenate([*boxes, frame]), *above]
         shading.draw(targets, bands([_region(view, box) for box in boxes]), damage, near)
         return targets
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastgen.container_layout import KINDS
 from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
-from fastgen.spreader_parts import CABLES, Hang, cables, ends, flippers, frame, headblock
+from fastgen.spreader_parts import TIERS, Hang, cables, ends, flippers, frame, headblock
 from fastgen.unfold import assemble
 
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
@@ -41,12 +41,11 @@ def build_spreader(
 
 
 @lru_cache(maxsize=128)
-def body_and_cables_mm(mesh: Mesh) -> tuple[Bounds, Bounds]:
-    """Lowest and highest coordinates [3] in mm of a spreader without its cables, and of these."""
-    cables = mesh.chart == mesh.chart_index(CABLES)
-    parts = mesh.positions_mm[~cables], mesh.positions_mm[cables]
-    body, falls = ((points.min(axis=0), points.max(axis=0)) for points in parts)
-    return body, falls
+def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
+    """Lowest and highest coordinates [3] in mm of each of TIERS of a spreader."""
+    tiers = np.array([chart.name.split(".")[1] for chart in mesh.charts])[mesh.chart]
+    parts = [mesh.positions_mm[tiers == tier] for tier in TIERS]
+    return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
 
 
 @lru_cache(maxsize=128)

@@ -15,8 +15,8 @@ from fastgen.container_layout import ContainerKind
 from fastgen.container_parts import ring
 from fastgen.unfold import Patch, Sheet, beside, box, prism
 
-CABLES = "spreader.cables"
-"""Name of the cables' chart."""
+TIERS = ("frame", "headblock", "cables")
+"""What a spreader is made of from below, ever narrower: charts are named spreader.TIER.PART."""
 
 CABLE_LENGTH_MM = 12000.0
 """What is drawn of the hoist cables: beyond the upper edge of every usual picture."""
@@ -72,10 +72,10 @@ class Hang:
 
 
 def frame(hang: Hang) -> list[Sheet]:
-    """The main frame: two box beams, cross members, and the cabinets that stand on them."""
+    """The main frame: two box beams and cross members."""
     sheets = [
         _painted(
-            f"spreader.beam.{name}",
+            f"spreader.frame.{name}",
             hang.block(
                 (-_FRAME_HALF_MM, _FRAME_HALF_MM), _around(side * _BEAM_Y_MM, 150.0), (110.0, 560.0)
             ),
@@ -86,13 +86,7 @@ def frame(hang: Hang) -> list[Sheet]:
     cross = [
         hang.block(_around(x, 110.0), inner, (170.0, 500.0)) for x in (-2500.0, -850, 850, 2500)
     ]
-    sheets.append(_painted("spreader.cross", beside(cross)))
-    cabinets = [
-        hang.block(_around(-2050.0, 340.0), (-620.0, 620.0), (555.0, 1080.0)),
-        hang.block(_around(2080.0, 300.0), (-560.0, 560.0), (555.0, 920.0)),
-    ]
-    sheets.append(Sheet("spreader.cabinets", "roof", "galvanized", "frame", beside(cabinets)))
-    return sheets
+    return [*sheets, _painted("spreader.frame.cross", beside(cross))]
 
 
 def ends(hang: Hang) -> list[Sheet]:
@@ -122,8 +116,8 @@ def ends(hang: Hang) -> list[Sheet]:
             for y in (-_BEAM_Y_MM - 135, -_BEAM_Y_MM + 135, _BEAM_Y_MM - 135, _BEAM_Y_MM + 135)
         ]
         sheets += [
-            _painted(f"spreader.end.{name}", beside([beam, *beams, *housings, *gussets])),
-            Sheet(f"spreader.locks.{name}", "roof", "cable", "frame", beside(locks)),
+            _painted(f"spreader.frame.{name}", beside([beam, *beams, *housings, *gussets])),
+            Sheet(f"spreader.frame.locks.{name}", "roof", "cable", "frame", beside(locks)),
         ]
     return sheets
 
@@ -139,11 +133,12 @@ def flippers(hang: Hang, down: tuple[bool, bool]) -> list[Sheet]:
         for end in _SIGNS:
             for across in (0, 1):  # the axis that the plate stands across
                 patches.extend(_guide(hang, half, np.array([end, side]), across, lowered))
-    return [_painted("spreader.flippers", beside(patches))]
+    return [_painted("spreader.frame.flippers", beside(patches))]
 
 
 def headblock(hang: Hang) -> list[Sheet]:
-    """What the cables carry: two beams on four feet, the cable basket, four sheaves."""
+    """What the cables carry: two beams on four feet, the cable basket, four sheaves; and the
+    cabinets that stand on the frame beside it."""
     low, high = _HEADBLOCK_MM
     beams = [
         hang.block((-1500.0, 1500.0), _around(side * _BEAM_Y_MM, 130.0), (low, high))
@@ -156,6 +151,10 @@ def headblock(hang: Hang) -> list[Sheet]:
     ]
     inner = (-_BEAM_Y_MM + 120.0, _BEAM_Y_MM - 120.0)
     cross = [hang.block(_around(x, 150.0), inner, (low + 20, high - 20)) for x in (-1100.0, 1100)]
+    cabinets = [
+        hang.block(_around(-2050.0, 340.0), (-620.0, 620.0), (555.0, 1080.0)),
+        hang.block(_around(2080.0, 300.0), (-560.0, 560.0), (555.0, 920.0)),
+    ]
     basket = prism(
         _regular((0.0, 0.0), 420.0, 12),
         (hang.base + 480.0, hang.base + 1300.0),
@@ -175,18 +174,20 @@ def headblock(hang: Hang) -> list[Sheet]:
                 stations = _around(middle, 18.0)
                 cheeks.append(prism(ring(plate), stations, 1, capped=(True, True)))
     return [
-        _painted("spreader.headblock", beside([*beams, *cross, *feet, *cheeks])),
-        Sheet("spreader.basket", "roof", "galvanized", "frame", basket),
-        Sheet("spreader.sheaves", "roof", "cable", "frame", beside(sheaves)),
+        _painted("spreader.headblock.beams", beside([*beams, *cross, *feet, *cheeks])),
+        Sheet(
+            "spreader.headblock.boxes", "roof", "galvanized", "frame", beside([basket, *cabinets])
+        ),
+        Sheet("spreader.headblock.sheaves", "roof", "cable", "frame", beside(sheaves)),
     ]
 
 
 def cables(hang: Hang) -> list[Sheet]:
-    """Eight falls, two from each sheave straight up."""
+    """Eight falls, two from each sheave straight up; under a pixel thick, so four sides will do."""
     z = hang.base + _SHEAVE_Z_MM
     falls = [
         prism(
-            _regular((x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM), _CABLE_RADIUS_MM, 6),
+            _regular((x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM), _CABLE_RADIUS_MM, 4),
             (z, z + CABLE_LENGTH_MM),
             2,
             capped=(True, True),
@@ -195,7 +196,7 @@ def cables(hang: Hang) -> list[Sheet]:
         for side in _SIGNS
         for turn in _SIGNS
     ]
-    return [Sheet(CABLES, "roof", "cable", "frame", beside(falls))]
+    return [Sheet("spreader.cables.falls", "roof", "cable", "frame", beside(falls))]
 
 
 def _painted(name: str, patch: Patch) -> Sheet:
