@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fastgen.container_castings import APERTURE_CENTER_MM
 from fastgen.container_layout import ContainerKind
 from fastgen.container_parts import ring
 from fastgen.unfold import Patch, Sheet, beside, box, prism
@@ -34,9 +35,6 @@ _BEAM_Y_MM = 520.0
 
 _FRAME_HALF_MM = 2650.0
 """Half the main frame's length: what a spreader drawn in to 20 feet leaves room for."""
-
-_TWISTLOCK_MM = (101.5, 89.0)
-"""Middle of the castings' upper apertures from the end and from the side, ISO 1161."""
 
 _TWISTLOCK_DEPTH_MM = 45.0
 """How far a twistlock's head reaches into its casting, which is 70 deep there."""
@@ -102,8 +100,8 @@ def ends(hang: Hang) -> list[Sheet]:
         beam = hang.block((end * (half_length - 260), end * (half_length - 12)), across, (70, 450))
         housings, locks = [], []
         for side in _SIGNS:
-            x = end * (half_length - _TWISTLOCK_MM[0])
-            y = side * (half_width - _TWISTLOCK_MM[1])
+            x = end * (half_length - APERTURE_CENTER_MM[0])
+            y = side * (half_width - APERTURE_CENTER_MM[1])
             housings.append(hang.block(_around(x, 106.0), _around(y, 95.0), (0.0, 300.0)))
             low = hang.base - hang.gap_mm - _TWISTLOCK_DEPTH_MM
             stem = _regular((x, y), 24.0, 8)
