@@ -19,7 +19,7 @@ from fastgen.unfold import assemble
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 GAP_LIMITS_MM = (0.0, 200.0)
-"""Higher up, the twistlocks would hang free."""
+"""Wider, nothing would look held any more."""
 
 
 def build_spreader(
