@@ -58,7 +58,8 @@ def stages(backend: str, size: tuple[int, int], scenes: int) -> dict[str, float]
                 t2 = time.perf_counter()
                 view = view_of(camera, size)
                 mesh = renderer.mesh(scene.container)
-                objects = label(Shot(frame, scene, view, mesh, config))
+                held = renderer.spreader_mesh(scene)
+                objects = label(Shot(frame, scene, view, mesh, held, config))
                 t3 = time.perf_counter()
                 sample = Sample(
                     **vars(frame), scene=scene, camera=camera, view=view, objects=objects

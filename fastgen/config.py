@@ -17,6 +17,7 @@ from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import Range, bounds, from_plain, nearest, to_plain
+from fastgen.spreader import GAP_LIMITS_MM
 
 UNIT = bounds(0.0, 1.0)
 LENGTH = bounds(0.0, 1e6, "mm")
@@ -123,6 +124,20 @@ class SplitConfig:
 
 
 @dataclass(frozen=True)
+class SpreaderConfig:
+    """How often a container hangs on a crane's spreader, and what that looks like.
+
+    flippers_down: probability of each side that its gather guides are lowered. gap_mm: from the
+    castings to the spreader, drawn in whole steps of 10 mm.
+    """
+
+    probability: float = field(default=0.9, metadata=UNIT)
+    colors: tuple[str, ...] = ("#d9a514", "#e0b428", "#c9661b", "#b8321f", "#a8541c", "#8f9396")
+    flippers_down: float = field(default=0.6, metadata=UNIT)
+    gap_mm: Range = field(default=Range(10, 30), metadata=bounds(*GAP_LIMITS_MM, "mm"))
+
+
+@dataclass(frozen=True)
 class LabelConfig:
     """What becomes of objects that are hard to see.
 
@@ -145,6 +160,7 @@ class Config:
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
     markings: MarkingsConfig = field(default_factory=MarkingsConfig)
     damage: DamageConfig = field(default_factory=DamageConfig)
+    spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
     labels: LabelConfig = field(default_factory=LabelConfig)
@@ -173,6 +189,10 @@ class Config:
             raise ConfigError("surface.rust_colors: the list is empty; give at least one color")
         for color in (*self.surface.rust_colors, self.surface.dirt_color):
             linear_color(color, "surface")
+        if not self.spreader.colors:
+            raise ConfigError("spreader.colors: the list is empty; give at least one color")
+        for color in self.spreader.colors:
+            linear_color(color, "spreader.colors")
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":

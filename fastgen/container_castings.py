@@ -10,7 +10,7 @@ from fastgen.container_layout import CASTING_MM, Array, Layout
 from fastgen.mesh import FACE_AXES, FACES
 from fastgen.unfold import Patch, Sheet, beside, flat, polygon, sweep
 
-_CENTER_MM = (101.5, 89.0, 59.0)
+APERTURE_CENTER_MM = (101.5, 89.0, 59.0)
 """Aperture centres from the end (x), the side (y) and the bottom or top (z)."""
 
 _APERTURES: dict[int, tuple[tuple[float, float], float]] = {
@@ -40,7 +40,7 @@ def _casting(name: str, faces: tuple[str, str, str], half: Array, signs: Array) 
     shift = np.array([0.0, 0.0, half[2]])
     corner = signs * half + shift
     far = corner - signs * size
-    holes_center = corner - signs * np.array(_CENTER_MM)
+    holes_center = corner - signs * np.array(APERTURE_CENTER_MM)
     sheets, plain = [], []
     for axis, face in enumerate(faces):
         axes = FACE_AXES[face]

@@ -74,8 +74,8 @@ def damage_facets(scene: Scene, mesh: Mesh, damage: Damage, owner: int) -> Facet
     return Facets(corners, kept, np.full(len(index), owner))
 
 
-def mesh_facets(scene: Scene, mesh: Mesh, groups: list[str], owner: int) -> Facets:
-    """All triangles of `groups` of the mesh."""
+def mesh_facets(scene: Scene | None, mesh: Mesh, groups: list[str], owner: int) -> Facets:
+    """All triangles of `groups` of the mesh, moved by the damages of `scene` if one is given."""
     index = np.concatenate(
         [np.arange(mesh.groups[name].start, mesh.groups[name].stop) for name in groups]
     )
@@ -151,7 +151,7 @@ def _on_chart(mesh: Mesh, decal: Decal) -> tuple[NDArray[np.int64], Array]:
     return index[near], sheet[near]
 
 
-def _corners(scene: Scene, mesh: Mesh, index: NDArray[np.int64]) -> tuple[Array, Array]:
+def _corners(scene: Scene | None, mesh: Mesh, index: NDArray[np.int64]) -> tuple[Array, Array]:
     """Corners [T, 3, 3] in mm of triangles as damage moved them, and at rest."""
     rest = mesh.positions_mm[mesh.triangles[index]].astype(np.float64)
-    return (deform(scene.damages, rest) if scene.damages else rest), rest
+    return (deform(scene.damages, rest) if scene and scene.damages else rest), rest

@@ -131,8 +131,8 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        mesh = renderer.mesh(scene.container)
-        objects = label(Shot(frame, scene, view, mesh, self.config))
+        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
+        objects = label(Shot(frame, scene, view, mesh, spreader, self.config))
         return Sample(
             image=frame.image,
             ids=frame.ids,

@@ -1,4 +1,4 @@
-"""A Mesh on the GPU, drawn with one indirect call that leaves out faces turned away."""
+"""Meshes on the GPU, each drawn with one indirect call that leaves out faces turned away."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
@@ -36,7 +36,8 @@ _COMMAND = np.dtype(
 class GpuMesh:
     """Vertex, index and chart data of one Mesh. Owned by the renderer, which releases it.
 
-    programs: the geometry program of each of programs.DAMAGE_VARIANTS.
+    programs: the geometry program of each of programs.DAMAGE_VARIANTS. first_chart: what the
+    numbers of the mesh's charts begin with in the chart table.
     """
 
     def __init__(
@@ -44,12 +45,13 @@ class GpuMesh:
         ctx: moderngl.Context,
         mesh: Mesh,
         programs: Mapping[str, moderngl.Program],
+        first_chart: int = 0,
     ) -> None:
         self.mesh = mesh
         layout = np.dtype([("p", "f4", 3), ("n", "f4", 3), ("a", "f4", 2), ("c", "u4")])
         vertices = np.empty(len(mesh.positions_mm), layout)
         vertices["p"], vertices["n"] = mesh.positions_mm, mesh.normals
-        vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart
+        vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart + first_chart
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * 2 * len(mesh.groups))
@@ -63,22 +65,23 @@ class GpuMesh:
             )
             for damage, program in programs.items()
         }
-        charts = np.zeros((2, len(mesh.charts), 4), np.float32)
-        charts[0] = [chart.rect_mm for chart in mesh.charts]
-        charts[1, :, 0] = [chart.material_index for chart in mesh.charts]
-        self.charts = ctx.texture((len(mesh.charts), 2), 4, charts.tobytes(), dtype="f4")
-        self.charts.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
-    def draw(self, position_mm: Iterable[float], damage: str, bent: Collection[str] = ()) -> None:
+    def draw(
+        self,
+        position_mm: Iterable[float],
+        damage: str,
+        bent: Collection[str] = (),
+        hollow: bool = True,
+    ) -> None:
         """Draw what a camera at `position_mm` may see, in one call.
 
-        damage: one of programs.DAMAGE_VARIANTS. 'holed' draws everything a second time, as the
+        damage: one of programs.DAMAGE_VARIANTS. 'holed' draws what is hollow a second time, as the
         instance that shows insides through holes. bent: faces to draw even if turned away.
         """
         names = {*facing_groups(self.mesh, position_mm), *bent}
         seen = [triangles for name, triangles in self.mesh.groups.items() if name in names]
         draws = [(0, triangles) for triangles in seen]
-        if damage == "holed":
+        if damage == "holed" and hollow:
             draws += [(1, triangles) for triangles in self.mesh.groups.values()]
         commands = np.zeros(len(draws), _COMMAND)
         for row, (instance, triangles) in zip(commands, draws, strict=True):
@@ -91,6 +94,22 @@ class GpuMesh:
     def release(self) -> None:
         """Free all GL objects."""
         buffers = (self._vertices, self._indices, self._commands, self._views)
-        items: list[Any] = [*self._arrays.values(), *buffers, self.charts]
+        items: list[Any] = [*self._arrays.values(), *buffers]
         for item in items:
             item.release()
+
+
+def chart_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Texture:
+    """Place and material of each chart as the shader reads them (shaders/material.glsl).
+
+    meshes: by the number that each one's charts begin with. The caller releases the texture.
+    """
+    count = max(first + len(mesh.charts) for first, mesh in meshes.items())
+    table = np.zeros((2, count, 4), np.float32)
+    for first, mesh in meshes.items():
+        columns = slice(first, first + len(mesh.charts))
+        table[0, columns] = [chart.rect_mm for chart in mesh.charts]
+        table[1, columns, 0] = [chart.material_index for chart in mesh.charts]
+    texture = ctx.texture((count, 2), 4, table.tobytes(), dtype="f4")
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture

@@ -14,7 +14,7 @@ from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
 from fastgen.facets import Facets, decal_facets, highest, lowest, mesh_facets
 from fastgen.mesh import Mesh
-from fastgen.programs import CONTAINER_ID
+from fastgen.programs import CONTAINER_ID, SPREADER_ID
 from fastgen.sample import Box, Keypoint, Object
 from fastgen.scene import Decal, Scene
 from fastgen.visibility import Shot, float_box, mask_box, visibility
@@ -41,7 +41,7 @@ def decal_of(scene: Scene, object_id: int) -> Decal:
 
 def label(shot: Shot) -> list[Object]:
     """All labelled objects of one image, those of which nothing is visible included."""
-    return [_container(shot), *damage_objects(shot), *_decals(shot)]
+    return [_container(shot), *_spreader(shot), *damage_objects(shot), *_decals(shot)]
 
 
 def _decals(shot: Shot) -> list[Object]:
@@ -88,9 +88,10 @@ def visible_boxes(
     """Tight boxes and areas of every id below `count` in one pass over the labelled pixels.
 
     ids: uint16 [H, W]. Returns a list of `count` boxes, None where an id is not seen, and int64
-    [count] areas in pixels. Ids 0 and 1 (void and container) are left out: None and 0.
+    [count] areas in pixels. Ids 0 and 1 (void and container) are left out, None and 0, as are those
+    of `count` and above.
     """
-    rows, columns = np.nonzero(ids > CONTAINER_ID)
+    rows, columns = np.nonzero((ids > CONTAINER_ID) & (ids < count))
     found = ids[rows, columns].astype(np.int64)
     areas = np.bincount(found, minlength=count)[:count]
     shape = ids.shape
@@ -143,20 +144,25 @@ def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
 
 def _container(shot: Shot) -> Object:
     """The container's pixels are also those of its decals: what lies on it is part of it."""
-    frame, scene, view, mesh = shot.frame, shot.scene, shot.view, shot.mesh
-    shown = frame.ids > 0
+    frame, view, mesh = shot.frame, shot.view, shot.mesh
+    shown = (frame.ids > 0) & (frame.ids != SPREADER_ID)
     area = int(np.count_nonzero(shown))
-    pixels, depth = view.project(_container_points(scene, mesh))
+    pixels, depth = view.project(_container_points(shot.scene, mesh))
     x, y = pixels.T.copy()
     bounds = np.array([x.min(), y.min(), x.max(), y.max()])
     alone = Canvas(np.zeros((0, 0), bool), (0, 0), 1)
-    if depth.min() < NEAR_M or min(bounds[:2]) < 0 or (bounds[2:] > view.size).any():
-        # what is seen needs no counting: only what reaches beyond the image
-        seen = project(mesh_facets(scene, mesh, list(mesh.groups), 0), view)
+    behind = mask_box(frame.ids == SPREADER_ID)
+    outside = depth.min() < NEAR_M or min(bounds[:2]) < 0 or np.any(bounds[2:] > view.size)
+    if outside or behind:
+        # what is seen needs no counting: only what lies beyond the image or behind the spreader
+        seen = project(mesh_facets(shot.scene, mesh, list(mesh.groups), 0), view)
         (bounds,) = boxes(seen.pixels, seen.owner, 1)
         low, high = lowest(seen.pixels), highest(seen.pixels)
-        beyond = seen.faces & ((low < 0) | (high > view.size)).any(axis=1)
-        (alone,) = canvases(seen.pixels[beyond], seen.owner[beyond], 1)
+        asked = ((low < 0) | (high > view.size)).any(axis=1)
+        if behind:
+            asked |= ((low < behind[2:]) & (high > behind[:2])).all(axis=1)
+        asked &= seen.faces
+        (alone,) = canvases(seen.pixels[asked], seen.owner[asked], 1)
     castings, polygon = _castings(shot)
     return Object(
         id=CONTAINER_ID,
@@ -171,6 +177,28 @@ def _container(shot: Shot) -> Object:
     )
 
 
+def _spreader(shot: Shot) -> list[Object]:
+    """The spreader with its headblock and the cables as far as they are modelled."""
+    if shot.spreader is None:
+        return []
+    shown = shot.frame.ids == SPREADER_ID
+    area = int(np.count_nonzero(shown))
+    seen = project(mesh_facets(None, shot.spreader, list(shot.spreader.groups), 0), shot.view)
+    (bounds,) = boxes(seen.pixels, seen.owner, 1)
+    (alone,) = canvases(seen.pixels[seen.faces], seen.owner[seen.faces], 1)
+    return [
+        Object(
+            id=SPREADER_ID,
+            class_name="spreader",
+            instance=1,
+            bbox=mask_box(shown),
+            amodal_bbox=float_box(bounds),
+            area=area,
+            **visibility(shot, alone, shown, True, area),
+        )
+    ]
+
+
 @lru_cache(maxsize=4)
 def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
     """All vertices [V, 3] in mm after damage, each once."""
@@ -180,7 +208,8 @@ def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
 def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
     """The castings' outer corners in the order of CASTINGS, and the polygon around them.
 
-    A convex body's corner is seen where any of the planes that meet in it faces the camera.
+    A convex body's corner is seen where any of the planes that meet in it faces the camera, and
+    the spreader is not before it.
     """
     kind = KINDS[shot.scene.container.kind]
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
@@ -190,6 +219,9 @@ def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
     outward = np.where(signs == 0, -1, signs)
     faces = np.any((shot.view.position_m / MM - corners) * outward > 0, axis=1)
     inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
+    x, y = np.where(inside[:, None], pixels, 0).astype(int).T
+    frame = shot.frame
+    faces &= ~((frame.ids[y, x] == SPREADER_ID) & (frame.depth[y, x] < depth))
     found: list[Keypoint] = [
         (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
         for (x, y), face, within in zip(

@@ -17,10 +17,13 @@ from fastgen.errors import ConfigError
 FACES = ("front", "back", "door", "no_door", "roof", "underside")
 """front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
 
-MATERIALS = ("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside")
+MATERIALS = (
+    *("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside"),
+    *("spreader", "cable"),
+)
 
-MAX_CHARTS = 1000
-"""The renderer keeps chart + 1 in ten bits."""
+MAX_CHARTS = 500
+"""Of one mesh: the renderer keeps chart + 1 of a container and of its spreader in ten bits."""
 
 GROUP_SLACK_MM = 12.0
 """A face's frame stands back from the castings' plane by at most this much, see Mesh.groups."""

@@ -15,7 +15,7 @@ from fastgen import environment
 from fastgen.artwork import ART_SIZE
 from fastgen.classes import DAMAGE_CLASSES, SOUND_CONTAINER
 from fastgen.lettering import TILE_CAPS
-from fastgen.mesh import MATERIALS
+from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, noise_tiles
 from fastgen.resources import shader_path
 from fastgen.uniforms import Block
@@ -47,6 +47,12 @@ CLASS_DEPTH_STEP = 0.125
 """Classes are told apart as depths, multiples of this (exact in every depth format)."""
 
 CONTAINER_ID = 1
+
+SPREADER_ID = 60000
+"""Above all decals, which count up from 2."""
+
+SPREADER_CHART = MAX_CHARTS
+"""The spreader's charts number from here on, the container's below."""
 
 PORTAL_CHART = 1000
 """Chart number of what a perforation tore away; real charts number below it."""
@@ -150,6 +156,8 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "VOID_DEPTH": "uintBitsToFloat(0x7f800000u)",
         "SOUND_CONTAINER": f"{SOUND_CONTAINER}u",
         "CONTAINER_ID": f"{CONTAINER_ID}u",
+        "SPREADER_ID": f"{SPREADER_ID}u",
+        "SPREADER_CHART": f"{SPREADER_CHART}u",
         "MIN_ROUGHNESS": "0.045",
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
@@ -172,6 +180,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "CLASS": list(PIXEL_CLASSES).index(pixel_class),
         **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
         "GUTTER_STEPS": GUTTER_STEPS,
+        "OUT_OF_REACH_MM": "1e6",
         "MAX_PARTS": 3,
         "MAX_SIDES": 4,
         "DAMAGED": int(damage != "sound"),

@@ -1,9 +1,9 @@
 """Renderer: Scene -> Frame, the only user of GL.
 
-One indirect draw of the scene's geometry writes, for each sample, which surface it sees and where
-on the unfolded sheet. Passes over the image then shade each pixel once for each different surface
-among its samples and write colour, ids, damage and depth at the pixel centre. Ids are never
-filtered: a sample lies exactly on each pixel centre.
+Two indirect draws, of the container and of the spreader that holds it, write for each sample which
+surface it sees and where on the unfolded sheet. Passes over the image then shade each pixel once
+for each different surface among its samples and write colour, ids, damage and depth at the pixel
+centre. Ids are never filtered: a sample lies exactly on each pixel centre.
 """
 
 from collections import OrderedDict
@@ -24,15 +24,24 @@ from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
-from fastgen.gpu_mesh import GpuMesh
+from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.mesh import Mesh
 from fastgen.noise import noise_tiles
-from fastgen.programs import DAMAGE_BLOCK, DAMAGE_VARIANTS, LAYERS, SCENE_BLOCK, VIEW_BLOCK, link
+from fastgen.programs import (
+    DAMAGE_BLOCK,
+    DAMAGE_VARIANTS,
+    LAYERS,
+    SCENE_BLOCK,
+    SPREADER_CHART,
+    VIEW_BLOCK,
+    link,
+)
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
+from fastgen.spreader import build_spreader, tier_bounds_mm
 from fastgen.surface_values import damage_values, scene_values
-from fastgen.targets import Region, Targets
+from fastgen.targets import Region, Targets, bands
 
 
 class _Releasable(Protocol):
@@ -107,6 +116,8 @@ class Renderer:
         self._shading: _Kept[Shading] = _Kept(len(LAYERS))
         self._targets: _Kept[Targets] = _Kept(3)
         self._meshes: _Kept[GpuMesh] = _Kept(16)
+        self._spreaders: _Kept[GpuMesh] = _Kept(64)
+        self._charts: _Kept[moderngl.Texture] = _Kept(64)
         self._lights: _Kept[GpuLight] = _Kept(24)
         self._scenes: _Kept[_SceneDecals] = _Kept(2)
         self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
@@ -141,7 +152,7 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh = self._mesh(scene.container)
+        mesh, spreader = self._mesh(scene.container), self._spreader(scene)
         light_data = self._light_of(scene.environment.name)
         light = self._lights.get(scene.environment.name, lambda: GpuLight(ctx, light_data))
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
@@ -163,6 +174,8 @@ class Renderer:
         # a dent may tilt a face into view that the rest mesh turns away
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}
+        if spreader is not None:
+            spreader.draw(camera.position_mm, damage, hollow=False)
         mesh.draw(camera.position_mm, damage, bent)
         targets.end_samples()
 
@@ -178,9 +191,13 @@ class Renderer:
             textures["rest_points"] = targets.rest
         for name, texture in textures.items():
             texture.use(UNITS[name])
-        self._bind_surface(scene, mesh)
+        self._bind_surface(scene, mesh, spreader)
         near = [_region(view, corners_mm(item)) for item in damages]
-        shading.draw(targets, _region(view, _mesh_corners(mesh.mesh, damages)), damage, near)
+        boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
+        if spreader is not None:
+            frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
+            boxes = [np.concatenate([*boxes, frame]), *above]
+        shading.draw(targets, bands([_region(view, box) for box in boxes]), damage, near)
         return targets
 
     def bake(self, scene: Scene, texel_mm: float) -> Atlas:
@@ -193,7 +210,7 @@ class Renderer:
             values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
             self._damage_block.write(DAMAGE_BLOCK.pack(values))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
-        self._bind_surface(scene, mesh)
+        self._bind_surface(scene, mesh, None)
         return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
@@ -203,7 +220,7 @@ class Renderer:
         view = view_of(camera, size)
         return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
 
-    def _bind_surface(self, scene: Scene, mesh: GpuMesh) -> None:
+    def _bind_surface(self, scene: Scene, mesh: GpuMesh, spreader: GpuMesh | None) -> None:
         """Bind what the material layers read."""
         decals = self._scenes.get(
             scene,
@@ -215,7 +232,7 @@ class Renderer:
             "noise_tiles": self._noise,
             "art": self._art,
             "glyph_tiles": self._tiles,
-            "chart_table": mesh.charts,
+            "chart_table": self._chart_table(mesh, spreader),
             "decal_grid": decals.grid,
             "decal_table": decals.table,
             "glyph_table": decals.glyphs,
@@ -227,6 +244,11 @@ class Renderer:
         """The rest mesh of a container, as it is drawn."""
         return self._mesh(container).mesh
 
+    def spreader_mesh(self, scene: Scene) -> Mesh | None:
+        """The spreader's mesh as it is drawn, None where the scene has none."""
+        spreader = self._spreader(scene)
+        return spreader.mesh if spreader else None
+
     def _mesh(self, container: Container) -> GpuMesh:
         def make() -> GpuMesh:
             mesh = build_container(container.kind, container.profiles)
@@ -234,10 +256,25 @@ class Renderer:
 
         return self._meshes.get(container, make)
 
+    def _spreader(self, scene: Scene) -> GpuMesh | None:
+        spreader = scene.spreader
+        if not spreader.present:
+            return None
+        mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
+        return self._spreaders.get(
+            mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
+        )
+
+    def _chart_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
+        meshes = {0: container.mesh}
+        if spreader is not None:
+            meshes[SPREADER_CHART] = spreader.mesh
+        return self._charts.get(tuple(meshes.values()), lambda: chart_table(self._ctx, meshes))
+
     def release(self) -> None:
         """Free every GL object that this renderer made."""
-        caches: list[Any] = [self._shading, self._targets, self._meshes]
-        for kept in (*caches, self._lights, self._scenes):
+        caches: list[Any] = [self._shading, self._targets, self._meshes, self._spreaders]
+        for kept in (*caches, self._charts, self._lights, self._scenes):
             kept.release()
         blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
         for item in (*blocks, *self._geometry.values()):
@@ -283,10 +320,12 @@ def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
 
 
-def _mesh_corners(mesh: Mesh, damages: tuple[Damage, ...]) -> np.ndarray:
-    """Corners [8, 3] of the box that holds `mesh`, bulges of damage included."""
+def _box_corners(
+    bounds_mm: tuple[np.ndarray, np.ndarray], damages: tuple[Damage, ...] = ()
+) -> np.ndarray:
+    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included."""
     bulge = sum(max(-damage.depth_mm, 0.0) for damage in damages)
-    low, high = mesh.bounds_mm
+    low, high = bounds_mm
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     return low - bulge + corners * (high - low + 2 * bulge)
 

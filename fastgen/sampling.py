@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastgen.config import CameraConfig, Config, linear_color
+from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
 from fastgen.container import KINDS, WallProfiles, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
@@ -27,6 +27,7 @@ from fastgen.scene import (
     Rust,
     Scene,
     Scratches,
+    Spreader,
     Surface,
     Vec3,
     Wear,
@@ -80,6 +81,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
             flats=mesh.flats,
         ),
         damages=damages,
+        spreader=_spreader(config.spreader, streams),
     )
 
 
@@ -159,6 +161,19 @@ def _environment(config: Config, streams: Streams, environments: Sequence[str]) 
             )
     name = str(streams("environment").choice(sorted(wanted)))
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
+
+
+def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
+    lowered = streams("spreader.flippers").random(2) < c.flippers_down
+    low, high = c.gap_mm
+    # few different gaps, so that few shapes are built
+    gap = 10.0 * round(_between(streams("spreader.gap"), c.gap_mm) / 10)
+    return Spreader(
+        present=bool(streams("spreader").random() < c.probability),
+        albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
+        flippers_down=(bool(lowered[0]), bool(lowered[1])),
+        gap_mm=min(max(gap, low), high),
+    )
 
 
 def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -> Camera:

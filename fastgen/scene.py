@@ -8,7 +8,7 @@ measured along the unfolded sheet.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fastgen.container import WallProfiles
 from fastgen.records import from_plain, to_plain
@@ -149,6 +149,20 @@ class Container:
 
 
 @dataclass(frozen=True)
+class Spreader:
+    """The crane's spreader that the container hangs on, where one is present.
+
+    albedo: of its paint. flippers_down: whether the gather guides of the front and of the back
+    side hang beside the container. gap_mm: from the upper castings to the spreader.
+    """
+
+    present: bool = False
+    albedo: Color = (0.6, 0.35, 0.02)
+    flippers_down: tuple[bool, bool] = (True, True)
+    gap_mm: float = 15.0
+
+
+@dataclass(frozen=True)
 class EnvironmentView:
     """Which HDRI lights the scene, turned about the vertical by yaw_deg (counter-clockwise)."""
 
@@ -184,6 +198,7 @@ class Scene:
     cameras: tuple[Camera, ...]
     decals: tuple[Decal, ...] = ()
     damages: tuple[Damage, ...] = ()
+    spreader: Spreader = field(default_factory=Spreader)
 
     def camera(self, name: str) -> Camera:
         """The camera of that name. Raises KeyError naming those that exist."""

@@ -42,34 +42,32 @@ class Shading:
     def draw(
         self,
         targets: Targets,
-        region: Region | None,
+        regions: Sequence[Region | None],
         damage: str,
         near_damage: Sequence[Region | None],
     ) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
-        region: the pixels outside which there is only sky; None where that is not known.
-        damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch.
+        regions: disjoint, and outside them there is only sky; None stands for all pixels.
+        damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
+        None where that is not known.
         """
         image = targets.image
         image.use()
         targets.clear_classes()
         self._ctx.enable_only(moderngl.DEPTH_TEST)
-        self._ctx.scissor = region
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
-        self._run("classify", "sound")
+        self._run("classify", "sound", regions)
         for part in near_damage:
-            self._ctx.scissor = part or region
-            self._run("classify", damage)
-        self._ctx.scissor = region
+            self._run("classify", damage, [part] if part else regions)
         image.depth_mask = False
         self._ctx.depth_func = "=="
         for name, traits in PIXEL_CLASSES.items():
             if name != "sky" and self._comes(name, traits, damage):
-                self._run(name, "holed" if "DAMAGE" in traits else "sound")
+                self._run(name, "holed" if "DAMAGE" in traits else "sound", regions)
+        self._run("sky", "sound", [None])
         self._ctx.scissor = None
-        self._run("sky", "sound")
         image.depth_mask = True
         self._ctx.depth_func = "<"
 
@@ -81,7 +79,7 @@ class Shading:
             return damage == "holed"
         return damage != "sound" or "DAMAGE" not in traits
 
-    def _run(self, name: str, damage: str) -> None:
+    def _run(self, name: str, damage: str, regions: Sequence[Region | None]) -> None:
         key = (name, damage)
         if key not in self._arrays:
             variant: dict[str, Any] = {
@@ -98,7 +96,9 @@ class Shading:
                 program["class_depth"] = list(PIXEL_CLASSES).index(name) * CLASS_DEPTH_STEP
             self._programs[key] = program
             self._arrays[key] = self._ctx.vertex_array(program, [])
-        self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
+        for region in regions:
+            self._ctx.scissor = region
+            self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
 
     def release(self) -> None:
         """Free all GL objects."""

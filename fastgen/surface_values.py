@@ -9,18 +9,18 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS
 from fastgen.programs import noise_deviation
-from fastgen.scene import Damage, Scene, Surface
+from fastgen.scene import Damage, Scene, Spreader, Surface
 
 _TILE_OF_SCALE = 4.0
 """A noise tile spans this many of its pattern's typical lengths."""
 
 
-def _materials(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.ndarray]:
     """(albedo and roughness, traits) of each material, float32 [M, 4] each.
 
     Traits: metallic, proneness to rust, share of the paint's layers. Albedo of hot-dip zinc:
     the range for weathered galvanised steel lies about 0.35 to 0.5 (measured tables of building
-    materials); rubber and tar are near 0.03.
+    materials); rubber and tar are near 0.03. Cables are steel under grease.
     """
     paint = np.array(surface.paint.albedo)
     rough = surface.paint.roughness
@@ -32,6 +32,8 @@ def _materials(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
         "galvanized": ((0.42, 0.42, 0.41), 0.55, 0.55, 1.3, 0.5),
         "rubber": ((0.022, 0.022, 0.023), 0.75, 0.0, 0.0, 0.35),
         "underside": (paint * 0.25 + 0.02, 0.85, 0.0, 1.8, 0.8),
+        "spreader": (spreader.albedo, 0.5, 0.0, 1.2, 1.0),
+        "cable": ((0.07, 0.068, 0.065), 0.6, 0.3, 0.6, 0.5),
     }
     base = np.array([[*np.asarray(rows[m][0]), rows[m][1]] for m in MATERIALS], np.float32)
     trait = np.array([[*rows[m][2:], 0.0] for m in MATERIALS], np.float32)
@@ -41,7 +43,7 @@ def _materials(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
     """All members of SCENE_BLOCK for `scene`."""
     surface = scene.surface
-    base, trait = _materials(surface)
+    base, trait = _materials(surface, scene.spreader)
     return {
         "material_base": base,
         "material_trait": trait,

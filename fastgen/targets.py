@@ -1,6 +1,8 @@
 """The framebuffers of one image size: samples of the geometry draw, and the shaded image."""
 
 import ctypes
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import moderngl
@@ -16,6 +18,28 @@ Region = tuple[int, int, int, int]
 _GL_COLOR, _GL_DEPTH, _GL_SCISSOR_TEST = 0x1800, 0x1801, 0x0C11
 _FAR, _SKY = (ctypes.c_float * 1)(1.0), (ctypes.c_float * 1)(0.0)
 _NOTHING = (ctypes.c_uint * 4)()
+
+
+def bands(regions: Sequence[Region | None]) -> list[Region | None]:
+    """Disjoint regions, the upper first, that hold all of `regions`; None is the whole image.
+
+    Each row is held from the leftmost to the rightmost column of the regions that it crosses.
+    """
+    known = [region for region in regions if region is not None]
+    if len(known) < len(regions):
+        return [None]
+    found: list[Region | None] = []
+    for top, bottom in pairwise(sorted({v for _, y, _, h in known for v in (y, y + h)})):
+        crossed = [(x, x + w) for x, y, w, h in known if y <= top and bottom <= y + h]
+        if not crossed:
+            continue
+        left, right = min(x for x, _ in crossed), max(x for _, x in crossed)
+        last = found[-1] if found else None
+        if last and (last[0], last[2]) == (left, right - left) and last[1] + last[3] == top:
+            found[-1] = (left, last[1], right - left, bottom - last[1])
+        else:
+            found.append((left, top, right - left, bottom - top))
+    return found
 
 
 class Targets:

@@ -3,7 +3,7 @@
 A Sheet is one chart before it has a place in the atlas; `assemble` packs sheets into a Mesh.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.mesh import FACE_AXES, FACES, GROUP_SLACK_MM, MATERIALS, MAX_CHARTS, Chart, Mesh
+from fastgen.seams import stitched
 
 Array = NDArray[np.float64]
 
@@ -211,10 +212,14 @@ def box(low_mm: ArrayLike, high_mm: ArrayLike) -> Patch:
 
 def assemble(
     sheets: Sequence[Sheet],
-    outer_size_mm: tuple[float, float, float],
-    flats: dict[str, tuple[tuple[float, float], ...]],
+    outer_size_mm: tuple[float, float, float] | None = None,
+    flats: Mapping[str, tuple[tuple[float, float], ...]] | None = None,
 ) -> Mesh:
-    """Pack the sheets into one atlas and join them into a Mesh, triangles sorted by group."""
+    """Pack the sheets into one atlas and join them into a Mesh, triangles sorted by group.
+
+    outer_size_mm: length, width and height of the container, whose planes the groups refer to;
+    without it, all sheets keep the group they name.
+    """
     assert len(sheets) < MAX_CHARTS
     assert all(s.material in MATERIALS and s.face in FACES for s in sheets)
     packing = _packed(np.array([s.patch.size_mm for s in sheets]))
@@ -223,25 +228,28 @@ def assemble(
         for s, turned, (x, y) in zip(sheets, packing.turned, packing.corners, strict=True)
     ]
     counts = [len(p.positions_mm) for p in patches]
-    chart = np.repeat(np.arange(len(sheets)), counts)
     whole = joined(patches)
-    group = np.concatenate([_groups(s, outer_size_mm) for s in sheets])
+    values = np.column_stack(
+        [whole.normals, whole.sheet_mm, np.repeat(np.arange(len(sheets)), counts)]
+    )
+    positions, values, triangles, source = stitched(whole.positions_mm, values, whole.triangles)
+    group = np.concatenate([_groups(s, outer_size_mm) for s in sheets])[source]
     order = np.argsort(group, kind="stable")
     ends = np.searchsorted(group[order], np.arange(len(FACES) + 2))
     names = (*FACES, "frame")
     mesh = Mesh(
-        positions_mm=whole.positions_mm.astype(np.float32),
-        normals=whole.normals.astype(np.float32),
-        atlas_mm=whole.sheet_mm.astype(np.float32),
-        chart=chart.astype(np.uint16),
-        triangles=whole.triangles[order].astype(np.uint32),
+        positions_mm=positions.astype(np.float32),
+        normals=values[:, :3].astype(np.float32),
+        atlas_mm=values[:, 3:5].astype(np.float32),
+        chart=np.rint(values[:, 5]).astype(np.uint16),
+        triangles=triangles[order].astype(np.uint32),
         charts=tuple(
             Chart(s.name, s.face, s.material, (float(x), float(y), *p.size_mm.tolist()))
             for s, p, (x, y) in zip(sheets, patches, packing.corners, strict=True)
         ),
         atlas_size_mm=packing.size,
         groups={n: slice(int(ends[i]), int(ends[i + 1])) for i, n in enumerate(names)},
-        flats=flats,
+        flats=flats or {},
     )
     # meshes are cached and shared, so nobody may write into them
     for array in (mesh.positions_mm, mesh.normals, mesh.atlas_mm, mesh.chart, mesh.triangles):
@@ -249,7 +257,7 @@ def assemble(
     return mesh
 
 
-def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float]) -> NDArray[np.int64]:
+def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> NDArray[np.int64]:
     """Index into (*FACES, "frame") of each triangle.
 
     A facet of the frame that looks straight out of a face, no deeper than the slack, is seen only
@@ -259,6 +267,8 @@ def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float]) -> NDArray[
     if sheet.group != "frame":
         return np.full(len(patch.triangles), FACES.index(sheet.group))
     result = np.full(len(patch.triangles), len(FACES))
+    if outer_size_mm is None:
+        return result
     length, width, height = outer_size_mm
     half = np.array([length, width, height]) / 2
     depth_center = patch.positions_mm - (0.0, 0.0, height / 2)

@@ -21,12 +21,14 @@ rounding, before something is said to hide it."""
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One image and all that explains it. mesh: the scene's container at rest."""
+    """One image and all that explains it. mesh: the scene's container at rest; spreader: its
+    spreader, None where it has none."""
 
     frame: Frame
     scene: Scene
     view: View
     mesh: Mesh
+    spreader: Mesh | None
     config: Config
 
 

@@ -10,6 +10,7 @@
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
+#include "decal_cell.glsl"
 #include "decal.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE

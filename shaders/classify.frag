@@ -2,13 +2,14 @@
 // llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
 #version 430 core
 #include "blocks.glsl"
+#include "octahedral.glsl"
+#include "decal_cell.glsl"
 #if DAMAGED
 #include "damage.glsl"
 #endif
 
 uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
-uniform usampler2D decal_grid;
 uniform sampler2D rest_points;
 
 void main() {
@@ -20,7 +21,7 @@ void main() {
         mixed = mixed || texelFetch(surface_keys, middle + TENT_OFFSET[i], 0).r != key;
 #endif
     vec4 sheet = texelFetch(sheet_points, middle, 0);
-    bool decal = key != 0u && texelFetch(decal_grid, ivec2(sheet.xy / DECAL_CELL_MM), 0).x != 0u;
+    bool decal = key != 0u && cell_at(key_chart(key), sheet.xy).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
     if (decal) ++found;
 #if DAMAGED

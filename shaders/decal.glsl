@@ -1,6 +1,5 @@
 // DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
 
-uniform usampler2D decal_grid;      // up to 8 decal numbers (1-based, 0: none) a cell in 16 bits each, bottom first
 uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decals.py
 uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
 uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
@@ -76,9 +75,9 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(vec3 paint, vec2 sheet_mm, float footprint_mm, float grain) {
+DecalHit decals_at(uint chart, vec3 paint, vec2 sheet_mm, float footprint_mm, float grain) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
-    uvec4 cell = texelFetch(decal_grid, ivec2(sheet_mm / DECAL_CELL_MM), 0);
+    uvec4 cell = cell_at(chart, sheet_mm);
     for (int i = 0; i < 8; ++i) {
         uint pair = cell[i >> 1];
         uint decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;

@@ -1,4 +1,4 @@
-// Vertex stage of the scene's only geometry draw: rest mesh, deformed by its damages, to clip space.
+// Vertex stage of the geometry draws: rest mesh, deformed by its damages, to clip space.
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
@@ -27,6 +27,10 @@ void main() {
 #if DAMAGED
     rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
+    if (in_chart >= SPREADER_CHART) {   // no damage moves or marks it
+        rest_mm = vec3(OUT_OF_REACH_MM);
+        position_mm = in_position_mm;
+    }
 #endif
     gl_Position = world_to_clip * vec4(position_mm * MM, 1.0);
 #if HOLED

@@ -10,6 +10,7 @@
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
+#include "decal_cell.glsl"
 #include "decal.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
@@ -86,6 +87,10 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     float footprint_mm = sheet.z * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
     p.surface = surface_at(key_chart(key), sheet.xy, footprint_mm, scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
+    if (key_chart(key) >= SPREADER_CHART) {
+        p.id = SPREADER_ID;
+        p.damage = 0u;
+    }
     return p;
 }
 

@@ -10,8 +10,12 @@ from fastgen import damage as fields
 from fastgen.camera import View
 from fastgen.mesh import Mesh
 from fastgen.scene import Decal, Scene
+from fastgen.spreader import build_spreader
 
 _MOST_LAYERS = 12
+
+SPREADER = 60000
+"""Id of the spreader's pixels."""
 
 
 @dataclass
@@ -20,6 +24,7 @@ class Hits:
 
     triangle: int, -1 where nothing. hole: number of the perforation that the ray passed through
     first, -1 for none. rest_mm [3]: rest position. atlas_mm [2]. depth_m: inf where nothing.
+    spreader: where the scene's spreader is before all that; triangle and hole are -1 there.
     """
 
     triangle: np.ndarray
@@ -27,6 +32,7 @@ class Hits:
     rest_mm: np.ndarray
     atlas_mm: np.ndarray
     depth_m: np.ndarray
+    spreader: np.ndarray
 
     @property
     def hit(self) -> np.ndarray:
@@ -38,7 +44,8 @@ def cast(
 ) -> Hits:
     """First outside that each pixel centre sees; through a hole of `scene`, the first inside.
 
-    pixels [..., 2]: other places in the image to look through.
+    pixels [..., 2]: other places in the image to look through. mesh: the
+    container's; a scene adds its damages and its spreader.
     """
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
@@ -84,13 +91,33 @@ def cast(
         atlas[at] = _between(atlas_corners, b[ends], c[ends])
         depth[at] = view.to_view(start + distance[ends, None] * ray[ends])[:, 2]
         active = active[~(ends | leaves)]
+    before = np.zeros(count, bool)
+    if scene and scene.spreader.present:
+        nearer = _spreader_depth(scene, view, start, rays)
+        before = nearer < depth
+        depth[before], seen[before], hole[before] = nearer[before], -1, -1
     return Hits(
         seen.reshape(shape),
         hole.reshape(shape),
         where.reshape(*shape, 3),
         atlas.reshape(*shape, 2),
         depth.reshape(shape),
+        before.reshape(shape),
     )
+
+
+def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarray) -> np.ndarray:
+    """Depth in metres of the spreader alone along each of rays [N, 3], inf where it is not."""
+    held = scene.spreader
+    mesh = build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
+    positions = mesh.positions_mm.astype(np.float64)
+    body = RayMeshIntersector(trimesh.Trimesh(positions * 1e-3, mesh.triangles, process=False))
+    triangle = body.intersects_first(np.tile(start * 1e-3, (len(rays), 1)), rays)
+    hit = triangle >= 0
+    distance, *_ = _meet(positions[mesh.triangles[triangle[hit]]], start, rays[hit])
+    depth = np.full(len(rays), np.inf)
+    depth[hit] = view.to_view(start + distance[:, None] * rays[hit])[:, 2]
+    return depth
 
 
 def _meet(corners: np.ndarray, start: np.ndarray, ray: np.ndarray):
@@ -126,6 +153,7 @@ def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
 def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
     """The id target that the rays say is right, uint16 [H, W]."""
     ids = np.where(hits.hit, 1, 0).astype(np.uint16)
+    ids[hits.spreader] = SPREADER
     chart = mesh.chart[mesh.triangles[hits.triangle, 0]]
     outside = hits.hit & (hits.hole < 0)
     following = 2

@@ -9,12 +9,14 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import damage as fields
 from fastgen.camera import View
+from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
 from fastgen.coverage import Canvas, canvases
 from fastgen.facets import clip
 from fastgen.generator import Generator
 from fastgen.labels import decal_of
-from fastgen.scene import Camera
+from fastgen.scene import Camera, Spreader
+from fastgen.spreader import build_spreader
 from tests import oracle
 
 SIZE = (200, 150)
@@ -136,7 +138,8 @@ def test_damages_cover_what_rays_say(generator):
         view = unbounded(sample.view)
         everything = np.arange(len(mesh.triangles))
         ray, rest, _ = all_hits(mesh, everything, view, sample.scene.damages)
-        for item, damage in zip(sample.objects[1:], sample.scene.damages, strict=False):
+        hurt = [item for item in sample.objects if item.class_name in DAMAGE_CLASSES]
+        for item, damage in zip(hurt, sample.scene.damages, strict=True):
             assert item.class_name == damage.kind
             if not item.area:
                 continue
@@ -157,7 +160,8 @@ def test_the_container_covers_its_silhouette(generator):
     cut = 0
     for sample in views(generator):
         mesh = generator._renderer.mesh(sample.scene.container)
-        whole = oracle.cast(mesh, unbounded(sample.view), dataclasses.replace(sample.scene)).hit
+        bare = dataclasses.replace(sample.scene, spreader=Spreader())
+        whole = oracle.cast(mesh, unbounded(sample.view), bare).hit
         container = sample.objects[0]
         box = np.array(oracle.box_of(whole)) - PAD
         if box.min() <= -PAD or (box[2:] >= np.array(SIZE) + PAD).any():
@@ -168,6 +172,25 @@ def test_the_container_covers_its_silhouette(generator):
     assert cut
 
 
+def test_the_spreader_covers_what_rays_say(generator):
+    seen = hidden = 0
+    for sample in views(generator):
+        held = sample.scene.spreader
+        if not held.present:
+            assert all(item.class_name != "spreader" for item in sample.objects)
+            continue
+        mesh = build_spreader(sample.scene.container.kind, held.flippers_down, held.gap_mm)
+        whole = oracle.cast(mesh, unbounded(sample.view)).hit
+        item = next(item for item in sample.objects if item.class_name == "spreader")
+        assert item.area == (sample.ids == item.id).sum()
+        assert item.bbox == oracle.box_of(sample.ids == item.id)
+        if item.area and not (whole[0].any() or whole[:, 0].any() or whole[:, -1].any()):
+            assert near(round(item.area / item.visible_fraction), whole.sum())
+            seen += 1
+            hidden += item.occluded
+    assert seen > 4
+
+
 def test_casting_corners_are_seen_as_rays_see_them(generator):
     flags = set()
     for sample in views(generator):
@@ -176,6 +199,14 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
         moved = fields.deform(sample.scene.damages, mesh.positions_mm)
         body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
         eye = sample.view.position_m
+        held = sample.scene.spreader
+        if held.present:
+            mesh_of = build_spreader(sample.scene.container.kind, held.flippers_down, held.gap_mm)
+            held = RayMeshIntersector(
+                trimesh.Trimesh(mesh_of.positions_mm * 1e-3, mesh_of.triangles, process=False)
+            )
+        else:
+            held = None
         for number, (x, y, flag) in enumerate(sample.objects[0].keypoints):
             corner = [(low, high)[number >> 2 & 1][0], (low, high)[number >> 1 & 1][1]]
             corner = np.array([*corner, (low, high)[number & 1][2]], np.float64)
@@ -191,7 +222,9 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
             ray = point - eye
             reach = np.linalg.norm(ray)
             where, _, _ = body.intersects_location([eye], [ray / reach])
-            free = not len(where) or np.linalg.norm(where - eye, axis=1).min() > reach
+            others, _, _ = held.intersects_location([eye], [ray / reach]) if held else ([],) * 3
+            meets = [np.linalg.norm(at - eye) for at in (*where, *others)]
+            free = min(meets, default=np.inf) > reach
             assert (flag == 2) == free
             flags.add(flag)
     assert flags == {1, 2}

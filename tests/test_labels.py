@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fastgen.classes import MARKER_CLASSES
+from fastgen.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.labels import decal_of, visible_boxes
@@ -12,7 +13,8 @@ from tests import oracle
 
 @pytest.fixture(scope="module")
 def samples():
-    with Generator(seed=11, size=(480, 360)) as generator:
+    config = Config.from_values({"spreader": {"probability": 0}})
+    with Generator(config, seed=11, size=(480, 360)) as generator:
         return [
             generator.render(index=i, camera=c) for i in range(4) for c in ("A", "B", "Cl", "Cr")
         ]

@@ -1,0 +1,121 @@
+"""At the limits: many decals, extreme sizes, borders, nothing in view, look-alikes in a row."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
+from fastgen.container import build_container
+from fastgen.generator import Generator
+from fastgen.programs import SPREADER_ID
+from fastgen.scene import Camera, Container, Decal, Spreader
+from tests import oracle
+
+
+def bare(generator, index=0, kind=None):
+    """A scene with nothing on its container."""
+    scene = generator.scene(index)
+    container = Container(kind or scene.container.kind, scene.container.profiles)
+    return replace(scene, container=container, decals=(), damages=(), spreader=Spreader())
+
+
+def markers(count, columns, step, names, size=120.0):
+    return tuple(
+        Decal(
+            "marker",
+            names[i % len(names)],
+            "front",
+            (300 + step * (i % columns), 300 + step * (i // columns)),
+            (size, size),
+            art=names[i % len(names)],
+        )
+        for i in range(count)
+    )
+
+
+def check(sample):
+    """Ids and boxes against rays and brute force over pixels."""
+    scene = sample.scene
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    truth = oracle.object_ids(scene, mesh, oracle.cast(mesh, sample.view, scene))
+    assert (sample.ids != truth).sum() <= 2 + 2e-5 * truth.size
+    for item in sample.objects:
+        held = (sample.ids > 0) & (sample.ids != SPREADER_ID)
+        mask = held if item.id == 1 else sample.ids == item.id
+        if item.class_name in DAMAGE_CLASSES:
+            mask = sample.damage == item.id
+        assert item.bbox == oracle.box_of(mask)
+        assert item.area == mask.sum()
+
+
+def test_300_markers_each_have_their_label():
+    with Generator(seed=4, size=(1600, 500)) as generator:
+        scene = replace(bare(generator, kind="45HC"), decals=markers(300, 60, 200, MARKER_CLASSES))
+        camera = Camera("all", (0, -9000, 1400), (0, 0, 1300), 20.0)
+        sample = generator.render(scene=scene, camera=camera)
+    labelled = [item for item in sample.objects if item.class_name in MARKER_CLASSES]
+    assert len(labelled) == 300
+    assert len({item.id for item in labelled}) == 300
+    assert all(item.area for item in labelled)
+    check(sample)
+
+
+def test_identical_markers_side_by_side_stay_apart():
+    with Generator(seed=4, size=(640, 300)) as generator:
+        scene = replace(bare(generator), decals=markers(24, 12, 250, ("C3.2",), size=250.0))
+        camera = Camera("row", (-1500, -5000, 900), (-1500, 0, 700), 30.0)
+        sample = generator.render(scene=scene, camera=camera)
+    check(sample)
+    found = [item for item in sample.objects if item.class_name == "C3.2" and item.area]
+    assert [item.instance for item in found] == sorted({item.instance for item in found})
+    assert len(found) > 10
+
+
+@pytest.mark.parametrize("size", [(64, 64), (64, 300), (4096, 64), (97, 4096), (1333, 800)])
+def test_every_size_is_exact(size):
+    with Generator(seed=8, size=size) as generator:
+        sample = generator.render(index=1, camera="Cl")
+    assert sample.image.shape == (size[1], size[0], 3)
+    assert sample.ids.dtype == np.uint16
+    check(sample)
+
+
+def test_the_largest_size_renders():
+    with Generator(seed=8, size=(4096, 4096), antialiasing="none") as generator:
+        sample = generator.render(index=1, camera="Cr")
+    assert sample.image.shape == (4096, 4096, 3)
+    assert (sample.ids > 0).mean() > 0.02
+
+
+def test_nothing_in_view_has_objects_without_boxes():
+    with Generator(seed=8, size=(96, 64)) as generator:
+        camera = Camera("away", (0, -8000, 1000), (0, -20000, 1000), 14.5)
+        sample = generator.render(index=2, camera=camera)
+    assert not sample.ids.any()
+    assert np.isinf(sample.depth).all()
+    for item in sample.objects:
+        assert item.bbox is None
+        assert item.area == 0
+        assert item.visible_fraction == 0
+        assert not item.truncated
+        assert item.ignored
+
+
+def test_a_marker_on_the_border_is_truncated_and_one_within_is_not():
+    with Generator(seed=8, size=(400, 400)) as generator:
+        scene = replace(bare(generator), decals=markers(1, 1, 0, ("C9.1",), size=300.0))
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        (x, y, z), *_ = mesh.sheet_to_surface("front", scene.decals[0].center_mm)[0]
+        shift = 0.0
+        # moved until the marker's left tip lies just within the image, then just beyond it
+        for gap, cut in ((0.3, False), (-1.3, True)):
+            for _ in range(4):
+                camera = Camera("at", (x + shift, y - 4000, z), (x + shift, y, z), 36.0)
+                sample = generator.render(scene=scene, camera=camera)
+                item = sample.objects[1]
+                shift += (item.amodal_bbox[0] - gap) * 4000 / sample.view.focal_px
+            assert item.amodal_bbox[0] == pytest.approx(gap, abs=0.1)
+            assert item.truncated == cut
+            assert item.visible_fraction == pytest.approx(1.0, abs=0.01)
+            assert item.bbox[0] <= 2

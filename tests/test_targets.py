@@ -1,0 +1,31 @@
+"""Regions of the image."""
+
+import numpy as np
+
+from fastgen.targets import bands
+
+
+def painted(regions, size=(40, 30)):
+    """How often each pixel [H, W] is covered."""
+    count = np.zeros(size[::-1], int)
+    for x, y, width, height in regions:
+        count[y : y + height, x : x + width] += 1
+    return count
+
+
+def test_bands_hold_all_regions_and_no_pixel_twice():
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        low = rng.integers(0, [30, 20], (rng.integers(1, 5), 2))
+        regions = [(*map(int, a), *map(int, rng.integers(0, 10, 2))) for a in low]
+        asked, given = painted(regions), painted(bands(regions))
+        assert given.max() <= 1
+        assert (given[asked > 0] == 1).all()
+        # nor a row that no region is in
+        assert (given.any(axis=1) == asked.any(axis=1)).all() or any(r[2] == 0 for r in regions)
+
+
+def test_one_region_stays_whole_and_an_unknown_one_is_the_image():
+    assert bands([(3, 4, 5, 6)]) == [(3, 4, 5, 6)]
+    assert bands([(3, 4, 5, 6), (3, 10, 5, 2)]) == [(3, 4, 5, 8)]
+    assert bands([(3, 4, 5, 6), None]) == [None]
