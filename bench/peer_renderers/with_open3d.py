@@ -58,6 +58,16 @@ def show(scene: rendering.Open3DScene, names: list[tuple[str, str]], painted: bo
     scene.set_background([0, 0, 0, 1] if painted else [0.5, 0.5, 0.5, 1])
 
 
+def as_painted(colors: dict[int, tuple[int, int, int]]) -> dict[int, tuple[int, int, int]]:
+    """What `colors` come back as: without post-processing, half of the linear value."""
+    found = {}
+    for number, color in colors.items():
+        linear = ((np.array(color) / 255 + 0.055) / 1.055) ** 2.4 * (np.array(color) > 0)
+        red, green, blue = (int(v) for v in np.rint(linear * 127.5))
+        found[number] = (red, green, blue)
+    return found
+
+
 def main(folder: Path, out: Path) -> None:
     """Every view."""
     job = read_job(folder)
@@ -85,7 +95,7 @@ def main(folder: Path, out: Path) -> None:
                 with recorder.lap("labels"):
                     show(scene, names, painted=True)
                     painted = np.asarray(renderer.render_to_image())
-            recorder.keep(scene_job, shot, image, nearest_id(painted, colors))
+            recorder.keep(scene_job, shot, image, nearest_id(painted, as_painted(colors)))
     recorder.save()
 
 

@@ -33,16 +33,18 @@ def open_scene(
         mesh.active_texture_coordinates = np.asarray(part.visual.uv, np.float32)
         material = part.visual.material
         texture = pv.Texture(np.asarray(material.baseColorTexture.convert("RGB")))
-        shaded.add_mesh(
-            mesh, texture=texture, pbr=True, metallic=0.0, roughness=material.roughnessFactor
-        )
+        texture.SetUseSRGBColorSpace(True)
+        actor = shaded.add_mesh(mesh, pbr=True, metallic=0.0, roughness=material.roughnessFactor)
+        actor.prop.SetBaseColorTexture(texture)
         painted.add_mesh(mesh, color=colors[object_id(name)], lighting=False)
-    sky = pv.read_texture(str(scene.hdri))
+    radiance = pv.read(scene.hdri)
+    # VTK has no exposure outside its tone mapping
+    radiance.active_scalars[:] = radiance.active_scalars * scene.shots[0].exposure
+    sky = pv.Texture(radiance)
     sky.SetColorModeToDirectScalars()
     sky.MipmapOn()
     sky.InterpolateOn()
-    shaded.renderer.SetBackgroundTexture(sky)
-    shaded.set_environment_texture(sky, is_srgb=False)
+    shaded.set_environment_texture(sky)
     return shaded, painted, colors
 
 
