@@ -8,7 +8,7 @@ virtual environment of its own (they pin packages that exclude one another), fas
 the same run. What they are given is simpler than what fastgen draws, see peer_jobs.py, and their
 labels are bare id pictures where fastgen's are finished boxes, masks and polygons. That they drew
 the same is checked by overlap with fastgen's ids. Opening a scene is left out of the sum.
-Leaves bench/results/peers.json and docs/peers.png. A peer that cannot run is listed with its reason.
+A peer that cannot run is listed with its reason. Leaves bench/results/peers.json, docs/peers.png.
 """
 
 import argparse
@@ -24,18 +24,18 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from peer_jobs import with_effort, write_jobs
-from results import machine, parse_size, save
+from results import ROOT, machine, parse_size, save
 
 from fastgen import Config, Generator
 
-ENVIRONMENTS = HERE / ".peers"
+ENVIRONMENTS = ROOT / "bench" / ".peers"
+SCRIPTS = ROOT / "bench" / "peer_renderers"
 TIMEOUT_S = 3600
 
 
@@ -126,13 +126,18 @@ def run(peer: Peer, job: Path, out: Path) -> dict[str, Any]:
     """Run a peer's script on a job: its result.json, or {'failed': reason}."""
     if not peer.interpreter.exists():
         return {"failed": "not installed: python bench/peers.py --install"}
-    command = [str(peer.interpreter), str(HERE / "peer_renderers" / peer.script), str(job), str(out)]
+    command = [
+        str(peer.interpreter),
+        str(SCRIPTS / peer.script),
+        str(job),
+        str(out),
+    ]
     variables = {**os.environ, **dict(peer.settings)}
     if peer.environment:
         variables.pop("LP_NUM_THREADS", None)  # peers use all cores, as they do by default
         variables.pop("PYTHONPATH", None)
     else:
-        variables["PYTHONPATH"] = str(HERE.parent)
+        variables["PYTHONPATH"] = str(ROOT)
     try:
         done = subprocess.run(
             [*command, *peer.arguments],
@@ -213,13 +218,13 @@ def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
         places = np.arange(len(rows)) + shift
         values = [row[key] for row in rows.values()]
         bars = axes.barh(places, values, height=0.38, label=label)
-        axes.bar_label(bars, fmt=lambda v: f"{v:.3g} ms", padding=3, fontsize=8)
+        axes.bar_label(bars, fmt=lambda v: f"{v:,.0f} ms", padding=3, fontsize=8)
     axes.set_yticks(np.arange(len(rows)), list(rows))
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set_xlim(right=axes.get_xlim()[1] * 3)
+    axes.set_xlim(1, axes.get_xlim()[1] * 2)
     axes.set_xlabel(f"ms a labelled image (median)\n{caption}")
-    axes.legend(loc="lower right")
+    axes.legend(loc="upper right")
     figure.tight_layout()
     chart.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(chart, dpi=110)
@@ -235,7 +240,7 @@ def main() -> None:
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--repeats", type=int, default=5, help="of each view; Cycles draws once")
     parser.add_argument("--samples", type=int, help="for Cycles, in place of 16 and 128")
-    parser.add_argument("--chart", type=Path, default=HERE.parent / "docs" / "peers.png")
+    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "peers.png")
     options = parser.parse_args()
     peers = [peer for peer in PEERS if options.only.lower() in peer.name.lower()]
     if options.install:

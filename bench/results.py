@@ -1,12 +1,12 @@
 """Where the figures of a bench go, and what machine they come from."""
 
-import argparse
 import json
 import os
 from pathlib import Path
 from typing import Any
 
-RESULTS = Path(__file__).resolve().parent / "results"
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "bench" / "results"
 
 
 def machine() -> str:
@@ -20,11 +20,11 @@ def machine() -> str:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) of text such as 640x480, for argparse."""
+    """(width, height) of text such as 640x480; ends the program with a message for other text."""
     try:
         width, height = (int(part) for part in text.split("x"))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; write WIDTHxHEIGHT") from None
+        raise SystemExit(f"{text!r} is no size; write WIDTHxHEIGHT") from None
     return width, height
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from measure import Job, Recorder, SceneJob, Shot, object_id, read_job
 from mathutils import Matrix
+from measure import Job, Recorder, SceneJob, Shot, object_id, read_job
 
 ID_STEP = 4
 """Ids are painted this many of 255 levels apart."""
@@ -97,7 +97,7 @@ def paint(flat: bpy.types.Material) -> None:
 
 
 def draw(folder: Path) -> np.ndarray:
-    """Render and read back, uint8 [H, W, 3], row 0 at the top. bpy hands out pixels by file only."""
+    """Render and read back, uint8 [H, W, 3], row 0 at the top, by a file as bpy gives no pixels."""
     bpy.context.scene.render.filepath = str(folder / "frame.png")
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(bpy.context.scene.render.filepath)
@@ -110,9 +110,7 @@ def draw(folder: Path) -> np.ndarray:
     return np.rint(pixels.reshape(shape)[::-1, :, :3] * 255).astype(np.uint8)
 
 
-def masks(
-    shot: Shot, objects: dict[int, bpy.types.Object], folder: Path
-) -> np.ndarray:
+def masks(shot: Shot, objects: dict[int, bpy.types.Object], folder: Path) -> np.ndarray:
     """Ids [H, W] of the markers, from a binary render of each one that is seen."""
     ids = np.zeros(0)
     for number in shot.markers:
