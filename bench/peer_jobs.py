@@ -114,7 +114,7 @@ def _write_hdr(scene: Scene, path: Path) -> None:
 def _write_glb(scene: Scene, markers: dict[int, Decal], path: Path) -> None:
     mesh = build_container(scene.container.kind, scene.container.profiles)
     export_glb(scene, path)
-    (container,) = trimesh.load(path, process=False).geometry.values()
+    (container,) = trimesh.load_scene(path, process=False).geometry.values()
     material = container.visual.material
     if material.baseColorTexture is None:
         material.baseColorTexture = _tinted(scene)

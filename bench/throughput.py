@@ -50,8 +50,8 @@ def stages(backend: str, size: tuple[int, int], scenes: int) -> tuple[str, dict[
     ):
         writer = SeafrontWriter(Path(folder), config.labels, "bench")
         for index in range(scenes):
-            for camera in config.cameras:  # make meshes, lights and programs
-                generator.render(index=index, camera=camera)
+            for name in config.cameras:  # make meshes, lights and programs
+                generator.render(index=index, camera=name)
         driver = generator.renderer_name
         renderer = generator._open()
         finish = renderer._ctx.finish
