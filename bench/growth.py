@@ -131,27 +131,34 @@ def workers(images: int) -> Table:
     return {"workers": [float(c) for c in counts], "images_per_s": rates}
 
 
-def length(images: int) -> Table:
+def length(images: int, size: str) -> Table:
     """Rate and resident memory of one `fastgen generate`, each time 100 more images are there.
 
-    resident_mb sums the command and its workers; pages that they share count once for each.
+    resident_mb sums the command and its workers; pages that they share count once for each. The
+    last row is the last at which all of them were at work.
     """
     table: Table = {"images": [], "seconds": [], "resident_mb": []}
     cores = len(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as place:
         out = Path(place) / "out"
-        command = generate_command(str(out), images, cores, "640x640", "auto")
+        command = generate_command(str(out), images, cores, size, "auto")
         began = time.perf_counter()
         process = subprocess.Popen(
             command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
+        at_work = 0
         while process.poll() is None:
             done = _images_in(out)
             if done >= LENGTH_STEP * (len(table["images"]) + 1):
+                sizes = _resident_mb(process.pid)
+                if len(sizes) < at_work:  # a worker has found nothing left to do
+                    break
+                at_work = len(sizes)
                 table["images"].append(done)
                 table["seconds"].append(time.perf_counter() - began)
-                table["resident_mb"].append(_resident_mb(process.pid))
+                table["resident_mb"].append(sum(sizes))
             time.sleep(_POLL_S)
+        process.wait()
     if process.returncode:
         raise SystemExit(f"fastgen generate ended with exit code {process.returncode}")
     return table
@@ -161,8 +168,8 @@ def _images_in(out: Path) -> int:
     return sum(len(os.listdir(split)) for split in out.glob("images/*"))
 
 
-def _resident_mb(pid: int) -> float:
-    """Resident memory of a process and all below it, in MB."""
+def _resident_mb(pid: int) -> list[float]:
+    """Resident memory of a process and of each one below it, in MB."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
         children = [
@@ -171,9 +178,11 @@ def _resident_mb(pid: int) -> float:
             for child in (task / "children").read_text(encoding="ascii").split()
         ]
     except (OSError, IndexError):  # it has ended
-        return 0.0
-    own = pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-    return own + sum(_resident_mb(child) for child in children)
+        return []
+    sizes = [pages * os.sysconf("SC_PAGE_SIZE") / 1e6]
+    for child in children:
+        sizes += _resident_mb(child)
+    return sizes
 
 
 def show(name: str, table: Table) -> None:
@@ -194,7 +203,7 @@ def drift(table: Table) -> str:
     words = (
         f"rate: first tenth {rates[:tenth].mean():.2f}/s, last tenth {rates[-tenth:].mean():.2f}/s"
     )
-    # every HDRI and mesh has come by once, and stays
+    # up to some 1000 images HDRIs and meshes come by for the first time, and stay
     for start in (100, 1000, 5000):
         if start < counts[-1]:
             at = int(np.searchsorted(counts, start))
@@ -268,6 +277,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers,length")
     parser.add_argument("--images", type=int, default=400, help="of the long run")
+    parser.add_argument("--size", default="640x640", help="of the long run's images")
     parser.add_argument("--run-images", type=int, default=200, help="of each run of `workers`")
     parser.add_argument("--rounds", type=int, default=5, help="of each view")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "growth.png")
@@ -278,7 +288,7 @@ def main() -> None:
         "damages": lambda: damages(options.rounds),
         "hdri": lambda: hdri(options.rounds),
         "workers": lambda: workers(options.run_images),
-        "length": lambda: length(options.images),
+        "length": lambda: length(options.images, options.size),
     }
     wanted = options.parts.split(",")
     for name in wanted:
@@ -292,6 +302,8 @@ def main() -> None:
     for name in wanted:
         table = measures[name]()
         parts[name] = {"machine": machine(), "table": table}
+        if name == "length":
+            parts[name]["size"] = options.size
         show(name, table)
         save("growth", parts)
     draw(parts, options.chart)

@@ -222,7 +222,7 @@ def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
     axes.set_yticks(np.arange(len(rows)), list(rows))
     axes.invert_yaxis()
     axes.set_xscale("log")
-    axes.set_xlim(1, axes.get_xlim()[1] * 2)
+    axes.set_xlim(1, axes.get_xlim()[1] * 5)
     axes.set_xlabel(f"ms a labelled image (median)\n{caption}")
     axes.legend(loc="upper right")
     figure.tight_layout()
