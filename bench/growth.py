@@ -135,28 +135,23 @@ def length(images: int, size: str) -> Table:
     """Rate and resident memory of one `fastgen generate`, each time 100 more images are there.
 
     resident_mb sums the command and its workers; pages that they share count once for each. The
-    last row is the last at which all of them were at work.
+    command is given LENGTH_STEP images more, so that its workers are still at work at the last row.
     """
     table: Table = {"images": [], "seconds": [], "resident_mb": []}
     cores = len(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as place:
         out = Path(place) / "out"
-        command = generate_command(str(out), images, cores, size, "auto")
+        command = generate_command(str(out), images + LENGTH_STEP, cores, size, "auto")
         began = time.perf_counter()
         process = subprocess.Popen(
             command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        at_work = 0
-        while process.poll() is None:
+        while process.poll() is None and len(table["images"]) < images // LENGTH_STEP:
             done = _images_in(out)
             if done >= LENGTH_STEP * (len(table["images"]) + 1):
-                sizes = _resident_mb(process.pid)
-                if len(sizes) < at_work:  # a worker has found nothing left to do
-                    break
-                at_work = len(sizes)
                 table["images"].append(done)
                 table["seconds"].append(time.perf_counter() - began)
-                table["resident_mb"].append(sum(sizes))
+                table["resident_mb"].append(_resident_mb(process.pid))
             time.sleep(_POLL_S)
         process.wait()
     if process.returncode:
@@ -168,8 +163,8 @@ def _images_in(out: Path) -> int:
     return sum(len(os.listdir(split)) for split in out.glob("images/*"))
 
 
-def _resident_mb(pid: int) -> list[float]:
-    """Resident memory of a process and of each one below it, in MB."""
+def _resident_mb(pid: int) -> float:
+    """Resident memory of a process and all below it, in MB."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
         children = [
@@ -177,12 +172,9 @@ def _resident_mb(pid: int) -> list[float]:
             for task in Path(f"/proc/{pid}/task").iterdir()
             for child in (task / "children").read_text(encoding="ascii").split()
         ]
-    except (OSError, IndexError):  # it has ended
-        return []
-    sizes = [pages * os.sysconf("SC_PAGE_SIZE") / 1e6]
-    for child in children:
-        sizes += _resident_mb(child)
-    return sizes
+    except OSError:  # it has ended
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6 + sum(map(_resident_mb, children))
 
 
 def show(name: str, table: Table) -> None:
@@ -228,6 +220,8 @@ def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
     for axes, (name, paint) in zip(panels.flat, painters.items(), strict=True):
         if name in parts:
             paint(axes, parts[name]["table"])
+            if "size" in parts[name]:
+                axes.set_xlabel(f"images of {parts[name]['size']} made")
         else:
             axes.set_title(f"{name}: not measured")
     machines = "; ".join(sorted({part["machine"] for part in parts.values()}))
