@@ -1,0 +1,307 @@
+"""How does the cost of an image grow with its pixels, markers, damages, light, workers and number?
+
+    python bench/growth.py [--images 400] [--parts pixels,markers,damages,hdri,workers,length]
+    python bench/growth.py --parts length --images 20000     # a long run: rate and memory
+
+Times are medians of `Generator.render`, labels included, in one process. Parts that were measured
+before are kept: bench/results/growth.json gathers them, and docs/growth.png shows them all.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import cv2
+import matplotlib.pyplot as plt
+import numpy as np
+from markers import with_markers
+from matplotlib.axes import Axes
+from results import RESULTS, ROOT, machine, parse_size, save
+from throughput import generate_command, whole_run
+
+from fastgen import Config, Generator
+from fastgen.environment import bundled_hdris, load_environment, load_radiance
+from fastgen.scene import Scene
+
+SIZES = ("320x320", "640x640", "1024x768", "1333x800", "1920x1080", "2560x1440")
+MARKERS = (1, 4, 16, 32, 64)
+DAMAGES = (0, 1, 2, 4, 8, 16, 32)
+HDRI_WIDTHS = (512, 1024, 2048, 4096, 8192)
+SCENES = 3
+LENGTH_STEP = 100
+_POLL_S = 0.5
+
+Table = dict[str, list[float]]
+"""Columns of equal length by name."""
+
+
+def frame_ms(generator: Generator, views: Sequence[tuple[Scene, str]], rounds: int) -> float:
+    """Median milliseconds of a labelled image over `views`, each drawn once before."""
+    for scene, camera in views:
+        generator.render(scene=scene, camera=camera)
+    taken = []
+    for _ in range(rounds):
+        for scene, camera in views:
+            began = time.perf_counter()
+            generator.render(scene=scene, camera=camera)
+            taken.append(time.perf_counter() - began)
+    return statistics.median(taken) * 1e3
+
+
+def pixels(rounds: int) -> Table:
+    """Against the size of the image."""
+    table: Table = {"pixels": [], "ms": []}
+    for text in SIZES:
+        width, height = parse_size(text)
+        with Generator(Config.preset(), seed=1, size=(width, height)) as generator:
+            scenes = [generator.scene(i) for i in range(SCENES)]
+            views = [(scene, camera.name) for scene in scenes for camera in scene.cameras]
+            table["ms"].append(frame_ms(generator, views, rounds))
+        table["pixels"].append(width * height)
+    return table
+
+
+def markers(rounds: int) -> Table:
+    """Against markers on the door, at 640x640."""
+    table: Table = {"markers": [], "ms": []}
+    with Generator(Config.preset(), seed=1) as generator:
+        scenes = [generator.scene(i) for i in range(SCENES)]
+        for count in MARKERS:
+            views = [(with_markers(scene, count), "Cr") for scene in scenes]
+            table["markers"].append(count)
+            table["ms"].append(frame_ms(generator, views, 3 * rounds))
+    return table
+
+
+def damages(rounds: int) -> Table:
+    """Against damages of a container, of all kinds, at 640x640; all else of a scene is the same."""
+    table: Table = {"damages": [], "ms": []}
+    for count in DAMAGES:
+        values = {"probability": float(count > 0), "count": [max(count, 1)] * 2}
+        with Generator(Config.from_values({"damage": values}), seed=1) as generator:
+            scenes = [generator.scene(i) for i in range(SCENES)]
+            views = [(scene, camera.name) for scene in scenes for camera in scene.cameras]
+            table["ms"].append(frame_ms(generator, views, rounds))
+        table["damages"].append(count)
+    return table
+
+
+def hdri(rounds: int) -> Table:
+    """Against the width of the HDRI: an image, preparing the light once, and reading it again."""
+    table: Table = {"width": [], "ms": [], "prepare_s": [], "reopen_ms": []}
+    radiance = load_radiance(bundled_hdris()["venice"])
+    for width in HDRI_WIDTHS:
+        with tempfile.TemporaryDirectory() as place:
+            os.environ["XDG_CACHE_HOME"] = f"{place}/cache"  # neither use nor fill the user's own
+            path = Path(place) / "light" / "light.hdr"
+            path.parent.mkdir()
+            larger = cv2.resize(radiance, (width, width // 2), interpolation=cv2.INTER_LINEAR)
+            cv2.imwrite(str(path), np.ascontiguousarray(larger[..., ::-1]))
+            began = time.perf_counter()
+            load_environment(path)
+            prepared = time.perf_counter()
+            load_environment(path)
+            opened = time.perf_counter()
+            with Generator(Config.preset(), seed=1, hdri_dir=path.parent) as generator:
+                scenes = [generator.scene(i) for i in range(SCENES)]
+                views = [(scene, camera.name) for scene in scenes for camera in scene.cameras]
+                table["ms"].append(frame_ms(generator, views, rounds))
+        table["width"].append(width)
+        table["prepare_s"].append(prepared - began)
+        table["reopen_ms"].append((opened - prepared) * 1e3)
+    return table
+
+
+def workers(images: int) -> Table:
+    """Images a second of `fastgen generate` against worker processes, up to twice the cores."""
+    cores = len(os.sched_getaffinity(0))
+    counts = sorted({1, 2, cores, 2 * cores})
+    rates = [whole_run("auto", "640x640", images, count) for count in counts]
+    return {"workers": [float(c) for c in counts], "images_per_s": rates}
+
+
+def length(images: int, size: str) -> Table:
+    """Rate and resident memory of one `fastgen generate`, each time 100 more images are there.
+
+    resident_mb sums the command and its workers; pages that they share count once for each. The
+    command is given LENGTH_STEP images more, so that its workers are still at work at the last row.
+    """
+    table: Table = {"images": [], "seconds": [], "resident_mb": []}
+    cores = len(os.sched_getaffinity(0))
+    with tempfile.TemporaryDirectory() as place:
+        out = Path(place) / "out"
+        command = generate_command(str(out), images + LENGTH_STEP, cores, size, "auto")
+        began = time.perf_counter()
+        process = subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        while process.poll() is None and len(table["images"]) < images // LENGTH_STEP:
+            done = _images_in(out)
+            if done >= LENGTH_STEP * (len(table["images"]) + 1):
+                table["images"].append(done)
+                table["seconds"].append(time.perf_counter() - began)
+                table["resident_mb"].append(_resident_mb(process.pid))
+            time.sleep(_POLL_S)
+        process.wait()
+    if process.returncode:
+        raise SystemExit(f"fastgen generate ended with exit code {process.returncode}")
+    return table
+
+
+def _images_in(out: Path) -> int:
+    return sum(len(os.listdir(split)) for split in out.glob("images/*"))
+
+
+def _resident_mb(pid: int) -> float:
+    """Resident memory of a process and all below it, in MB."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+        children = [
+            int(child)
+            for task in Path(f"/proc/{pid}/task").iterdir()
+            for child in (task / "children").read_text(encoding="ascii").split()
+        ]
+    except OSError:  # it has ended
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6 + sum(map(_resident_mb, children))
+
+
+def show(name: str, table: Table) -> None:
+    """Print a part's table, a long run's in at most twenty rows, and what it comes to."""
+    rows = list(zip(*table.values(), strict=True))
+    print(f"\n{name}\n" + "".join(f"{column:>14}" for column in table))
+    for row in rows[:: max(len(rows) // 20, 1)]:
+        print("".join(f"{value:14.1f}" for value in row))
+    if name == "length" and len(rows) > 1:
+        print(drift(table))
+
+
+def drift(table: Table) -> str:
+    """How rate and memory changed over a long run, in words."""
+    counts, seconds, memory = (np.array(table[k]) for k in ("images", "seconds", "resident_mb"))
+    rates = np.diff(counts) / np.diff(seconds)
+    tenth = max(len(rates) // 10, 1)
+    words = (
+        f"rate: first tenth {rates[:tenth].mean():.2f}/s, last tenth {rates[-tenth:].mean():.2f}/s"
+    )
+    # up to some 1000 images HDRIs and meshes come by for the first time, and stay
+    for start in (100, 1000, 5000):
+        if start < counts[-1]:
+            at = int(np.searchsorted(counts, start))
+            change = memory[-1] / memory[at] - 1
+            words += (
+                f"\nresident memory from image {counts[at]:.0f} to {counts[-1]:.0f}: {change:+.2%}"
+            )
+    return words
+
+
+def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
+    """A panel for each part that was measured."""
+    figure, panels = plt.subplots(2, 3, figsize=(12, 7))
+    painters: dict[str, Callable[[Axes, Table], None]] = {
+        "pixels": _draw_pixels,
+        "markers": lambda axes, t: _draw_ms(axes, t["markers"], t["ms"], "markers on the door"),
+        "damages": lambda axes, t: _draw_ms(axes, t["damages"], t["ms"], "damages"),
+        "hdri": _draw_hdri,
+        "workers": _draw_workers,
+        "length": _draw_length,
+    }
+    for axes, (name, paint) in zip(panels.flat, painters.items(), strict=True):
+        if name in parts:
+            paint(axes, parts[name]["table"])
+            if "size" in parts[name]:
+                axes.set_xlabel(f"images of {parts[name]['size']} made")
+        else:
+            axes.set_title(f"{name}: not measured")
+    machines = "; ".join(sorted({part["machine"] for part in parts.values()}))
+    figure.text(0.5, 0.005, f"{machines}; 640x640 unless said", ha="center", fontsize=8)
+    figure.tight_layout(rect=(0, 0.02, 1, 1))
+    chart.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(chart, dpi=110)
+
+
+def _draw_ms(axes: Axes, x: list[float], ms: list[float], label: str) -> None:
+    axes.plot(x, ms, "o-")
+    axes.set(xlabel=label, ylabel="ms a labelled image", ylim=(0, None), xlim=(0, None))
+
+
+def _draw_pixels(axes: Axes, table: Table) -> None:
+    _draw_ms(axes, [p / 1e6 for p in table["pixels"]], table["ms"], "million pixels")
+
+
+def _draw_hdri(axes: Axes, table: Table) -> None:
+    axes.plot(table["width"], table["ms"], "o-", label="an image, ms")
+    axes.plot(table["width"], table["reopen_ms"], "^-", label="opening it again, ms")
+    axes.plot(table["width"], [1e3 * s for s in table["prepare_s"]], "s-", label="first use, ms")
+    axes.set(xlabel="width of the HDRI in texels", ylabel="ms", xscale="log", yscale="log")
+    axes.set_xticks(table["width"], [f"{w:.0f}" for w in table["width"]])
+    axes.minorticks_off()
+    axes.legend(fontsize=8)
+
+
+def _draw_workers(axes: Axes, table: Table) -> None:
+    axes.plot(table["workers"], table["images_per_s"], "o-")
+    axes.set(xlabel="workers", ylabel="images a second, start-up included")
+    axes.set(ylim=(0, None), xlim=(0, None))
+
+
+def _draw_length(axes: Axes, table: Table) -> None:
+    counts, seconds = np.array(table["images"]), np.array(table["seconds"])
+    axes.plot(counts[1:], np.diff(counts) / np.diff(seconds), ".", ms=3)
+    axes.set(xlabel="images made", ylabel="images a second", ylim=(0, None), xlim=(0, None))
+    memory = axes.twinx()
+    memory.plot(counts, table["resident_mb"], "C1")
+    memory.set_ylim(0, None)
+    memory.set_ylabel("resident MB, all processes", color="C1")
+
+
+def main() -> None:
+    """Measure the parts asked for, print them and draw the chart."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers,length")
+    parser.add_argument("--images", type=int, default=400, help="of the long run")
+    parser.add_argument("--size", default="640x640", help="of the long run's images")
+    parser.add_argument("--run-images", type=int, default=200, help="of each run of `workers`")
+    parser.add_argument("--rounds", type=int, default=5, help="of each view")
+    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "growth.png")
+    options = parser.parse_args()
+    measures: dict[str, Callable[[], Table]] = {
+        "pixels": lambda: pixels(options.rounds),
+        "markers": lambda: markers(options.rounds),
+        "damages": lambda: damages(options.rounds),
+        "hdri": lambda: hdri(options.rounds),
+        "workers": lambda: workers(options.run_images),
+        "length": lambda: length(options.images, options.size),
+    }
+    wanted = options.parts.split(",")
+    for name in wanted:
+        if name not in measures:
+            parser.error(f"--parts: {name!r} is unknown; there are {', '.join(measures)}")
+    stored = RESULTS / "growth.json"
+    parts: dict[str, dict[str, Any]] = (
+        json.loads(stored.read_text(encoding="utf-8")) if stored.exists() else {}
+    )
+    print(machine())
+    for name in wanted:
+        table = measures[name]()
+        parts[name] = {"machine": machine(), "table": table}
+        if name == "length":
+            parts[name]["size"] = options.size
+        show(name, table)
+        save("growth", parts)
+    draw(parts, options.chart)
+
+
+if __name__ == "__main__":
+    main()

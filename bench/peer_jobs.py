@@ -1,0 +1,158 @@
+"""Scenes of fastgen as job folders that any renderer can be given: GLB, HDR light, cameras.
+
+The container is what `fastgen export` writes. Where that has no texture yet, a tinted one of
+TEXTURE_SIDE texels stands in, so that peers sample a texture as large as a baked one would be.
+Every marker is a mesh of its own that follows the corrugation 3 mm before the sheet, with its
+artwork as texture, because peers can only tell apart what is an object. Texts, rust, dirt and
+scratches are left out: what peers draw is simpler than what fastgen draws.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from fastgen import Generator
+from fastgen.camera import MM, View, view_of
+from fastgen.container import build_container
+from fastgen.damage import deform
+from fastgen.decal_tables import object_ids
+from fastgen.environment import bundled_hdris, load_environment, load_radiance
+from fastgen.export import export_glb
+from fastgen.exposure import metered_exposure
+from fastgen.mesh import Mesh
+from fastgen.resources import asset_path
+from fastgen.scene import Decal, Scene
+
+TEXTURE_SIDE = 2048
+_LIFT_MM = 3.0
+_CELLS = 24
+_Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
+
+
+def write_jobs(
+    generator: Generator, indices: list[int], cameras: list[str], repeats: int, folder: Path
+) -> list[tuple[int, str, NDArray[np.uint16]]]:
+    """Write one job folder; returns scene, camera and fastgen's own ids [H, W] of each view."""
+    folder.mkdir(parents=True, exist_ok=True)
+    scenes, truths = [], []
+    for index in indices:
+        scene = generator.scene(index)
+        markers = _markers(scene)
+        _write_glb(scene, markers, folder / f"{index:06d}.glb")
+        _write_hdr(scene, folder / f"{index:06d}.hdr")
+        shots = []
+        for name in cameras:
+            sample = generator.render(scene=scene, camera=name)
+            visible = set(np.unique(sample.ids).tolist())
+            shots.append(_shot(scene, name, sample.view, sorted(visible & markers.keys())))
+            keep = [0, 1, *markers]
+            # texts are part of the container here, as they are no objects of the peers
+            ids = np.where(np.isin(sample.ids, keep), sample.ids, 1).astype(np.uint16)
+            truths.append((index, name, ids))
+        scenes.append(
+            {
+                "index": index,
+                "glb": f"{index:06d}.glb",
+                "hdri": f"{index:06d}.hdr",
+                "yaw_deg": scene.environment.yaw_deg,
+                "shots": shots,
+            }
+        )
+    plain = {"seed": generator.seed, "size": generator.size, "repeats": repeats}
+    job = {**plain, "samples": 0, "scenes": scenes}
+    (folder / "job.json").write_text(json.dumps(job, indent=1), encoding="utf-8")
+    return truths
+
+
+def with_effort(folder: Path, samples: int, repeats: int) -> None:
+    """Set how many samples a pixel, and how often each view is drawn, in a job folder."""
+    path = folder / "job.json"
+    job = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps({**job, "samples": samples, "repeats": repeats}), encoding="utf-8")
+
+
+def _markers(scene: Scene) -> dict[int, Decal]:
+    """The scene's markers by id."""
+    numbered = zip(object_ids(scene), scene.decals, strict=True)
+    return {number: decal for number, decal in numbered if decal.kind == "marker"}
+
+
+def _shot(scene: Scene, name: str, view: View, markers: list[int]) -> dict[str, Any]:
+    camera = scene.camera(name)
+    pose = np.eye(4)
+    right, down, forward = view.rotation
+    pose[:3, :3] = np.stack([right, -down, -forward], axis=1)
+    pose[:3, 3] = view.position_m
+    light = load_environment(bundled_hdris()[scene.environment.name])
+    exposure = metered_exposure(
+        light,
+        scene.environment.yaw_deg,
+        view_of(camera, view.size),
+        camera,
+        scene.surface.paint.albedo,
+    )
+    return {
+        "camera": name,
+        "pose": pose.tolist(),
+        "focal_px": view.focal_px,
+        "exposure": exposure,
+        "markers": markers,
+    }
+
+
+def _write_hdr(scene: Scene, path: Path) -> None:
+    radiance = load_radiance(bundled_hdris()[scene.environment.name])
+    cv2.imwrite(str(path), np.ascontiguousarray(radiance[..., ::-1]))
+
+
+def _write_glb(scene: Scene, markers: dict[int, Decal], path: Path) -> None:
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    export_glb(scene, path)
+    (container,) = trimesh.load_scene(path, process=False).geometry.values()
+    material = container.visual.material
+    if material.baseColorTexture is None:
+        material.baseColorTexture = _tinted(scene)
+        material.baseColorFactor = [1.0, 1.0, 1.0, 1.0]
+    whole = trimesh.Scene()
+    whole.add_geometry(container, node_name="container", geom_name="container")
+    for number, decal in markers.items():
+        name = f"marker_{number}"
+        whole.add_geometry(_marker_mesh(scene, mesh, decal), node_name=name, geom_name=name)
+    path.write_bytes(whole.export(file_type="glb"))
+
+
+def _tinted(scene: Scene) -> Image.Image:
+    """The paint with smooth variations, sRGB, TEXTURE_SIDE texels a side."""
+    rng = np.random.default_rng(scene.index)
+    coarse = rng.uniform(0.8, 1.0, (64, 64, 1)).astype(np.float32)
+    tint = cv2.resize(coarse, (TEXTURE_SIDE, TEXTURE_SIDE), interpolation=cv2.INTER_CUBIC)
+    linear = np.clip(tint[..., None] * np.array(scene.surface.paint.albedo), 0, 1)
+    encoded = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return Image.fromarray(np.rint(encoded * 255).astype(np.uint8))
+
+
+def _marker_mesh(scene: Scene, mesh: Mesh, decal: Decal) -> trimesh.Trimesh:
+    """The decal's diamond as a grid of triangles on the sheet, lifted off it, metres, y up."""
+    steps = np.linspace(-0.5, 0.5, _CELLS + 1)
+    s, t = (a.ravel() for a in np.meshgrid(steps, steps))
+    local = np.stack([s - t, s + t], axis=-1) / 2  # a diamond in [-1/2, 1/2] squared
+    angle = np.deg2rad(decal.rotation_deg)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    sheet = local * decal.size_mm @ turn.T + decal.center_mm
+    positions, normals = mesh.sheet_to_surface(decal.face, sheet)
+    lifted = (deform(scene.damages, positions) + _LIFT_MM * normals) * MM @ _Y_UP.T
+    corner = np.arange(_CELLS)[:, None] * (_CELLS + 1) + np.arange(_CELLS)
+    a, b, c, d = (corner.ravel() + o for o in (0, 1, _CELLS + 2, _CELLS + 1))
+    triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+    artwork = Image.open(asset_path("markers", f"{decal.art}.png")).convert("RGB")
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=artwork.resize((256, 256)), metallicFactor=0.0, roughnessFactor=0.5
+    )
+    visual = trimesh.visual.TextureVisuals(uv=local + 0.5, material=material)
+    return trimesh.Trimesh(lifted, triangles, process=False, visual=visual)

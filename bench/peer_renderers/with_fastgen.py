@@ -1,0 +1,37 @@
+"""fastgen itself, measured as its peers are: python with_fastgen.py JOB OUT."""
+
+import os
+import sys
+from pathlib import Path
+
+# one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
+os.environ.setdefault("LP_NUM_THREADS", "0")
+
+from measure import Recorder, read_job
+
+import fastgen
+from fastgen import Config, Generator
+
+
+def main(folder: Path, out: Path) -> None:
+    """Every view, image and all labels from one draw."""
+    job = read_job(folder)
+    with Generator(Config.preset(), seed=job.seed, size=job.size) as generator:
+        recorder = Recorder(out, f"{fastgen.__version__}, {generator.renderer_name}")
+        for scene in job.scenes:
+            with recorder.lap("set-up"):
+                plain = generator.scene(scene.index)
+                generator.render(scene=plain, camera=scene.shots[0].camera)
+            for shot in scene.shots:
+                generator.render(scene=plain, camera=shot.camera)
+                for _ in range(job.repeats):
+                    with recorder.lap("colour"):
+                        sample = generator.render(scene=plain, camera=shot.camera)
+                    with recorder.lap("labels"):
+                        pass  # came with the image
+                recorder.keep(scene, shot, sample.image, sample.ids)
+        recorder.save()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

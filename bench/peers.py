@@ -1,0 +1,274 @@
+"""What does a labelled image cost with the tools that a user would otherwise take?
+
+    python bench/peers.py --install                      # once: an environment for each peer
+    python bench/peers.py [--scenes 2] [--cameras A,B,Cl,Cr] [--size 640x640]
+
+Every peer draws the same scenes from the same cameras at the same size, each in a process and a
+virtual environment of its own (they pin packages that exclude one another), fastgen among them in
+the same run. What they are given is simpler than what fastgen draws, see peer_jobs.py, and their
+labels are bare id pictures where fastgen's are finished boxes, masks and polygons. That they drew
+the same is checked by overlap with fastgen's ids. Opening a scene is left out of the sum.
+A peer that cannot run is listed with its reason. Leaves bench/results/peers.json, docs/peers.png.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+from peer_jobs import with_effort, write_jobs
+from results import ROOT, machine, parse_size, save
+
+from fastgen import Config, Generator
+
+ENVIRONMENTS = ROOT / "bench" / ".peers"
+SCRIPTS = ROOT / "bench" / "peer_renderers"
+TIMEOUT_S = 3600
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A tool to measure.
+
+    script: in peer_renderers, with its own arguments after. environment: folder of its virtual
+    environment, '' for this one. requirements: what pip installs there. python: the only version
+    that the tool's wheels exist for. samples: a pixel, where that can be chosen. slow: views are
+    drawn once instead of several times. settings: environment variables.
+    """
+
+    name: str
+    script: str
+    arguments: tuple[str, ...] = ()
+    environment: str = ""
+    requirements: tuple[str, ...] = ()
+    python: str = ""
+    samples: int = 1
+    slow: bool = False
+    settings: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def interpreter(self) -> Path:
+        """The Python that runs it."""
+        if not self.environment:
+            return Path(sys.executable)
+        return ENVIRONMENTS / self.environment / "bin" / "python"
+
+
+_CYCLES: dict[str, Any] = {
+    "script": "with_cycles.py",
+    "environment": "cycles",
+    "requirements": ("bpy==4.5.15",),
+    "python": "3.11",
+    "slow": True,
+}
+
+PEERS = (
+    Peer("fastgen", "with_fastgen.py"),
+    Peer(
+        "pyrender, colour + segmentation",
+        "with_pyrender.py",
+        environment="pyrender",
+        # it uses np.infty, which numpy 2 dropped
+        requirements=("pyrender==0.1.45", "numpy<2", "trimesh", "pillow"),
+    ),
+    Peer(
+        "PyVista, PBR + painted ids",
+        "with_pyvista.py",
+        environment="pyvista",
+        requirements=("pyvista==0.49.1", "trimesh", "pillow"),
+    ),
+    Peer(
+        "Open3D (Filament), colour + painted ids",
+        "with_open3d.py",
+        environment="open3d",
+        requirements=("open3d==0.20.0", "trimesh", "pillow"),
+        settings=(("XDG_RUNTIME_DIR", tempfile.gettempdir()),),
+    ),
+    Peer("Cycles 16 spp denoised + id render", arguments=("denoise",), samples=16, **_CYCLES),
+    Peer("Cycles 128 spp + a mask a marker", arguments=("masks",), samples=128, **_CYCLES),
+)
+
+
+def install(peer: Peer) -> str:
+    """Make the peer's environment; returns why that failed, or ''."""
+    if not peer.environment:
+        return ""
+    folder = ENVIRONMENTS / peer.environment
+    wanted = f"python{peer.python}" if peer.python else sys.executable
+    if peer.python == f"{sys.version_info.major}.{sys.version_info.minor}":
+        wanted = sys.executable
+    if shutil.which(wanted) is None:
+        return f"needs {wanted}, which is not on the PATH"
+    for command in (
+        [wanted, "-m", "venv", str(folder)],
+        [str(peer.interpreter), "-m", "pip", "install", "--quiet", *peer.requirements],
+    ):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode:
+            return _last_words(done.stderr)
+    return ""
+
+
+def run(peer: Peer, job: Path, out: Path) -> dict[str, Any]:
+    """Run a peer's script on a job: its result.json, or {'failed': reason}."""
+    if not peer.interpreter.exists():
+        return {"failed": "not installed: python bench/peers.py --install"}
+    command = [
+        str(peer.interpreter),
+        str(SCRIPTS / peer.script),
+        str(job),
+        str(out),
+    ]
+    variables = {**os.environ, **dict(peer.settings)}
+    if peer.environment:
+        variables.pop("LP_NUM_THREADS", None)  # peers use all cores, as they do by default
+        variables.pop("PYTHONPATH", None)
+    else:
+        variables["PYTHONPATH"] = str(ROOT)
+    try:
+        done = subprocess.run(
+            [*command, *peer.arguments],
+            capture_output=True,
+            text=True,
+            env=variables,
+            timeout=TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return {"failed": f"took longer than {TIMEOUT_S} s"}
+    # some libraries crash while they exit, after the work is done
+    if not (out / "result.json").exists():
+        return {"failed": _last_words(done.stderr) or f"exit code {done.returncode}"}
+    result: dict[str, Any] = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    return result
+
+
+def _last_words(text: str) -> str:
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return lines[-1][:200] if lines else ""
+
+
+def summary(
+    result: dict[str, Any], out: Path, truths: list[tuple[int, str, NDArray[np.uint16]]]
+) -> dict[str, Any]:
+    """Medians in ms, and the mean overlap of container and markers with fastgen's ids."""
+    laps = result["laps"]
+    walls, cores = (
+        {stage: statistics.median(lap[i] for lap in laps[stage]) for stage in laps} for i in (0, 1)
+    )
+    whole: list[float] = []
+    marks: list[float] = []
+    for index, camera, truth in truths:
+        with np.load(out / f"{index:06d}_{camera}.npz") as stored:
+            ids = stored["ids"]
+        if (ids == 1).any():  # binary masks are of markers only
+            whole.append(_overlap(ids > 0, truth > 0))
+        marks += [_overlap(ids == i, truth == i) for i in np.unique(truth[truth > 1])]
+    return {
+        "version": result["version"],
+        "set-up": walls["set-up"],
+        "colour": walls["colour"],
+        "labels": walls["labels"],
+        "image": walls["colour"] + walls["labels"],
+        "cores": cores["colour"] + cores["labels"],
+        "container overlap": statistics.fmean(whole) if whole else None,
+        "marker overlap": statistics.median(marks) if marks else None,
+    }
+
+
+def _overlap(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
+    """Intersection over union."""
+    return float((a & b).sum() / max((a | b).sum(), 1))
+
+
+def show(found: dict[str, dict[str, Any]]) -> None:
+    """Print the table."""
+    columns = ("set-up", "colour", "labels", "image", "cores")
+    print(f"\n{'median ms':42}" + "".join(f"{c:>10}" for c in columns) + f"{'overlap':>14}")
+    for name, row in found.items():
+        if "failed" in row:
+            print(f"{name:42}  not measured: {row['failed']}")
+            continue
+        overlaps = "/".join(
+            "-" if row[key] is None else f"{row[key]:.3f}"
+            for key in ("container overlap", "marker overlap")
+        )
+        print(f"{name:42}" + "".join(f"{row[c]:10.1f}" for c in columns) + f"{overlaps:>14}")
+    print("\nset-up: of a scene, not in the sum. image: colour + labels, wall time on all cores.")
+    print("cores: processor time of an image. overlap: container/markers with fastgen's ids.")
+
+
+def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
+    """Bars of wall and processor time of a labelled image on a logarithmic axis."""
+    rows = {name: row for name, row in found.items() if "failed" not in row}
+    figure, axes = plt.subplots(figsize=(9, 0.7 * len(rows) + 1.6))
+    for shift, key, label in ((-0.2, "image", "wall time"), (0.2, "cores", "processor time")):
+        places = np.arange(len(rows)) + shift
+        values = [row[key] for row in rows.values()]
+        bars = axes.barh(places, values, height=0.38, label=label)
+        axes.bar_label(bars, fmt=lambda v: f"{v:,.0f} ms", padding=3, fontsize=8)
+    axes.set_yticks(np.arange(len(rows)), list(rows))
+    axes.invert_yaxis()
+    axes.set_xscale("log")
+    axes.set_xlim(1, axes.get_xlim()[1] * 5)
+    axes.set_xlabel(f"ms a labelled image (median)\n{caption}")
+    axes.legend(loc="upper right")
+    figure.tight_layout()
+    chart.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(chart, dpi=110)
+
+
+def main() -> None:
+    """Install the peers, or measure them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--install", action="store_true")
+    parser.add_argument("--only", default="", help="measure peers whose name holds this")
+    parser.add_argument("--scenes", type=int, default=2)
+    parser.add_argument("--cameras", default="A,B,Cl,Cr")
+    parser.add_argument("--size", default="640x640")
+    parser.add_argument("--repeats", type=int, default=5, help="of each view; Cycles draws once")
+    parser.add_argument("--samples", type=int, help="for Cycles, in place of 16 and 128")
+    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "peers.png")
+    options = parser.parse_args()
+    peers = [peer for peer in PEERS if options.only.lower() in peer.name.lower()]
+    if options.install:
+        for peer in {peer.environment: peer for peer in peers if peer.environment}.values():
+            print(f"{peer.environment}: {install(peer) or 'installed'}", flush=True)
+        return
+    cameras = options.cameras.split(",")
+    found: dict[str, dict[str, Any]] = {}
+    with tempfile.TemporaryDirectory() as place:
+        job = Path(place) / "job"
+        with Generator(Config.preset(), seed=7, size=parse_size(options.size)) as generator:
+            truths = write_jobs(generator, list(range(options.scenes)), cameras, 1, job)
+        for number, peer in enumerate(peers):
+            samples = options.samples or peer.samples
+            with_effort(job, samples, 1 if peer.slow else options.repeats)
+            out = Path(place) / str(number)
+            result = run(peer, job, out)
+            found[peer.name] = result if "failed" in result else summary(result, out, truths)
+            print(f"{peer.name}: {found[peer.name]}", file=sys.stderr, flush=True)
+    about = machine()
+    caption = f"{options.size}, {len(truths)} views, {about}"
+    if options.samples:
+        caption += f"; a trial: Cycles at {options.samples} spp"
+    print(caption)
+    show(found)
+    save("peers", {"machine": about, "size": options.size, "views": len(truths), "peers": found})
+    draw(found, caption, options.chart)
+
+
+if __name__ == "__main__":
+    main()
