@@ -219,9 +219,8 @@ def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
     outward = np.where(signs == 0, -1, signs)
     faces = np.any((shot.view.position_m / MM - corners) * outward > 0, axis=1)
     inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
-    x, y = np.where(inside[:, None], pixels, 0).astype(int).T
-    frame = shot.frame
-    faces &= ~((frame.ids[y, x] == SPREADER_ID) & (frame.depth[y, x] < depth))
+    if shot.spreader is not None:
+        faces &= ~_behind(shot.spreader, shot.view.position_m / MM, corners)
     found: list[Keypoint] = [
         (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
         for (x, y), face, within in zip(
@@ -232,3 +231,21 @@ def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
         return tuple(found), ()
     hull = cv2.convexHull(pixels.astype(np.float32))
     return tuple(found), tuple(np.round(hull.reshape(-1), 2).astype(float).tolist())
+
+
+def _behind(
+    mesh: Mesh, eye_mm: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Which of points [N, 3] the mesh hides from the eye, bool [N]; Moeller and Trumbore 1997."""
+    a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
+    ray = (points - eye_mm)[:, None]
+    p = np.cross(ray, c - a)
+    scale = np.einsum("ntk,tk->nt", p, b - a)
+    scale[np.abs(scale) < 1e-9] = np.inf
+    offset = eye_mm - a
+    u = np.einsum("ntk,tk->nt", p, offset) / scale
+    q = np.cross(offset, b - a)
+    v = np.einsum("ntk,tk->nt", np.broadcast_to(ray, p.shape), q) / scale
+    along = (q * (c - a)).sum(axis=1) / scale
+    met = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0) & (along < 1)
+    return np.asarray(met.any(axis=1), bool)

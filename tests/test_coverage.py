@@ -188,7 +188,7 @@ def test_the_spreader_covers_what_rays_say(generator):
             assert near(round(item.area / item.visible_fraction), whole.sum())
             seen += 1
             hidden += item.occluded
-    assert seen > 4
+    assert seen > 1
 
 
 def test_casting_corners_are_seen_as_rays_see_them(generator):

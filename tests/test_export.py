@@ -24,7 +24,11 @@ SIZE = (320, 240)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
 
 TORN = Config.from_values(
-    {"container": {"kinds": {"20": 1}}, "damage": {"probability": 1, "count": [4, 4]}}
+    {
+        "container": {"kinds": {"20": 1}},
+        "damage": {"probability": 1, "count": [4, 4]},
+        "spreader": {"probability": 0},
+    }
 )
 
 

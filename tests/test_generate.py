@@ -284,7 +284,14 @@ def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):
 def test_ctrl_c_stops_cleanly_and_the_run_goes_on_later(dataset, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # a shell's background jobs, this test run among them, may ignore it
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     while not (out / "dataset.json").exists():
         time.sleep(0.02)
     time.sleep(1.0)
