@@ -53,7 +53,7 @@ class Canvas:
 @dataclass(frozen=True, eq=False)
 class Projected:
     """Facets in the image. pixels: float64 [K, M, 2]; depth_m: [K, M]; rest_mm: [K, M, 3];
-    owner: int [K]; faces: bool [K], whether their outside faces the camera."""
+    owner: int [K], ascending; faces: bool [K], whether their outside faces the camera."""
 
     pixels: Array
     depth_m: Array
@@ -80,11 +80,13 @@ def project(facets: Facets, view: View) -> Projected:
 def boxes(pixels: Array, owner: NDArray[np.int64], count: int) -> Array:
     """Exact bounds (x0, y0, x1, y1) float64 [count, 4] of each owner's polygons [K, M, 2].
 
-    An owner without polygons gets (inf, inf, -inf, -inf).
+    owner: int [K], ascending. One without polygons gets (inf, inf, -inf, -inf).
     """
     found = np.tile([np.inf, np.inf, -np.inf, -np.inf], (count, 1))
-    np.minimum.at(found[:, :2], owner, lowest(pixels))
-    np.maximum.at(found[:, 2:], owner, highest(pixels))
+    present, first = np.unique(owner, return_index=True)
+    if present.size:
+        found[present, :2] = np.minimum.reduceat(lowest(pixels), first)
+        found[present, 2:] = np.maximum.reduceat(highest(pixels), first)
     return found
 
 

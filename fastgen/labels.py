@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from fastgen.camera import MM, NEAR_M
 from fastgen.container import KINDS
-from fastgen.coverage import Canvas, boxes, canvases, project
+from fastgen.coverage import boxes, canvases, project
 from fastgen.damage import deform
 from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
-from fastgen.facets import Facets, decal_facets, highest, lowest, mesh_facets
+from fastgen.facets import Facets, decal_facets, mesh_facets
 from fastgen.mesh import Mesh
 from fastgen.programs import CONTAINER_ID, SPREADER_ID
 from fastgen.sample import Box, Keypoint, Object
@@ -54,7 +54,9 @@ def _decals(shot: Shot) -> list[Object]:
     seen_boxes, areas = visible_boxes(frame.ids, int(ids.max()) + 1)
     seen = project(_decal_facets(scene, mesh), view)
     bounds = boxes(seen.pixels, seen.owner, count)
-    alone = canvases(seen.pixels, seen.owner, count)
+    # of what is not seen, what it would cover does not matter
+    asked = (areas[ids[labelled]] > 0)[seen.owner]
+    alone = canvases(seen.pixels[asked], seen.owner[asked], count)
     pixels, depth = view.project(outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
     objects = []
@@ -143,27 +145,26 @@ def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
 
 
 def _container(shot: Shot) -> Object:
-    """The container's pixels are also those of its decals: what lies on it is part of it."""
-    frame, view, mesh = shot.frame, shot.view, shot.mesh
+    """The container's pixels are also those of its decals: what lies on it is part of it.
+
+    Where the spreader hides it, or the image ends, its outer box stands for it, a few millimetres
+    larger than rails and sheets: its visible fraction is true to half a percent.
+    """
+    frame, view = shot.frame, shot.view
     shown = (frame.ids > 0) & (frame.ids != SPREADER_ID)
     area = int(np.count_nonzero(shown))
-    pixels, depth = view.project(_container_points(shot.scene, mesh))
+    points = _container_points(shot.scene, shot.mesh)
+    pixels, depth = view.project(points)
     x, y = pixels.T.copy()
     bounds = np.array([x.min(), y.min(), x.max(), y.max()])
-    alone = Canvas(np.zeros((0, 0), bool), (0, 0), 1)
-    behind = mask_box(frame.ids == SPREADER_ID)
-    outside = depth.min() < NEAR_M or min(bounds[:2]) < 0 or np.any(bounds[2:] > view.size)
-    if outside or behind:
-        # what is seen needs no counting: only what lies beyond the image or behind the spreader
-        seen = project(mesh_facets(shot.scene, mesh, list(mesh.groups), 0), view)
-        (bounds,) = boxes(seen.pixels, seen.owner, 1)
-        low, high = lowest(seen.pixels), highest(seen.pixels)
-        asked = ((low < 0) | (high > view.size)).any(axis=1)
-        if behind:
-            asked |= ((low < behind[2:]) & (high > behind[:2])).all(axis=1)
-        asked &= seen.faces
-        (alone,) = canvases(seen.pixels[asked], seen.owner[asked], 1)
-    castings, polygon = _castings(shot)
+    if depth.min() < NEAR_M:
+        everything = project(mesh_facets(shot.scene, shot.mesh, list(shot.mesh.groups), 0), view)
+        (bounds,) = boxes(everything.pixels, everything.owner, 1)
+    corners = _corners_mm(shot.scene)
+    sides = corners[list(_SIDES)]
+    box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
+    (alone,) = canvases(box.pixels, box.owner, 1)
+    castings, polygon = _castings(shot, corners)
     return Object(
         id=CONTAINER_ID,
         class_name="container",
@@ -173,7 +174,8 @@ def _container(shot: Shot) -> Object:
         area=area,
         polygon=polygon,
         keypoints=castings,
-        **visibility(shot, alone, shown, True, area),
+        # what is void within the box is known: nothing hides there
+        **visibility(shot, alone, frame.ids == SPREADER_ID, False, area),
     )
 
 
@@ -201,22 +203,34 @@ def _spreader(shot: Shot) -> list[Object]:
 
 @lru_cache(maxsize=4)
 def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """All vertices [V, 3] in mm after damage, each once."""
-    return deform(scene.damages, mesh.points_mm)
+    """Points [P, 3] in mm after damage: from any side the container's outermost are among them."""
+    if scene.damages:
+        return deform(scene.damages, mesh.points_mm)
+    return mesh.points_mm[mesh.hull]
 
 
-def _castings(shot: Shot) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
+_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
+_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Corners of the outer box in the order of CASTINGS, and its sides."""
+
+
+def _corners_mm(scene: Scene) -> NDArray[np.float64]:
+    """The castings' outer corners [8, 3] after damage."""
+    kind = KINDS[scene.container.kind]
+    rest = _SIGNS * np.array([kind.length_mm / 2, kind.width_mm / 2, kind.height_mm])
+    return deform(scene.damages, rest)
+
+
+def _castings(
+    shot: Shot, corners: NDArray[np.float64]
+) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
     """The castings' outer corners in the order of CASTINGS, and the polygon around them.
 
     A convex body's corner is seen where any of the planes that meet in it faces the camera, and
     the spreader is not before it.
     """
-    kind = KINDS[shot.scene.container.kind]
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
-    rest = signs * np.array([kind.length_mm / 2, kind.width_mm / 2, kind.height_mm])
-    corners = deform(shot.scene.damages, rest)
     pixels, depth = shot.view.project(corners)
-    outward = np.where(signs == 0, -1, signs)
+    outward = np.where(_SIGNS == 0, -1, _SIGNS)
     faces = np.any((shot.view.position_m / MM - corners) * outward > 0, axis=1)
     inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
     if shot.spreader is not None:

@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import ConvexHull
 
 from fastgen.errors import ConfigError
 
@@ -137,6 +138,11 @@ class Mesh:
     def points_mm(self) -> NDArray[np.float64]:
         """Positions [P, 3] of all vertices, those that coincide only once."""
         return np.unique(self.positions_mm, axis=0).astype(np.float64)
+
+    @cached_property
+    def hull(self) -> NDArray[np.int64]:
+        """Which of points_mm are corners of their convex hull."""
+        return np.asarray(ConvexHull(self.points_mm).vertices, np.int64)
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
