@@ -5,7 +5,8 @@ from typing import Any
 
 import moderngl
 
-from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link
+from fastgen.pixel_lists import PixelLists
+from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link, link_compute
 from fastgen.targets import Region, Targets
 
 UNITS = {
@@ -36,8 +37,9 @@ class Shading:
         self._ctx = ctx
         self._samples_per_axis = samples_per_axis
         self._layer = layer
-        self._programs: dict[tuple[str, str], moderngl.Program] = {}
-        self._arrays: dict[tuple[str, str], moderngl.VertexArray] = {}
+        self._programs: list[moderngl.Program] = []
+        self._arrays: dict[tuple[str, str, str], moderngl.VertexArray] = {}
+        self._mixed: dict[tuple[str, str], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -58,18 +60,34 @@ class Shading:
         self._ctx.scissor = region
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
-        self._run("classify", "sound")
+        self._run("classify", "sky", "sound")
         for part in near_damage:
             self._ctx.scissor = part or region
-            self._run("classify", damage)
+            self._run("classify", "sky", damage)
         self._ctx.scissor = region
         image.depth_mask = False
         self._ctx.depth_func = "=="
-        for name, traits in PIXEL_CLASSES.items():
-            if name != "sky" and self._comes(name, traits, damage):
-                self._run(name, "holed" if "DAMAGE" in traits else "sound")
+        coming = [
+            (name, "holed" if "DAMAGE" in traits else "sound")
+            for name, traits in PIXEL_CLASSES.items()
+            if name != "sky" and self._comes(name, traits, damage)
+        ]
+        listed = [(name, d) for name, d in coming if "MIXED" in PIXEL_CLASSES[name]]
+        image.color_mask = [(False,) * 4] * 3
+        for name, _ in listed:
+            targets.lists.begin(name)
+            self._run("list", name, "sound")
+        image.color_mask = [(True,) * 4] * 3
+        for name, variant in coming:
+            if (name, variant) not in listed:
+                self._run("shade", name, variant)
         self._ctx.scissor = None
-        self._run("sky", "sound")
+        self._run("shade", "sky", "sound")
+        self._ctx.memory_barrier()
+        targets.bind_images()
+        for name, variant in listed:
+            self._dispatch(name, variant, targets.lists)
+        self._ctx.memory_barrier()
         image.depth_mask = True
         self._ctx.depth_func = "<"
 
@@ -81,27 +99,37 @@ class Shading:
             return damage == "holed"
         return damage != "sound" or "DAMAGE" not in traits
 
-    def _run(self, name: str, damage: str) -> None:
-        key = (name, damage)
+    def _run(self, stage: str, pixel_class: str, damage: str) -> None:
+        """Draw `stage`.frag over the pixels of a class; the classifier gives all of them theirs."""
+        key = (stage, pixel_class, damage)
         if key not in self._arrays:
-            variant: dict[str, Any] = {
-                "samples_per_axis": self._samples_per_axis,
-                "layer": self._layer,
-                "damage": damage,
-            }
-            fragment = "classify.frag"
-            if name != "classify":
-                fragment = "shade.frag"
-                variant["pixel_class"] = name
-            program = link(self._ctx, "fullscreen.vert", fragment, UNITS, **variant)
-            if name != "classify":
-                program["class_depth"] = list(PIXEL_CLASSES).index(name) * CLASS_DEPTH_STEP
-            self._programs[key] = program
+            program = link(
+                self._ctx, "fullscreen.vert", f"{stage}.frag", UNITS, **self._variant(*key[1:])
+            )
+            program["class_depth"] = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
+            self._programs.append(program)
             self._arrays[key] = self._ctx.vertex_array(program, [])
         self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
 
+    def _dispatch(self, pixel_class: str, damage: str, lists: PixelLists) -> None:
+        """Shade the listed pixels of a class."""
+        key = (pixel_class, damage)
+        if key not in self._mixed:
+            self._mixed[key] = link_compute(
+                self._ctx, "shade_mixed.comp", UNITS, **self._variant(*key)
+            )
+        lists.dispatch(pixel_class, self._mixed[key])
+
+    def _variant(self, pixel_class: str, damage: str) -> dict[str, Any]:
+        return {
+            "samples_per_axis": self._samples_per_axis,
+            "layer": self._layer,
+            "pixel_class": pixel_class,
+            "damage": damage,
+        }
+
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [*self._arrays.values(), *self._programs.values()]
+        items: list[Any] = [*self._arrays.values(), *self._programs, *self._mixed.values()]
         for item in items:
             item.release()

@@ -8,6 +8,8 @@ import numpy as np
 
 from fastgen.errors import FastgenError
 from fastgen.gl import GLContext
+from fastgen.pixel_lists import PixelLists
+from fastgen.programs import PIXEL_CLASSES
 from fastgen.sample import Frame
 
 Region = tuple[int, int, int, int]
@@ -61,12 +63,14 @@ class Targets:
         self._fine = fine
         self._buffers = [*attached, self._depth]
         self._image = [
-            ctx.renderbuffer(size, 4),
-            ctx.renderbuffer(size, 1, dtype="u4"),
-            ctx.renderbuffer(size, 1, dtype="f4"),
+            ctx.texture(size, 4),
+            ctx.texture(size, 1, dtype="u4"),
+            ctx.texture(size, 1, dtype="f4"),
         ]
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
+        listed = [name for name, traits in PIXEL_CLASSES.items() if "MIXED" in traits]
+        self.lists = PixelLists(ctx, size, listed)
         self._viewport = gl.function(
             "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
         )
@@ -109,6 +113,11 @@ class Targets:
         """Mark all pixels of the bound image framebuffer as sky, class 0."""
         self._clear_float(_GL_DEPTH, 0, _SKY)
 
+    def bind_images(self) -> None:
+        """Let compute shaders write the colour, label and depth images, units 0 to 2."""
+        for unit, texture in enumerate(self._image):
+            texture.bind_to_image(unit, read=False, write=True)
+
     def read(self) -> Frame:
         """Copy the shaded image out."""
         width, height = self.size
@@ -129,6 +138,6 @@ class Targets:
     def release(self) -> None:
         """Free all GL objects."""
         buffers = (*self._buffers, self._classes, *self._image)
-        items: list[Any] = [self.samples, self.image, *buffers]
+        items: list[Any] = [self.samples, self.image, *buffers, self.lists]
         for item in items:
             item.release()

@@ -1,0 +1,74 @@
+// Shades the listed pixels of one class, each once for every different surface that its samples see.
+#version 430 core
+#include "blocks.glsl"
+#include "shade.glsl"
+#include "pixel_list.glsl"
+
+layout(local_size_x = LIST_GROUP) in;
+
+layout(rgba8, binding = 0) writeonly uniform image2D color_image;
+layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
+layout(r32f, binding = 2) writeonly uniform image2D depth_image;
+
+void main() {
+    if (gl_GlobalInvocationID.x >= listed_pixels()) return;
+    ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
+    vec2 center = vec2(pixel) + 0.5;
+    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+
+    // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
+    // for each part of the container seen, the light once for each of its orientations
+    uint keys[TENT_SAMPLES];
+    float sky_weight = 0.0;
+    for (int i = 0; i < TENT_SAMPLES; ++i) {
+        ivec2 at = middle + TENT_OFFSET[i];
+        keys[i] = texelFetch(surface_keys, at, 0).r;
+        if (keys[i] == 0u) { sky_weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
+#if WITH_HOLES
+        int hole = hole_at(texelFetch(rest_points, at, 0).xyz);
+        if (keys[i] != TAKEN && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
+#endif
+    }
+    bool sees_sky = keys[0] == TAKEN;
+    Shaded s = sky(view_ray(center));
+    vec3 color = sky_weight * s.color;
+    float done = sky_weight;
+    for (int part = 0; part < MAX_PARTS && done < 0.999; ++part) {
+        int first = -1;
+        uint chart = 0u;
+        for (int i = 0; i < TENT_SAMPLES; ++i)
+            if (first < 0 && keys[i] != TAKEN) { first = i; chart = key_chart(keys[i]); }
+        ivec2 offset = TENT_OFFSET[first];
+        vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
+        vec3 view = -normalize(ray);
+        Part p = part_at(middle + offset, keys[first], view);
+        bool at_center = part == 0 && !sees_sky;
+        if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
+        bool more = true;
+        for (int side = 0; side < MAX_SIDES && more; ++side) {
+            uint key = TAKEN;
+            float weight = 0.0;
+            more = false;
+            for (int i = 0; i < TENT_SAMPLES; ++i) {
+                bool same_part = keys[i] != TAKEN && key_chart(keys[i]) == chart;
+                if (same_part && key == TAKEN) key = keys[i];
+                if (same_part && keys[i] == key) { weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
+                else more = more || same_part;
+            }
+            vec3 lit_color = part_color(p, key, view);
+#if WITH_HOLES
+            if (chart == PORTAL_CHART) {
+                Shaded through = through_hole(middle + offset, key, ray);
+                lit_color = through.color;
+                if (at_center && side == 0) s = through;
+            }
+#endif
+            color += weight * lit_color;
+            done += weight;
+        }
+    }
+    color /= done;   // of a busy pixel, what was not come to counts like the rest
+    imageStore(color_image, pixel, vec4(srgb_encode(color), 1.0));
+    imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
+    imageStore(depth_image, pixel, vec4(s.depth));
+}
