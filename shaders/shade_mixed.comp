@@ -18,43 +18,48 @@ void main() {
 
     // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
     // for each part of the container seen, the light once for each of its orientations
-    uint keys[TENT_SAMPLES];
+    uint keys[TENT_SAMPLES];   // never changed below, so that it stays in registers
+    uint left = 0u;            // a bit for each sample that is still to be shaded
     float sky_weight = 0.0;
     for (int i = 0; i < TENT_SAMPLES; ++i) {
         ivec2 at = middle + TENT_OFFSET[i];
         keys[i] = texelFetch(surface_keys, at, 0).r;
-        if (keys[i] == 0u) { sky_weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
+        if (keys[i] == 0u) sky_weight += TENT_WEIGHT[i];
+        else left |= 1u << i;
 #if WITH_HOLES
         int hole = hole_at(texelFetch(rest_points, at, 0).xyz);
-        if (keys[i] != TAKEN && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
+        if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
 #endif
     }
-    bool sees_sky = keys[0] == TAKEN;
+    bool sees_sky = keys[0] == 0u;
     Shaded s = sky(view_ray(center));
     vec3 color = sky_weight * s.color;
     float done = sky_weight;
-    for (int part = 0; part < MAX_PARTS && done < 0.999; ++part) {
-        int first = -1;
-        uint chart = 0u;
+    for (int part = 0; part < MAX_PARTS && left != 0u; ++part) {
+        uint first_key = 0u;
+        ivec2 offset = ivec2(0);
+        for (int i = TENT_SAMPLES - 1; i >= 0; --i)
+            if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = TENT_OFFSET[i]; }
+        uint chart = key_chart(first_key);
+        uint of_part = 0u;
         for (int i = 0; i < TENT_SAMPLES; ++i)
-            if (first < 0 && keys[i] != TAKEN) { first = i; chart = key_chart(keys[i]); }
-        ivec2 offset = TENT_OFFSET[first];
+            if (key_chart(keys[i]) == chart) of_part |= 1u << i;
+        of_part &= left;
         vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
         vec3 view = -normalize(ray);
-        Part p = part_at(middle + offset, keys[first], view);
+        Part p = part_at(middle + offset, first_key, view);
         bool at_center = part == 0 && !sees_sky;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
-        bool more = true;
-        for (int side = 0; side < MAX_SIDES && more; ++side) {
-            uint key = TAKEN;
+        for (int side = 0; side < MAX_SIDES && of_part != 0u; ++side) {
+            uint key = 0u;
+            for (int i = TENT_SAMPLES - 1; i >= 0; --i)
+                if ((of_part & 1u << i) != 0u) key = keys[i];
             float weight = 0.0;
-            more = false;
-            for (int i = 0; i < TENT_SAMPLES; ++i) {
-                bool same_part = keys[i] != TAKEN && key_chart(keys[i]) == chart;
-                if (same_part && key == TAKEN) key = keys[i];
-                if (same_part && keys[i] == key) { weight += TENT_WEIGHT[i]; keys[i] = TAKEN; }
-                else more = more || same_part;
-            }
+            uint of_side = 0u;
+            for (int i = 0; i < TENT_SAMPLES; ++i)
+                if (keys[i] == key) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
+            of_part &= ~of_side;
+            left &= ~of_side;
             vec3 lit_color = part_color(p, key, view);
 #if WITH_HOLES
             if (chart == PORTAL_CHART) {
