@@ -24,6 +24,7 @@ UNITS = {
     "decal_table": 11,
     "glyph_table": 12,
     "rest_points": 13,
+    "sheet_depths": 14,
 }
 
 

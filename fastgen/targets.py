@@ -53,9 +53,11 @@ class Targets:
             )
         self.scale = (size[0] * samples_per_axis / fine[0], size[1] * samples_per_axis / fine[1])
         self.keys = ctx.texture(stored, 1, dtype="u4")
-        self.points = ctx.texture(stored, 4, dtype="f4")
+        # two textures of two and one numbers are cheaper to draw to than one of four
+        self.points = ctx.texture(stored, 2, dtype="f4")
+        self.depths = ctx.texture(stored, 1, dtype="f4")
         self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        attached = [t for t in (self.keys, self.points, self.rest) if t is not None]
+        attached = [t for t in (self.keys, self.points, self.depths, self.rest) if t is not None]
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth = ctx.depth_renderbuffer(stored)

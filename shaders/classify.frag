@@ -19,8 +19,8 @@ void main() {
     for (int i = 1; i < TENT_SAMPLES; ++i)
         mixed = mixed || texelFetch(surface_keys, middle + TENT_OFFSET[i], 0).r != key;
 #endif
-    vec4 sheet = texelFetch(sheet_points, middle, 0);
-    bool decal = key != 0u && texelFetch(decal_grid, ivec2(sheet.xy / DECAL_CELL_MM), 0).x != 0u;
+    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
+    bool decal = key != 0u && texelFetch(decal_grid, ivec2(sheet_mm / DECAL_CELL_MM), 0).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
     if (decal) ++found;
 #if DAMAGED

@@ -20,6 +20,7 @@ uniform sampler2D rest_points;
 
 uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
+uniform sampler2D sheet_depths;
 
 struct Shaded {
     vec3 color;   // displayed, linear
@@ -63,11 +64,11 @@ struct Part {
 };
 
 Part part_at(ivec2 sample_at, uint key, vec3 view) {
-    vec4 sheet = texelFetch(sheet_points, sample_at, 0);
+    vec2 sheet_mm = texelFetch(sheet_points, sample_at, 0).xy;
     vec3 normal = key_normal(key);
     Part p;
     p.damage = SOUND_CONTAINER;
-    p.depth = sheet.z;
+    p.depth = texelFetch(sheet_depths, sample_at, 0).r;
     float scar = 0.0;
 #if WITH_DAMAGE
     Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
@@ -78,8 +79,8 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
-    float footprint_mm = sheet.z * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(key_chart(key), sheet.xy, footprint_mm, scar);
+    float footprint_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+    p.surface = surface_at(key_chart(key), sheet_mm, footprint_mm, scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     return p;
 }
@@ -98,7 +99,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
     uint inner_key = texelFetch(surface_keys, inner_at, 0).r;
     vec3 rest_mm = texelFetch(rest_points, inner_at, 0).xyz;
-    float depth = texelFetch(sheet_points, inner_at, 0).z;
+    float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);
     if (inner_key != 0u && hole_at(rest_mm) < 0) {
         vec3 seen = inside(-key_normal(inner_key), rest_mm);
