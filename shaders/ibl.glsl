@@ -17,7 +17,10 @@ vec3 to_environment(vec3 d) {
 }
 
 // inside the border of a map that is `size` texels wide
-vec2 bordered(vec2 uv, float size) { return (1.0 + uv * (size - 2.0)) / size; }
+vec2 bordered(vec2 uv, float size) {
+    float texel = 1.0 / size;
+    return uv * (1.0 - 2.0 * texel) + texel;
+}
 
 vec3 prefiltered(vec3 direction, float roughness) {
     vec2 uv = bordered(octahedral(to_environment(direction)), SPECULAR_SIZE);
@@ -33,6 +36,7 @@ vec3 diffuse_radiance(vec3 normal) {
     return textureLod(irradiance_light, uv, 0.0).rgb;
 }
 
+// the direction may have any length
 vec3 background(vec3 direction) {
     vec2 uv = bordered(octahedral(to_environment(direction)), background_size);
     return textureLod(background_light, uv, 0.0).rgb;

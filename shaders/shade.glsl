@@ -45,7 +45,7 @@ vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view) {
 
 Shaded sky(vec3 ray) {
 #if LAYER == LAYER_ALL
-    vec3 color = neutral_tone(exposure * background(normalize(ray)));
+    vec3 color = neutral_tone(exposure * background(ray));
 #else
     vec3 color = vec3(1.0);
 #endif
