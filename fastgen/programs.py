@@ -48,6 +48,9 @@ LIST_HEADER = 4
 
 LIST_BINDING = 0
 
+LISTED_CLASSES = tuple(name for name in PIXEL_CLASSES if name not in ("sky", "plain"))
+"""Classes of scattered pixels, which are shaded from lists."""
+
 MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
 

@@ -6,7 +6,7 @@ from typing import Any
 import moderngl
 
 from fastgen.pixel_lists import PixelLists
-from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link, link_compute
+from fastgen.programs import CLASS_DEPTH_STEP, LISTED_CLASSES, PIXEL_CLASSES, link, link_compute
 from fastgen.targets import Region, Targets
 
 UNITS = {
@@ -40,7 +40,7 @@ class Shading:
         self._layer = layer
         self._programs: list[moderngl.Program] = []
         self._arrays: dict[tuple[str, str, str], moderngl.VertexArray] = {}
-        self._mixed: dict[tuple[str, str], moderngl.ComputeShader] = {}
+        self._listed: dict[tuple[str, str], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -73,7 +73,7 @@ class Shading:
             for name, traits in PIXEL_CLASSES.items()
             if name != "sky" and self._comes(name, traits, damage)
         ]
-        listed = [(name, d) for name, d in coming if "MIXED" in PIXEL_CLASSES[name]]
+        listed = [(name, d) for name, d in coming if name in LISTED_CLASSES]
         image.color_mask = [(False,) * 4] * 3
         for name, _ in listed:
             targets.lists.begin(name)
@@ -115,11 +115,11 @@ class Shading:
     def _dispatch(self, pixel_class: str, damage: str, lists: PixelLists) -> None:
         """Shade the listed pixels of a class."""
         key = (pixel_class, damage)
-        if key not in self._mixed:
-            self._mixed[key] = link_compute(
-                self._ctx, "shade_mixed.comp", UNITS, **self._variant(*key)
+        if key not in self._listed:
+            self._listed[key] = link_compute(
+                self._ctx, "shade_listed.comp", UNITS, **self._variant(*key)
             )
-        lists.dispatch(pixel_class, self._mixed[key])
+        lists.dispatch(pixel_class, self._listed[key])
 
     def _variant(self, pixel_class: str, damage: str) -> dict[str, Any]:
         return {
@@ -131,6 +131,6 @@ class Shading:
 
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [*self._arrays.values(), *self._programs, *self._mixed.values()]
+        items: list[Any] = [*self._arrays.values(), *self._programs, *self._listed.values()]
         for item in items:
             item.release()

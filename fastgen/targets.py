@@ -9,7 +9,7 @@ import numpy as np
 from fastgen.errors import FastgenError
 from fastgen.gl import GLContext
 from fastgen.pixel_lists import PixelLists
-from fastgen.programs import PIXEL_CLASSES
+from fastgen.programs import LISTED_CLASSES
 from fastgen.sample import Frame
 
 Region = tuple[int, int, int, int]
@@ -71,8 +71,7 @@ class Targets:
         ]
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
-        listed = [name for name, traits in PIXEL_CLASSES.items() if "MIXED" in traits]
-        self.lists = PixelLists(ctx, size, listed)
+        self.lists = PixelLists(ctx, size, LISTED_CLASSES)
         self._viewport = gl.function(
             "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
         )

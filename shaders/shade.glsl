@@ -93,6 +93,15 @@ vec3 part_color(Part p, uint key, vec3 view) {
     return layer_color(p.surface, normal, view);
 }
 
+// a pixel all of whose samples see the same surface
+Shaded single_surface(ivec2 pixel) {
+    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    uint key = texelFetch(surface_keys, middle, 0).r;
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
+    Part p = part_at(middle, key, view);
+    return Shaded(part_color(p, key, view), p.id, p.damage, p.depth);
+}
+
 #if WITH_HOLES
 // what a hole shows: the inside of the container, or the sky through another hole
 Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {

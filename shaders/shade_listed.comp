@@ -1,4 +1,4 @@
-// Shades the listed pixels of one class, each once for every different surface that its samples see.
+// Shades the listed pixels of one class: for few pixels, scattered ones, and such as see several surfaces.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
@@ -13,9 +13,9 @@ layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 void main() {
     if (gl_GlobalInvocationID.x >= listed_pixels()) return;
     ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
+#if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
     ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
-
     // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
     // for each part of the container seen, the light once for each of its orientations
     uint keys[TENT_SAMPLES];   // never changed below, so that it stays in registers
@@ -73,6 +73,10 @@ void main() {
         }
     }
     color /= done;   // of a busy pixel, what was not come to counts like the rest
+#else
+    Shaded s = single_surface(pixel);
+    vec3 color = s.color;
+#endif
     imageStore(color_image, pixel, vec4(srgb_encode(color), 1.0));
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
     imageStore(depth_image, pixel, vec4(s.depth));
