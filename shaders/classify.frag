@@ -2,23 +2,21 @@
 // llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
 #version 430 core
 #include "blocks.glsl"
+#include "keys_around.glsl"
 #if DAMAGED
 #include "damage.glsl"
 #endif
 
-uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
 uniform usampler2D decal_grid;
 uniform sampler2D rest_points;
 
 void main() {
     ivec2 middle = ivec2(gl_FragCoord.xy) * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
-    uint key = texelFetch(surface_keys, middle, 0).r;
     bool mixed = false;
-#if SAMPLES_PER_AXIS > 1
-    for (int i = 1; i < TENT_SAMPLES; ++i)
-        mixed = mixed || texelFetch(surface_keys, middle + TENT_OFFSET[i], 0).r != key;
-#endif
+    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint key = keys[0];
+    for (int i = 1; i < TENT_SAMPLES; ++i) mixed = mixed || keys[i] != key;
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
     bool decal = key != 0u && texelFetch(decal_grid, ivec2(sheet_mm / DECAL_CELL_MM), 0).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;

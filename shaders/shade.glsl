@@ -1,6 +1,7 @@
 // Shaded sky(ray), Part part_at(...), vec3 part_color(...): what shading a pixel of any class is made of.
 
 #include "octahedral.glsl"
+#include "keys_around.glsl"
 #include "tone.glsl"
 #include "ibl.glsl"
 #include "layers.glsl"
@@ -18,7 +19,6 @@
 uniform sampler2D rest_points;
 #endif
 
-uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 
@@ -96,7 +96,7 @@ vec3 part_color(Part p, uint key, vec3 view) {
 // a pixel all of whose samples see the same surface
 Shaded single_surface(ivec2 pixel) {
     ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
-    uint key = texelFetch(surface_keys, middle, 0).r;
+    uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
     return Shaded(part_color(p, key, view), p.id, p.damage, p.depth);
@@ -106,7 +106,7 @@ Shaded single_surface(ivec2 pixel) {
 // what a hole shows: the inside of the container, or the sky through another hole
 Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
-    uint inner_key = texelFetch(surface_keys, inner_at, 0).r;
+    uint inner_key = key_at(inner_at);
     vec3 rest_mm = texelFetch(rest_points, inner_at, 0).xyz;
     float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);

@@ -18,16 +18,14 @@ void main() {
     ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
     // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
     // for each part of the container seen, the light once for each of its orientations
-    uint keys[TENT_SAMPLES];   // never changed below, so that it stays in registers
-    uint left = 0u;            // a bit for each sample that is still to be shaded
+    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint left = 0u;   // a bit for each sample that is still to be shaded
     float sky_weight = 0.0;
     for (int i = 0; i < TENT_SAMPLES; ++i) {
-        ivec2 at = middle + TENT_OFFSET[i];
-        keys[i] = texelFetch(surface_keys, at, 0).r;
         if (keys[i] == 0u) sky_weight += TENT_WEIGHT[i];
         else left |= 1u << i;
 #if WITH_HOLES
-        int hole = hole_at(texelFetch(rest_points, at, 0).xyz);
+        int hole = hole_at(texelFetch(rest_points, middle + TENT_OFFSET[i], 0).xyz);
         if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
 #endif
     }
