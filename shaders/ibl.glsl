@@ -13,13 +13,13 @@ struct Material {
 };
 
 vec3 to_environment(vec3 d) {
-    return vec3(yaw.x * d.x + yaw.y * d.y, yaw.x * d.y - yaw.y * d.x, d.z);
+    return vec3(fma(yaw.x, d.x, yaw.y * d.y), fma(yaw.x, d.y, -yaw.y * d.x), d.z);
 }
 
 // inside the border of a map that is `size` texels wide
 vec2 bordered(vec2 uv, float size) {
     float texel = 1.0 / size;
-    return uv * (1.0 - 2.0 * texel) + texel;
+    return fma(uv, vec2(1.0 - 2.0 * texel), vec2(texel));
 }
 
 vec3 prefiltered(vec3 direction, float roughness) {

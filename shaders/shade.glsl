@@ -29,7 +29,9 @@ struct Shaded {
     float depth;
 };
 
-vec3 view_ray(vec2 pixel) { return ray_corner + pixel.x * ray_right + pixel.y * ray_down; }
+vec3 view_ray(vec2 pixel) {
+    return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
+}
 
 vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view) {
 #if LAYER == LAYER_ALL
