@@ -48,9 +48,6 @@ LIST_HEADER = 4
 
 LIST_BINDING = 0
 
-LISTED_CLASSES = tuple(name for name in PIXEL_CLASSES if name not in ("sky", "plain"))
-"""Classes of scattered pixels, which are shaded from lists."""
-
 MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
 
@@ -129,6 +126,22 @@ DAMAGE_BLOCK = Block(
         ("int", "inner_row"),  # first row of the inner view in the sample targets
     ),
 )
+
+
+def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
+    """The classes of scattered pixels that such a frame may hold; they are shaded from lists.
+
+    damage: one of DAMAGE_VARIANTS. The other classes, sky and plain, are drawn.
+    """
+
+    def comes(name: str, traits: tuple[str, ...]) -> bool:
+        if name in ("sky", "plain") or (samples_per_axis == 1 and name.startswith("mixed")):
+            return False
+        if "HOLES" in traits:
+            return damage == "holed"
+        return damage != "sound" or "DAMAGE" not in traits
+
+    return tuple(name for name, traits in PIXEL_CLASSES.items() if comes(name, traits))
 
 
 def noise_deviation() -> NDArray[np.float32]:
@@ -253,7 +266,9 @@ def link_compute(
     return program
 
 
-def _assign(program: moderngl.Program | moderngl.ComputeShader, samplers: Mapping[str, int]) -> None:
+def _assign(
+    program: moderngl.Program | moderngl.ComputeShader, samplers: Mapping[str, int]
+) -> None:
     for name, unit in samplers.items():
         if name in program:
             program[name] = unit

@@ -6,7 +6,7 @@ from typing import Any
 import moderngl
 
 from fastgen.pixel_lists import PixelLists
-from fastgen.programs import CLASS_DEPTH_STEP, LISTED_CLASSES, PIXEL_CLASSES, link, link_compute
+from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link, link_compute, listed_classes
 from fastgen.targets import Region, Targets
 
 UNITS = {
@@ -28,6 +28,11 @@ UNITS = {
 }
 
 
+def _mask(write: bool) -> Any:
+    """For all three attachments; moderngl's annotation knows the mask of a single one."""
+    return [(write,) * 4] * 3
+
+
 class Shading:
     """The programs that shade one layer: a classifier, and one program a pixel class.
 
@@ -40,7 +45,7 @@ class Shading:
         self._layer = layer
         self._programs: list[moderngl.Program] = []
         self._arrays: dict[tuple[str, str, str], moderngl.VertexArray] = {}
-        self._listed: dict[tuple[str, str], moderngl.ComputeShader] = {}
+        self._listed: dict[str, moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -68,37 +73,22 @@ class Shading:
         self._ctx.scissor = region
         image.depth_mask = False
         self._ctx.depth_func = "=="
-        coming = [
-            (name, "holed" if "DAMAGE" in traits else "sound")
-            for name, traits in PIXEL_CLASSES.items()
-            if name != "sky" and self._comes(name, traits, damage)
-        ]
-        listed = [(name, d) for name, d in coming if name in LISTED_CLASSES]
-        image.color_mask = [(False,) * 4] * 3
-        for name, _ in listed:
+        listed = listed_classes(self._samples_per_axis, damage)
+        image.color_mask = _mask(False)
+        for name in listed:
             targets.lists.begin(name)
             self._run("list", name, "sound")
-        image.color_mask = [(True,) * 4] * 3
-        for name, variant in coming:
-            if (name, variant) not in listed:
-                self._run("shade", name, variant)
+        image.color_mask = _mask(True)
+        self._run("shade", "plain", "sound")
         self._ctx.scissor = None
         self._run("shade", "sky", "sound")
         self._ctx.memory_barrier()
         targets.bind_images()
-        for name, variant in listed:
-            self._dispatch(name, variant, targets.lists)
+        for name in listed:
+            self._dispatch(name, targets.lists)
         self._ctx.memory_barrier()
         image.depth_mask = True
         self._ctx.depth_func = "<"
-
-    def _comes(self, name: str, traits: tuple[str, ...], damage: str) -> bool:
-        """Whether the classifier of this variant may give any pixel this class."""
-        if self._samples_per_axis == 1 and name.startswith("mixed"):
-            return False
-        if "HOLES" in traits:
-            return damage == "holed"
-        return damage != "sound" or "DAMAGE" not in traits
 
     def _run(self, stage: str, pixel_class: str, damage: str) -> None:
         """Draw `stage`.frag over the pixels of a class; the classifier gives all of them theirs."""
@@ -112,14 +102,14 @@ class Shading:
             self._arrays[key] = self._ctx.vertex_array(program, [])
         self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
 
-    def _dispatch(self, pixel_class: str, damage: str, lists: PixelLists) -> None:
+    def _dispatch(self, pixel_class: str, lists: PixelLists) -> None:
         """Shade the listed pixels of a class."""
-        key = (pixel_class, damage)
-        if key not in self._listed:
-            self._listed[key] = link_compute(
-                self._ctx, "shade_listed.comp", UNITS, **self._variant(*key)
+        if pixel_class not in self._listed:
+            damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
+            self._listed[pixel_class] = link_compute(
+                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage)
             )
-        lists.dispatch(pixel_class, self._listed[key])
+        lists.dispatch(pixel_class, self._listed[pixel_class])
 
     def _variant(self, pixel_class: str, damage: str) -> dict[str, Any]:
         return {

@@ -9,7 +9,7 @@ import numpy as np
 from fastgen.errors import FastgenError
 from fastgen.gl import GLContext
 from fastgen.pixel_lists import PixelLists
-from fastgen.programs import LISTED_CLASSES
+from fastgen.programs import listed_classes
 from fastgen.sample import Frame
 
 Region = tuple[int, int, int, int]
@@ -71,7 +71,7 @@ class Targets:
         ]
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
-        self.lists = PixelLists(ctx, size, LISTED_CLASSES)
+        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, damage))
         self._viewport = gl.function(
             "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
         )
