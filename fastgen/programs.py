@@ -40,6 +40,14 @@ PIXEL_CLASSES = {
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 
+LIST_GROUP = 64
+"""Pixels of a list that a compute work group takes."""
+
+LIST_HEADER = 4
+"""Numbers before the pixels of a list: the three of its dispatch, and its length."""
+
+LIST_BINDING = 0
+
 MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
 
@@ -132,6 +140,22 @@ DAMAGE_BLOCK = Block(
 )
 
 
+def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
+    """The classes of scattered pixels that such a frame may hold; they are shaded from lists.
+
+    damage: one of DAMAGE_VARIANTS. The other classes, sky and plain, are drawn.
+    """
+
+    def comes(name: str, traits: tuple[str, ...]) -> bool:
+        if name in ("sky", "plain") or (samples_per_axis == 1 and name.startswith("mixed")):
+            return False
+        if "HOLES" in traits:
+            return damage == "holed"
+        return damage != "sound" or "DAMAGE" not in traits
+
+    return tuple(name for name, traits in PIXEL_CLASSES.items() if comes(name, traits))
+
+
 def noise_deviation() -> NDArray[np.float32]:
     """The table `noise_lost` of SCENE_BLOCK, float32 [2 * levels, 4]."""
     return noise_tiles().lost_deviation.reshape(-1, 4)
@@ -181,6 +205,8 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
         "GUTTER_STEPS": GUTTER_STEPS,
         "OUT_OF_REACH_MM": "1e6",
+        "LIST_GROUP": f"{LIST_GROUP}u",
+        "LIST_BINDING": LIST_BINDING,
         "MAX_PARTS": 3,
         "MAX_SIDES": 4,
         "DAMAGED": int(damage != "sound"),
@@ -223,9 +249,12 @@ def expand(
             constants = _constants(samples_per_axis, layer, pixel_class, damage)
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)
-        return shader_path(match[1]).read_text(encoding="utf-8")
+        return included(shader_path(match[1]).read_text(encoding="utf-8"))
 
-    text = re.sub(r'#include "([^"]+)"\n', include, text)
+    def included(part: str) -> str:
+        return re.sub(r'#include "([^"]+)"\n', include, part)
+
+    text = included(text)
     version = re.search(r"#version .*\n", text)
     assert version, "a shader needs a #version line"
     return version[0] + text.replace(version[0], "", 1)
@@ -239,7 +268,24 @@ def link(
         vertex_shader=expand(shader_path(vertex).read_text(encoding="utf-8"), **variant),
         fragment_shader=expand(shader_path(fragment).read_text(encoding="utf-8"), **variant),
     )
+    _assign(program, samplers)
+    return program
+
+
+def link_compute(
+    ctx: moderngl.Context, compute: str, samplers: Mapping[str, int], **variant: Any
+) -> moderngl.ComputeShader:
+    """Compile and link a compute shader file; samplers: as for `link`."""
+    program = ctx.compute_shader(
+        expand(shader_path(compute).read_text(encoding="utf-8"), **variant)
+    )
+    _assign(program, samplers)
+    return program
+
+
+def _assign(
+    program: moderngl.Program | moderngl.ComputeShader, samplers: Mapping[str, int]
+) -> None:
     for name, unit in samplers.items():
         if name in program:
             program[name] = unit
-    return program

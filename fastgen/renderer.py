@@ -182,6 +182,7 @@ class Renderer:
         textures: dict[str, Any] = {
             "surface_keys": targets.keys,
             "sheet_points": targets.points,
+            "sheet_depths": targets.depths,
             "specular_light": light.specular,
             "irradiance_light": light.irradiance,
             "background_light": light.background,

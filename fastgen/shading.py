@@ -5,7 +5,8 @@ from typing import Any
 
 import moderngl
 
-from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link
+from fastgen.pixel_lists import PixelLists
+from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link, link_compute, listed_classes
 from fastgen.targets import Region, Targets
 
 UNITS = {
@@ -23,7 +24,13 @@ UNITS = {
     "decal_table": 11,
     "glyph_table": 12,
     "rest_points": 13,
+    "sheet_depths": 14,
 }
+
+
+def _mask(write: bool) -> Any:
+    """For all three attachments; moderngl's annotation knows the mask of a single one."""
+    return [(write,) * 4] * 3
 
 
 class Shading:
@@ -36,8 +43,9 @@ class Shading:
         self._ctx = ctx
         self._samples_per_axis = samples_per_axis
         self._layer = layer
-        self._programs: dict[tuple[str, str], moderngl.Program] = {}
-        self._arrays: dict[tuple[str, str], moderngl.VertexArray] = {}
+        self._programs: list[moderngl.Program] = []
+        self._arrays: dict[tuple[str, str, str], moderngl.VertexArray] = {}
+        self._listed: dict[str, moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -58,50 +66,64 @@ class Shading:
         self._ctx.enable_only(moderngl.DEPTH_TEST)
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
-        self._run("classify", "sound", regions)
+        self._run("classify", "sky", "sound", regions)
         for part in near_damage:
-            self._run("classify", damage, [part] if part else regions)
+            self._run("classify", "sky", damage, [part] if part else regions)
         image.depth_mask = False
         self._ctx.depth_func = "=="
-        for name, traits in PIXEL_CLASSES.items():
-            if name != "sky" and self._comes(name, traits, damage):
-                self._run(name, "holed" if "DAMAGE" in traits else "sound", regions)
-        self._run("sky", "sound", [None])
+        listed = listed_classes(self._samples_per_axis, damage)
+        image.color_mask = _mask(False)
+        for name in listed:
+            targets.lists.begin(name)
+            self._run("list", name, "sound", regions)
+        image.color_mask = _mask(True)
+        self._run("shade", "plain", "sound", regions)
+        self._run("shade", "sky", "sound", [None])
         self._ctx.scissor = None
+        self._ctx.memory_barrier()
+        targets.bind_images()
+        for name in listed:
+            self._dispatch(name, targets.lists)
+        self._ctx.memory_barrier()
         image.depth_mask = True
         self._ctx.depth_func = "<"
 
-    def _comes(self, name: str, traits: tuple[str, ...], damage: str) -> bool:
-        """Whether the classifier of this variant may give any pixel this class."""
-        if self._samples_per_axis == 1 and name.startswith("mixed"):
-            return False
-        if "HOLES" in traits:
-            return damage == "holed"
-        return damage != "sound" or "DAMAGE" not in traits
-
-    def _run(self, name: str, damage: str, regions: Sequence[Region | None]) -> None:
-        key = (name, damage)
+    def _run(
+        self, stage: str, pixel_class: str, damage: str, regions: Sequence[Region | None]
+    ) -> None:
+        """Draw `stage`.frag over the pixels of a class in `regions`; the classifier gives all of
+        them theirs."""
+        key = (stage, pixel_class, damage)
         if key not in self._arrays:
-            variant: dict[str, Any] = {
-                "samples_per_axis": self._samples_per_axis,
-                "layer": self._layer,
-                "damage": damage,
-            }
-            fragment = "classify.frag"
-            if name != "classify":
-                fragment = "shade.frag"
-                variant["pixel_class"] = name
-            program = link(self._ctx, "fullscreen.vert", fragment, UNITS, **variant)
-            if name != "classify":
-                program["class_depth"] = list(PIXEL_CLASSES).index(name) * CLASS_DEPTH_STEP
-            self._programs[key] = program
+            program = link(
+                self._ctx, "fullscreen.vert", f"{stage}.frag", UNITS, **self._variant(*key[1:])
+            )
+            program["class_depth"] = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
+            self._programs.append(program)
             self._arrays[key] = self._ctx.vertex_array(program, [])
         for region in regions:
             self._ctx.scissor = region
             self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
 
+    def _dispatch(self, pixel_class: str, lists: PixelLists) -> None:
+        """Shade the listed pixels of a class."""
+        if pixel_class not in self._listed:
+            damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
+            self._listed[pixel_class] = link_compute(
+                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage)
+            )
+        lists.dispatch(pixel_class, self._listed[pixel_class])
+
+    def _variant(self, pixel_class: str, damage: str) -> dict[str, Any]:
+        return {
+            "samples_per_axis": self._samples_per_axis,
+            "layer": self._layer,
+            "pixel_class": pixel_class,
+            "damage": damage,
+        }
+
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [*self._arrays.values(), *self._programs.values()]
+        items: list[Any] = [*self._arrays.values(), *self._programs, *self._listed.values()]
         for item in items:
             item.release()

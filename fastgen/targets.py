@@ -10,6 +10,8 @@ import numpy as np
 
 from fastgen.errors import FastgenError
 from fastgen.gl import GLContext
+from fastgen.pixel_lists import PixelLists
+from fastgen.programs import listed_classes
 from fastgen.sample import Frame
 
 Region = tuple[int, int, int, int]
@@ -75,9 +77,11 @@ class Targets:
             )
         self.scale = (size[0] * samples_per_axis / fine[0], size[1] * samples_per_axis / fine[1])
         self.keys = ctx.texture(stored, 1, dtype="u4")
-        self.points = ctx.texture(stored, 4, dtype="f4")
+        # two textures of two and one numbers are cheaper to draw to than one of four
+        self.points = ctx.texture(stored, 2, dtype="f4")
+        self.depths = ctx.texture(stored, 1, dtype="f4")
         self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        attached = [t for t in (self.keys, self.points, self.rest) if t is not None]
+        attached = [t for t in (self.keys, self.points, self.depths, self.rest) if t is not None]
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth = ctx.depth_renderbuffer(stored)
@@ -85,12 +89,13 @@ class Targets:
         self._fine = fine
         self._buffers = [*attached, self._depth]
         self._image = [
-            ctx.renderbuffer(size, 4),
-            ctx.renderbuffer(size, 1, dtype="u4"),
-            ctx.renderbuffer(size, 1, dtype="f4"),
+            ctx.texture(size, 4),
+            ctx.texture(size, 1, dtype="u4"),
+            ctx.texture(size, 1, dtype="f4"),
         ]
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
+        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, damage))
         self._viewport = gl.function(
             "glViewportIndexedf", None, ctypes.c_uint, *[ctypes.c_float] * 4
         )
@@ -133,6 +138,11 @@ class Targets:
         """Mark all pixels of the bound image framebuffer as sky, class 0."""
         self._clear_float(_GL_DEPTH, 0, _SKY)
 
+    def bind_images(self) -> None:
+        """Let compute shaders write the colour, label and depth images, units 0 to 2."""
+        for unit, texture in enumerate(self._image):
+            texture.bind_to_image(unit, read=False, write=True)
+
     def read(self) -> Frame:
         """Copy the shaded image out."""
         width, height = self.size
@@ -153,6 +163,6 @@ class Targets:
     def release(self) -> None:
         """Free all GL objects."""
         buffers = (*self._buffers, self._classes, *self._image)
-        items: list[Any] = [self.samples, self.image, *buffers]
+        items: list[Any] = [self.samples, self.image, *buffers, self.lists]
         for item in items:
             item.release()

@@ -4,24 +4,22 @@
 #include "blocks.glsl"
 #include "octahedral.glsl"
 #include "decal_cell.glsl"
+#include "keys_around.glsl"
 #if DAMAGED
 #include "damage.glsl"
 #endif
 
-uniform usampler2D surface_keys;
 uniform sampler2D sheet_points;
 uniform sampler2D rest_points;
 
 void main() {
     ivec2 middle = ivec2(gl_FragCoord.xy) * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
-    uint key = texelFetch(surface_keys, middle, 0).r;
     bool mixed = false;
-#if SAMPLES_PER_AXIS > 1
-    for (int i = 1; i < TENT_SAMPLES; ++i)
-        mixed = mixed || texelFetch(surface_keys, middle + TENT_OFFSET[i], 0).r != key;
-#endif
-    vec4 sheet = texelFetch(sheet_points, middle, 0);
-    bool decal = key != 0u && cell_at(key_chart(key), sheet.xy).x != 0u;
+    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint key = keys[0];
+    for (int i = 1; i < TENT_SAMPLES; ++i) mixed = mixed || keys[i] != key;
+    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
+    bool decal = key != 0u && cell_at(key_chart(key), sheet_mm).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
     if (decal) ++found;
 #if DAMAGED

@@ -6,17 +6,19 @@ in vec2 atlas_mm;
 flat in uint surface_key;
 
 layout(location = 0) out uint out_key;
-layout(location = 1) out vec4 out_sheet;   // sheet x, y in mm, depth in m, -
+layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
+layout(location = 2) out float out_depth;  // m
 #if DAMAGED
 in vec3 rest_mm;
 
-layout(location = 2) out vec4 out_rest;    // rest position in mm, -
+layout(location = 3) out vec4 out_rest;    // rest position in mm, -
 #endif
 
 void main() {
     out_key = surface_key;
+    out_sheet = atlas_mm;
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
-    out_sheet = vec4(atlas_mm, 1.0 / gl_FragCoord.w, 0.0);
+    out_depth = 1.0 / gl_FragCoord.w;
 #if DAMAGED
     out_rest = vec4(rest_mm, 0.0);
 #endif

@@ -13,11 +13,14 @@ struct Material {
 };
 
 vec3 to_environment(vec3 d) {
-    return vec3(yaw.x * d.x + yaw.y * d.y, yaw.x * d.y - yaw.y * d.x, d.z);
+    return vec3(fma(yaw.x, d.x, yaw.y * d.y), fma(yaw.x, d.y, -yaw.y * d.x), d.z);
 }
 
 // inside the border of a map that is `size` texels wide
-vec2 bordered(vec2 uv, float size) { return (1.0 + uv * (size - 2.0)) / size; }
+vec2 bordered(vec2 uv, float size) {
+    float texel = 1.0 / size;
+    return fma(uv, vec2(1.0 - 2.0 * texel), vec2(texel));
+}
 
 vec3 prefiltered(vec3 direction, float roughness) {
     vec2 uv = bordered(octahedral(to_environment(direction)), SPECULAR_SIZE);
@@ -33,6 +36,7 @@ vec3 diffuse_radiance(vec3 normal) {
     return textureLod(irradiance_light, uv, 0.0).rgb;
 }
 
+// the direction may have any length
 vec3 background(vec3 direction) {
     vec2 uv = bordered(octahedral(to_environment(direction)), background_size);
     return textureLod(background_light, uv, 0.0).rgb;

@@ -8,17 +8,23 @@ vec3 neutral_tone(vec3 c) {
     float low = min(c.r, min(c.g, c.b));
     c -= low < 0.08 ? low - 6.25 * low * low : 0.04;
     float peak = max(c.r, max(c.g, c.b));
-    if (peak < start) return c;
+    // where the peak is below the start, the shoulder's own formula leaves c as it is
     const float d = 1.0 - start;
-    float new_peak = 1.0 - d * d / (peak + d - start);
-    c *= new_peak / peak;
-    float g = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0);
-    return mix(c, vec3(new_peak), g);
+    float shoulder = max(peak, start);
+    float new_peak = 1.0 - d * d / (shoulder + d - start);
+    float white = desaturation * (shoulder - new_peak) + 1.0;
+    float keep = 1.0 / (shoulder * white);
+    return c * (new_peak * keep) + (new_peak - new_peak * shoulder * keep);
 }
 
-// IEC 61966-2-1
+// IEC 61966-2-1, within 1e-5: the power 1/2.4 as a polynomial of the fourth root, which costs less
 vec3 srgb_encode(vec3 c) {
-    vec3 curve = 1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055;
+    vec3 x = sqrt(sqrt(c));
+    vec3 curve = fma(vec3(-0.06538064), x, vec3(0.28097106));
+    curve = fma(curve, x, vec3(-0.56738774));
+    curve = fma(curve, x, vec3(1.24977997));
+    curve = fma(curve, x, vec3(0.16349550));
+    curve = fma(curve, x, vec3(-0.06148334));
     return mix(curve, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 

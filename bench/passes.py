@@ -1,0 +1,136 @@
+"""What each pass of a draw costs, and for how many pixels.
+
+    python bench/passes.py [--scenes 6] [--repeats 3] [--size 640x640] [--damage 0.4]
+
+Prints, for each camera, core-milliseconds (process CPU time, so other load on the machine counts
+little) and thousands of pixels of each pass in one process, means over scenes of the least of
+`repeats` draws. Each pass is waited for by itself, which a real frame is not.
+"""
+
+import argparse
+import os
+import statistics
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+# one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
+os.environ.setdefault("LP_NUM_THREADS", "0")
+
+import moderngl
+
+from fastgen import Config, Generator
+from fastgen.gpu_mesh import GpuMesh
+from fastgen.shading import Shading
+from fastgen.targets import Targets
+
+
+class PassTimer:
+    """Stands in front of the methods that draw; leaving it puts them back."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._kept: list[tuple[type, str, Callable[..., Any]]] = []
+        self.count_pixels = False
+        self.seconds: dict[str, float] = {}
+        self.pixels: dict[str, int] = {}
+
+    def __enter__(self) -> "PassTimer":
+        self._wrap(Targets, "begin_samples", lambda *_: "clear")
+        self._wrap(GpuMesh, "draw", lambda *_: "geometry")
+        self._wrap(Shading, "_run", lambda stage, name, _: name if stage == "shade" else stage)
+        self._wrap(Shading, "_dispatch", lambda name, *_: name)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for owner, method, original in self._kept:
+            setattr(owner, method, original)
+
+    def _wrap(self, owner: type, method: str, named: Callable[..., str]) -> None:
+        original = getattr(owner, method)
+        self._kept.append((owner, method, original))
+
+        def timed(this: object, *args: Any) -> None:
+            name = named(*args)
+            if self.count_pixels:
+                query = self._ctx.query(samples=True)
+                with query:
+                    original(this, *args)
+                self.pixels[name] = self.pixels.get(name, 0) + query.samples
+                return
+            self._ctx.finish()
+            began = time.process_time()
+            original(this, *args)
+            self._ctx.finish()
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - began
+
+        setattr(owner, method, timed)
+
+
+def measure(
+    config: Config, size: tuple[int, int], scenes: int, repeats: int
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
+    """Mean milliseconds and mean pixels, by camera and pass; 'draw' is a whole draw untouched."""
+    spent: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    with Generator(config, seed=7, size=size, backend="egl") as generator:
+        renderer = generator._open()
+        ctx = renderer._ctx
+        for index in range(scenes):
+            scene = generator.scene(index)
+            for camera in scene.cameras:
+                renderer.draw(scene, camera, size)
+                whole = []
+                for _ in range(repeats):
+                    ctx.finish()
+                    began = time.process_time()
+                    renderer.draw(scene, camera, size)
+                    ctx.finish()
+                    whole.append(time.process_time() - began)
+                spent[camera.name]["draw"].append(min(whole) * 1e3)
+                with PassTimer(ctx) as timer:
+                    timer.count_pixels = True
+                    renderer.draw(scene, camera, size)
+                    timer.count_pixels = False
+                    least: dict[str, float] = {}
+                    for _ in range(repeats):
+                        timer.seconds = {}
+                        renderer.draw(scene, camera, size)
+                        for name, value in timer.seconds.items():
+                            least[name] = min(least.get(name, value), value)
+                for name, value in least.items():
+                    spent[camera.name][name].append(value * 1e3)
+                    drawn[camera.name][name].append(timer.pixels[name])
+    # a pass that a scene does without counts as nothing there
+    mean_ms = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in spent.items()}
+    pixels = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in drawn.items()}
+    return mean_ms, pixels
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=6)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--size", default="640x640")
+    parser.add_argument("--damage", type=float, help="share of scenes with damage")
+    options = parser.parse_args()
+    width, height = (int(v) for v in options.size.split("x"))
+    values = {} if options.damage is None else {"damage": {"probability": options.damage}}
+    times, pixels = measure(
+        Config.from_values(values), (width, height), options.scenes, options.repeats
+    )
+    cameras = list(times)
+    names = list(dict.fromkeys(name for rows in times.values() for name in rows))
+    print("ms (thousands of pixels)")
+    print(f"{'pass':14}" + "".join(f"{c:>16}" for c in cameras) + f"{'mean':>9}")
+    for name in names:
+        cells = [times[c].get(name, 0.0) for c in cameras]
+        counts = [pixels[c].get(name, 0.0) / 1e3 for c in cameras]
+        row = "".join(f"{ms:8.2f} ({count:5.1f})" for ms, count in zip(cells, counts, strict=True))
+        print(f"{name:14}{row}{statistics.fmean(cells):9.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+// Shaded sky(ray), Part part_at(...), vec3 part_color(...): what shading a pixel of any class is made of.
+
+#include "octahedral.glsl"
+#include "keys_around.glsl"
+#include "tone.glsl"
+#include "ibl.glsl"
+#include "layers.glsl"
+#include "ageing.glsl"
+#include "dirt.glsl"
+#include "rust.glsl"
+#include "scratches.glsl"
+#include "wear.glsl"
+#include "decal_cell.glsl"
+#include "decal.glsl"
+#include "material.glsl"
+#if WITH_DAMAGE
+#include "damage.glsl"
+#include "inside.glsl"
+
+uniform sampler2D rest_points;
+#endif
+
+uniform sampler2D sheet_points;
+uniform sampler2D sheet_depths;
+
+struct Shaded {
+    vec3 color;   // displayed, linear
+    uint id;
+    uint damage;
+    float depth;
+};
+
+vec3 view_ray(vec2 pixel) {
+    return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
+}
+
+vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view) {
+#if LAYER == LAYER_ALL
+    return neutral_tone(exposure * lit(s.material, normal, view));
+#elif LAYER == LAYER_NORMALS
+    return srgb_decode(normal * 0.5 + 0.5);
+#elif LAYER == LAYER_REFLECTION
+    return srgb_decode(vec3(s.material.roughness));
+#else
+    return s.material.albedo;
+#endif
+}
+
+Shaded sky(vec3 ray) {
+#if LAYER == LAYER_ALL
+    vec3 color = neutral_tone(exposure * background(ray));
+#else
+    vec3 color = vec3(1.0);
+#endif
+    return Shaded(color, 0u, 0u, VOID_DEPTH);
+}
+
+// all that the samples of one part within a pixel share: its layers, the point they are taken at
+struct Part {
+    SurfacePoint surface;
+    uint id;
+    uint damage;
+    float depth;
+#if WITH_DAMAGE
+    mat3 bend;
+#endif
+};
+
+Part part_at(ivec2 sample_at, uint key, vec3 view) {
+    vec2 sheet_mm = texelFetch(sheet_points, sample_at, 0).xy;
+    vec3 normal = key_normal(key);
+    Part p;
+    p.damage = SOUND_CONTAINER;
+    p.depth = texelFetch(sheet_depths, sample_at, 0).r;
+    float scar = 0.0;
+#if WITH_DAMAGE
+    Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
+    if (d.value != 0u) p.damage = d.value;
+    scar = d.scar;
+    p.bend = d.bend;
+    normal = bent_normal(d.bend, normal);
+#endif
+    float facing = dot(normal, view);
+    // the geometric mean of the footprint's two axes on the sheet
+    float footprint_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+    p.surface = surface_at(key_chart(key), sheet_mm, footprint_mm, scar);
+    p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
+    if (key_chart(key) >= SPREADER_CHART) {
+        p.id = SPREADER_ID;
+        p.damage = 0u;
+    }
+    return p;
+}
+
+vec3 part_color(Part p, uint key, vec3 view) {
+    vec3 normal = key_normal(key);
+#if WITH_DAMAGE
+    normal = bent_normal(p.bend, normal);
+#endif
+    return layer_color(p.surface, normal, view);
+}
+
+// a pixel all of whose samples see the same surface
+Shaded single_surface(ivec2 pixel) {
+    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    uint key = key_at(middle);
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
+    Part p = part_at(middle, key, view);
+    return Shaded(part_color(p, key, view), p.id, p.damage, p.depth);
+}
+
+#if WITH_HOLES
+// what a hole shows: the inside of the container, or the sky through another hole
+Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
+    ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
+    uint inner_key = key_at(inner_at);
+    vec3 rest_mm = texelFetch(rest_points, inner_at, 0).xyz;
+    float depth = texelFetch(sheet_depths, inner_at, 0).r;
+    Shaded s = sky(ray);
+    if (inner_key != 0u && hole_at(rest_mm) < 0) {
+        vec3 seen = inside(-key_normal(inner_key), rest_mm);
+#if LAYER == LAYER_ALL
+        seen = neutral_tone(exposure * seen);
+#endif
+        s = Shaded(seen, CONTAINER_ID, 0u, depth);
+    }
+    s.damage = uint(damage_shape[3 * int(key >> 10) + 2].w);
+    return s;
+}
+#endif

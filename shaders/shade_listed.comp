@@ -1,0 +1,81 @@
+// Shades the listed pixels of one class: for few pixels, scattered ones, and such as see several surfaces.
+#version 430 core
+#include "blocks.glsl"
+#include "shade.glsl"
+#include "pixel_list.glsl"
+
+layout(local_size_x = LIST_GROUP) in;
+
+layout(rgba8, binding = 0) writeonly uniform image2D color_image;
+layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
+layout(r32f, binding = 2) writeonly uniform image2D depth_image;
+
+void main() {
+    if (gl_GlobalInvocationID.x >= listed_pixels()) return;
+    ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
+#if WITH_MIXED
+    vec2 center = vec2(pixel) + 0.5;
+    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
+    // for each part of the container seen, the light once for each of its orientations
+    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint left = 0u;   // a bit for each sample that is still to be shaded
+    float sky_weight = 0.0;
+    for (int i = 0; i < TENT_SAMPLES; ++i) {
+        if (keys[i] == 0u) sky_weight += TENT_WEIGHT[i];
+        else left |= 1u << i;
+#if WITH_HOLES
+        int hole = hole_at(texelFetch(rest_points, middle + TENT_OFFSET[i], 0).xyz);
+        if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
+#endif
+    }
+    bool sees_sky = keys[0] == 0u;
+    Shaded s = sky(view_ray(center));
+    vec3 color = sky_weight * s.color;
+    float done = sky_weight;
+    for (int part = 0; part < MAX_PARTS && left != 0u; ++part) {
+        uint first_key = 0u;
+        ivec2 offset = ivec2(0);
+        for (int i = TENT_SAMPLES - 1; i >= 0; --i)
+            if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = TENT_OFFSET[i]; }
+        uint chart = key_chart(first_key);
+        uint of_part = 0u;
+        for (int i = 0; i < TENT_SAMPLES; ++i)
+            if (key_chart(keys[i]) == chart) of_part |= 1u << i;
+        of_part &= left;
+        vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
+        vec3 view = -normalize(ray);
+        Part p = part_at(middle + offset, first_key, view);
+        bool at_center = part == 0 && !sees_sky;
+        if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
+        for (int side = 0; side < MAX_SIDES && of_part != 0u; ++side) {
+            uint key = 0u;
+            for (int i = TENT_SAMPLES - 1; i >= 0; --i)
+                if ((of_part & 1u << i) != 0u) key = keys[i];
+            float weight = 0.0;
+            uint of_side = 0u;
+            for (int i = 0; i < TENT_SAMPLES; ++i)
+                if (keys[i] == key) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
+            of_part &= ~of_side;
+            left &= ~of_side;
+            vec3 lit_color = part_color(p, key, view);
+#if WITH_HOLES
+            if (chart == PORTAL_CHART) {
+                Shaded through = through_hole(middle + offset, key, ray);
+                lit_color = through.color;
+                if (at_center && side == 0) s = through;
+            }
+#endif
+            color += weight * lit_color;
+            done += weight;
+        }
+    }
+    color /= done;   // of a busy pixel, what was not come to counts like the rest
+#else
+    Shaded s = single_surface(pixel);
+    vec3 color = s.color;
+#endif
+    imageStore(color_image, pixel, vec4(srgb_encode(color), 1.0));
+    imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
+    imageStore(depth_image, pixel, vec4(s.depth));
+}
