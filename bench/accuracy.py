@@ -215,7 +215,7 @@ def main() -> None:
     parser.add_argument("--size", default="320x320")
     parser.add_argument("--samples", type=int, default=256)
     parser.add_argument("--noise-scenes", type=int, default=2, help="how many to render twice")
-    parser.add_argument("--antialiasing", default="balanced")
+    parser.add_argument("--quality", default="balanced")
     parser.add_argument("--blender-python", type=Path)
     parser.add_argument("--hdri", help="folder of .hdr and .exr files to light with")
     parser.add_argument("--references", type=Path, default=Path(__file__).parent / "references")
@@ -235,7 +235,7 @@ def main() -> None:
         options.seed,
         (width, height),
         hdri_dir=options.hdri,
-        antialiasing=options.antialiasing,
+        quality=options.quality,
     ) as generator:
         for index in range(options.scenes):
             scene = generator.scene(index)

@@ -16,7 +16,7 @@ from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.export import export_glb
 from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
-from fastgen.generator import Generator, find_camera
+from fastgen.generator import QUALITY, Generator, find_camera
 from fastgen.gl import BACKENDS
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
@@ -95,6 +95,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
         command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
 
+    for command in (make, show):
+        command.add_argument("--quality", default="balanced", metavar="|".join(QUALITY))
+
     for name, run, words in (
         ("stats", _stats, "print what a dataset holds"),
         ("verify", _verify, "check that a dataset is whole"),
@@ -132,6 +135,7 @@ def _generate(options: argparse.Namespace) -> int:
         hdri_dir=options.hdri,
         backend=options.backend,
         fmt=options.format,
+        quality=options.quality,
         formats=tuple(filter(None, options.also.split(","))),
         shard_scenes=shard,
     )
@@ -158,6 +162,7 @@ def _show(options: argparse.Namespace) -> int:
         _size(options.size),
         backend=options.backend,
         hdri_dir=options.hdri,
+        quality=options.quality,
     ) as generator:
         sample = generator.render(index=options.index, camera=options.camera, layer=drawn)
     image = sample.image

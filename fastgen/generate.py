@@ -151,7 +151,9 @@ def _settings(job: Job) -> dict[str, Any]:
     from fastgen import __version__
 
     # validates seed and size without opening GL
-    generator = Generator(job.config, job.seed, job.size, hdri_dir=job.hdri_dir)
+    generator = Generator(
+        job.config, job.seed, job.size, hdri_dir=job.hdri_dir, quality=job.quality
+    )
     names = generator.environments
     generator.scene(0)  # what only sampling can refuse is refused before anything is written
     for path in find_hdris(job.hdri_dir) if job.hdri_dir else ():
@@ -162,6 +164,7 @@ def _settings(job: Job) -> dict[str, Any]:
         "formats": list(job.formats),
         "seed": job.seed,
         "size": list(job.size),
+        "quality": job.quality,
         "cameras": list(job.cameras),
         "environments": list(names),
         "shard_scenes": job.shard_scenes,

@@ -21,7 +21,7 @@ from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 
-ANTIALIASING = {"none": 1, "balanced": 2, "high": 3}
+QUALITY = {"draft": 1, "balanced": 2, "high": 3}
 """Samples along each axis of a pixel by quality."""
 
 
@@ -38,7 +38,8 @@ class Generator:
 
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
-    in place of the bundled ones. Use it from one thread, and make one in each process.
+    in place of the bundled ones. quality: draft (one sample a pixel), balanced or high. Use it from
+    one thread, and make one in each process.
 
     Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
     """
@@ -50,7 +51,7 @@ class Generator:
         size: tuple[int, int] = (640, 640),
         backend: str = "auto",
         hdri_dir: str | Path | None = None,
-        antialiasing: str = "balanced",
+        quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
         if seed != int(seed) or seed < 0:
@@ -62,15 +63,13 @@ class Generator:
                     f"size: {width}x{height} is out of range; "
                     f"each side takes {MIN_SIZE} to {MAX_SIZE} pixels"
                 )
-        if antialiasing not in ANTIALIASING:
-            raise ConfigError(
-                f"antialiasing: {antialiasing!r} is unknown{nearest(antialiasing, ANTIALIASING)}"
-            )
+        if quality not in QUALITY:
+            raise ConfigError(f"quality: {quality!r} is unknown{nearest(quality, QUALITY)}")
         self.config = config or Config.preset()
         self.seed = int(seed)
         self.size = (int(width), int(height))
         self.backend = backend
-        self._samples_per_axis = ANTIALIASING[antialiasing]
+        self._samples_per_axis = QUALITY[quality]
         self._device_index = device_index
         self._hdris = (
             {path.stem: path for path in find_hdris(Path(hdri_dir))}
@@ -154,6 +153,12 @@ class Generator:
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         return self._open().exposure(scene, camera, self.size)
+
+    def preload(self) -> None:
+        """Load every light now, so that neither time nor memory grows as scenes first meet them."""
+        renderer = self._open()
+        for name in self.environments:
+            renderer.preload(name)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""

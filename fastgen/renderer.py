@@ -153,8 +153,7 @@ class Renderer:
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
         mesh, spreader = self._mesh(scene.container), self._spreader(scene)
-        light_data = self._light_of(scene.environment.name)
-        light = self._lights.get(scene.environment.name, lambda: GpuLight(ctx, light_data))
+        light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         exposure = self.exposure(scene, camera, size)
@@ -200,6 +199,11 @@ class Renderer:
             boxes = [np.concatenate([*boxes, frame]), *above]
         shading.draw(targets, bands([_region(view, box) for box in boxes]), damage, near)
         return targets
+
+    def preload(self, environment: str) -> GpuLight:
+        """The light of an environment, made if need be."""
+        data = self._light_of(environment)
+        return self._lights.get(environment, lambda: GpuLight(self._ctx, data))
 
     def bake(self, scene: Scene, texel_mm: float) -> Atlas:
         """The material of the whole container of `scene` as textures, see bake.Atlas."""

@@ -25,6 +25,9 @@ from fastgen.storage import storage_of
 SHARD_SCENES = {"seafront": 4, "webdataset": 64}
 """Scenes that are committed together, by format of the whole."""
 
+_PRELOAD_IMAGES = 1000
+"""A run of more meets every light anyway; from the start, its memory does not grow later."""
+
 FORMATS = tuple(SHARD_SCENES)
 ATTEMPTS = 3
 """A scene that failed so often is given up."""
@@ -49,6 +52,7 @@ class Job:
     backend: str
     fmt: str = "seafront"
     formats: tuple[str, ...] = ()
+    quality: str = "balanced"
     shard_scenes: int = 4
 
     @property
@@ -102,8 +106,15 @@ class Maker:
         self._formats = formats_of(job.formats)
         self._storage = storage_of(job.out)
         self._generator = Generator(
-            job.config, job.seed, job.size, backend=job.backend, hdri_dir=job.hdri_dir
+            job.config,
+            job.seed,
+            job.size,
+            backend=job.backend,
+            hdri_dir=job.hdri_dir,
+            quality=job.quality,
         )
+        if job.images > _PRELOAD_IMAGES:
+            self._generator.preload()
         names = (self._generator.used_backend, self._generator.renderer_name)
         report("made by", dict(zip(("backend", "renderer"), names, strict=True)))
 

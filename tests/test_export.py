@@ -101,7 +101,7 @@ class Exported:
 
 @pytest.fixture(scope="module")
 def generator():
-    with Generator(TORN, seed=2, size=SIZE, antialiasing="none") as made:
+    with Generator(TORN, seed=2, size=SIZE, quality="draft") as made:
         yield made
 
 

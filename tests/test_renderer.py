@@ -62,8 +62,8 @@ def test_damage_is_the_sound_container_wherever_that_is_seen(generator):
 
 def test_ids_do_not_depend_on_antialiasing():
     frames = []
-    for antialiasing in ("none", "balanced", "high"):
-        with Generator(SOUND, seed=5, size=SIZE, antialiasing=antialiasing) as generator:
+    for quality in ("draft", "balanced", "high"):
+        with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:
             frames.append(generator.render(index=1, camera="Cr"))
     for other in frames[1:]:
         assert (frames[0].ids != other.ids).mean() < 2e-4
@@ -76,13 +76,13 @@ def test_ids_do_not_depend_on_antialiasing():
 def test_antialiasing_approaches_a_fine_render_averaged_down():
     """An image of 4 x 4 as many pixels, box-filtered in linear light, is the reference."""
     fine = (4 * SIZE[0], 4 * SIZE[1])
-    with Generator(SOUND, seed=5, size=fine, antialiasing="none") as generator:
+    with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
         image = generator.render(index=1, camera="Cl").image
     linear = np.where(image <= 10, image / 255 / 12.92, ((image / 255 + 0.055) / 1.055) ** 2.4)
     reference = linear.reshape(SIZE[1], 4, SIZE[0], 4, 3).mean(axis=(1, 3))
     errors = []
-    for antialiasing in ("none", "balanced"):
-        with Generator(SOUND, seed=5, size=SIZE, antialiasing=antialiasing) as generator:
+    for quality in ("draft", "balanced"):
+        with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:
             sample = generator.render(index=1, camera="Cl")
         edge = near_edge(sample.ids)
         seen = (sample.image / 255.0) ** 2.2

@@ -35,7 +35,7 @@ class ContainerDataset(Dataset[Item]):
     """Map-style: item i of `length` is rendered when asked for, the same bytes in every process.
 
     task: damage, imdg, text or door; targets.item_of says what image and target hold. config,
-    seed, size, backend, hdri_dir, antialiasing, device_index: as for Generator. length: images of
+    seed, size, backend, hdri_dir, quality, device_index: as for Generator. length: images of
     an epoch over all ranks. cameras: names, by default all of the rig that the task can use.
     split: 'train', 'val' or 'test' as `fastgen generate` deals scenes out, None for all scenes.
     fixed: whether every epoch has the same scenes, as a validation set should; else each has new
@@ -66,7 +66,7 @@ class ContainerDataset(Dataset[Item]):
         curriculum: Curriculum | None = None,
         backend: str = "auto",
         hdri_dir: str | Path | None = None,
-        antialiasing: str = "balanced",
+        quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
         if length != int(length) or not 1 <= length <= MAX_LENGTH:
@@ -83,7 +83,7 @@ class ContainerDataset(Dataset[Item]):
             size=size,
             backend=backend,
             hdri_dir=hdri_dir,
-            antialiasing=antialiasing,
+            quality=quality,
             device_index=device_index,
         )
         self._plan = Plan(self.config, seed, self.cameras, split, fixed, all_views)
@@ -100,7 +100,7 @@ class ContainerDataset(Dataset[Item]):
             "split": split,
             "fixed": fixed,
             "all_views": all_views,
-            "antialiasing": antialiasing,
+            "quality": quality,
             "config": self.config.to_plain(),
         }
 
