@@ -8,6 +8,7 @@ scratches are left out: what peers draw is simpler than what fastgen draws.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from fastgen.export import export_glb
 from fastgen.exposure import metered_exposure
 from fastgen.mesh import Mesh
 from fastgen.resources import asset_path
-from fastgen.scene import Decal, Scene
+from fastgen.scene import Decal, Scene, Spreader
 
 TEXTURE_SIDE = 2048
 _LIFT_MM = 3.0
@@ -42,9 +43,10 @@ def write_jobs(
     folder.mkdir(parents=True, exist_ok=True)
     scenes, truths = [], []
     for index in indices:
-        scene = generator.scene(index)
+        # peers get neither holes nor a spreader: fastgen draws what they draw
+        scene = replace(generator.scene(index), damages=(), spreader=Spreader())
         markers = _markers(scene)
-        _write_glb(scene, markers, folder / f"{index:06d}.glb")
+        _write_glb(generator, scene, markers, folder / f"{index:06d}.glb")
         _write_hdr(scene, folder / f"{index:06d}.hdr")
         shots = []
         for name in cameras:
@@ -111,9 +113,9 @@ def _write_hdr(scene: Scene, path: Path) -> None:
     cv2.imwrite(str(path), np.ascontiguousarray(radiance[..., ::-1]))
 
 
-def _write_glb(scene: Scene, markers: dict[int, Decal], path: Path) -> None:
+def _write_glb(generator: Generator, scene: Scene, markers: dict[int, Decal], path: Path) -> None:
     mesh = build_container(scene.container.kind, scene.container.profiles)
-    export_glb(scene, path)
+    export_glb(generator, scene, path, cameras=())
     (container,) = trimesh.load_scene(path, process=False).geometry.values()
     material = container.visual.material
     if material.baseColorTexture is None:

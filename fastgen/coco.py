@@ -16,18 +16,26 @@ _LICENSE = {
 }
 
 
-def rle(mask: NDArray[np.bool_]) -> dict[str, Any]:
-    """Compressed run-length encoding of a mask [H, W]: {'size': [H, W], 'counts': text}.
+def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int]) -> dict[str, Any]:
+    """Compressed run-length encoding of a mask: {'size': [H, W], 'counts': text}.
 
-    Runs go down the columns and begin with zeros.
+    part: bool [h, w], what is not all zeros of the mask; corner: (x, y) of its first pixel in the
+    mask of `size` (width, height). Runs go down the columns and begin with zeros.
     """
-    flat = np.asarray(mask, bool).ravel(order="F")
-    changes = np.flatnonzero(flat[1:] != flat[:-1]) + 1
-    edges = np.concatenate([[0], changes, [flat.size]])
+    (x, y), (width, height) = corner, size
+    padded = np.zeros((part.shape[1], part.shape[0] + 2), bool)
+    padded[:, 1:-1] = part.T
+    # where columns begin and end to be set, in the order of the whole mask
+    column, row = np.nonzero(padded[:, 1:] != padded[:, :-1])
+    edges = (x + column) * height + y + row
+    # a run that goes on in the next column ends and begins at one place
+    again = np.flatnonzero(edges[1:] == edges[:-1])
+    edges = np.delete(edges, np.concatenate([again, again + 1]))
+    edges = np.concatenate([[0], edges, [width * height]])
     counts = np.diff(edges)
-    if flat.size and flat[0]:
-        counts = np.concatenate([[0], counts])
-    return {"size": [int(mask.shape[0]), int(mask.shape[1])], "counts": _packed(counts)}
+    if len(edges) > 2 and edges[-1] == edges[-2]:
+        counts = counts[:-1]
+    return {"size": [height, width], "counts": _packed(counts)}
 
 
 def _packed(counts: NDArray[np.int64]) -> str:
@@ -49,18 +57,23 @@ def _packed(counts: NDArray[np.int64]) -> str:
 
 
 def annotation(
-    category_id: int, box: Box, mask: NDArray[np.bool_], ignored: bool
+    category_id: int,
+    box: Box,
+    part: NDArray[np.bool_],
+    size: tuple[int, int],
+    ignored: bool,
 ) -> dict[str, Any]:
-    """One instance: category, box (x, y, width, height), area and mask [H, W].
+    """One instance: category, box (x, y, width, height), area and mask.
 
-    An ignored one is a crowd, which scorers neither ask for nor punish.
+    part: bool [h, w], its pixels within the box. size: (width, height) of the image. An ignored one
+    is a crowd, which scorers neither ask for nor punish.
     """
     x0, y0, x1, y1 = box
     return {
         "category_id": category_id,
         "bbox": [x0, y0, x1 - x0, y1 - y0],
-        "area": int(np.count_nonzero(mask)),
-        "segmentation": rle(mask),
+        "area": int(np.count_nonzero(part)),
+        "segmentation": rle(part, (x0, y0), size),
         "iscrowd": int(ignored),
     }
 

@@ -6,7 +6,6 @@ that files over the whole dataset are made from. What has no manifest was never 
 
 import hashlib
 import io
-import json
 import os
 import tarfile
 import traceback
@@ -14,6 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
+
+import orjson
 
 from fastgen.config import Config
 from fastgen.errors import FastgenError
@@ -140,8 +141,7 @@ class Maker:
             "files": {path: _entry(files, path) for path in files},
             "records": [record for _, record in made],
         }
-        text = json.dumps(manifest, separators=(",", ":"))
-        self._storage.write(manifest_path(task.shard), [text.encode()])
+        self._storage.write(manifest_path(task.shard), [orjson.dumps(manifest)])
 
     def _patiently(
         self, index: int, camera: str, skip: dict[int, str]

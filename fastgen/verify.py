@@ -162,7 +162,8 @@ def _same_masks(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
         rows, columns = np.nonzero(part)
         x, y = int(columns.min()), int(rows.min())
         box = [x, y, int(columns.max()) + 1 - x, int(rows.max()) + 1 - y]
-        seen.append((category, int(rows.size), box, coco.rle(part)["counts"]))
+        runs = coco.rle(part, (0, 0), (mask.shape[1], mask.shape[0]))["counts"]
+        seen.append((category, int(rows.size), box, runs))
     held = [
         (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
         for item in annotations

@@ -1,7 +1,7 @@
 """How much of an object is seen: what every kind of object's label has in common."""
 
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,3 +75,9 @@ def float_box(bounds: NDArray[np.float64]) -> tuple[float, float, float, float] 
         return None
     x0, y0, x1, y1 = np.round(bounds, 3).tolist()
     return x0, y0, x1, y1
+
+
+def window(target: NDArray[Any], box: Box) -> NDArray[Any]:
+    """The part of `target` [H, W] within a box, as a view."""
+    x0, y0, x1, y1 = box
+    return target[y0:y1, x0:x1]

@@ -16,6 +16,7 @@ from fastgen.formats import Item, assemble, damage, known_formats, yolo
 from fastgen.generator import Generator
 from fastgen.sample import Object
 from fastgen.scene import Camera
+from fastgen.visibility import mask_box, window
 
 
 def masks():
@@ -31,7 +32,9 @@ def masks():
 
 def test_run_lengths_decode_in_pycocotools_to_the_same_mask():
     for mask in masks():
-        made = coco.rle(mask)
+        made = coco.rle(mask, (0, 0), mask.shape[::-1])
+        box = mask_box(mask) or (0, 0, 1, 1)
+        assert coco.rle(window(mask, box), box[:2], mask.shape[::-1]) == made
         packed = {"size": made["size"], "counts": made["counts"].encode()}
         np.testing.assert_array_equal(coco_mask.decode(packed).astype(bool), mask)
         assert coco_mask.area(packed) == mask.sum()

@@ -6,13 +6,14 @@ arrive whole, is storage.py's and shards.py's business.
 """
 
 import importlib
-import json
 import pkgutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import Any
+
+import orjson
 
 from fastgen.camera import View
 from fastgen.config import LabelConfig
@@ -118,11 +119,11 @@ def assemble(item: Item, formats: Sequence[Format]) -> tuple[Files, Record]:
         "size": list(item.sample.view.size),
         "facts": facts,
     }
-    files[f"scenes/{item.split}/{item.stem}.json"] = _scene_file(item).encode()
+    files[f"scenes/{item.split}/{item.stem}.json"] = _scene_file(item)
     return files, record
 
 
-def _scene_file(item: Item) -> str:
+def _scene_file(item: Item) -> bytes:
     """The Scene, the camera in numbers that other tools take, and all Objects."""
     sample = item.sample
     head = {
@@ -133,7 +134,7 @@ def _scene_file(item: Item) -> str:
         "view": view_values(sample.view),
         "objects": [vars(thing) for thing in sample.objects],
     }
-    return f'{json.dumps(head, separators=(",", ":"))[:-1]},"scene":{_scene_json(sample.scene)}}}'
+    return orjson.dumps(head)[:-1] + b',"scene":' + _scene_json(sample.scene) + b"}"
 
 
 def view_values(view: View) -> dict[str, Any]:
@@ -148,6 +149,6 @@ def view_values(view: View) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=2)
-def _scene_json(scene: Scene) -> str:
+def _scene_json(scene: Scene) -> bytes:
     """The scene as JSON text; all cameras of a scene share it."""
-    return json.dumps(to_plain(scene), separators=(",", ":"))
+    return orjson.dumps(to_plain(scene))

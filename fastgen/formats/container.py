@@ -6,6 +6,7 @@ from fastgen import coco
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, view_values
 from fastgen.labels import CASTINGS
 from fastgen.programs import CONTAINER_ID
+from fastgen.visibility import window
 
 _EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
 
@@ -21,8 +22,9 @@ class _Container(Format):
         if thing.bbox is None:
             return {}, []
         pose = view_values(sample.view)
+        part = window(sample.damage, thing.bbox) > 0
         found = {
-            **coco.annotation(1, thing.bbox, sample.damage > 0, thing.ignored),
+            **coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored),
             "keypoints": [value for point in thing.keypoints for value in point],
             "num_keypoints": sum(flag > 0 for *_, flag in thing.keypoints),
             "kind": sample.scene.container.kind,

@@ -12,7 +12,7 @@ from fastgen.encode import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records
 from fastgen.formats.yolo import line, outline
 from fastgen.sample import Box, Sample
-from fastgen.visibility import mask_box
+from fastgen.visibility import mask_box, window
 
 CATEGORIES = [
     {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
@@ -48,7 +48,10 @@ class _Damage(Format):
             f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),
             f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
         }
-        return files, [coco.annotation(*one) for one in found]
+        return files, [
+            coco.annotation(category, box, window(mask, box), (width, height), ignored)
+            for category, box, mask, ignored in found
+        ]
 
     def folders(self, split: str) -> Sequence[str]:
         return (f"damage/masks/{split}", f"damage/yolo/{split}")

@@ -9,6 +9,7 @@ from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
 from fastgen.formats.yolo import detection_lines
 from fastgen.programs import CONTAINER_ID
 from fastgen.sampling import SPLITS
+from fastgen.visibility import window
 
 CATEGORIES = [{"id": i + 1, "name": name} for i, name in enumerate(DETECTION_CLASSES)]
 
@@ -30,10 +31,16 @@ class _Imdg(Format):
             if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
                 continue
             on_top = thing.id == CONTAINER_ID
-            mask = sample.damage > 0 if on_top else sample.ids == thing.id
+            target = window(sample.damage if on_top else sample.ids, thing.bbox)
+            part = target > 0 if on_top else target == thing.id
             category = DETECTION_CLASSES.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
-            found.append({**coco.annotation(category, thing.bbox, mask, thing.ignored), **more})
+            found.append(
+                {
+                    **coco.annotation(category, thing.bbox, part, sample.view.size, thing.ignored),
+                    **more,
+                }
+            )
         return files, found
 
     def folders(self, split: str) -> Sequence[str]:
