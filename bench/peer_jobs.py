@@ -47,6 +47,7 @@ def write_jobs(
         scene = replace(generator.scene(index), damages=(), spreader=Spreader())
         markers = _markers(scene)
         _write_glb(generator, scene, markers, folder / f"{index:06d}.glb")
+        (folder / f"{index:06d}.json").write_text(scene.to_json(), encoding="utf-8")
         _write_hdr(scene, folder / f"{index:06d}.hdr")
         shots = []
         for name in cameras:

@@ -11,6 +11,7 @@ from measure import Recorder, read_job
 
 import fastgen
 from fastgen import Config, Generator
+from fastgen.scene import Scene
 
 
 def main(folder: Path, out: Path) -> None:
@@ -20,7 +21,8 @@ def main(folder: Path, out: Path) -> None:
         recorder = Recorder(out, f"{fastgen.__version__}, {generator.renderer_name}")
         for scene in job.scenes:
             with recorder.lap("set-up"):
-                plain = generator.scene(scene.index)
+                text = Path(scene.glb).with_suffix(".json").read_text(encoding="utf-8")
+                plain = Scene.from_json(text)
                 generator.render(scene=plain, camera=scene.shots[0].camera)
             for shot in scene.shots:
                 generator.render(scene=plain, camera=shot.camera)
