@@ -14,40 +14,29 @@ from fastgen.facets import Facets, clip, highest, lowest
 
 Array = NDArray[np.float64]
 
-_MOST_PIXELS = 4_000_000
-"""Canvases of more pixels are counted on a coarser grid, to about one part in a thousand."""
+_MOST_ROWS = 100_000
+"""Objects that cross more rows than this are counted on a coarser grid, to a thousandth."""
 
 
 @dataclass(frozen=True, eq=False)
-class Canvas:
+class Cover:
     """Pixels that one object covers alone.
 
-    mask: bool [h, w]. corner: (x, y) of the mask's first pixel, which may lie outside the image.
-    scale: side of a mask cell in pixels, a whole number; 1 unless the object is enormous.
+    mask: bool [h, w], those within the image. corner: (x, y) of the mask's first pixel. beyond: how
+    many more it covers outside the image.
     """
 
     mask: NDArray[np.bool_]
     corner: tuple[int, int]
-    scale: int
+    beyond: int
 
-    @property
-    def area(self) -> int:
-        """Pixels covered, within the image or not."""
-        return int(np.count_nonzero(self.mask)) * self.scale**2
+    def hidden(self, target: NDArray[np.generic], value: int) -> int:
+        """Covered pixels of the image where `target` [H, W] is not `value`."""
+        (x, y), (height, width) = self.corner, self.mask.shape
+        return int(np.count_nonzero(self.mask & (target[y : y + height, x : x + width] != value)))
 
-    def split(self, target: NDArray[np.generic], value: int) -> tuple[int, int]:
-        """Covered pixels where `target` [H, W] is not `value`, and those beyond the image."""
-        step = self.scale
-        height, width = self.mask.shape
-        (x, y), (bottom, right) = self.corner, target.shape
-        x0, y0 = max(-(x // step), 0), max(-(y // step), 0)
-        x1, y1 = min((right - x) // step, width), min((bottom - y) // step, height)
-        if x1 <= x0 or y1 <= y0:
-            return 0, self.area
-        inside = self.mask[y0:y1, x0:x1]
-        there = target[y + y0 * step : y + y1 * step : step, x + x0 * step : x + x1 * step : step]
-        hidden = int(np.count_nonzero(inside & (there != value))) * step**2
-        return hidden, self.area - int(np.count_nonzero(inside)) * step**2
+
+NOTHING = Cover(np.zeros((0, 0), bool), (0, 0), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,48 +79,72 @@ def boxes(pixels: Array, owner: NDArray[np.int64], count: int) -> Array:
     return found
 
 
-def canvases(pixels: Array, owner: NDArray[np.int64], count: int) -> list[Canvas]:
-    """What each owner's polygons [K, M, 2] cover, their union; `count` canvases."""
-    bounds = boxes(pixels, owner, count)
-    bounds[~np.isfinite(bounds).all(axis=1)] = 0.0
-    scale = _scale(bounds)
-    corner = np.floor(bounds[:, :2] / scale[:, None]) * scale[:, None]
-    shape = np.ceil((bounds[:, 2:] - corner) / scale[:, None]).astype(np.int64)
-    # a row has one cell more, where runs that reach its end are closed
-    stride = shape[:, 0] + 1
-    ends = np.cumsum(stride * shape[:, 1])
-    starts = ends - stride * shape[:, 1]
-    local = (pixels - corner[owner, None]) / scale[owner, None, None]
-    polygon, row, left, right = spans(local)
-    at = starts[owner[polygon]] + row * stride[owner[polygon]]
-    total = int(ends[-1]) if count else 0
-    steps = np.bincount(at + left, minlength=total) - np.bincount(at + right, minlength=total)
-    covered = np.cumsum(steps) > 0
-    return [
-        Canvas(
-            covered[starts[i] : ends[i]].reshape(shape[i, 1], stride[i])[:, :-1],
-            (int(corner[i, 0]), int(corner[i, 1])),
-            int(scale[i]),
-        )
-        for i in range(count)
-    ]
+def covers(
+    pixels: Array, owner: NDArray[np.int64], count: int, size: tuple[int, int]
+) -> list[Cover]:
+    """What each owner's polygons [K, M, 2] cover, their union, in an image of `size`."""
+    rows = np.ptp(pixels[..., 1]) if pixels.size else 0.0
+    step = max(int(np.ceil(rows / _MOST_ROWS)), 1)
+    polygon, row, left, right = spans(pixels / step)
+    whose = owner[polygon]
+    total = _union_length(whose, row, left, right, count) * step**2
+    if step > 1:  # of something enormous the image sees a small part, which is counted as it is
+        polygon, row, left, right = spans(pixels, size[1])
+        whose = owner[polygon]
+    left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
+    inside = (right > left) & (row >= 0) & (row < size[1])
+    whose, row, left, right = whose[inside], row[inside], left[inside], right[inside]
+    result = [Cover(NOTHING.mask, (0, 0), int(total[i])) for i in range(count)]
+    present, first = np.unique(whose, return_index=True)
+    ends = np.append(first[1:], len(whose))[: len(first)]
+    for i, begin, end in zip(present.tolist(), first, ends, strict=True):
+        runs = slice(begin, end)
+        x0, y0 = int(left[runs].min()), int(row[runs].min())
+        width, height = int(right[runs].max()) - x0, int(row[runs].max()) + 1 - y0
+        at = (row[runs] - y0) * (width + 1) - x0
+        # a row has one cell more, where runs that reach its end are closed
+        cells = height * (width + 1)
+        steps = np.bincount(at + left[runs], minlength=cells)
+        steps -= np.bincount(at + right[runs], minlength=cells)
+        mask = (np.cumsum(steps) > 0).reshape(height, width + 1)[:, :-1]
+        beyond = max(int(total[i]) - int(np.count_nonzero(mask)), 0)
+        result[i] = Cover(mask, (x0, y0), beyond)
+    return result
 
 
-def _scale(bounds: Array) -> Array:
-    """Side in pixels of the cells that boxes [..., 4] are counted in, whole numbers [...]."""
-    sides = np.maximum(bounds[..., 2:] - bounds[..., :2], 0.0)
-    return np.maximum(np.ceil(np.sqrt(sides.prod(axis=-1) / _MOST_PIXELS)), 1.0)
+def _union_length(
+    whose: NDArray[np.int64],
+    row: NDArray[np.int64],
+    left: NDArray[np.int64],
+    right: NDArray[np.int64],
+    count: int,
+) -> NDArray[np.int64]:
+    """Pixels in the union of each owner's runs, int [count]."""
+    if not len(row):
+        return np.zeros(count, np.int64)
+    # one long line of all rows of all owners, none of which reaches into the next
+    low, top = int(left.min()), int(row.min())
+    width, height = int(right.max()) - low + 1, int(row.max()) - top + 1
+    line = (whose * height + row - top) * width - low
+    order = np.argsort(line + left, kind="stable")
+    start, end = (line + left)[order], (line + right)[order]
+    reached = np.concatenate([[start[0]], np.maximum.accumulate(end)[:-1]])
+    fresh = np.maximum(end - np.maximum(start, reached), 0)
+    return np.bincount(whose[order], weights=fresh, minlength=count).astype(np.int64)
 
 
 def spans(
-    pixels: Array,
+    pixels: Array, rows: int | None = None
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Runs of pixel centres in convex polygons [K, M, 2]: polygon, row, first and past-last column.
 
-    One entry for each polygon and row, those of no pixel left out.
+    One entry for each polygon and row, those of no pixel left out. rows: only rows from 0 up to
+    this one.
     """
     first = np.ceil(lowest(pixels[..., 1]) - 0.5).astype(np.int64)
     last = np.ceil(highest(pixels[..., 1]) - 0.5).astype(np.int64)
+    if rows is not None:
+        first, last = np.clip(first, 0, rows), np.clip(last, 0, rows)
     height = last - first
     polygon = np.repeat(np.arange(len(pixels)), height)
     offset = np.arange(len(polygon)) - np.repeat(np.cumsum(height) - height, height)
@@ -153,37 +166,42 @@ def spans(
     return polygon[some], row[some], begin[some], end[some]
 
 
+_MOST_POINTS = 4_000_000
+"""Of things that cover more, only what lies within the image is looked at."""
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
-    """What single pixel centres see. cell: int [P, 2], column and row of cells of scale x scale
-    pixels; depth_m: float64 [P]; rest_mm: float64 [P, 3]."""
+    """What single pixel centres see. pixel: int [P, 2], column and row; depth_m: float64 [P];
+    rest_mm: float64 [P, 3]."""
 
-    cell: NDArray[np.int64]
-    scale: int
+    pixel: NDArray[np.int64]
     depth_m: Array
     rest_mm: Array
 
 
-def surface_points(seen: Projected) -> Points:
-    """Every pixel centre in every facet.
+def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
+    """Every pixel centre in every facet, also outside an image of `size` unless they are too many.
 
     What is linear on a facet is linear in the image when divided by depth; Blinn 1992,
     "Hyperbolic Interpolation".
     """
     bounds = boxes(seen.pixels, np.zeros(len(seen.owner), np.int64), 1)[0]
-    scale = int(_scale(bounds)) if np.isfinite(bounds).all() else 1
-    pixels = seen.pixels / scale
-    polygon, row, left, right = spans(pixels)
+    if np.isfinite(bounds).all() and np.prod(bounds[2:] - bounds[:2]) > _MOST_POINTS:
+        polygon, row, left, right = spans(seen.pixels, size[1])
+        left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
+    else:
+        polygon, row, left, right = spans(seen.pixels)
     length = right - left
     run = np.repeat(np.arange(len(row)), length)
     column = left[run] + np.arange(len(run)) - np.repeat(np.cumsum(length) - length, length)
     polygon, row = polygon[run], row[run]
-    origin = pixels[:, :1]
-    flat = np.concatenate([pixels - origin, np.ones_like(seen.depth_m)[..., None]], axis=2)
+    origin = seen.pixels[:, :1]
+    flat = np.concatenate([seen.pixels - origin, np.ones_like(seen.depth_m)[..., None]], axis=2)
     values = np.concatenate([seen.rest_mm, np.ones_like(seen.rest_mm[..., :1])], axis=2)
     to_values = np.linalg.pinv(flat) @ (values / seen.depth_m[..., None])
-    cell = np.stack([column, row], axis=1)
-    at = np.concatenate([cell + 0.5 - origin[polygon, 0], np.ones((len(cell), 1))], axis=1)
+    pixel = np.stack([column, row], axis=1)
+    at = np.concatenate([pixel + 0.5 - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
     found = np.einsum("pi,pij->pj", at, to_values[polygon])
     depth = 1 / found[:, 3]
-    return Points(cell, scale, depth, found[:, :3] * depth[:, None])
+    return Points(pixel, depth, found[:, :3] * depth[:, None])

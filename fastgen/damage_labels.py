@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera import MM
 from fastgen.classes import SOUND_CONTAINER
-from fastgen.coverage import Canvas, project, surface_points
+from fastgen.coverage import NOTHING, Cover, project, surface_points
 from fastgen.damage import amount_mm, in_hole, mask_values, may_be_seen
 from fastgen.facets import Facets, damage_facets
 from fastgen.mesh import Mesh
@@ -29,16 +29,14 @@ def damage_objects(shot: Shot) -> list[Object]:
     for damage, value in zip(shot.scene.damages, mask_values(shot.scene.damages), strict=True):
         shown = shot.frame.damage == value
         area = int(np.count_nonzero(shown))
-        alone = _canvas(shot, damage, shown)
-        box = mask_box(alone.mask)
-        amodal = np.array(box) * alone.scale + 2 * alone.corner if box else None
+        alone, bounds = _cover(shot, damage, shown)
         objects.append(
             Object(
                 id=value,
                 class_name=damage.kind,
                 instance=value % 100,
                 bbox=mask_box(shown),
-                amodal_bbox=None if amodal is None else float_box(amodal),
+                amodal_bbox=float_box(bounds),
                 area=area,
                 **visibility(shot, alone, shot.frame.damage, value, area),
             )
@@ -46,30 +44,38 @@ def damage_objects(shot: Shot) -> list[Object]:
     return objects
 
 
-def _canvas(shot: Shot, damage: Damage, shown: NDArray[np.bool_]) -> Canvas:
-    """What the damage would cover alone."""
-    empty = Canvas(np.zeros((0, 0), bool), (0, 0), 1)
+def _cover(
+    shot: Shot, damage: Damage, shown: NDArray[np.bool_]
+) -> tuple[Cover, NDArray[np.float64]]:
+    """What the damage would cover alone, and the bounds of that, infinite where it is nothing."""
+    unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
     camera_mm = shot.view.position_m / MM
     if not may_be_seen(damage, (camera_mm[0], camera_mm[1], camera_mm[2])):
-        return empty
-    points = surface_points(project(_facets(shot.scene, shot.mesh, damage), shot.view))
-    cell, step = points.cell, points.scale
-    at = cell * step + step // 2
-    within = np.all((at >= 0) & (at < shot.view.size), axis=1)
-    x, y = np.where(within[:, None], at, 0).T
+        return NOTHING, unbounded
+    size = shot.view.size
+    points = surface_points(project(_facets(shot.scene, shot.mesh, damage), shot.view), size)
+    pixel = points.pixel
+    within = np.all((pixel >= 0) & (pixel < size), axis=1)
+    x, y = np.where(within[:, None], pixel, 0).T
     # where the sheet itself is seen, the damage target knows the answer already
     known = within & (points.depth_m <= shot.frame.depth[y, x] * (1 + _DEPTH_SLACK))
     known &= (shot.frame.damage[y, x] == SOUND_CONTAINER) | shown[y, x]
-    cell, rest_mm = cell[~known], points.rest_mm[~known]
+    pixel, rest_mm = pixel[~known], points.rest_mm[~known]
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     part |= in_hole(damage, rest_mm)
-    covered = np.concatenate([cell[part], np.argwhere(shown)[:, ::-1] // step])
+    covered = np.concatenate([pixel[part], np.argwhere(shown)[:, ::-1]])
     if not len(covered):
-        return empty
-    low = covered.min(axis=0)
-    mask = np.zeros((covered.max(axis=0) - low + 1)[::-1], bool)
-    mask[*(covered - low).T[::-1]] = True
-    return Canvas(mask, (int(low[0]) * step, int(low[1]) * step), step)
+        return NOTHING, unbounded
+    bounds = np.concatenate([covered.min(axis=0), covered.max(axis=0) + 1]).astype(np.float64)
+    within = np.all((covered >= 0) & (covered < size), axis=1)
+    beyond = len(np.unique(covered[~within], axis=0))
+    inside = covered[within]
+    if not len(inside):
+        return Cover(NOTHING.mask, (0, 0), beyond), bounds
+    low = inside.min(axis=0)
+    mask = np.zeros((inside.max(axis=0) - low + 1)[::-1], bool)
+    mask[*(inside - low).T[::-1]] = True
+    return Cover(mask, (int(low[0]), int(low[1])), beyond), bounds
 
 
 @lru_cache(maxsize=64)

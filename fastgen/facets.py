@@ -143,11 +143,11 @@ def _on_chart(mesh: Mesh, decal: Decal) -> tuple[NDArray[np.int64], Array]:
     """Triangles of the decal's chart around it, and their sheet corners [T, 3, 2] in mm."""
     number = mesh.chart_index(decal.face)
     index, sheet = mesh.chart_triangles(number)
+    low, high = mesh.chart_bounds(number)
     reach = np.hypot(*decal.size_mm) / 2
     center = np.array(decal.center_mm)
-    (high_x, high_y), (low_x, low_y) = highest(sheet).T, lowest(sheet).T
-    near = (high_x >= center[0] - reach) & (low_x <= center[0] + reach)
-    near &= (high_y >= center[1] - reach) & (low_y <= center[1] + reach)
+    near = (high[0] >= center[0] - reach) & (low[0] <= center[0] + reach)
+    near &= (high[1] >= center[1] - reach) & (low[1] <= center[1] + reach)
     return index[near], sheet[near]
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera import MM, NEAR_M
 from fastgen.container import KINDS
-from fastgen.coverage import boxes, canvases, project
+from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
 from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
@@ -56,7 +56,7 @@ def _decals(shot: Shot) -> list[Object]:
     bounds = boxes(seen.pixels, seen.owner, count)
     # of what is not seen, what it would cover does not matter
     asked = (areas[ids[labelled]] > 0)[seen.owner]
-    alone = canvases(seen.pixels[asked], seen.owner[asked], count)
+    alone = covers(seen.pixels[asked], seen.owner[asked], count, view.size)
     pixels, depth = view.project(outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
     objects = []
@@ -163,7 +163,7 @@ def _container(shot: Shot) -> Object:
     corners = _corners_mm(shot.scene)
     sides = corners[list(_SIDES)]
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
-    (alone,) = canvases(box.pixels, box.owner, 1)
+    (alone,) = covers(box.pixels, box.owner, 1, view.size)
     castings, polygon = _castings(shot, corners)
     return Object(
         id=CONTAINER_ID,
@@ -187,7 +187,7 @@ def _spreader(shot: Shot) -> list[Object]:
     area = int(np.count_nonzero(shown))
     seen = project(mesh_facets(None, shot.spreader, list(shot.spreader.groups), 0), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
-    (alone,) = canvases(seen.pixels[seen.faces], seen.owner[seen.faces], 1)
+    (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
     return [
         Object(
             id=SPREADER_ID,

@@ -110,6 +110,13 @@ class Mesh:
         """Numbers [T] of the triangles of chart `number`, and their sheet corners [T, 3, 2]."""
         return self._of_chart[number]
 
+    def chart_bounds(self, number: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Least and greatest sheet coordinates [2, T] of each triangle of chart `number`."""
+        if number not in self._bounds:
+            corners = self.chart_triangles(number)[1].transpose(2, 1, 0)
+            self._bounds[number] = corners.min(axis=1), corners.max(axis=1)
+        return self._bounds[number]
+
     def sheet_to_surface(
         self, chart_name: str, sheet_mm: ArrayLike
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -157,6 +164,10 @@ class Mesh:
             corners = self.atlas_mm[self.triangles[index]].astype(np.float64)
             found.append((index, corners - chart.rect_mm[:2]))
         return found
+
+    @cached_property
+    def _bounds(self) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        return {}
 
     @cached_property
     def _locators(self) -> dict[int, "_Locator"]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera import View
 from fastgen.config import Config
-from fastgen.coverage import Canvas
+from fastgen.coverage import Cover
 from fastgen.mesh import Mesh
 from fastgen.sample import Box, Frame
 from fastgen.scene import Scene
@@ -42,14 +42,14 @@ class Visibility(TypedDict):
 
 
 def visibility(
-    shot: Shot, alone: Canvas, target: NDArray[np.generic], value: int, area: int
+    shot: Shot, alone: Cover, target: NDArray[np.generic], value: int, area: int
 ) -> Visibility:
     """alone: what the object would cover by itself. target [H, W] has `value` in its `area` visible
     pixels.
 
-    Pixels that are seen count as covered whatever the canvas says of them.
+    Pixels that are seen count as covered whatever the cover says of them.
     """
-    hidden, beyond = alone.split(target, value)
+    hidden, beyond = alone.hidden(target, value), alone.beyond
     whole = area + hidden + beyond
     fraction = area / whole if whole else 0.0
     rules = shot.config.labels

@@ -11,7 +11,7 @@ from fastgen import damage as fields
 from fastgen.camera import View
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
-from fastgen.coverage import Canvas, canvases
+from fastgen.coverage import covers
 from fastgen.facets import clip
 from fastgen.generator import Generator
 from fastgen.labels import decal_of
@@ -245,9 +245,9 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
     rng = np.random.default_rng(3)
     corners = rng.uniform(-20, 60, (50, 3, 2))
     owner = np.repeat(np.arange(5), 10)
-    found = canvases(corners, owner, 5)
+    found = covers(corners, owner, 5, (50, 40))
     columns, rows = np.meshgrid(np.arange(-30, 80) + 0.5, np.arange(-30, 80) + 0.5)
-    for number, canvas in enumerate(found):
+    for number, cover in enumerate(found):
         truth = np.zeros(columns.shape, bool)
         for a, b, c in corners[owner == number]:
             sides = [
@@ -255,17 +255,16 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
                 for p, q in ((a, b), (b, c), (c, a))
             ]
             truth |= np.all(np.array(sides) >= 0, axis=0) | np.all(np.array(sides) <= 0, axis=0)
-        assert canvas.area == truth.sum()
         image = np.zeros((40, 50), np.uint8)
         image[10:, :] = 1
-        hidden, beyond = canvas.split(image, 1)
-        assert beyond == truth.sum() - truth[30:70, 30:80].sum()
-        assert hidden == truth[30:40, 30:80].sum()
+        assert cover.beyond == truth.sum() - truth[30:70, 30:80].sum()
+        assert cover.hidden(image, 1) == truth[30:40, 30:80].sum()
+        assert cover.hidden(image, 7) == truth[30:70, 30:80].sum()
 
 
 def test_enormous_objects_are_counted_to_a_thousandth():
-    square = np.array([[[-9e4, -8e4], [7e4, -8e4], [7e4, 9e4], [-9e4, 9e4]]])
-    (canvas,) = canvases(square, np.zeros(1, np.int64), 1)
-    assert canvas.scale > 1
-    assert canvas.area == pytest.approx(16e4 * 17e4, rel=1e-3)
-    assert isinstance(canvas, Canvas)
+    square = np.array([[[-9e5, -8e5], [7e5, -8e5], [7e5, 9e5], [-9e5, 9e5]]])
+    (cover,) = covers(square, np.zeros(1, np.int64), 1, (64, 48))
+    assert cover.mask.shape == (48, 64)
+    assert cover.mask.all()
+    assert cover.beyond == pytest.approx(16e5 * 17e5, rel=1e-3)
