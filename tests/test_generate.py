@@ -1,6 +1,5 @@
 """Whole datasets from the command line: complete, the same bytes, resumable, and clear errors."""
 
-import hashlib
 import json
 import os
 import shutil
@@ -26,21 +25,13 @@ from fastgen.sampling import split_of
 from fastgen.scene import Scene
 from fastgen.shards import Job, Maker
 from fastgen.storage import storage_of
+from tests.folders import content
 
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
 
 
 def run(out, *more):
     return main(["generate", str(out), *ARGUMENTS, *more])
-
-
-def content(folder):
-    """Hash of every file by its relative name."""
-    return {
-        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file()
-    }
 
 
 @pytest.fixture(scope="module")

@@ -20,17 +20,10 @@ from fastgen.formats import Same
 from fastgen.storage import Folder, storage_of
 from fastgen.workers import run
 from tests.crash_run import FAULTY_SCENE, make
+from tests.folders import content
 
 SCENES = 40
 SCRIPT = str(Path(__file__).parent / "crash_run.py")
-
-
-def content(folder):
-    return {
-        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file()
-    }
 
 
 @pytest.fixture(scope="module")
