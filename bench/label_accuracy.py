@@ -72,7 +72,9 @@ def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) 
     unexplained = 0
     if rows.size:
         turn = np.arange(_AROUND) * 2 * np.pi / _AROUND
-        around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * EDGE_PX
+        circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * EDGE_PX
+        # slivers of cables are thinner than the disc
+        around = np.concatenate([circle * share for share in (0.125, 0.25, 0.5, 1.0)])
         centers = np.stack([columns, rows], axis=-1) + 0.5
         # all that rays within EDGE_PX see: ours must be among it
         near = truth(np.concatenate([centers[:, None], centers[:, None] + around], axis=1))
