@@ -59,7 +59,8 @@ def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) 
     def truth(pixels: np.ndarray | None = None) -> np.ndarray:
         hits = oracle.cast(mesh, sample.view, scene, pixels)
         ids = oracle.object_ids(scene, mesh, hits).astype(np.int64)
-        depth = np.where(hits.hit, np.rint(hits.depth_m * 1e4), -1).astype(np.int64)
+        seen = np.isfinite(hits.depth_m)
+        depth = np.where(seen, np.rint(np.where(seen, hits.depth_m, 0) * 1e4), -1).astype(np.int64)
         return np.stack([ids, oracle.damage_values(scene, hits, threshold), depth], axis=-1)
 
     found = truth()
