@@ -18,6 +18,7 @@ from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
 from fastgen.generator import QUALITY, Generator, find_camera
 from fastgen.gl import BACKENDS
+from fastgen.on_ray import run_on_ray
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
 from fastgen.records import nearest
@@ -61,7 +62,14 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
     make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
     cores = len(os.sched_getaffinity(0))
-    make.add_argument("--workers", type=int, default=cores, metavar="K")
+    make.add_argument("--workers", type=int, metavar="K", help=f"default: every core, here {cores}")
+    make.add_argument(
+        "--ray",
+        nargs="?",
+        const="",
+        metavar="ADDRESS",
+        help="on a Ray cluster: auto or HOST:PORT; OUT must be seen by all of its nodes",
+    )
     make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
     extra = ",".join(sorted(set(known_formats()) - set(SEAFRONT)))
     make.add_argument("--also", default="", metavar=extra, help="further files for each image")
@@ -139,7 +147,9 @@ def _generate(options: argparse.Namespace) -> int:
         formats=tuple(filter(None, options.also.split(","))),
         shard_scenes=shard,
     )
-    manifest = generate(job, options.workers)
+    runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
+    cores = len(os.sched_getaffinity(0))
+    manifest = generate(job, cores if options.workers is None else options.workers, runner)
     total = sum(split["images"] for split in manifest["counts"].values())
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
     print(f"{total} images in {options.out}{look}")

@@ -24,10 +24,10 @@ from fastgen.progress import Progress
 from fastgen.records import nearest
 from fastgen.sampling import SPLITS
 from fastgen.shards import (
-    ATTEMPTS,
     FORMATS,
     Job,
     Maker,
+    Strikes,
     Task,
     digest,
     manifest_path,
@@ -81,25 +81,9 @@ def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Mak
     """A runner with so many processes on this machine."""
 
     def run(job: Job, tasks: list[Task], on_report: Callable[[str, Any], None]) -> None:
-        deaths: Counter[int] = Counter()
-
-        def on_death(task: Task, place: int | None, ended: str) -> Task:
-            first = job.wanted(task.shard)[0][0]
-            scene = first if place is None else place
-            deaths[scene] += 1
-            if deaths[scene] < ATTEMPTS:
-                return task
-            if place is None:
-                raise OutputError(
-                    f"worker processes die before they render anything ({ended}); try "
-                    f"fastgen doctor; what is written stays good"
-                )
-            reason = f"the process that rendered it died ({ended})"
-            return replace(task, skip={**task.skip, scene: reason})
-
         whole = worker_count >= len(os.sched_getaffinity(0))
         arguments = (job, whole)
-        workers.run(maker, arguments, tasks, worker_count, on_report, on_death, hang_s)
+        workers.run(maker, arguments, tasks, worker_count, on_report, Strikes(job), hang_s)
 
     return run
 

@@ -9,15 +9,16 @@ import io
 import os
 import tarfile
 import traceback
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
 
 import orjson
 
 from fastgen.config import Config
-from fastgen.errors import FastgenError
+from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
 from fastgen.generator import Generator
 from fastgen.sampling import SPLITS, split_of
@@ -75,6 +76,33 @@ class Task:
 
     shard: int
     skip: dict[int, str] = field(default_factory=dict)
+
+
+class Strikes:
+    """Counts the deaths of processes by the scene that each was at; called for every death."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._deaths: Counter[int] = Counter()
+
+    def __call__(self, task: Task, scene: int | None, ended: str) -> Task:
+        """The task to try instead: without a scene that has ended ATTEMPTS processes.
+
+        scene: where the process was, None before the first one. ended: how it died. Raises
+        OutputError where processes die again and again before they come to a scene.
+        """
+        first = self._job.wanted(task.shard)[0][0]
+        blamed = first if scene is None else scene
+        self._deaths[blamed] += 1
+        if self._deaths[blamed] < ATTEMPTS:
+            return task
+        if scene is None:
+            raise OutputError(
+                f"worker processes die before they render anything ({ended}); try "
+                f"fastgen doctor; what is written stays good"
+            )
+        reason = f"the process that rendered it died ({ended})"
+        return replace(task, skip={**task.skip, scene: reason})
 
 
 def stem_of(index: int, camera: str) -> str:

@@ -5,6 +5,7 @@ import ctypes
 import fcntl
 import os
 import shutil
+import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -50,7 +51,7 @@ class Folder:
 
     def commit(self, files: Files, name: str) -> None:
         """Write aside, flush, rename. name: distinguishes this commit from others under way."""
-        aside = self.root / f"{ASIDE}-{name}-{os.getpid()}"
+        aside = self.root / f"{ASIDE}-{name}-{uuid.uuid4().hex}"
         try:
             for path, content in files.items():
                 target = aside / path
@@ -73,7 +74,8 @@ class Folder:
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
         """Written aside, flushed, renamed."""
         target = self.root / path
-        aside = target.with_name(f".{target.name}.part")
+        # two processes may write the same file where one was given up but lives on
+        aside = target.with_name(f".{target.name}.{uuid.uuid4().hex}.part")
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             with aside.open("wb") as stream:

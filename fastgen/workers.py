@@ -107,11 +107,19 @@ def _listen(worker: _Worker, on_report: Callable[[str, Any], None], hang_s: floa
     return ""
 
 
+def in_words(error: Exception, place: str) -> str:
+    """What stops a run, for its user. place: where it happened, for mistakes of ours."""
+    if isinstance(error, FastgenError | OSError):
+        return str(error)
+    traceback.print_exception(error)
+    return f"{place}: {error!r} (our mistake: please report it)"
+
+
 def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
     """One worker process: tasks from the pipe until the parent ends it."""
     # Ctrl-C reaches the whole group; the parent decides
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    place: Any = "start"
+    place = "start"
 
     def report(kind: str, value: Any) -> None:
         nonlocal place
@@ -126,8 +134,5 @@ def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
             pipe.send(("done", None))
     except EOFError:
         pass  # the parent is gone
-    except (FastgenError, OSError) as error:
-        pipe.send(("failed", str(error)))
     except Exception as error:
-        traceback.print_exc()
-        pipe.send(("failed", f"{place}: {error!r} (our mistake: please report it)"))
+        pipe.send(("failed", in_words(error, place)))

@@ -1,0 +1,194 @@
+"""Runs on a Ray cluster of two nodes give the bytes of a run without Ray, whatever dies."""
+
+import hashlib
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from fastgen.cli import main
+from fastgen.config import Config
+from fastgen.errors import OutputError
+from fastgen.generate import generate, run_here
+from fastgen.on_ray import run_on_ray
+from fastgen.shards import Job
+from tests.crash_run import FAULTY_SCENE, QuickMaker
+
+ray = pytest.importorskip("ray")
+from ray.cluster_utils import Cluster  # noqa: E402
+
+SCENES = 24
+HANGING_SCENE = 14
+NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
+
+
+class SlowMaker(QuickMaker):
+    """Leaves the time to kill a node in mid-run, and names the node that makes a shard."""
+
+    def __call__(self, task):
+        self._report("node", ray.get_runtime_context().get_node_id())
+        time.sleep(0.25)
+        super().__call__(task)
+
+
+class FaultyMaker(QuickMaker):
+    def _image(self, index, camera):
+        if index == FAULTY_SCENE:
+            os.abort()
+        if index == HANGING_SCENE:
+            time.sleep(3600)
+        return super()._image(index, camera)
+
+
+class BrokenMaker(QuickMaker):
+    def _image(self, index, camera):
+        raise OSError(28, "No space left on device")
+
+
+def job_at(out, scenes):
+    config = Config.preset()
+    return Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
+
+
+def content(folder):
+    return {
+        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """A head node and one more, a CPU each; this process has joined it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        made = Cluster(initialize_head=True, head_node_args=NODE)
+        made.add_node(**NODE)
+        ray.init(address=made.address)
+        yield made
+        ray.shutdown()
+        made.shutdown()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """An undisturbed run without Ray."""
+    out = tmp_path_factory.mktemp("whole") / "out"
+    generate(job_at(out, SCENES), 2, run_here(2, maker=QuickMaker))
+    return out
+
+
+def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
+    out = tmp_path / "out"
+    victim = cluster.add_node(**NODE)
+    cluster.wait_for_nodes()
+    seen = []
+
+    def run(job, tasks, on_report):
+        def hear(kind, value):
+            if kind == "node":
+                seen.append(value)
+            else:
+                on_report(kind, value)
+
+        run_on_ray(None, maker=SlowMaker)(job, tasks, hear)
+
+    def kill():
+        while seen.count(victim.node_id) < 2:
+            time.sleep(0.01)
+        cluster.remove_node(victim, allow_graceful=False)
+        seen.append("killed")
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    generate(job_at(out, SCENES), 1, run)
+    killer.join(timeout=10)
+    after = seen[seen.index("killed") + 1 :]
+    assert len(set(after) - {victim.node_id}) == 2  # both that were left went on
+    assert seen[-1] != victim.node_id
+    assert content(out) == content(whole)
+
+
+def test_scenes_that_kill_or_hang_their_actors_are_given_up_and_no_other(cluster, whole, tmp_path):
+    out = tmp_path / "out"
+    runner = run_on_ray(None, 2, hang_s=1.5, maker=FaultyMaker)
+    made = generate(job_at(out, SCENES), 2, runner)
+    failed = {each["scene"]: each["error"] for each in made["failed"]}
+    assert failed.keys() == {FAULTY_SCENE, HANGING_SCENE}
+    assert "died" in failed[FAULTY_SCENE]
+    assert "no sign of life" in failed[HANGING_SCENE]
+    assert sum(split["images"] for split in made["counts"].values()) == SCENES - 2
+    assert content(out / "images").items() <= content(whole / "images").items()
+
+
+def test_an_actors_error_reaches_the_caller_in_its_own_words(cluster, tmp_path):
+    with pytest.raises(OutputError, match=r"node .*: .*No space left on device"):
+        generate(job_at(tmp_path / "out", 8), 2, run_on_ray(None, maker=BrokenMaker))
+
+
+def test_a_place_that_other_nodes_do_not_see_is_named(cluster):
+    # fsspec's memory is that of one process
+    with pytest.raises(OutputError, match=r"node .*memory://unseen.* all nodes share"):
+        generate(job_at("memory://unseen", 8), 2, run_on_ray(None))
+
+
+def test_rendered_images_are_those_of_a_run_without_ray(cluster, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["--images", "6", "--size", "64x64", "--seed", "3", "--shard", "1"]
+    assert main(["generate", "here", *arguments, "--workers", "1"]) == 0
+    assert main(["generate", "there", *arguments, "--ray"]) == 0
+    assert len(list((tmp_path / "there").glob("images/*/*.jpg"))) == 6
+    assert content(tmp_path / "there") == content(tmp_path / "here")
+
+
+def run_alone(out, *more):
+    command = [sys.executable, "-m", "fastgen", "generate", str(out), "--images", "400"]
+    return subprocess.Popen(
+        [*command, "--size", "64x64", *more],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+def test_ctrl_c_stops_ray_and_the_folder_is_left_clean(tmp_path, monkeypatch):
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    monkeypatch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+    out = tmp_path / "out"
+    process = run_alone(out, "--ray", "--workers", "1", "--shard", "1")
+    while not list(out.glob("shards/*.json")) and process.poll() is None:
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    error = process.communicate(timeout=30)[1]
+    assert process.returncode == 130
+    assert "fastgen: stopped; run the same command again to go on" in error
+    assert "KeyboardInterrupt" not in error
+    assert not [p for p in out.iterdir() if p.name.startswith(".")]
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:{free}", "head", "ray://head:1", "head:port"])
+def test_an_address_without_a_cluster_is_named(address, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(ray, "is_initialized", lambda: False)
+    with socket.socket() as unheard:
+        unheard.bind(("127.0.0.1", 0))
+        named = address.format(free=unheard.getsockname()[1])
+        arguments = ["--images", "2", "--size", "64x64", "--ray", named]
+        assert main(["generate", str(tmp_path / "out"), *arguments]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith(f"fastgen: --ray {named}: ")
+
+
+def test_without_ray_one_line_says_what_to_install(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    assert main(["generate", str(tmp_path / "out"), "--images", "2", "--ray"]) == 2
+    assert "pip install 'fastgen[ray]'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
