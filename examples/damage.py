@@ -12,7 +12,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import torch
 from common import charts, drawing
 from common.data import Feed, Kept, in_order, rendered
 from common.detection_metrics import Found, Scores, hits, operating_point, score
@@ -79,15 +78,15 @@ def groups_of(target: Mapping[str, Any]) -> dict[str, np.ndarray]:
     damages = labels > 1
     small = damages & (target["area"].numpy() < SMALL_PX)
     slender = np.array([slenderness(mask) >= THIN for mask in target["masks"].numpy()], bool)
-    kinds = {
-        name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1
-    }
+    kinds = {name: labels == k for k, name in enumerate(SEGMENTATION_CLASSES, start=1) if k > 1}
     thin = damages & slender
     sorts = {"small": small, "larger": damages & ~small, "thin": thin, "not thin": damages & ~thin}
     return {"all damages": damages, **kinds, **sorts, "small and thin": small & thin}
 
 
-def recall_table(targets: Sequence[Mapping[str, Any]], found: Sequence[Found], least: float) -> Table:
+def recall_table(
+    targets: Sequence[Mapping[str, Any]], found: Sequence[Found], least: float
+) -> Table:
     """How many damages of each sort are found, by box and by mask, at a score of `least`."""
     tally: dict[str, np.ndarray] = {}
     for target, each in zip(targets, found, strict=True):
@@ -96,7 +95,12 @@ def recall_table(targets: Sequence[Mapping[str, Any]], found: Sequence[Found], l
             counted = np.array([chosen.sum(), boxes[chosen].sum(), masks[chosen].sum()])
             tally[name] = tally.get(name, 0) + counted
     rows = [
-        [name, int(n), 100 * by_box / n if n else float("nan"), 100 * by_mask / n if n else float("nan")]
+        [
+            name,
+            int(n),
+            100 * by_box / n if n else float("nan"),
+            100 * by_mask / n if n else float("nan"),
+        ]
         for name, (n, by_box, by_mask) in tally.items()
     ]
     title = f"Damages found at an IoU of 0.5 and a score of {least:.2f}, %"
@@ -129,7 +133,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     run = start("damage", __doc__ or "", PLANS, argv)
     plan = run.plan
     data = training_data(run)
-    feed = Feed(data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers)
+    feed = Feed(
+        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
+    )
     shape = {"width": 96, "blocks": 3} if run.full else {"width": 32, "blocks": 1}
     model = Detector(len(SEGMENTATION_CLASSES), masks=True, **shape)
     losses = train(model, feed, run)

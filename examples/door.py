@@ -12,8 +12,7 @@ from typing import Any
 import torch
 from common import charts
 from common.data import Feed, Kept, in_order, rendered
-from common.run import Plan, Run, Table, conclude, parameters, start, train
-from torch import nn
+from common.run import Learner, Plan, Run, Table, conclude, parameters, start, train
 from torch.nn import functional
 from transformers import ResNetConfig, ResNetForImageClassification
 
@@ -33,19 +32,16 @@ DOOR, NO_DOOR = 0, 1
 PAPER = {"1: Cl, Cr": (100.0, 100.0), "2: with A, B": (90.4, 96.0)}
 
 
-class Classifier(nn.Module):
+class Classifier(Learner):
     """ResNet-50, or a narrow ResNet-10 where `full` is false, from fresh weights."""
 
     def __init__(self, full: bool) -> None:
         super().__init__()
-        narrow = ResNetConfig(
-            embedding_size=24,
-            hidden_sizes=[24, 48, 96, 192],
-            depths=[1, 1, 1, 1],
-            layer_type="basic",
-            num_labels=2,
-        )
-        self.net = ResNetForImageClassification(ResNetConfig(num_labels=2) if full else narrow)
+        settings: dict[str, Any] = {"num_labels": 2}
+        if not full:
+            settings |= {"embedding_size": 24, "hidden_sizes": [24, 48, 96, 192]}
+            settings |= {"depths": [1, 1, 1, 1], "layer_type": "basic"}
+        self.net = ResNetForImageClassification(ResNetConfig(**settings))
 
     def forward(self, images: list[torch.Tensor]) -> torch.Tensor:
         """Logits [B, 2] of images uint8 [3, H, W]."""
@@ -75,7 +71,9 @@ def precision_recall(door: torch.Tensor, called_door: torch.Tensor) -> tuple[flo
 def training_data(run: Run) -> ContainerDataset:
     """Images of Cl and Cr."""
     plan = run.plan
-    return ContainerDataset("door", seed=run.seed, size=plan.size, length=plan.images, split="train")
+    return ContainerDataset(
+        "door", seed=run.seed, size=plan.size, length=plan.images, split="train"
+    )
 
 
 def test_data(run: Run) -> tuple[Kept, Kept]:
@@ -100,7 +98,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     run = start("door", __doc__ or "", PLANS, argv)
     plan = run.plan
     data = training_data(run)
-    feed = Feed(data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers)
+    feed = Feed(
+        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
+    )
     model = Classifier(run.full)
     losses = train(model, feed, run)
 

@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import torch
 from common import charts, drawing
 from common.data import Feed, Kept, in_order, rendered
-from common.detection_metrics import Scores, confusion, operating_point, score
+from common.detection_metrics import OperatingPoint, Scores, confusion, operating_point, score
 from common.detector import Detector
-from common.run import Plan, Run, Table, conclude, parameters, start, train
 from common.rtdetr import RtDetr
-from torch import nn
+from common.run import Plan, Run, Table, conclude, parameters, start, train
 
 from fastgen import Config
 from fastgen.classes import DETECTION_CLASSES
@@ -64,7 +62,7 @@ def test_data(run: Run) -> Kept:
     return rendered(data, run.cache)
 
 
-def class_table(scores: Scores, point: Any) -> Table:
+def class_table(scores: Scores, point: OperatingPoint) -> Table:
     """Precision, recall, AP50 and AP of each class, and of all, in percent."""
     rows: list[list[str | float]] = [
         ["all", sum(scores.counts), point.mean_precision, point.mean_recall, scores.ap50, scores.ap]
@@ -96,16 +94,16 @@ def main(argv: Sequence[str] | None = None) -> None:
     run = start("imdg", __doc__ or "", PLANS, argv)
     plan = run.plan
     data = training_data(run)
-    feed = Feed(data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers)
+    feed = Feed(
+        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
+    )
     classes = len(DETECTION_CLASSES)
-    model: nn.Module = RtDetr(classes, small=plan.workers == 0) if run.full else Detector(classes)
+    model = RtDetr(classes, small=run.mode == "smoke") if run.full else Detector(classes)
     losses = train(model, feed, run)
 
     test = test_data(run)
     targets = [test[i][1] for i in range(len(test))]
-    predict = model.predict
-    assert callable(predict)
-    found = [one for images, _ in in_order(test, plan.batch) for one in predict(images)]
+    found = [one for images, _ in in_order(test, plan.batch) for one in model.predict(images)]
     scores = score(targets, found, DETECTION_CLASSES, plan.size)
     point = operating_point(scores)
     counts = confusion(targets, found, classes, point.score)

@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from common import charts
 from common.data import Feed, Kept, in_order, rendered
-from common.run import Plan, Run, Table, conclude, parameters, start, train
+from common.run import Learner, Plan, Run, Table, conclude, parameters, start, train
 from common.strips import strip
 from torch import nn
 from torch.nn import functional
@@ -38,7 +38,7 @@ SIDES_SIZE = (1600, 480)
 CHARACTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
-class Reader(nn.Module):
+class Reader(Learner):
     """Strips to characters. width: channels of the first layer."""
 
     def __init__(self, width: int = 16) -> None:
@@ -170,7 +170,7 @@ def kept(run: Run, split: str) -> Kept:
     """The crops of a split, rendered once."""
     crops = Kept([])
     for data in data_of(run, split):
-        crops = crops + rendered(data, run.cache)
+        crops = crops.with_more(rendered(data, run.cache))
     return crops
 
 

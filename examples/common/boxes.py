@@ -4,7 +4,7 @@ import torch
 
 
 def iou(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Intersection over union of boxes [N, 4] and [M, 4], float32 [N, M]; 0 where both are empty."""
+    """Intersection over union of boxes [N, 4] and [M, 4], [N, M]; 0 where both are empty."""
     low = torch.maximum(a[:, None, :2], b[None, :, :2])
     high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
     shared = (high - low).clamp(min=0).prod(-1)

@@ -1,4 +1,4 @@
-"""Charts of the examples as PNG files: losses, classes, confusion, and pictures of what was found."""
+"""Charts of the examples as PNG files: losses, classes, confusion, and what was found."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

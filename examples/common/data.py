@@ -42,8 +42,8 @@ class Kept(Dataset[Any]):
             target = {**target, "masks": _unpacked(target["masks"], pixels.shape[:2])}
         return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target
 
-    def __add__(self, other: Dataset[Any]) -> "Kept":
-        assert isinstance(other, Kept)
+    def with_more(self, other: "Kept") -> "Kept":
+        """These items, then those of another."""
         return Kept(self._items + other._items)
 
 
@@ -84,9 +84,7 @@ class Feed:
     workers: processes that render; other items are fetched in this one.
     """
 
-    def __init__(
-        self, source: Dataset[Any], batch: int, seed: int, workers: int = 0
-    ) -> None:
+    def __init__(self, source: Dataset[Any], batch: int, seed: int, workers: int = 0) -> None:
         self._order = torch.Generator()
         self._seed = seed
         self._loader: Any

@@ -251,7 +251,10 @@ def _scored(
 
 
 def _curve(
-    thresholds: NDArray[np.float64], values: NDArray[np.float64], hit: NDArray[np.bool_], labels: int
+    thresholds: NDArray[np.float64],
+    values: NDArray[np.float64],
+    hit: NDArray[np.bool_],
+    labels: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Precision and recall 0..1 at each threshold; nan where nothing is called or labelled."""
     kept = values[None] >= thresholds[:, None]

@@ -5,6 +5,7 @@ in TTFNet (Liu et al. 2020). The first class spans the image and the others lie 
 has a box map of its own. An instance's mask is its class's mask inside its box.
 """
 
+import itertools
 from typing import Any
 
 import torch
@@ -12,6 +13,7 @@ from torch import nn
 from torch.nn import functional
 
 from common.boxes import generalized_iou
+from common.run import Learner
 
 STRIDE = 4
 """Image pixels to a cell of the maps; image sides are multiples of 32."""
@@ -40,7 +42,7 @@ class _Residual(nn.Module):
         return x + self.body(x)
 
 
-class Detector(nn.Module):
+class Detector(Learner):
     """classes: how many, the first the container. width: channels at stride 4. blocks: residual
     blocks at each coarser level. masks: whether it segments too."""
 
@@ -50,7 +52,7 @@ class Detector(nn.Module):
         widths = [width, 2 * width, 3 * width, 4 * width]
         self.stem = nn.Sequential(_conv(3, width // 2, 2), _conv(width // 2, width, 2))
         levels, sides = [], [nn.Conv2d(width, width, 1)]
-        for before, after in zip(widths, widths[1:], strict=False):
+        for before, after in itertools.pairwise(widths):
             body = [_Residual(after) for _ in range(blocks)]
             levels.append(nn.Sequential(_conv(before, after, 2), *body))
             sides.append(nn.Conv2d(after, width, 1))

@@ -46,7 +46,5 @@ def found_pictures(
     count: int = 8,
 ) -> None:
     """The first images of `data` with what was found on them, in one PNG."""
-    images = [
-        drawn(data[i][0], found[i], names, least_score) for i in range(min(count, len(data)))
-    ]
+    images = [drawn(data[i][0], found[i], names, least_score) for i in range(min(count, len(data)))]
     charts.pictures(images, [f"test image {i}" for i in range(len(images))], path)

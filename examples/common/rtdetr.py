@@ -3,39 +3,28 @@
 from typing import Any
 
 import torch
-from torch import nn
 from transformers import RTDetrConfig, RTDetrForObjectDetection, RTDetrResNetConfig
+
+from common.run import Learner
 
 _CANDIDATES = 100
 
 
-class RtDetr(nn.Module):
+class RtDetr(Learner):
     """classes: how many, without a background. small: a backbone and decoder cut down for tests,
     else ResNet-50. Image sides are multiples of 32."""
 
     def __init__(self, classes: int, small: bool = False) -> None:
         super().__init__()
+        backbone: dict[str, Any] = {"out_features": ["stage2", "stage3", "stage4"]}
+        settings: dict[str, Any] = {"num_labels": classes}
         if small:
-            backbone = RTDetrResNetConfig(
-                embedding_size=16,
-                hidden_sizes=[16, 32, 48, 64],
-                depths=[1, 1, 1, 1],
-                layer_type="basic",
-                out_features=["stage2", "stage3", "stage4"],
-            )
-            config = RTDetrConfig(
-                backbone_config=backbone,
-                encoder_in_channels=[32, 48, 64],
-                encoder_hidden_dim=64,
-                d_model=64,
-                decoder_in_channels=[64, 64, 64],
-                decoder_layers=2,
-                num_queries=50,
-                num_labels=classes,
-            )
-        else:
-            backbone = RTDetrResNetConfig(out_features=["stage2", "stage3", "stage4"])
-            config = RTDetrConfig(backbone_config=backbone, num_labels=classes)
+            backbone |= {"embedding_size": 16, "hidden_sizes": [16, 32, 48, 64]}
+            backbone |= {"depths": [1, 1, 1, 1], "layer_type": "basic"}
+            settings |= {"encoder_in_channels": [32, 48, 64], "encoder_hidden_dim": 64}
+            settings |= {"decoder_in_channels": [64, 64, 64], "decoder_layers": 2}
+            settings |= {"d_model": 64, "num_queries": 50}
+        config = RTDetrConfig(backbone_config=RTDetrResNetConfig(**backbone), **settings)
         self.net = RTDetrForObjectDetection(config)
 
     def loss(self, images: list[torch.Tensor], targets: list[dict[str, Any]]) -> torch.Tensor:

@@ -1,14 +1,15 @@
-"""One way to run an example: its options, its seeds, its training loop and what it leaves behind."""
+"""One way to run an example: options, seeds, the training loop and what it leaves behind."""
 
 import argparse
 import json
+import math
 import os
 import platform
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 from torch import nn
@@ -58,11 +59,12 @@ class Run:
         return self.folder / "cache"
 
 
-class Learner(Protocol):
-    """A model that knows its loss; a torch module."""
+class Learner(nn.Module):
+    """A model that knows its loss."""
 
     def loss(self, images: list[torch.Tensor], targets: list[Any]) -> torch.Tensor:
         """Loss of a batch, a scalar."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class Table:
 
     title: str
     heads: Sequence[str]
-    rows: Sequence[Sequence[str | float]]
+    rows: Sequence[Sequence[object]]
 
     def markdown(self) -> str:
         """The table in Markdown; numbers with one decimal, those that are none as a dash."""
@@ -101,9 +103,8 @@ def start(
     return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
 
 
-def train(model: nn.Module, feed: Feed, run: Run) -> list[float]:
+def train(model: Learner, feed: Feed, run: Run) -> list[float]:
     """Train over all passes of the plan with AdamW and one cycle of the rate; losses by step."""
-    assert callable(getattr(model, "loss", None))
     plan = run.plan
     model.to(run.device).train()
     steps = max(len(feed) * plan.passes, 2)
@@ -149,9 +150,7 @@ def conclude(run: Run, tables: Sequence[Table], found: dict[str, Any]) -> None:
     print(text)
 
 
-def _cell(value: str | float) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int):
-        return str(value)
-    return "–" if value != value else f"{value:.1f}"
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "–" if math.isnan(value) else f"{value:.1f}"
+    return str(value)

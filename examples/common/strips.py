@@ -1,9 +1,14 @@
 """A text crop laid out as one line: columns turned over, slant taken out, rows side by side."""
 
+from typing import Any
+
 import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
+
+Grey = NDArray[Any]
+"""A grey image [h, w], uint8 or float32."""
 
 HEIGHT, WIDTH = 24, 400
 """Pixels of a strip."""
@@ -25,7 +30,7 @@ def strip(crop: torch.Tensor) -> torch.Tensor:
     return torch.from_numpy(_in_one_line(level, row_count(level.shape, upright)))[None]
 
 
-def straightened(grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def straightened(grey: Grey) -> Grey:
     """Shear [h, w] vertically so that its rows are level, and cut off what that leaves empty.
 
     Level rows are where strokes gather in the fewest image rows.
@@ -52,7 +57,7 @@ def row_count(shape: tuple[int, int], upright: bool) -> int:
     return 2 if proportion > 2.2 else 3
 
 
-def _sheared(image: NDArray[np.generic], slant: float) -> NDArray[np.generic]:
+def _sheared(image: Grey, slant: float) -> Grey:
     height, width = image.shape
     matrix = np.array([[1, 0, 0], [slant, 1, -slant * width / 2]], np.float32)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -61,7 +66,7 @@ def _sheared(image: NDArray[np.generic], slant: float) -> NDArray[np.generic]:
     )
 
 
-def _in_one_line(level: NDArray[np.uint8], rows: int) -> NDArray[np.uint8]:
+def _in_one_line(level: Grey, rows: int) -> Grey:
     height, width = level.shape
     pitch, parts = height / rows, []
     for row in range(rows):
