@@ -16,9 +16,7 @@ def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
     return [
         (DETECTION_CLASSES.index(item.class_name), item, item.bbox)
         for item in objects
-        if item.class_name in DETECTION_CLASSES
-        and item.bbox is not None
-        and not item.ignored
+        if item.class_name in DETECTION_CLASSES and item.bbox is not None and not item.ignored
     ]
 
 
