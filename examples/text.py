@@ -28,7 +28,7 @@ PLANS = {
     "full": Plan(
         images=8000, test_images=1000, size=(1280, 1280), batch=16, passes=20, rate=1e-3, workers=12
     ),
-    "smoke": Plan(images=6, test_images=6, size=(640, 640), batch=4, passes=1, rate=1e-3),
+    "smoke": Plan(images=4, test_images=4, size=(640, 640), batch=4, passes=1, rate=1e-3),
 }
 """Images of the end cameras, and on a CPU as many of the side cameras."""
 
@@ -70,7 +70,7 @@ class Reader(Learner):
         words = [[CHARACTERS.index(c) + 1 for c in joined(text)] for text in targets]
         return functional.ctc_loss(
             shares,
-            torch.tensor([k for word in words for k in word]),
+            torch.tensor([k for word in words for k in word], device=shares.device),
             torch.full((len(words),), len(shares)),
             torch.tensor([len(word) for word in words]),
             zero_infinity=True,

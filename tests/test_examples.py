@@ -323,6 +323,17 @@ def test_order_of_batches_is_decided_by_seed_and_pass():
     assert sorted(order(1, 1)) == list(range(9))
 
 
+def test_workers_render_new_strips_for_every_pass():
+    options = {"size": (640, 640), "length": 4, "cameras": ("Cr",), "all_views": False}
+    data = ContainerDataset("text", seed=1, transforms=text.strips_of, **options)
+    feed = Feed(data, 4, seed=1, workers=1)
+    passes = [[batch for batch in feed.passed(number)] for number in (0, 1)]
+    for images, texts in passes[0] + passes[1]:
+        assert len(images) == len(texts) > 0
+        assert images[0].shape == (1, 24, 400)
+    assert set(passes[0][0][1]).isdisjoint(passes[1][0][1])
+
+
 def test_table_shows_a_dash_for_what_is_not_measured():
     table = Table("T", ["a", "b", "c"], [["x", 3, float("nan")], ["y", 2, 1.25]])
     assert table.markdown().splitlines()[2:] == [

@@ -89,7 +89,10 @@ class Feed:
         self._seed = seed
         self._loader: Any
         if isinstance(source, ContainerDataset):
-            options: dict[str, Any] = {"num_workers": workers, "persistent_workers": workers > 0}
+            options: dict[str, Any] = {"num_workers": workers}
+            if workers:
+                # a process that has opened CUDA or OpenGL is no good to fork
+                options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
             collate = None if source.task == "text" else collate_lists
             self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
         else:
