@@ -24,7 +24,7 @@ from fastgen.identifier import check_digit
 from fastgen.torch import ContainerDataset
 
 PLANS = {
-    "cpu": Plan(images=1000, test_images=200, size=(640, 640), batch=16, passes=14, rate=2e-3),
+    "cpu": Plan(images=800, test_images=200, size=(640, 640), batch=16, passes=14, rate=2e-3),
     "full": Plan(
         images=8000, test_images=1000, size=(1280, 1280), batch=16, passes=20, rate=1e-3, workers=12
     ),

@@ -215,18 +215,20 @@ def _rle(masks: torch.Tensor) -> list[dict[str, Any]]:
 
 
 def _entries(one: Mapping[str, Any], image_id: int, masks: bool) -> list[dict[str, Any]]:
-    """Box, class and mask of each thing of an image as COCO's JSON has them."""
-    coded = _rle(one["masks"]) if masks else [None] * len(one["labels"])
-    entries = []
-    for box, label, mask in zip(one["boxes"].tolist(), one["labels"].tolist(), coded, strict=True):
-        x0, y0, x1, y1 = box
-        entry = {"image_id": image_id, "category_id": label, "bbox": [x0, y0, x1 - x0, y1 - y0]}
-        # a detection's area is its mask's where masks are compared, else its box's
-        entries.append(entry if mask is None else {**entry, "segmentation": mask})
+    """Class and mask, or class and box, of each thing of an image as COCO's JSON has them.
+
+    A detection's size class follows from what it bears, so that it never bears both.
+    """
     if masks:
-        for entry in entries:
-            entry.pop("bbox")
-    return entries
+        shapes = [{"segmentation": mask} for mask in _rle(one["masks"])]
+    else:
+        corners = one["boxes"].tolist()
+        shapes = [{"bbox": [x0, y0, x1 - x0, y1 - y0]} for x0, y0, x1, y1 in corners]
+    labels = one["labels"].tolist()
+    return [
+        {"image_id": image_id, "category_id": label, **shape}
+        for label, shape in zip(labels, shapes, strict=True)
+    ]
 
 
 def _nothing(truth: COCO) -> COCO:
