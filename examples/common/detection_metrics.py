@@ -219,6 +219,7 @@ def _entries(one: Mapping[str, Any], image_id: int, masks: bool) -> list[dict[st
 
     A detection's size class follows from what it bears, so that it never bears both.
     """
+    shapes: list[dict[str, Any]]
     if masks:
         shapes = [{"segmentation": mask} for mask in _rle(one["masks"])]
     else:
