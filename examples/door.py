@@ -19,7 +19,7 @@ from transformers import ResNetConfig, ResNetForImageClassification
 from fastgen.torch import ContainerDataset
 
 PLANS = {
-    "cpu": Plan(images=1600, test_images=600, size=(192, 192), batch=16, passes=6, rate=2e-3),
+    "cpu": Plan(images=1200, test_images=400, size=(192, 192), batch=16, passes=6, rate=2e-3),
     "full": Plan(
         images=7910, test_images=1240, size=(224, 224), batch=64, passes=20, rate=1e-3, workers=12
     ),

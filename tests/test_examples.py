@@ -22,7 +22,7 @@ import torch
 from common.boxes import generalized_iou, iou
 from common.data import Feed, rendered
 from common.detection_metrics import confusion, hits, operating_point, score
-from common.detector import STRIDE, Detector, gaussians
+from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from common.strips import row_count, straightened, strip
 from pycocotools import mask as coco_mask
@@ -193,6 +193,11 @@ def test_detector_reads_boxes_and_classes_off_its_maps(monkeypatch):
     order = found["labels"].argsort()
     assert found["labels"][order].tolist() == [1, 2, 3]
     assert found["boxes"][order] == pytest.approx(target["boxes"][[0, 2, 1]], abs=1e-3)
+
+
+def test_of_boxes_of_a_class_on_one_another_the_best_stays():
+    boxes = torch.tensor([[0.0, 0, 10, 10], [1, 0, 11, 10], [0, 0, 10, 10], [5, 0, 15, 10]])
+    assert distinct(boxes, torch.tensor([1, 1, 2, 1])).tolist() == [True, False, True, True]
 
 
 def test_heat_is_one_at_the_cell_of_the_centre_alone_and_longer_along_the_longer_side():

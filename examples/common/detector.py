@@ -12,7 +12,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from common.boxes import generalized_iou
+from common.boxes import generalized_iou, iou
 from common.run import Learner
 
 STRIDE = 4
@@ -25,6 +25,7 @@ _BOX_WEIGHT = 5.0
 _LONGEST_LOG = 6.5  # of a side in pixels over the stride
 _CANDIDATES = 100
 _LEAST_SCORE = 0.01
+_SAME_THING = 0.6  # IoU of two boxes of a class
 
 
 def _conv(before: int, after: int, stride: int = 1) -> nn.Sequential:
@@ -124,7 +125,10 @@ class Detector(Learner):
             boxes = _boxes(sides, columns + 0.5, rows + 0.5)
             limit = boxes.new_tensor([width, height, width, height]) * STRIDE
             boxes = boxes.clamp(min=0).minimum(limit)
-            one = {"boxes": boxes, "labels": classes + 1, "scores": scores[number, kept]}
+            # a broad bell has several peaks
+            alone = distinct(boxes, classes)
+            boxes, classes = boxes[alone], classes[alone]
+            one = {"boxes": boxes, "labels": classes + 1, "scores": scores[number, kept][alone]}
             if self.masks:
                 one["masks"] = _instance_masks(maps[2][number], boxes, classes)
             found.append({name: value.cpu() for name, value in one.items()})
@@ -166,6 +170,17 @@ def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
     across = torch.exp(-0.5 * (x / spread[:, :1]) ** 2)
     down = torch.exp(-0.5 * (y / spread[:, 1:]) ** 2)
     return down[:, :, None] * across[:, None, :]
+
+
+def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
+    """Which boxes [N, 4], best first, no better one of the same class lies on; bool [N]."""
+    same = (iou(boxes, boxes) > _SAME_THING) & (classes[:, None] == classes[None])
+    rest = same.cpu().triu(1)
+    kept = torch.ones(len(boxes), dtype=torch.bool)
+    for i in range(len(boxes)):
+        if kept[i]:
+            kept &= ~rest[i]
+    return kept.to(boxes.device)
 
 
 def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
