@@ -1,8 +1,9 @@
-"""A small anchor-free detector: a heat map of centres, the four sides of a box, and class masks.
+"""A small anchor-free detector: a heat map of centres, the four sides of a box, and masks.
 
 Centres and their Gaussians as in CenterNet (Zhou et al. 2019), boxes trained over the Gaussian as
-in TTFNet (Liu et al. 2020). The first class spans the image and the others lie on it, so that it
-has a box map of its own. An instance's mask is its class's mask inside its box.
+in TTFNet (Liu et al. 2020). The first class spans the image and the others lie on it, so that boxes
+and masks have two groups: the first class, and the rest. An instance's mask is its group's mask
+inside its box.
 """
 
 import itertools
@@ -22,6 +23,8 @@ _SPREAD = 0.09  # Gaussian's sigma per side of the box; TTFNet's alpha 0.54, ove
 _LEAST_SPREAD = 0.3  # cells
 _RARE = 0.01  # heat that the maps start from
 _BOX_WEIGHT = 5.0
+_MASK_WEIGHT = 2.0
+_RARE_MASK_WEIGHT = 4.0  # of a pixel of the second group, which covers little of an image
 _LONGEST_LOG = 6.5  # of a side in pixels over the stride
 _CANDIDATES = 100
 _LEAST_SCORE = 0.01
@@ -61,14 +64,14 @@ class Detector(Learner):
         self.fuse = _conv(width, width * 3 // 2)
         self.heat = nn.Conv2d(width * 3 // 2, classes, 1)
         self.box = nn.Conv2d(width * 3 // 2, 8, 1)
-        self.mask = nn.Conv2d(width * 3 // 2, classes, 1) if masks else None
+        self.mask = nn.Conv2d(width * 3 // 2, 2, 1) if masks else None
         nn.init.constant_(self.heat.bias, -torch.tensor(1 / _RARE - 1).log().item())  # type: ignore[arg-type]
 
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Maps at a quarter of the size of images [B, 3, H, W] in -1..1.
 
-        Heat logits [B, classes, h, w]; logarithms of the sides' distances in cells [B, 2, 4, h, w],
-        for the first class and for the rest; and mask logits [B, classes, h, w] if it segments.
+        Heat logits [B, classes, h, w]; of both groups the logarithms of the sides' distances in
+        cells [B, 2, 4, h, w]; and mask logits [B, 2, h, w] if it segments.
         """
         x = self.stem(pixels)
         seen = [x]
@@ -138,20 +141,15 @@ class Detector(Learner):
         return torch.stack(images).to(self.heat.weight.device).float() / 127.5 - 1
 
     def _mask_loss(self, logits: torch.Tensor, targets: list[dict[str, Any]]) -> torch.Tensor:
-        wanted = torch.stack([self._class_masks(t) for t in targets]).to(logits.device)
+        wanted = torch.stack([_group_masks(t) for t in targets]).to(logits.device)
         # shares of a cell, not 0 or 1: thin things stay
         wanted = functional.avg_pool2d(wanted, STRIDE)
-        crossed = functional.binary_cross_entropy_with_logits(logits, wanted)
+        rare = logits.new_tensor([1.0, _RARE_MASK_WEIGHT])[:, None, None]
+        crossed = functional.binary_cross_entropy_with_logits(logits, wanted, pos_weight=rare)
         shares = logits.sigmoid()
         shared = (shares * wanted).sum((0, 2, 3))
         sizes = shares.sum((0, 2, 3)) + wanted.sum((0, 2, 3))
-        return crossed + (1 - (2 * shared + 1) / (sizes + 1)).mean()
-
-    def _class_masks(self, target: dict[str, Any]) -> torch.Tensor:
-        masks = torch.zeros(self.classes, *target["masks"].shape[1:])
-        for label, mask in zip(target["labels"], target["masks"], strict=True):
-            masks[label - 1] = torch.maximum(masks[label - 1], mask.float())
-        return masks
+        return _MASK_WEIGHT * (crossed + (1 - (2 * shared + 1) / (sizes + 1)).mean())
 
 
 def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
@@ -181,6 +179,15 @@ def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
         if kept[i]:
             kept &= ~rest[i]
     return kept.to(boxes.device)
+
+
+def _group_masks(target: dict[str, Any]) -> torch.Tensor:
+    """What the first class covers, and what the rest covers; float32 [2, H, W]."""
+    masks = torch.zeros(2, *target["masks"].shape[1:])
+    for label, mask in zip(target["labels"], target["masks"], strict=True):
+        group = int(label > 1)
+        masks[group] = torch.maximum(masks[group], mask.float())
+    return masks
 
 
 def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
@@ -214,7 +221,7 @@ def _boxes(sides: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tenso
 def _instance_masks(
     logits: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor
 ) -> torch.Tensor:
-    """Class masks at image size, each cut to its instance's box; bool [N, H, W]."""
+    """Group masks at image size, each cut to its instance's box; bool [N, H, W]."""
     grown = functional.interpolate(
         logits[None], scale_factor=float(STRIDE), mode="bilinear", align_corners=False
     )[0]
@@ -223,4 +230,4 @@ def _instance_masks(
     y = torch.arange(height, device=boxes.device) + 0.5
     across = (x >= boxes[:, :1]) & (x < boxes[:, 2:3])
     down = (y >= boxes[:, 1:2]) & (y < boxes[:, 3:])
-    return (grown > 0)[classes] & down[:, :, None] & across[:, None, :]
+    return (grown > 0)[(classes > 0).long()] & down[:, :, None] & across[:, None, :]
