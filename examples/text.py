@@ -42,7 +42,8 @@ class Reader(Learner):
     """Strips to characters. width: channels of the first layer.
 
     It sees about three letters around each column. A recurrent layer in place of the last
-    convolution learnt the few owner and size codes by heart: it read every 45G1 as 42G1.
+    convolution seemed to learn the few owner and size codes by heart: it read 45G1 as 42G1 where
+    the 5 is plain to see.
     """
 
     def __init__(self, width: int = 16) -> None:
