@@ -1,0 +1,86 @@
+"""Charts of the examples as PNG files: losses, classes, confusion, and what was found."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
+_DPI = 90
+
+
+def loss_curve(losses: Sequence[float], path: Path, window: int = 25) -> None:
+    """Loss by step, and its running mean over `window` steps."""
+    figure, axes = pyplot.subplots(figsize=(6, 3.2))
+    axes.plot(losses, color="0.8", linewidth=0.8, label="step")
+    if len(losses) >= window:
+        mean = np.convolve(losses, np.ones(window) / window, "valid")
+        axes.plot(np.arange(window - 1, len(losses)), mean, label=f"mean of {window} steps")
+    axes.set(xlabel="step", ylabel="loss", yscale="log")
+    axes.legend()
+    _save(figure, path)
+
+
+def histogram(groups: Mapping[str, torch.Tensor], label: str, path: Path) -> None:
+    """How the values 0..1 of each group are spread, counts on a logarithmic axis."""
+    figure, axes = pyplot.subplots(figsize=(6, 3.2))
+    values = [group.numpy() for group in groups.values()]
+    axes.hist(values, bins=np.linspace(0, 1, 21).tolist(), label=list(groups))
+    axes.set(xlabel=label, ylabel="images", yscale="log")
+    axes.legend()
+    _save(figure, path)
+
+
+def bars(names: Sequence[str], series: Mapping[str, Sequence[float]], path: Path) -> None:
+    """A group of bars, in percent, for each name, one bar a series."""
+    figure, axes = pyplot.subplots(figsize=(max(5.0, 0.4 * len(names)), 3.2))
+    width = 0.8 / len(series)
+    for number, (label, values) in enumerate(series.items()):
+        axes.bar(np.arange(len(names)) + number * width, values, width, label=label)
+    axes.set_xticks(np.arange(len(names)) + 0.4 - width / 2, names, rotation=60, ha="right")
+    axes.set(ylabel="%", ylim=(0, 100))
+    axes.legend(loc="lower right")
+    _save(figure, path)
+
+
+def confusion(counts: NDArray[np.int64], names: Sequence[str], path: Path) -> None:
+    """Counts [true, found] as shares of each true class; the last column is what was missed."""
+    columns = [*names, "missed"][: counts.shape[1]]
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    figure, axes = pyplot.subplots(figsize=(7.5, 7))
+    shown = axes.imshow(shares, cmap="magma_r", vmin=0, vmax=1)
+    axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=7)
+    axes.set_yticks(range(len(names)), list(names), fontsize=7)
+    axes.set(xlabel="found as", ylabel="is")
+    figure.colorbar(shown, label="share of the class", shrink=0.7)
+    _save(figure, path)
+
+
+def pictures(
+    images: Sequence[torch.Tensor], titles: Sequence[str], path: Path, columns: int = 4
+) -> None:
+    """Images uint8 [3, H, W] in a grid, a title above each."""
+    rows = -(-len(images) // columns)
+    height, width = images[0].shape[1:]
+    cell = (2.6, 2.6 * height / width + 0.3)
+    figure, grid = pyplot.subplots(
+        rows, columns, figsize=(cell[0] * columns, cell[1] * rows), squeeze=False
+    )
+    for axes in grid.flat:
+        axes.axis("off")
+    for axes, image, title in zip(grid.flat, images, titles, strict=False):
+        axes.imshow(image.permute(1, 2, 0).numpy())
+        axes.set_title(title, fontsize=7)
+    _save(figure, path)
+
+
+def _save(figure: Any, path: Path) -> None:
+    figure.tight_layout()
+    figure.savefig(path, dpi=_DPI)
+    pyplot.close(figure)

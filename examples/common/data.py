@@ -1,0 +1,135 @@
+"""Images for training: rendered once and kept as JPEG, or rendered anew for every pass."""
+
+import hashlib
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import simplejpeg
+import torch
+from torch.utils.data import DataLoader, Dataset
+
+import fastgen
+from fastgen.encode import jpeg
+from fastgen.torch import ContainerDataset, Loader, collate_lists
+
+Batch = tuple[list[torch.Tensor], list[Any]]
+"""Images, uint8 [3, H, W] each, and as many targets."""
+
+_REPORT_S = 30.0
+
+
+class Kept(Dataset[Any]):
+    """Items that `rendered` made: image uint8 [3, H, W] and what the loader gives as its target.
+
+    A text item is one crop and the string that it reads.
+    """
+
+    def __init__(self, items: list[dict[str, Any]]) -> None:
+        self._items = items
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __getitem__(self, position: int) -> tuple[torch.Tensor, Any]:
+        item = self._items[position]
+        pixels = simplejpeg.decode_jpeg(item["jpeg"].numpy().tobytes())
+        target = item["target"]
+        if isinstance(target, dict) and "masks" in target:
+            target = {**target, "masks": _unpacked(target["masks"], pixels.shape[:2])}
+        return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target
+
+    def with_more(self, other: "Kept") -> "Kept":
+        """These items, then those of another."""
+        return Kept(self._items + other._items)
+
+
+def rendered(data: ContainerDataset, folder: Path) -> Kept:
+    """All items of `data` in its present epoch, read from `folder` where they were rendered before.
+
+    The file is named after everything that decides the items, so that it never serves others.
+    """
+    told = json.dumps([fastgen.__version__, data.epoch, data.description], sort_keys=True)
+    path = folder / f"{data.task}_{hashlib.sha256(told.encode()).hexdigest()[:12]}.pt"
+    if path.exists():
+        return Kept(torch.load(path, weights_only=True))
+    folder.mkdir(parents=True, exist_ok=True)
+    items: list[dict[str, Any]] = []
+    start = reported = time.perf_counter()
+    for position in range(len(data)):
+        image, target = data[position]
+        if data.task == "text":
+            pairs = zip(image, target["texts"], strict=True)
+            items += [{"jpeg": _jpeg(crop), "target": text} for crop, text in pairs]
+        else:
+            items.append({"jpeg": _jpeg(image), "target": _packed(target)})
+        if (now := time.perf_counter()) - reported > _REPORT_S:
+            reported = now
+            rate = (position + 1) / (now - start)
+            print(f"{data.task}: {position + 1} of {len(data)} images, {rate:.1f}/s", flush=True)
+    data.close()
+    aside = path.with_suffix(".part")
+    torch.save(items, aside)
+    aside.rename(path)
+    return Kept(items)
+
+
+class Feed:
+    """Batches of lists, one pass at a time, in an order that the seed and the pass decide.
+
+    source: items with a length, or a ContainerDataset, which renders new scenes for every pass.
+    workers: processes that render; other items are fetched in this one.
+    """
+
+    def __init__(self, source: Dataset[Any], batch: int, seed: int, workers: int = 0) -> None:
+        self._order = torch.Generator()
+        self._seed = seed
+        self._loader: Any
+        if isinstance(source, ContainerDataset):
+            options: dict[str, Any] = {"num_workers": workers}
+            if workers:
+                # a process that has opened CUDA or OpenGL is no good to fork
+                options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
+            collate = None if source.task == "text" else collate_lists
+            self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
+        else:
+            self._loader = DataLoader(
+                source, batch, shuffle=True, collate_fn=collate_lists, generator=self._order
+            )
+
+    def __len__(self) -> int:
+        return len(self._loader)
+
+    def passed(self, number: int) -> Iterator[Batch]:
+        """The batches of pass `number`, counted from 0."""
+        self._order.manual_seed(self._seed + number)
+        if isinstance(self._loader, Loader):
+            self._loader.set_epoch(number)
+        return iter(self._loader)
+
+
+def in_order(source: Dataset[Any], batch: int) -> Iterator[Batch]:
+    """Batches of items in their order, each item once."""
+    return iter(DataLoader(source, batch, collate_fn=collate_lists))
+
+
+def _jpeg(image: torch.Tensor) -> torch.Tensor:
+    data = jpeg(image.permute(1, 2, 0).numpy())
+    return torch.frombuffer(bytearray(data), dtype=torch.uint8)
+
+
+def _packed(target: Any) -> Any:
+    if not isinstance(target, dict) or "masks" not in target:
+        return target
+    masks = target["masks"].numpy()
+    bits = np.packbits(masks.reshape(len(masks), -1), axis=1)
+    return {**target, "masks": torch.from_numpy(bits)}
+
+
+def _unpacked(bits: torch.Tensor, shape: tuple[int, int]) -> torch.Tensor:
+    height, width = shape
+    masks = np.unpackbits(bits.numpy(), axis=1, count=height * width)
+    return torch.from_numpy(masks.reshape(-1, height, width))

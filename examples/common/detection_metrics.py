@@ -1,0 +1,276 @@
+"""COCO's metrics by size and class, precision and recall at one score, and who is taken for whom.
+
+Targets are the loader's detection form, detections what `Detector.predict` gives. All shares are in
+percent; nan where there is nothing to measure.
+"""
+
+import contextlib
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from pycocotools import mask as coco_mask
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from common.boxes import iou
+
+Found = Mapping[str, torch.Tensor]
+
+_SUMMARY = {
+    "AP": 0,
+    "AP50": 1,
+    "AP75": 2,
+    "AP_S": 3,
+    "AP_M": 4,
+    "AP_L": 5,
+    "AR": 8,
+    "AR_S": 9,
+    "AR_M": 10,
+    "AR_L": 11,
+}
+"""Where COCOeval keeps what the paper's Tables 4 to 7 call so."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """summary: COCO's means, keys of the paper. class_ap50, class_ap, counts: by class. scored:
+    for each class the scores of its detections, whether each hit a label at an IoU of 0.5, and how
+    many labels there are."""
+
+    names: Sequence[str]
+    summary: dict[str, float]
+    class_ap50: list[float]
+    class_ap: list[float]
+    counts: list[int]
+    scored: list[tuple[NDArray[np.float64], NDArray[np.bool_], int]]
+
+    @property
+    def ap(self) -> float:
+        """AP over IoU 0.5 to 0.95, mean over classes."""
+        return self.summary["AP"]
+
+    @property
+    def ap50(self) -> float:
+        """AP at an IoU of 0.5, mean over classes."""
+        return self.summary["AP50"]
+
+    def by_class(self) -> dict[str, dict[str, float]]:
+        """Labels, AP50 and AP of each class by name."""
+        return {
+            name: {
+                "labels": self.counts[k],
+                "AP50": self.class_ap50[k],
+                "AP": self.class_ap[k],
+            }
+            for k, name in enumerate(self.names)
+        }
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Precision and recall of each class where only detections of `score` and above count."""
+
+    score: float
+    precision: list[float]
+    recall: list[float]
+
+    @property
+    def mean_precision(self) -> float:
+        """Mean over the classes that have one."""
+        return _mean(np.array(self.precision))
+
+    @property
+    def mean_recall(self) -> float:
+        """Mean over the classes that have labels."""
+        return _mean(np.array(self.recall))
+
+
+def score(
+    targets: Sequence[Mapping[str, Any]],
+    found: Sequence[Found],
+    names: Sequence[str],
+    size: tuple[int, int],
+    masks: bool = False,
+) -> Scores:
+    """Measure detections, image by image, against labels with pycocotools, by box or by mask.
+
+    size: (width, height) of the images.
+    """
+    truth = COCO()
+    truth.dataset = {
+        "info": {},
+        "images": [
+            {"id": i, "width": size[0], "height": size[1]} for i in range(1, len(targets) + 1)
+        ],
+        "categories": [{"id": k + 1, "name": name} for k, name in enumerate(names)],
+        "annotations": [
+            {**one, "area": float(area), "iscrowd": 0}
+            for i, target in enumerate(targets, start=1)
+            for one, area in zip(_entries(target, i, masks), target["area"], strict=True)
+        ],
+    }
+    for number, one in enumerate(truth.dataset["annotations"], start=1):
+        one["id"] = number  # COCOeval takes a match with id 0 for none
+    with contextlib.redirect_stdout(io.StringIO()):
+        truth.createIndex()
+        detections = [
+            {**one, "score": float(value)}
+            for i, each in enumerate(found, start=1)
+            for one, value in zip(_entries(each, i, masks), each["scores"], strict=True)
+        ]
+        guessed = truth.loadRes(detections) if detections else _nothing(truth)
+        measured = COCOeval(truth, guessed, "segm" if masks else "bbox")
+        measured.evaluate()
+        measured.accumulate()
+        measured.summarize()
+    precision = measured.eval["precision"][..., 0, -1]  # [IoU, recall, class]
+    return Scores(
+        names=names,
+        summary={name: _percent(float(measured.stats[i])) for name, i in _SUMMARY.items()},
+        class_ap50=[_percent(float(p.mean())) for p in precision[0].T],
+        class_ap=[_percent(float(precision[..., k].mean())) for k in range(len(names))],
+        counts=[
+            sum(int((target["labels"] == k + 1).sum()) for target in targets)
+            for k in range(len(names))
+        ],
+        scored=[_scored(measured, k, len(targets)) for k in range(len(names))],
+    )
+
+
+def operating_point(scores: Scores) -> OperatingPoint:
+    """The score at which F1, averaged over the classes, is best: as YOLOv7 reports P and R."""
+    thresholds = np.linspace(0.01, 0.99, 99)
+    curves = [_curve(thresholds, *each) for each in scores.scored]
+    precision = np.array([p for p, _ in curves])
+    recall = np.array([r for _, r in curves])
+    f1 = 2 * precision * recall / np.maximum(precision + recall, 1e-9)
+    labelled = [k for k, each in enumerate(scores.scored) if each[2]]
+    best = int(np.nan_to_num(f1[labelled]).mean(axis=0).argmax()) if labelled else 0
+    return OperatingPoint(
+        score=float(thresholds[best]),
+        precision=(100 * precision[:, best]).tolist(),
+        recall=(100 * recall[:, best]).tolist(),
+    )
+
+
+def confusion(
+    targets: Sequence[Mapping[str, Any]], found: Sequence[Found], classes: int, least_score: float
+) -> NDArray[np.int64]:
+    """Counts [classes, classes + 1] of what each label is found as; the last column: missed.
+
+    Detections of `least_score` and above take, best first, the free label that they overlap most,
+    of any class, where IoU is at least 0.5; the first class, which spans the others, apart.
+    """
+    counts = np.zeros((classes, classes + 1), np.int64)
+    for target, each in zip(targets, found, strict=True):
+        kept = each["scores"] >= least_score
+        boxes, labels = each["boxes"][kept], each["labels"][kept]
+        overlap = iou(boxes, target["boxes"])
+        overlap[(labels == 1)[:, None] != (target["labels"] == 1)[None]] = 0
+        free = torch.ones(len(target["labels"]), dtype=torch.bool)
+        for i in range(len(boxes)):
+            left = overlap[i] * free
+            if len(left) and float(left.max()) >= 0.5:
+                j = int(left.argmax())
+                free[j] = False
+                counts[int(target["labels"][j]) - 1, int(labels[i]) - 1] += 1
+        for label in target["labels"][free].tolist():
+            counts[label - 1, classes] += 1
+    return counts
+
+
+def hits(
+    target: Mapping[str, Any], each: Found, least_score: float, masks: bool = False
+) -> NDArray[np.bool_]:
+    """Which labels of one image are found: class right and IoU at least 0.5; bool [N].
+
+    Best detections first, each takes the label that it overlaps most among those still free.
+    """
+    order = each["scores"].argsort(descending=True, stable=True).tolist()
+    overlap = _mask_iou(each["masks"], target["masks"]) if masks else None
+    if overlap is None:
+        overlap = iou(each["boxes"], target["boxes"]).numpy()
+    hit = np.zeros(len(target["labels"]), bool)
+    for i in order:
+        same = (target["labels"] == each["labels"][i]).numpy() & ~hit
+        if float(each["scores"][i]) < least_score or not same.any():
+            continue
+        j = int(np.where(same, overlap[i], -1).argmax())
+        hit[j] = overlap[i, j] >= 0.5
+    return hit
+
+
+def _mask_iou(a: torch.Tensor, b: torch.Tensor) -> NDArray[np.float64]:
+    shape = (len(a), len(b))
+    return np.asarray(coco_mask.iou(_rle(a), _rle(b), [0] * len(b))).reshape(shape)
+
+
+def _rle(masks: torch.Tensor) -> list[dict[str, Any]]:
+    return [coco_mask.encode(np.asfortranarray(m.numpy().astype(np.uint8))) for m in masks]
+
+
+def _entries(one: Mapping[str, Any], image_id: int, masks: bool) -> list[dict[str, Any]]:
+    """Class and mask, or class and box, of each thing of an image as COCO's JSON has them.
+
+    A detection's size class follows from what it bears, so that it never bears both.
+    """
+    shapes: list[dict[str, Any]]
+    if masks:
+        shapes = [{"segmentation": mask} for mask in _rle(one["masks"])]
+    else:
+        corners = one["boxes"].tolist()
+        shapes = [{"bbox": [x0, y0, x1 - x0, y1 - y0]} for x0, y0, x1, y1 in corners]
+    labels = one["labels"].tolist()
+    return [
+        {"image_id": image_id, "category_id": label, **shape}
+        for label, shape in zip(labels, shapes, strict=True)
+    ]
+
+
+def _nothing(truth: COCO) -> COCO:
+    empty = COCO()
+    empty.dataset = {**truth.dataset, "annotations": []}
+    empty.createIndex()
+    return empty
+
+
+def _scored(
+    measured: COCOeval, k: int, images: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+    """Of one class, over all sizes, at an IoU of 0.5: see Scores.scored."""
+    areas = len(measured.params.areaRng)
+    entries = measured.evalImgs[k * areas * images : k * areas * images + images]
+    seen = [entry for entry in entries if entry is not None]
+    if not seen:
+        return np.zeros(0), np.zeros(0, bool), 0
+    values = np.concatenate([np.asarray(entry["dtScores"], float) for entry in seen])
+    hit = np.concatenate([np.asarray(entry["dtMatches"])[0] > 0 for entry in seen])
+    return values, hit, sum(len(entry["gtIgnore"]) for entry in seen)
+
+
+def _curve(
+    thresholds: NDArray[np.float64],
+    values: NDArray[np.float64],
+    hit: NDArray[np.bool_],
+    labels: int,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Precision and recall 0..1 at each threshold; nan where nothing is called or labelled."""
+    kept = values[None] >= thresholds[:, None]
+    right, called = (kept & hit).sum(axis=1), kept.sum(axis=1)
+    precision = np.where(called > 0, right / np.maximum(called, 1), np.nan)
+    return precision, right / labels if labels else np.full(len(thresholds), np.nan)
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def _percent(share: float) -> float:
+    """COCOeval says -1 where there is nothing to measure."""
+    return 100 * share if share >= 0 else float("nan")

@@ -1,0 +1,233 @@
+"""A small anchor-free detector: a heat map of centres, the four sides of a box, and masks.
+
+Centres and their Gaussians as in CenterNet (Zhou et al. 2019), boxes trained over the Gaussian as
+in TTFNet (Liu et al. 2020). The first class spans the image and the others lie on it, so that boxes
+and masks have two groups: the first class, and the rest. An instance's mask is its group's mask
+inside its box.
+"""
+
+import itertools
+from typing import Any
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from common.boxes import generalized_iou, iou
+from common.run import Learner
+
+STRIDE = 4
+"""Image pixels to a cell of the maps; image sides are multiples of 32."""
+
+_SPREAD = 0.09  # Gaussian's sigma per side of the box; TTFNet's alpha 0.54, over 6
+_LEAST_SPREAD = 0.3  # cells
+_RARE = 0.01  # heat that the maps start from
+_BOX_WEIGHT = 5.0
+_MASK_WEIGHT = 2.0
+_RARE_MASK_WEIGHT = 4.0  # of a pixel of the second group, which covers little of an image
+_LONGEST_LOG = 6.5  # of a side in pixels over the stride
+_CANDIDATES = 100
+_LEAST_SCORE = 0.01
+_SAME_THING = 0.6  # IoU of two boxes of a class
+
+
+def _conv(before: int, after: int, stride: int = 1) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Conv2d(before, after, 3, stride, 1, bias=False), nn.BatchNorm2d(after), nn.ReLU()
+    )
+
+
+class _Residual(nn.Module):
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.body = nn.Sequential(_conv(width, width), _conv(width, width))
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return x + self.body(x)
+
+
+class Detector(Learner):
+    """classes: how many, the first the container. width: channels at stride 4. blocks: residual
+    blocks at each coarser level. masks: whether it segments too."""
+
+    def __init__(self, classes: int, width: int = 32, blocks: int = 1, masks: bool = False) -> None:
+        super().__init__()
+        self.classes, self.masks = classes, masks
+        widths = [width, 2 * width, 3 * width, 4 * width]
+        self.stem = nn.Sequential(_conv(3, width // 2, 2), _conv(width // 2, width, 2))
+        levels, sides = [], [nn.Conv2d(width, width, 1)]
+        for before, after in itertools.pairwise(widths):
+            body = [_Residual(after) for _ in range(blocks)]
+            levels.append(nn.Sequential(_conv(before, after, 2), *body))
+            sides.append(nn.Conv2d(after, width, 1))
+        self.levels, self.sides = nn.ModuleList(levels), nn.ModuleList(sides)
+        self.fuse = _conv(width, width * 3 // 2)
+        self.heat = nn.Conv2d(width * 3 // 2, classes, 1)
+        self.box = nn.Conv2d(width * 3 // 2, 8, 1)
+        self.mask = nn.Conv2d(width * 3 // 2, 2, 1) if masks else None
+        nn.init.constant_(self.heat.bias, -torch.tensor(1 / _RARE - 1).log().item())  # type: ignore[arg-type]
+
+    def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Maps at a quarter of the size of images [B, 3, H, W] in -1..1.
+
+        Heat logits [B, classes, h, w]; of both groups the logarithms of the sides' distances in
+        cells [B, 2, 4, h, w]; and mask logits [B, 2, h, w] if it segments.
+        """
+        x = self.stem(pixels)
+        seen = [x]
+        for level in self.levels:
+            seen.append(x := level(x))
+        merged = self.sides[-1](seen[-1])
+        for finer, side in zip(seen[-2::-1], list(self.sides)[-2::-1], strict=True):
+            merged = side(finer) + functional.interpolate(merged, scale_factor=2.0)
+        features = self.fuse(functional.relu(merged))
+        maps = [self.heat(features), self.box(features).unflatten(1, (2, 4))]
+        return (*maps, self.mask(features)) if self.mask is not None else tuple(maps)
+
+    def loss(self, images: list[torch.Tensor], targets: list[dict[str, Any]]) -> torch.Tensor:
+        """Focal loss of the heat, GIoU of the boxes, and cross entropy and Dice of the masks.
+
+        images: uint8 [3, H, W]; targets: the loader's detection form.
+        """
+        maps = self(self._pixels(images))
+        heat, box = maps[0], maps[1]
+        total = heat.new_zeros(())
+        count = max(sum(len(t["labels"]) for t in targets), 1)
+        for number, target in enumerate(targets):
+            boxes = target["boxes"].to(heat.device)
+            classes = target["labels"].to(heat.device) - 1
+            bells = gaussians(boxes, heat.shape[2:])
+            wanted = torch.zeros_like(heat[number])
+            for k in range(len(boxes)):
+                wanted[classes[k]] = torch.maximum(wanted[classes[k]], bells[k])
+            total = total + _focal(heat[number], wanted) / count
+            for group, chosen in enumerate((classes == 0, classes > 0)):
+                if chosen.any():
+                    lost = _box_loss(box[number, group], boxes[chosen], bells[chosen])
+                    total = total + _BOX_WEIGHT * lost / count
+        if self.masks:
+            total = total + self._mask_loss(maps[2], targets)
+        return total
+
+    @torch.no_grad()
+    def predict(self, images: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
+        """Boxes float32 [N, 4] in pixels, labels int64 [N] from 1 and scores float32 [N], best
+        first, for each image; and masks bool [N, H, W] if it segments. All on the CPU."""
+        maps = [m.float() for m in self(self._pixels(images))]
+        heat = maps[0].sigmoid()
+        peaks = heat * (functional.max_pool2d(heat, 3, 1, 1) == heat)
+        height, width = heat.shape[2:]
+        scores, places = peaks.flatten(1).topk(min(_CANDIDATES, peaks[0].numel()))
+        found = []
+        for number in range(len(images)):
+            kept = scores[number] >= _LEAST_SCORE
+            classes = places[number, kept] // (height * width)
+            cells = places[number, kept] % (height * width)
+            sides = maps[1][number].flatten(2)[(classes > 0).long(), :, cells]
+            columns, rows = cells % width, cells // width
+            boxes = _boxes(sides, columns + 0.5, rows + 0.5)
+            limit = boxes.new_tensor([width, height, width, height]) * STRIDE
+            boxes = boxes.clamp(min=0).minimum(limit)
+            # a broad bell has several peaks
+            alone = distinct(boxes, classes)
+            boxes, classes = boxes[alone], classes[alone]
+            one = {"boxes": boxes, "labels": classes + 1, "scores": scores[number, kept][alone]}
+            if self.masks:
+                one["masks"] = _instance_masks(maps[2][number], boxes, classes)
+            found.append({name: value.cpu() for name, value in one.items()})
+        return found
+
+    def _pixels(self, images: list[torch.Tensor]) -> torch.Tensor:
+        return torch.stack(images).to(self.heat.weight.device).float() / 127.5 - 1
+
+    def _mask_loss(self, logits: torch.Tensor, targets: list[dict[str, Any]]) -> torch.Tensor:
+        wanted = torch.stack([_group_masks(t) for t in targets]).to(logits.device)
+        # shares of a cell, not 0 or 1: thin things stay
+        wanted = functional.avg_pool2d(wanted, STRIDE)
+        rare = logits.new_tensor([1.0, _RARE_MASK_WEIGHT])[:, None, None]
+        crossed = functional.binary_cross_entropy_with_logits(logits, wanted, pos_weight=rare)
+        shares = logits.sigmoid()
+        shared = (shares * wanted).sum((0, 2, 3))
+        sizes = shares.sum((0, 2, 3)) + wanted.sum((0, 2, 3))
+        return _MASK_WEIGHT * (crossed + (1 - (2 * shared + 1) / (sizes + 1)).mean())
+
+
+def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
+    """A bell over the cell that holds each box's centre, 1 there; float32 [N, h, w].
+
+    boxes: [N, 4] in pixels; shape: (h, w) of the maps.
+    """
+    height, width = shape
+    sides = (boxes[:, 2:] - boxes[:, :2]) / STRIDE
+    spread = (_SPREAD * sides).clamp(min=_LEAST_SPREAD)
+    centres = ((boxes[:, :2] + boxes[:, 2:]) / 2 / STRIDE).floor()
+    column = centres[:, 0].clamp(0, width - 1)
+    row = centres[:, 1].clamp(0, height - 1)
+    x = torch.arange(width, device=boxes.device) - column[:, None]
+    y = torch.arange(height, device=boxes.device) - row[:, None]
+    across = torch.exp(-0.5 * (x / spread[:, :1]) ** 2)
+    down = torch.exp(-0.5 * (y / spread[:, 1:]) ** 2)
+    return down[:, :, None] * across[:, None, :]
+
+
+def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
+    """Which boxes [N, 4], best first, no better one of the same class lies on; bool [N]."""
+    same = (iou(boxes, boxes) > _SAME_THING) & (classes[:, None] == classes[None])
+    rest = same.cpu().triu(1)
+    kept = torch.ones(len(boxes), dtype=torch.bool)
+    for i in range(len(boxes)):
+        if kept[i]:
+            kept &= ~rest[i]
+    return kept.to(boxes.device)
+
+
+def _group_masks(target: dict[str, Any]) -> torch.Tensor:
+    """What the first class covers, and what the rest covers; float32 [2, H, W]."""
+    masks = torch.zeros(2, *target["masks"].shape[1:])
+    for label, mask in zip(target["labels"], target["masks"], strict=True):
+        group = int(label > 1)
+        masks[group] = torch.maximum(masks[group], mask.float())
+    return masks
+
+
+def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
+    """CenterNet's focal loss with fewer penalties near a centre, summed over the maps."""
+    heat = logits.sigmoid()
+    at_centre = (1 - heat) ** 2 * functional.logsigmoid(logits)
+    elsewhere = (1 - wanted) ** 4 * heat**2 * functional.logsigmoid(-logits)
+    return -torch.where(wanted == 1, at_centre, elsewhere).sum()
+
+
+def _box_loss(sides: torch.Tensor, boxes: torch.Tensor, bells: torch.Tensor) -> torch.Tensor:
+    """1 - GIoU over each box's bell, weighted by it, summed over boxes; sides: [4, h, w].
+
+    Where bells meet a cell learns both boxes, each by its weight.
+    """
+    which, rows, columns = (bells > 0.1).nonzero(as_tuple=True)
+    weights = bells[which, rows, columns]
+    total = torch.zeros(len(boxes), device=boxes.device).index_add(0, which, weights)
+    guessed = _boxes(sides[:, rows, columns].T, columns + 0.5, rows + 0.5)
+    lost = 1 - generalized_iou(guessed, boxes[which])
+    return (lost * weights / total[which]).sum()
+
+
+def _boxes(sides: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """Pixel boxes [N, 4] from logarithms of distances [N, 4] (left, top, right, bottom) and the
+    centres x and y [N] of cells; all in cells."""
+    left, top, right, bottom = sides.clamp(max=_LONGEST_LOG).exp().unbind(-1)
+    return torch.stack([x - left, y - top, x + right, y + bottom], dim=-1) * STRIDE
+
+
+def _instance_masks(
+    logits: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor
+) -> torch.Tensor:
+    """Group masks at image size, each cut to its instance's box; bool [N, H, W]."""
+    grown = functional.interpolate(
+        logits[None], scale_factor=float(STRIDE), mode="bilinear", align_corners=False
+    )[0]
+    height, width = grown.shape[1:]
+    x = torch.arange(width, device=boxes.device) + 0.5
+    y = torch.arange(height, device=boxes.device) + 0.5
+    across = (x >= boxes[:, :1]) & (x < boxes[:, 2:3])
+    down = (y >= boxes[:, 1:2]) & (y < boxes[:, 3:])
+    return (grown > 0)[(classes > 0).long()] & down[:, :, None] & across[:, None, :]

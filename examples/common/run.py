@@ -1,0 +1,156 @@
+"""One way to run an example: options, seeds, the training loop and what it leaves behind."""
+
+import argparse
+import json
+import math
+import os
+import platform
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import nn
+
+from common.data import Feed
+from fastgen.errors import ConfigError
+
+RESULTS = Path(__file__).parent.parent / "results"
+
+_GRADIENT_LIMIT = 10.0
+_REPORT_STEPS = 50
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much to render and train.
+
+    images, test_images: how many. size: (width, height) in pixels. rate: highest learning rate.
+    workers: processes that render while the model trains, each pass new scenes; 0 renders the
+    images once and keeps them.
+    """
+
+    images: int
+    test_images: int
+    size: tuple[int, int]
+    batch: int
+    passes: int
+    rate: float
+    workers: int = 0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the command line asked for. full: the larger model. folder: where results go."""
+
+    name: str
+    mode: str
+    plan: Plan
+    full: bool
+    folder: Path
+    seed: int
+    device: torch.device
+
+    @property
+    def cache(self) -> Path:
+        """Where rendered images are kept."""
+        return self.folder / "cache"
+
+
+class Learner(nn.Module):
+    """A model that knows its loss."""
+
+    def loss(self, images: list[torch.Tensor], targets: list[Any]) -> torch.Tensor:
+        """Loss of a batch, a scalar."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of results: a title, the heads of its columns, and rows of text or numbers."""
+
+    title: str
+    heads: Sequence[str]
+    rows: Sequence[Sequence[object]]
+
+    def markdown(self) -> str:
+        """The table in Markdown; numbers with one decimal, those that are none as a dash."""
+        lines = [self.heads, ["---"] * len(self.heads), *[map(_cell, row) for row in self.rows]]
+        return f"**{self.title}**\n\n" + "\n".join("| " + " | ".join(c) + " |" for c in lines)
+
+
+def start(
+    name: str, description: str, plans: dict[str, Plan], argv: Sequence[str] | None = None
+) -> Run:
+    """Read the command line, choose one of the plans cpu, full and smoke, and seed torch."""
+    first, _, rest = description.partition("\n")
+    parser = argparse.ArgumentParser(
+        description=first, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--full", action="store_true", help="the version for a GPU")
+    parser.add_argument("--smoke", action="store_true", help="a few steps, to see that it runs")
+    parser.add_argument("--seed", type=int, default=1, help="of scenes, weights and order")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder for what it finds")
+    asked = parser.parse_args(argv)
+    if asked.seed < 0:
+        raise ConfigError(f"seed: {asked.seed} is not a whole number of 0 or more")
+    mode = "smoke" if asked.smoke else "full" if asked.full else "cpu"
+    torch.manual_seed(asked.seed)
+    asked.results.mkdir(parents=True, exist_ok=True)
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
+
+
+def train(model: Learner, feed: Feed, run: Run) -> list[float]:
+    """Train over all passes of the plan with AdamW and one cycle of the rate; losses by step."""
+    plan = run.plan
+    model.to(run.device).train()
+    steps = max(len(feed) * plan.passes, 2)
+    optimizer = torch.optim.AdamW(model.parameters(), plan.rate, weight_decay=0.01)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, plan.rate, steps, pct_start=0.15)
+    losses: list[float] = []
+    began = time.perf_counter()
+    for number in range(plan.passes):
+        for images, targets in feed.passed(number):
+            loss = model.loss(images, targets)
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(model.parameters(), _GRADIENT_LIMIT)
+            optimizer.step()
+            schedule.step()
+            losses.append(float(loss.detach()))
+            if len(losses) % _REPORT_STEPS == 0:
+                mean = sum(losses[-_REPORT_STEPS:]) / _REPORT_STEPS
+                spent = time.perf_counter() - began
+                print(f"step {len(losses)} of {steps}: loss {mean:.3f}, {spent:.0f} s", flush=True)
+    model.eval()
+    return losses
+
+
+def parameters(model: nn.Module) -> int:
+    """How many numbers are trained."""
+    return sum(p.numel() for p in model.parameters() if p.requires_grad)
+
+
+def conclude(run: Run, tables: Sequence[Table], found: dict[str, Any]) -> None:
+    """Print the tables, and write them as NAME.md and everything found as NAME.json."""
+    text = "\n\n".join(table.markdown() for table in tables)
+    made = {
+        "example": run.name,
+        "mode": run.mode,
+        "seed": run.seed,
+        "plan": asdict(run.plan),
+        "machine": f"{os.cpu_count()} cores, {platform.machine()}, {run.device.type}",
+        "torch": str(torch.__version__),
+    }
+    (run.folder / f"{run.name}.json").write_text(json.dumps(made | found, indent=1) + "\n")
+    (run.folder / f"{run.name}.md").write_text(text + "\n")
+    print(text)
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "–" if math.isnan(value) else f"{value:.1f}"
+    return str(value)

@@ -1,0 +1,220 @@
+"""Identifiers read from crops: a small convolutional net with CTC.
+
+    python examples/text.py [--full]
+
+Scores how many identifiers are read without a mistake, and the character error rate, by layout; and
+what the check digit of ISO 6346 catches. Needs fastgen[examples]. --full trains a wider net on a
+GPU while workers render.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from common import charts
+from common.data import Feed, Kept, in_order, rendered
+from common.run import Learner, Plan, Run, Table, conclude, parameters, start, train
+from common.strips import strip
+from torch import nn
+from torch.nn import functional
+from torch.utils.data import Dataset
+
+from fastgen.errors import ConfigError
+from fastgen.identifier import check_digit
+from fastgen.torch import ContainerDataset
+
+PLANS = {
+    "cpu": Plan(images=800, test_images=200, size=(640, 640), batch=16, passes=24, rate=2e-3),
+    "full": Plan(
+        images=8000, test_images=1000, size=(1280, 1280), batch=16, passes=20, rate=1e-3, workers=12
+    ),
+    "smoke": Plan(images=4, test_images=4, size=(640, 640), batch=4, passes=1, rate=1e-3),
+}
+"""Images of the end cameras, and on a CPU as many of the side cameras."""
+
+SIDES_SIZE = (1600, 480)
+"""Of the side cameras' images on a CPU: letters are as large as on the end cameras' images."""
+
+CHARACTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+class Reader(Learner):
+    """Strips to characters. width: channels of the first layer.
+
+    It sees about three letters around each column. A recurrent layer in place of the last
+    convolution seemed to learn the few owner and size codes by heart: it read 45G1 as 42G1 where
+    the 5 is plain to see.
+    """
+
+    def __init__(self, width: int = 16) -> None:
+        super().__init__()
+        layers: list[nn.Module] = []
+        before = 1
+        for after, pool in ((width, 2), (2 * width, 2), (4 * width, (2, 1)), (8 * width, (3, 1))):
+            layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after)]
+            layers += [nn.ReLU(), nn.MaxPool2d(pool)]
+            before = after
+        self.features = nn.Sequential(*layers)
+        self.context = nn.Conv1d(before, before, 5, padding=2, bias=False)
+        self.norm = nn.BatchNorm1d(before)
+        self.letters = nn.Conv1d(before, len(CHARACTERS) + 1, 1)
+
+    def forward(self, strips: torch.Tensor) -> torch.Tensor:
+        """Logarithms of shares [B, T, 37] from strips uint8 [B, 1, H, W]; 0 stands for none."""
+        grey = strips.to(self.letters.weight.device).float()
+        mean, deviation = grey.mean((2, 3), keepdim=True), grey.std((2, 3), keepdim=True)
+        grey = (grey - mean) / (deviation + 1)
+        if self.training:
+            # dark on light reads like light on dark
+            grey = grey * (2 * torch.randint(2, (len(grey), 1, 1, 1), device=grey.device) - 1)
+        columns = self.features(grey).mean(dim=2)
+        surrounded = functional.relu(self.norm(self.context(columns))) + columns
+        return self.letters(surrounded).transpose(1, 2).log_softmax(-1)
+
+    def loss(self, images: list[torch.Tensor], targets: list[str]) -> torch.Tensor:
+        """CTC of a batch of strips against what they read without its blanks."""
+        words = [[CHARACTERS.index(c) + 1 for c in joined(text)] for text in targets]
+        shares = self(torch.stack(images))
+        return functional.ctc_loss(
+            shares.transpose(0, 1),
+            torch.tensor([k for word in words for k in word], device=shares.device),
+            torch.full((len(words),), shares.shape[1]),
+            torch.tensor([len(word) for word in words]),
+        )
+
+    @torch.no_grad()
+    def read(self, images: list[torch.Tensor]) -> list[str]:
+        """What each strip reads, by the best character at each column."""
+        return [decoded(best) for best in self(torch.stack(images)).argmax(2).tolist()]
+
+
+class Strips(Dataset[Any]):
+    """Kept crops as strips, with what they read."""
+
+    def __init__(self, crops: Kept) -> None:
+        self._items = [(strip(crop), text) for crop, text in (crops[i] for i in range(len(crops)))]
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __getitem__(self, position: int) -> tuple[torch.Tensor, str]:
+        return self._items[position]
+
+
+def decoded(best: Sequence[int]) -> str:
+    """Characters of CTC's best path: repeats are one, 0 is none."""
+    kept = [k for k, before in zip(best, [0, *best], strict=False) if k and k != before]
+    return "".join(CHARACTERS[k - 1] for k in kept)
+
+
+def joined(text: str) -> str:
+    """A text without its blanks, which say how it is laid out."""
+    return text.replace(" ", "")
+
+
+def layout_of(text: str) -> str:
+    """'columns' or 'rows': letters below one another have no blank inside the identifier."""
+    return "columns" if text.count(" ") == 1 else "rows"
+
+
+def edit_distance(a: str, b: str) -> int:
+    """Least number of characters put in, left out or changed to make b of a. Levenshtein 1966."""
+    row = list(range(len(b) + 1))
+    for i, left in enumerate(a, start=1):
+        before, row = row, [i]
+        for j, right in enumerate(b, start=1):
+            row.append(min(before[j] + 1, row[-1] + 1, before[j - 1] + (left != right)))
+    return row[-1]
+
+
+def checks(text: str) -> bool:
+    """Whether a read begins with a whole identifier whose check digit is right."""
+    try:
+        return len(text) == 15 and str(check_digit(text[:10])) == text[10]
+    except ConfigError:
+        return False
+
+
+def measured(texts: Sequence[str], read: Sequence[str]) -> dict[str, float]:
+    """Exact matches and character error rate in percent; share of reads whose check digit is right,
+    and how many of those are exact. nan for a share of nothing."""
+    pairs = [(joined(text), got) for text, got in zip(texts, read, strict=True)]
+    exact = [wanted == got for wanted, got in pairs]
+    passed = [right for right, (_, got) in zip(exact, pairs, strict=True) if checks(got)]
+    wrong = sum(edit_distance(got, wanted) for wanted, got in pairs)
+
+    def percent(part: int, whole: int) -> float:
+        return 100 * part / whole if whole else float("nan")
+
+    return {
+        "exact": percent(sum(exact), len(pairs)),
+        "character errors": percent(wrong, sum(len(wanted) for wanted, _ in pairs)),
+        "check digit right": percent(len(passed), len(pairs)),
+        "exact among these": percent(sum(passed), len(passed)),
+    }
+
+
+def strips_of(crops: Any, target: dict[str, Any]) -> tuple[list[torch.Tensor], dict[str, Any]]:
+    """The crops of an image as strips, for a loader's `transforms`."""
+    return [strip(crop) for crop in crops], target
+
+
+def data_of(run: Run, split: str) -> list[ContainerDataset]:
+    """End cameras and side cameras, each image of another container; with --full all at once."""
+    plan = run.plan
+    training = split == "train"
+    length = plan.images if training else plan.test_images
+    options: dict[str, Any] = {"seed": run.seed, "split": split, "all_views": False}
+    options |= {"fixed": not training, "length": length}
+    if plan.workers:
+        return [ContainerDataset("text", size=plan.size, **options)]
+    ends = ContainerDataset("text", size=plan.size, cameras=("Cl", "Cr"), **options)
+    return [ends, ContainerDataset("text", size=SIDES_SIZE, cameras=("A", "B"), **options)]
+
+
+def kept(run: Run, split: str) -> Kept:
+    """The crops of a split, rendered once."""
+    crops = Kept([])
+    for data in data_of(run, split):
+        crops = crops.with_more(rendered(data, run.cache))
+    return crops
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Train, test, and write what was found."""
+    run = start("text", __doc__ or "", PLANS, argv)
+    plan = run.plan
+    source: Any
+    if plan.workers:
+        source = data_of(run, "train")[0]
+        source.transforms = strips_of
+    else:
+        source = Strips(kept(run, "train"))
+    feed = Feed(source, plan.batch, run.seed, plan.workers)
+    model = Reader(width=48 if run.full else 16)
+    losses = train(model, feed, run)
+
+    crops = kept(run, "test")
+    test = Strips(crops)
+    texts = [test[i][1] for i in range(len(test))]
+    read = [one for images, _ in in_order(test, 64) for one in model.read(images)]
+    parts = {"all": range(len(texts))} | {
+        name: [i for i, text in enumerate(texts) if layout_of(text) == name]
+        for name in ("rows", "columns")
+    }
+    found = {
+        name: measured([texts[i] for i in places], [read[i] for i in places])
+        for name, places in parts.items()
+    }
+    rows = [[name, len(parts[name]), *found[name].values()] for name in parts]
+    table = Table("Identifiers read, %", ["layout", "crops", *found["all"]], rows)
+    charts.loss_curve(losses, run.folder / "text_loss.png")
+    titles = [f"{joined(texts[i])}\nread {read[i]}" for i in range(min(20, len(test)))]
+    strips = [test[i][0].expand(3, -1, -1) for i in range(len(titles))]
+    if strips:
+        charts.pictures(strips, titles, run.folder / "text_pictures.png", columns=2)
+    conclude(run, [table], {"parameters": parameters(model), **found, "last_loss": losses[-1]})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,349 @@
+"""The examples: each runs end to end, and what they measure agrees with hand-made cases."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("transformers")
+pytest.importorskip("pycocotools")
+
+import cv2
+import damage
+import door
+import text
+import torch
+from common.boxes import generalized_iou, iou
+from common.data import Feed, rendered
+from common.detection_metrics import confusion, hits, operating_point, score
+from common.detector import STRIDE, Detector, distinct, gaussians
+from common.run import Table
+from common.strips import row_count, straightened, strip
+from pycocotools import mask as coco_mask
+
+from fastgen.artwork import glyph_tiles
+from fastgen.lettering import layout
+from fastgen.torch import ContainerDataset
+
+ROOT = Path(__file__).parent.parent
+NAMES = ("container", "axis", "dented")
+SIZE = (200, 100)
+
+
+@pytest.mark.parametrize("example", ["door", "imdg", "damage", "text", "imdg --full"])
+def test_example_runs_and_leaves_table_numbers_and_charts(example, tmp_path):
+    name, *options = example.split()
+    command = [sys.executable, f"examples/{name}.py", "--smoke", *options]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_WAIT_POLICY": "PASSIVE"}
+    command += ["--results", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True)
+    made = json.loads((tmp_path / f"{name}.json").read_text())
+    assert (made["example"], made["mode"], made["seed"]) == (name, "smoke", 1)
+    assert made["parameters"] > 0
+    assert "| --- |" in (tmp_path / f"{name}.md").read_text()
+    assert (tmp_path / f"{name}_loss.png").stat().st_size > 1000
+
+
+def labels(*things, masks=None):
+    """Target of (label, x0, y0, x1, y1) each, its area that of the box or of the mask."""
+    boxes = torch.tensor([t[1:] for t in things], dtype=torch.float32).reshape(-1, 4)
+    target = {"boxes": boxes, "labels": torch.tensor([t[0] for t in things], dtype=torch.int64)}
+    target["area"] = (boxes[:, 2:] - boxes[:, :2]).prod(1)
+    if masks is not None:
+        target |= {"masks": torch.stack(masks), "area": torch.stack(masks).sum((1, 2)).float()}
+    return target
+
+
+def detections(*things, masks=None):
+    """Detections of (score, label, x0, y0, x1, y1) each."""
+    found = labels(*(t[1:] for t in things), masks=masks)
+    return found | {"scores": torch.tensor([t[0] for t in things], dtype=torch.float32)}
+
+
+def test_average_precision_of_right_wrong_right_is_that_of_the_interpolated_curve():
+    target = labels((1, 0, 0, 20, 20), (1, 100, 0, 120, 20))
+    found = detections((0.9, 1, 0, 0, 20, 20), (0.8, 1, 50, 50, 70, 70), (0.7, 1, 100, 0, 120, 20))
+    scores = score([target], [found], NAMES, SIZE)
+    # recalls 0, 0.01 ... 0.5 are reached at precision 1, the other fifty at 2/3
+    assert scores.class_ap50[0] == pytest.approx(100 * (51 + 50 * 2 / 3) / 101)
+    assert scores.counts == [2, 0, 0]
+    assert np.isnan(scores.class_ap50[1])
+    assert scores.ap50 == pytest.approx(scores.class_ap50[0])
+
+
+def test_sizes_are_told_apart_by_the_area_of_the_label():
+    target = labels((1, 0, 0, 20, 20), (1, 60, 0, 110, 50), (1, 100, 0, 200, 100))
+    found = detections((0.9, 1, 60, 0, 110, 50))
+    summary = score([target], [found], NAMES, SIZE).summary
+    assert [summary[f"AR_{s}"] for s in "SML"] == pytest.approx([0, 100, 0])
+
+
+def test_a_mask_that_overlaps_by_three_fifths_counts_at_three_of_ten_thresholds():
+    whole, part = torch.zeros(100, 200, dtype=torch.uint8), torch.zeros(100, 200, dtype=torch.uint8)
+    whole[10:60, 20:40] = 1
+    part[10:40, 20:40] = 1  # IoU 0.6
+    target = labels((2, 20, 10, 40, 60), masks=[whole])
+    found = detections((0.9, 2, 20, 10, 40, 60), masks=[part])
+    assert score([target], [found], NAMES, SIZE, masks=True).class_ap[1] == pytest.approx(30)
+    assert score([target], [found], NAMES, SIZE).class_ap[1] == pytest.approx(100)
+
+
+def test_nothing_found_is_no_error():
+    scores = score([labels((1, 0, 0, 20, 20))], [detections()], NAMES, SIZE)
+    point = operating_point(scores)
+    assert scores.ap == 0
+    assert point.mean_recall == 0
+    assert np.isnan(point.mean_precision)
+
+
+def test_operating_point_leaves_out_what_costs_more_precision_than_it_brings_recall():
+    target = labels((1, 0, 0, 20, 20), (1, 100, 0, 120, 20))
+    wrong = [(0.3, 1, 50, y, 60, y + 10) for y in (0, 20, 40, 60, 80)]
+    right = [(0.8, 1, 0, 0, 20, 20), (0.7, 1, 100, 0, 120, 20)]
+    point = operating_point(score([target], [detections(*right, *wrong)], NAMES, SIZE))
+    assert 0.3 < point.score <= 0.7
+    assert (point.precision[0], point.recall[0]) == (100, 100)
+    assert (point.mean_precision, point.mean_recall) == (100, 100)
+
+
+def test_confusion_counts_the_class_found_at_each_label_and_what_is_missed():
+    target = labels((1, 0, 0, 200, 100), (2, 0, 0, 200, 98), (3, 10, 10, 30, 30), (3, 60, 0, 70, 9))
+    ends = (0.9, 1, 0, 0, 200, 99), (0.8, 3, 0, 0, 198, 98)
+    found = detections(*ends, (0.7, 3, 9, 9, 30, 30), (0.1, 3, 60, 0, 70, 9))
+    counts = confusion([target], [found], 3, least_score=0.5)
+    assert counts.tolist() == [[1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]
+
+
+@pytest.mark.parametrize("masks", [False, True])
+def test_hits_are_the_labels_that_pycocotools_matches(masks):
+    rng = np.random.default_rng(3)
+    targets, found = [], []
+    for _ in range(12):
+        things = [(int(rng.integers(1, 4)), *_box(rng)) for _ in range(6)]
+        guesses = [(k, *(v + int(rng.integers(-4, 5)) for v in box)) for k, *box in things * 2]
+        guesses = [(float(rng.random()), *g) for g in guesses]
+        filled = [_filled(t[1:]) for t in things], [_filled(g[2:]) for g in guesses]
+        targets.append(labels(*things, masks=filled[0]))
+        found.append(detections(*guesses, masks=filled[1]))
+    scored = score(targets, found, NAMES, SIZE, masks).scored
+    own = [hits(t, f, 0.0, masks) for t, f in zip(targets, found, strict=True)]
+    for k in range(3):
+        of_class = [(t["labels"] == k + 1).numpy() for t in targets]
+        ours = sum(int(h[c].sum()) for h, c in zip(own, of_class, strict=True))
+        assert 0 < ours == int(scored[k][1].sum())
+
+
+def _box(rng):
+    x, y = int(rng.integers(10, 150)), int(rng.integers(10, 60))
+    return x, y, x + int(rng.integers(9, 30)), y + int(rng.integers(9, 30))
+
+
+def _filled(box):
+    mask = torch.zeros(SIZE[1], SIZE[0], dtype=torch.uint8)
+    x0, y0, x1, y1 = box
+    mask[y0:y1, x0:x1] = 1
+    return mask
+
+
+def test_overlaps_of_boxes_are_those_of_pycocotools():
+    rng = np.random.default_rng(4)
+    a, b = (torch.tensor([_box(rng) for _ in range(n)], dtype=torch.float32) for n in (7, 9))
+    theirs = coco_mask.iou(*(_sized(boxes) for boxes in (a, b)), [0] * len(b))
+    assert iou(a, b).numpy() == pytest.approx(theirs, abs=1e-6)
+
+
+def _sized(boxes):
+    return torch.cat([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]], dim=1).double().numpy()
+
+
+def test_generalized_overlap_falls_below_zero_with_the_gap():
+    unit = torch.tensor([0.0, 0, 1, 1])
+    for gap in (0.0, 1.0, 5.0):
+        apart = unit + torch.tensor([1 + gap, 0, 1 + gap, 0])
+        assert float(generalized_iou(unit, apart)) == pytest.approx(-gap / (2 + gap))
+    assert float(generalized_iou(unit, unit)) == 1
+
+
+def perfect_maps(target, classes):
+    """Maps that a detector would give for a target of boxes whose centres are cell centres."""
+    height, width = SIZE[1] // STRIDE, SIZE[0] // STRIDE
+    heat = torch.full((1, classes, height, width), -20.0)
+    sides = torch.zeros(1, 2, 4, height, width)
+    things = zip(target["labels"].tolist(), target["boxes"].tolist(), strict=True)
+    for label, (x0, y0, x1, y1) in things:
+        row, column = int((y0 + y1) / 2 / STRIDE), int((x0 + x1) / 2 / STRIDE)
+        heat[0, label - 1, row, column] = 20.0
+        half = torch.tensor([x1 - x0, y1 - y0, x1 - x0, y1 - y0]) / 2 / STRIDE
+        sides[0, int(label > 1), :, row, column] = half.log()
+    return heat, sides
+
+
+def test_detector_reads_boxes_and_classes_off_its_maps(monkeypatch):
+    target = labels((1, 2, 4, 194, 96), (3, 90, 40, 114, 68), (2, 26, 14, 34, 22))
+    model = Detector(3)
+    monkeypatch.setattr(Detector, "forward", lambda self, pixels: perfect_maps(target, 3))
+    image = torch.zeros(3, SIZE[1], SIZE[0], dtype=torch.uint8)
+    found = model.predict([image])[0]
+    order = found["labels"].argsort()
+    assert found["labels"][order].tolist() == [1, 2, 3]
+    assert found["boxes"][order] == pytest.approx(target["boxes"][[0, 2, 1]], abs=1e-3)
+
+
+def test_of_boxes_of_a_class_on_one_another_the_best_stays():
+    boxes = torch.tensor([[0.0, 0, 10, 10], [1, 0, 11, 10], [0, 0, 10, 10], [5, 0, 15, 10]])
+    assert distinct(boxes, torch.tensor([1, 1, 2, 1])).tolist() == [True, False, True, True]
+
+
+def test_heat_is_one_at_the_cell_of_the_centre_alone_and_longer_along_the_longer_side():
+    bells = gaussians(torch.tensor([[16.0, 40, 176, 60]]), torch.Size((25, 50)))[0]
+    assert (bells == 1).nonzero().tolist() == [[12, 24]]
+    assert bells[12, 28] > bells[16, 24]
+
+
+def test_losses_of_a_detector_fall_on_one_image_until_it_finds_the_box():
+    torch.manual_seed(0)
+    image = torch.full((3, 64, 64), 60, dtype=torch.uint8)
+    image[0, 20:44, 12:36] = 250
+    mask = torch.zeros(64, 64, dtype=torch.uint8)
+    mask[20:44, 12:36] = 1
+    target = labels((2, 12, 20, 36, 44), masks=[mask])
+    model = Detector(2, width=16, masks=True)
+    optimizer = torch.optim.Adam(model.parameters(), 5e-3)
+    for _ in range(60):
+        optimizer.zero_grad()
+        model.loss([image, image], [target, target]).backward()
+        optimizer.step()
+    best = {name: value[:1] for name, value in model.predict([image, image])[0].items()}
+    assert hits(target, best, 0.3).all()
+    assert hits(target, best, 0.3, masks=True).all()
+
+
+def test_precision_and_recall_of_doors():
+    is_door = torch.tensor([True, True, True, False, False])
+    called = torch.tensor([True, True, False, True, False])
+    assert door.precision_recall(is_door, called) == pytest.approx((200 / 3, 200 / 3))
+    none = torch.zeros(5, dtype=torch.bool)
+    assert np.isnan(door.precision_recall(is_door, none)[0])
+
+
+def test_edit_distance_is_the_shortest_of_all_ways():
+    @cache
+    def shortest(a, b):
+        if not a or not b:
+            return len(a) + len(b)
+        change = shortest(a[1:], b[1:]) + (a[0] != b[0])
+        return min(change, shortest(a[1:], b) + 1, shortest(a, b[1:]) + 1)
+
+    assert text.edit_distance("kitten", "sitting") == 3
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        a, b = ("".join(rng.choice(list("AB1"), rng.integers(0, 7))) for _ in range(2))
+        assert text.edit_distance(a, b) == shortest(a, b)
+
+
+def test_reads_are_scored_without_their_blanks_and_by_their_check_digit():
+    truth = ["CSQU305438 3 22G1", "CSQU3054383 22G1", "CSQU3054383 22G1"]
+    read = ["CSQU305438322G1", "CSQU305438422G1", "CSQU305438322G"]
+    found = text.measured(truth, read)
+    assert found["exact"] == pytest.approx(100 / 3)
+    assert found["character errors"] == pytest.approx(100 * 2 / 45)
+    assert found["check digit right"] == pytest.approx(100 / 3)
+    assert found["exact among these"] == 100
+
+
+def test_best_path_drops_repeats_and_blanks():
+    a, b = text.CHARACTERS.index("A") + 1, text.CHARACTERS.index("B") + 1
+    assert text.decoded([0, a, a, 0, a, b, b, 0]) == "AAB"
+
+
+def test_rows_are_counted_right_in_every_layout_of_every_font():
+    blocks = {
+        2: [("ORLU 566020 5", "42G1")],
+        3: [("ORLU", "566020 5", "42G1"), ("ORLU 566", "020 5", "42G1")],
+    }
+    columns = {1: [("ORLU5660205 42G1",)], 2: [("ORLU5660205", "42G1")]}
+    for upright, layouts in ((False, blocks), (True, columns)):
+        for rows, all_lines in layouts.items():
+            for lines in all_lines:
+                for font in glyph_tiles()[1].values():
+                    width, height = layout(lines, font, 100.0, upright).size_mm
+                    shape = (width, height) if upright else (height, width)
+                    assert row_count(shape, upright) == rows, (font.name, lines)
+
+
+@pytest.mark.parametrize("slant", [-0.2, -0.05, 0.0, 0.1, 0.2])
+def test_slanted_rows_become_level(slant):
+    grey = np.full((60, 180), 200, np.uint8)
+    for x in range(4, 176, 6):
+        for row in (18, 42):
+            y = round(row + slant * (x - 90))
+            cv2.rectangle(grey, (x, y - 5), (x + 2, y + 5), 20, -1)
+    ink = straightened(grey) < 110
+    rows = np.flatnonzero(ink.any(axis=1))
+    between = np.diff(rows).max()
+    assert between > 8  # a free band across the whole width
+    assert strip(torch.from_numpy(np.repeat(grey[None], 3, axis=0))).shape == (1, 24, 400)
+
+
+def test_slenderness_of_a_tilted_bar_is_its_length_over_its_width():
+    y, x = np.mgrid[:200, :200] - 100.0
+    along, across = 0.8 * x + 0.6 * y, 0.8 * y - 0.6 * x
+    bar = (abs(along) < 60) & (abs(across) < 10)
+    assert damage.slenderness(bar) == pytest.approx(6, rel=0.05)
+    square = np.zeros((9, 9), np.uint8)
+    square[2:6, 3:7] = 1
+    assert damage.slenderness(square) == pytest.approx(1)
+
+
+def test_kept_items_are_those_of_the_dataset_and_come_back_from_the_file(tmp_path):
+    config = damage.Config.from_values(damage.MANY_DAMAGES)
+    data = ContainerDataset("damage", config, seed=2, size=(96, 64), length=4)
+    first, again = rendered(data, tmp_path), rendered(data, tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+    for i in range(4):
+        image, target = data[i]
+        kept_image, kept_target = again[i]
+        assert (first[i][0] == kept_image).all()
+        assert (target["masks"] == kept_target["masks"]).all()
+        assert (target["boxes"] == kept_target["boxes"]).all()
+        # a JPEG
+        assert (image.float() - kept_image.float()).abs().mean() < 6
+    data.close()
+
+
+def test_order_of_batches_is_decided_by_seed_and_pass():
+    items = list(zip(torch.arange(9), range(9), strict=True))
+
+    def order(seed, number):
+        return [k for _, targets in Feed(items, 2, seed).passed(number) for k in targets]
+
+    assert order(1, 0) == order(1, 0)
+    assert order(1, 0) != order(1, 1)
+    assert sorted(order(1, 1)) == list(range(9))
+
+
+def test_workers_render_new_strips_for_every_pass():
+    options = {"size": (640, 640), "length": 4, "cameras": ("Cr",), "all_views": False}
+    data = ContainerDataset("text", seed=1, transforms=text.strips_of, **options)
+    feed = Feed(data, 4, seed=1, workers=1)
+    passes = [[batch for batch in feed.passed(number)] for number in (0, 1)]
+    for images, texts in passes[0] + passes[1]:
+        assert len(images) == len(texts) > 0
+        assert images[0].shape == (1, 24, 400)
+    assert set(passes[0][0][1]).isdisjoint(passes[1][0][1])
+
+
+def test_table_shows_a_dash_for_what_is_not_measured():
+    table = Table("T", ["a", "b", "c"], [["x", 3, float("nan")], ["y", 2, 1.25]])
+    assert table.markdown().splitlines()[2:] == [
+        "| a | b | c |",
+        "| --- | --- | --- |",
+        "| x | 3 | – |",
+        "| y | 2 | 1.2 |",
+    ]
