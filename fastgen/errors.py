@@ -14,7 +14,7 @@ class AssetError(FastgenError):
 
 
 class ContextError(FastgenError):
-    """No OpenGL context could be made on this machine."""
+    """This machine gives no OpenGL context, or CUDA no access to what it draws."""
 
 
 class OutputError(FastgenError):

@@ -7,6 +7,7 @@ from typing import Self
 from fastgen.bake import Atlas
 from fastgen.camera import view_of
 from fastgen.config import Config
+from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
 from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
 from fastgen.errors import ConfigError
 from fastgen.gl import GLContext, open_context
@@ -80,6 +81,7 @@ class Generator:
         self._light = lru_cache(maxsize=24)(self._load_light)
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
+        self._cuda: CudaFrames | None = None
 
     @property
     def environments(self) -> tuple[str, ...]:
@@ -118,15 +120,9 @@ class Generator:
         camera: the name of one of the scene's cameras, or a Camera of your own.
         layer: 'all', or one material layer by itself (see programs.LAYERS).
         """
-        if (index is None) == (scene is None):
-            raise ConfigError("render: give either index or scene")
         if layer not in LAYERS:
             raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
-        if scene is None:
-            assert index is not None
-            scene = self.scene(index)
-        if isinstance(camera, str):
-            camera = find_camera(scene, camera)
+        scene, camera = self._chosen(index, camera, scene)
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
@@ -142,6 +138,30 @@ class Generator:
             view=view,
             objects=objects,
         )
+
+    def render_cuda(
+        self,
+        index: int | None = None,
+        camera: str | Camera = "A",
+        scene: Scene | None = None,
+    ) -> CudaFrame:
+        """As `render`, but the frame stays on the GPU, without objects; good until the next call.
+
+        Raises ContextError where `cuda_reason` gives one.
+        """
+        scene, camera = self._chosen(index, camera, scene)
+        renderer = self._open()
+        if self._cuda is None:
+            assert self._gl is not None
+            self._cuda = CudaFrames(self._gl, self.size)
+        image, labels, depth = self._cuda.take(renderer.draw(scene, camera, self.size))
+        return CudaFrame(image, labels, depth, scene, camera, view_of(camera, self.size))
+
+    def cuda_reason(self) -> str:
+        """Why `render_cuda` cannot work here, in one line; '' where it can."""
+        self._open()
+        assert self._gl is not None
+        return cuda_reason(self._gl)
 
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
@@ -162,17 +182,30 @@ class Generator:
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
+        if self._cuda is not None:
+            self._cuda.release()
         if self._renderer is not None:
             self._renderer.release()
         if self._gl is not None:
             self._gl.release()
-        self._renderer, self._gl = None, None
+        self._cuda, self._renderer, self._gl = None, None, None
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _chosen(
+        self, index: int | None, camera: str | Camera, scene: Scene | None
+    ) -> tuple[Scene, Camera]:
+        """The scene and camera that the arguments of a render name."""
+        if (index is None) == (scene is None):
+            raise ConfigError("render: give either index or scene")
+        if scene is None:
+            assert index is not None
+            scene = self.scene(index)
+        return scene, find_camera(scene, camera) if isinstance(camera, str) else camera
 
     def _open(self) -> Renderer:
         if self._renderer is None:

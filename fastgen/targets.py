@@ -149,9 +149,7 @@ class Targets:
         color = np.empty((height, width, 4), np.uint8)
         labels = np.empty((height, width), np.uint32)
         depth = np.empty((height, width), np.float32)
-        self.image.read_into(color, components=4, attachment=0, alignment=1)
-        self.image.read_into(labels, components=1, attachment=1, dtype="u4", alignment=1)
-        self.image.read_into(depth, components=1, attachment=2, dtype="f4", alignment=1)
+        self.copy_to(color, labels, depth)
         pairs = labels.view(np.uint16).reshape(height, width, 2)
         return Frame(
             image=np.ascontiguousarray(color[..., :3]),
@@ -159,6 +157,15 @@ class Targets:
             damage=np.ascontiguousarray(pairs[..., 1]),
             depth=depth,
         )
+
+    def copy_to(self, color: Any, labels: Any, depth: Any) -> None:
+        """Copy the shaded image into writable memory or, without leaving the GPU, moderngl buffers.
+
+        color: uint8 [H, W, 4]. labels: uint32 [H, W], id | damage << 16. depth: float32 [H, W].
+        """
+        self.image.read_into(color, components=4, attachment=0, alignment=1)
+        self.image.read_into(labels, components=1, attachment=1, dtype="u4", alignment=1)
+        self.image.read_into(depth, components=1, attachment=2, dtype="f4", alignment=1)
 
     def release(self) -> None:
         """Free all GL objects."""
