@@ -61,8 +61,9 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument("--images", type=int, required=True, metavar="N")
     make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
     make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
-    cores = len(os.sched_getaffinity(0))
-    make.add_argument("--workers", type=int, metavar="K", help=f"default: every core, here {cores}")
+    make.add_argument(
+        "--workers", type=int, metavar="K", help="default: one a core, with --ray of the cluster"
+    )
     make.add_argument(
         "--ray",
         nargs="?",

@@ -5,6 +5,7 @@ uniformly unless their comment says otherwise. Lengths are millimetres, angles d
 sRGB hex in files (people pick them on screens) and linear albedo in scenes.
 """
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -176,6 +177,10 @@ class Config:
         if not self.cameras:
             raise ConfigError("cameras: the rig is empty; describe at least one camera")
         for name, camera in self.cameras.items():
+            if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+                raise ConfigError(
+                    f"cameras.{name!r}: names become file names; use letters, digits, - and _"
+                )
             if camera.face not in FACES:
                 hint = nearest(camera.face, FACES)
                 raise ConfigError(f"cameras.{name}.face: unknown face {camera.face!r}{hint}")

@@ -20,6 +20,7 @@ from fastgen.environment import find_hdris, load_environment
 from fastgen.errors import ConfigError, OutputError
 from fastgen.formats import SEAFRONT, Record, formats_of
 from fastgen.generator import Generator
+from fastgen.gl import BACKENDS
 from fastgen.progress import Progress
 from fastgen.records import nearest
 from fastgen.sampling import SPLITS
@@ -126,7 +127,14 @@ def _checked(job: Job, worker_count: int) -> Job:
             raise ConfigError(f"cameras: {name!r} is unknown{nearest(name, job.config.cameras)}")
     if not job.cameras or len(set(job.cameras)) != len(job.cameras):
         raise ConfigError("cameras: name at least one, and each only once")
+    if job.backend not in BACKENDS:
+        raise ConfigError(f"backend: {job.backend!r} is unknown{nearest(job.backend, BACKENDS)}")
     formats_of(job.formats)
+    if job.fmt == "webdataset" and "bop" in job.formats:
+        raise ConfigError(
+            "also: bop keeps poses in files over all images, which webdataset has not; "
+            "the poses stand in each sample's json, or use the seafront format"
+        )
     names = dict.fromkeys((*SEAFRONT, *job.formats))
     return replace(job, formats=tuple(names))
 
@@ -150,7 +158,7 @@ def _settings(job: Job) -> dict[str, Any]:
         "size": list(job.size),
         "quality": job.quality,
         "cameras": list(job.cameras),
-        "environments": list(names),
+        "environments": {name: generator.environment_digest(name) for name in names},
         "shard_scenes": job.shard_scenes,
         "config": job.config.to_plain(),
     }
@@ -187,6 +195,14 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         return {}
     except ValueError:
         raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
+    if not isinstance(old, dict):
+        raise OutputError(f"{where}: is damaged; remove the dataset or give another")
+    beyond = manifest_path(job.shard_count)
+    made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
+    if (made and made[-1] >= beyond) or old.get("images", 0) > job.images:
+        raise OutputError(
+            f"{job.out}: holds more than {job.images} images; give --images as before or more"
+        )
     for key, value in settings.items():
         if old.get(key) != value:
             raise OutputError(
@@ -243,6 +259,7 @@ def _finish(
     result = {
         **settings,
         **made_by,
+        "images": job.images,
         "counts": {split: dict(count) for split, count in counts.items()},
         "failed": failed,
         "files": files,

@@ -1,5 +1,6 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
+import hashlib
 from functools import lru_cache
 from pathlib import Path
 from typing import Self
@@ -87,6 +88,10 @@ class Generator:
     def environments(self) -> tuple[str, ...]:
         """Names of the HDRIs that scenes may draw."""
         return tuple(sorted(self._hdris))
+
+    def environment_digest(self, name: str) -> str:
+        """SHA-256 in hexadecimal of an HDRI's file."""
+        return hashlib.sha256(self._hdris[name].read_bytes()).hexdigest()
 
     @property
     def renderer_name(self) -> str:

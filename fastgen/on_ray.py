@@ -57,6 +57,9 @@ def run_on_ray(
             crew = _Crew(_everywhere(job), tasks, on_report, count, hang_s, maker)
             try:
                 crew.work()
+            except ray.exceptions.RayError as error:
+                words = "--ray: the cluster is lost; run the same command again to go on"
+                raise OutputError(f"{words} ({error})") from None
             finally:
                 crew.dismiss()
         finally:
@@ -230,7 +233,7 @@ class _Crew:
     def work(self) -> None:
         """Have every task done. Raises OutputError; see run_on_ray."""
         ray = _ray()
-        counted = -_POLL_S
+        counted = float("-inf")
         while self._waiting or self._busy():
             if time.monotonic() - counted >= _POLL_S:
                 counted = time.monotonic()

@@ -11,6 +11,7 @@ import json
 from dataclasses import dataclass, field
 
 from fastgen.container import WallProfiles
+from fastgen.errors import ConfigError
 from fastgen.records import from_plain, to_plain
 
 Color = tuple[float, float, float]
@@ -213,5 +214,14 @@ class Scene:
 
     @staticmethod
     def from_json(text: str) -> "Scene":
-        """A scene from `to_json`'s text. Raises ConfigError naming a field that does not fit."""
-        return from_plain(Scene, json.loads(text), "scene")
+        """A scene from `to_json`'s text, or from that of a dataset's scene file.
+
+        Raises ConfigError naming a field that does not fit.
+        """
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            raise ConfigError(f"scene: is no JSON ({error})") from None
+        if isinstance(data, dict) and "scene" in data:  # a scene file of a dataset
+            data = data["scene"]
+        return from_plain(Scene, data, "scene")

@@ -18,7 +18,7 @@ from typing import Any
 import orjson
 
 from fastgen.config import Config
-from fastgen.errors import FastgenError, OutputError
+from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
 from fastgen.generator import Generator
 from fastgen.sampling import SPLITS, split_of
@@ -178,8 +178,11 @@ class Maker:
         for attempt in range(ATTEMPTS):
             try:
                 return self._image(index, camera)
-            except (FastgenError, OSError):
-                raise  # bad input or a full disk: trying again helps nobody
+            except (AssetError, ContextError, OutputError, OSError):
+                raise  # no light, no driver, a full disk: trying again helps nobody
+            except FastgenError as error:  # this scene cannot be; others may
+                skip[index] = f"camera {camera}: {error}"
+                return None
             except Exception as error:
                 if attempt + 1 == ATTEMPTS:
                     traceback.print_exc()
@@ -213,10 +216,13 @@ def pack(made: Sequence[tuple[Files, Record]], shard: int) -> Files:
             continue
         with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
             for files, record in chosen:
+                names: set[str] = set()
                 for path, content in files.items():
                     if isinstance(content, Same):
                         continue
                     member = tarfile.TarInfo(_member(path, record["stem"]))
+                    assert member.name not in names, member.name
+                    names.add(member.name)
                     member.size = len(content)
                     tar.addfile(member, io.BytesIO(content))
         packed[f"{split}-{shard:06d}.tar"] = buffer.getvalue()
@@ -225,12 +231,14 @@ def pack(made: Sequence[tuple[Files, Record]], shard: int) -> Files:
 
 def _member(path: str, stem: str) -> str:
     pure = PurePosixPath(path)
-    folder = pure.parts[0]
+    folder, *between = pure.parts[:-1]
     ending = pure.suffix[1:]
     if folder in ("images", "scenes"):
         return f"{stem}.{ending}"
+    # kitti has files of one name in folders of different names
+    inner = [part for part in between if folder == "kitti" and part not in SPLITS]
     part = pure.stem.removeprefix(stem).strip("_")
-    return ".".join(filter(None, (stem, folder, part, ending)))
+    return ".".join(filter(None, (stem, folder, *inner, part, ending)))
 
 
 def _joined(made: Sequence[tuple[Files, Record]]) -> Files:

@@ -7,16 +7,11 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-pytest.importorskip("matplotlib")
-pytest.importorskip("transformers")
-pytest.importorskip("pycocotools")
-
 import cv2
 import damage
 import door
+import numpy as np
+import pytest
 import text
 import torch
 from common.boxes import generalized_iou, iou

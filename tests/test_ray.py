@@ -9,8 +9,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
+import ray
+from ray.cluster_utils import Cluster
 
 from fastgen.cli import main
 from fastgen.config import Config
@@ -20,9 +23,7 @@ from fastgen.on_ray import run_on_ray
 from fastgen.shards import Job
 from tests.crash_run import FAULTY_SCENE, QuickMaker
 
-ray = pytest.importorskip("ray")
-from ray.cluster_utils import Cluster  # noqa: E402
-
+ROOT = str(Path(__file__).parent.parent)
 SCENES = 24
 HANGING_SCENE = 14
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
@@ -32,7 +33,7 @@ class SlowMaker(QuickMaker):
     """Leaves the time to kill a node in mid-run, and names the node that makes a shard."""
 
     def __call__(self, task):
-        self._report("node", ray.get_runtime_context().get_node_id())
+        self._report("made on", (ray.get_runtime_context().get_node_id(), os.getpid()))
         time.sleep(0.25)
         super().__call__(task)
 
@@ -70,6 +71,8 @@ def cluster():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+        # the nodes' processes import this file and the fastgen that is tested
+        patch.setenv("PYTHONPATH", ROOT, prepend=os.pathsep)
         made = Cluster(initialize_head=True, head_node_args=NODE)
         made.add_node(**NODE)
         ray.init(address=made.address)
@@ -94,7 +97,7 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
 
     def run(job, tasks, on_report):
         def hear(kind, value):
-            if kind == "node":
+            if kind == "made on":
                 seen.append(value)
             else:
                 on_report(kind, value)
@@ -102,18 +105,22 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
         run_on_ray(None, maker=SlowMaker)(job, tasks, hear)
 
     def kill():
-        while seen.count(victim.node_id) < 2:
+        while [node for node, _ in seen].count(victim.node_id) < 2:
             time.sleep(0.01)
+        # a machine that dies takes its actors along; a killed raylet alone lets them live a while
+        (pid,) = {pid for node, pid in seen if node == victim.node_id}
+        os.kill(pid, signal.SIGKILL)
         cluster.remove_node(victim, allow_graceful=False)
-        seen.append("killed")
+        seen.append(("killed", pid))
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     generate(job_at(out, SCENES), 1, run)
     killer.join(timeout=10)
-    after = seen[seen.index("killed") + 1 :]
+    nodes = [node for node, _ in seen]
+    after = nodes[nodes.index("killed") + 1 :]
     assert len(set(after) - {victim.node_id}) == 2  # both that were left went on
-    assert seen[-1] != victim.node_id
+    assert not victim.any_processes_alive()
     assert content(out) == content(whole)
 
 
@@ -140,11 +147,12 @@ def test_a_place_that_other_nodes_do_not_see_is_named(cluster):
         generate(job_at("memory://unseen", 8), 2, run_on_ray(None))
 
 
-def test_rendered_images_are_those_of_a_run_without_ray(cluster, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_rendered_images_are_those_of_a_run_without_ray(cluster, tmp_path):
     arguments = ["--images", "6", "--size", "64x64", "--seed", "3", "--shard", "1"]
-    assert main(["generate", "here", *arguments, "--workers", "1"]) == 0
-    assert main(["generate", "there", *arguments, "--ray"]) == 0
+    assert main(["generate", str(tmp_path / "here"), *arguments, "--workers", "1"]) == 0
+    # the relative path is the driver's; actors have folders of their own
+    command = [sys.executable, "-m", "fastgen", "generate", "there", *arguments]
+    subprocess.run([*command, "--ray", cluster.address], cwd=tmp_path, check=True)
     assert len(list((tmp_path / "there").glob("images/*/*.jpg"))) == 6
     assert content(tmp_path / "there") == content(tmp_path / "here")
 

@@ -24,7 +24,8 @@ CATEGORIES = [
 def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], bool]]:
     """Category, tight box, mask [H, W] and whether it is ignored, of the container and each damage
     that is seen. The container's mask spans its damages: they are part of it."""
-    ignored = {thing.id: thing.ignored for thing in sample.objects}
+    own = [thing for thing in sample.objects if thing.class_name in SEGMENTATION_CLASSES]
+    ignored = {thing.id: thing.ignored for thing in own}
     for value in (0, *np.unique(sample.damage[sample.damage >= 200]).tolist()):
         mask = sample.damage == value if value else sample.damage > 0
         box = mask_box(mask)

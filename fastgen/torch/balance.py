@@ -13,12 +13,12 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.damage import may_be_seen
 from fastgen.errors import ConfigError
-from fastgen.formats.door import DOOR_FOLDERS
+from fastgen.formats.door import DOOR_CLASSES, door_class
 from fastgen.generator import Generator
 from fastgen.labels import outlines_mm
 from fastgen.scene import Camera, Scene
 from fastgen.torch.plan import chosen_cameras
-from fastgen.torch.targets import DOOR_CLASSES, class_names
+from fastgen.torch.targets import class_names
 
 
 def class_counts(
@@ -51,7 +51,7 @@ def class_counts(
         for name in chosen:
             camera = scene.camera(name)
             if task == "door":
-                counts[DOOR_CLASSES.index(DOOR_FOLDERS[name])] += 1
+                counts[DOOR_CLASSES.index(str(door_class(camera)))] += 1
                 continue
             counts[0] += 1  # the container, of both other tasks
             view = view_of(camera, size)

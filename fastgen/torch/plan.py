@@ -8,7 +8,7 @@ import torch
 
 from fastgen.config import Config
 from fastgen.errors import ConfigError
-from fastgen.formats.door import DOOR_FOLDERS
+from fastgen.formats.door import DOOR_CLASSES
 from fastgen.records import nearest
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
@@ -77,11 +77,12 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     Raises ConfigError for an unknown task or camera, or one that says nothing about the task.
     """
     class_names(task)
-    usable = [name for name in config.cameras if task != "door" or name in DOOR_FOLDERS]
+    rig = config.cameras
+    usable = [name for name in rig if task != "door" or rig[name].face in DOOR_CLASSES]
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
         if name not in usable:
-            why = nearest(name, usable) if usable else f" (it takes {', '.join(DOOR_FOLDERS)})"
+            why = nearest(name, usable) if usable else " (it takes cameras at the container's ends)"
             raise ConfigError(f"cameras: {name!r} is none of the {task} task's{why}")
     if not chosen or len(set(chosen)) != len(chosen):
         raise ConfigError("cameras: name at least one, and each only once")

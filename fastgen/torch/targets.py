@@ -1,7 +1,7 @@
 """Sample -> image and target tensors for each task of the paper, and their collate functions.
 
 What is labelled at all is decided where the files are written: coco.instances, yolo.detections,
-text_crops and DOOR_FOLDERS.
+text_crops and door_class.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from fastgen.crops import text_crops
 from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
-from fastgen.formats.door import DOOR_FOLDERS
+from fastgen.formats.door import DOOR_CLASSES, door_class
 from fastgen.records import nearest
 from fastgen.sample import Box, Sample
 
@@ -26,8 +26,6 @@ Item = tuple[Any, Any]
 
 Collate = Callable[[Sequence[Item]], Any]
 
-DOOR_CLASSES = tuple(sorted(set(DOOR_FOLDERS.values())))
-"""Label i of the door task is DOOR_CLASSES[i]: the order in which an ImageFolder numbers them."""
 
 _NAMES: dict[str, tuple[str, ...]] = {
     "damage": SEGMENTATION_CLASSES,
@@ -83,7 +81,7 @@ def item_of(
         return _text_item(sample, labels, image_id, as_float)
     image = image_tensor(sample.image, as_float)
     if task == "door":
-        return image, DOOR_CLASSES.index(DOOR_FOLDERS[sample.camera.name])
+        return image, DOOR_CLASSES.index(str(door_class(sample.camera)))
     found = _damages(sample) if task == "damage" else _markers(sample)
     if form == "yolo":
         size = sample.view.size
