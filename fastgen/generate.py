@@ -197,18 +197,18 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
     if not isinstance(old, dict):
         raise OutputError(f"{where}: is damaged; remove the dataset or give another")
-    beyond = manifest_path(job.shard_count)
-    made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
-    if (made and made[-1] >= beyond) or old.get("images", 0) > job.images:
-        raise OutputError(
-            f"{job.out}: holds more than {job.images} images; give --images as before or more"
-        )
     for key, value in settings.items():
         if old.get(key) != value:
             raise OutputError(
                 f"{job.out}: was made with another {key}; repeat its settings to resume, "
                 f"or give another folder"
             )
+    beyond = manifest_path(job.shard_count)
+    made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
+    if (made and made[-1] >= beyond) or old.get("images", 0) > job.images:
+        raise OutputError(
+            f"{job.out}: holds more than {job.images} images; give --images as before or more"
+        )
     return old
 
 

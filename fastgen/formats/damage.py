@@ -43,7 +43,7 @@ class _Damage(Format):
         for category, _, mask, ignored in found:
             polygon = outline(mask)
             if len(polygon) > 2 and not ignored:
-                points = (polygon + 0.5) / (width, height)
+                points = polygon / (width, height)
                 lines.append(line(category - 1, points.ravel().tolist()))
         files: Files = {
             f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.sample import Box, Object
+from fastgen.visibility import mask_box, window
 
 
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
@@ -38,16 +39,20 @@ def line(index: int, values: Iterable[float]) -> str:
 
 
 def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """One closed polygon [N, 2] of pixel indices around all parts of a mask.
+    """One closed polygon [N, 2] along the pixels' outer borders, around all parts of a mask.
 
     Parts are joined by a bridge between their nearest corners, there and back. Holes cannot be told
     in a polygon and are filled.
     """
-    found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    parts = [cv2.approxPolyDP(c, 0.7, True)[:, 0].astype(np.float64) for c in found]
-    parts = sorted((p for p in parts if len(p) > 2), key=len, reverse=True)
-    if not parts:
+    box = mask_box(mask)
+    if box is None:
         return np.zeros((0, 2))
+    # with pixels cut in four, contours run through quarters at the border, whose outer edge is it
+    quarters = window(mask, box).astype(np.uint8).repeat(2, axis=0).repeat(2, axis=1)
+    found, _ = cv2.findContours(quarters, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    borders = [((contour + 1) // 2).astype(np.float32) for contour in found]
+    parts = [cv2.approxPolyDP(each, 0.5, True)[:, 0].astype(np.float64) for each in borders]
+    parts = sorted((part + box[:2] for part in parts), key=len, reverse=True)
     joined = parts[0]
     for part in parts[1:]:
         gap = np.linalg.norm(joined[:, None] - part[None], axis=-1)

@@ -1,6 +1,6 @@
 """How exact are damage masks and depth, and what does a damaged frame cost?
 
-    python bench/damage.py [--scenes 100]
+    python bench/damage_masks.py [--scenes 100]
 
 Each damaged scene, seen by all its cameras at 256x256, is compared with rays that Embree casts
 through every pixel centre at the mesh deformed in numpy (tests/oracle.py). Then the median frame
