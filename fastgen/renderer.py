@@ -214,6 +214,16 @@ class Renderer:
         self._bind_surface(scene, mesh, None)
         return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
 
+    def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
+        """The spreader's material as textures, None where the scene has none."""
+        spreader = self._spreader(scene)
+        if spreader is None:
+            return None
+        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
+        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        self._bind_surface(scene, self._mesh(scene.container), spreader)
+        return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_CHART)
+
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         light = self._light_of(scene.environment.name)
