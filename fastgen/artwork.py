@@ -19,6 +19,8 @@ from fastgen.resources import asset_path
 ART_SIZE = 512
 GLYPH_TILE_SIZE = 64
 
+_INK_SAMPLES = 8
+
 
 @dataclass(frozen=True)
 class Glyph:
@@ -98,6 +100,18 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
         for name, glyphs in data["fonts"].items()
     }
     return np.ascontiguousarray(tiles[: data["tiles"]]), MappingProxyType(fonts)
+
+
+def glyph_coverage(tiles: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Share of ink, uint8 [G, 64, 64], in each texel of signed-distance tiles [G, 64, 64].
+
+    Mip levels of it keep the ink that those of distances lose where strokes are thin.
+    """
+    side = GLYPH_TILE_SIZE * _INK_SAMPLES
+    fine = np.stack([cv2.resize(t, (side, side), interpolation=cv2.INTER_LINEAR) for t in tiles])
+    shape = (len(tiles), GLYPH_TILE_SIZE, _INK_SAMPLES, GLYPH_TILE_SIZE, _INK_SAMPLES)
+    share = (fine >= 128).reshape(shape).mean(axis=(2, 4))
+    return np.asarray(np.rint(share * 255), np.uint8)
 
 
 @lru_cache(maxsize=1)

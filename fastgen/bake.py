@@ -1,4 +1,4 @@
-"""A container's material layers baked into textures, by the GLSL that shades images."""
+"""Material layers of a container or a spreader as textures, baked by the GLSL that shades images."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +21,7 @@ _TILE = 1024
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Baked textures of one container; row 0 holds the highest atlas y, so lettering is upright.
+    """Baked textures of one mesh; row 0 holds the highest atlas y, so lettering is upright.
 
     base_color: uint8 [H, W, 3], sRGB-encoded albedo. surface: uint8 [H, W, 3], as glTF 2.0 orders
     it: 255, roughness, metallic (linear). texel_mm: width of a texel on the sheet.
@@ -52,10 +52,13 @@ def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
     return width, height
 
 
-def bake_atlas(ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str) -> Atlas:
+def bake_atlas(
+    ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str, first_chart: int = 0
+) -> Atlas:
     """Bake all texels of `mesh`. The scene's textures and uniform blocks are bound already.
 
-    damage: one of programs.DAMAGE_VARIANTS. Raises ConfigError where texel_mm does not fit.
+    damage: one of programs.DAMAGE_VARIANTS. first_chart: what the numbers of the mesh's charts
+    begin with in the chart table. Raises ConfigError where texel_mm does not fit.
     """
     width, height = atlas_size(mesh, texel_mm)
     program = link(
@@ -69,6 +72,7 @@ def bake_atlas(ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str) 
     layout = np.dtype([("p", "f4", 3), ("a", "f4", 2), ("c", "u4")])
     vertices = np.empty(len(mesh.positions_mm), layout)
     vertices["p"], vertices["a"], vertices["c"] = mesh.positions_mm, mesh.atlas_mm, mesh.chart
+    vertices["c"] += first_chart
     vertex_buffer = ctx.buffer(vertices.tobytes())
     index_buffer = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
     # without damage no texel asks for its rest position

@@ -23,7 +23,7 @@ from fastgen import prefilter
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
 
-PREFILTER_VERSION = 2
+PREFILTER_VERSION = 3
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -52,7 +52,8 @@ _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
-    """Light of one HDRI, ready for a GPU. All maps are float32, finite, within [0, HALF_MAX].
+    """Light of one HDRI, ready for a GPU. All maps are finite, within [0, HALF_MAX], and float32
+    but for the background.
 
     The octahedral maps have a border of one texel (prefilter.py says how uv meets it). Their values
     are exactly representable as half floats.
@@ -63,8 +64,9 @@ class EnvironmentLight:
     """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS."""
     irradiance: NDArray[np.float32]
     """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
-    background: NDArray[np.float32]
-    """[B, B, 3] radiance as it is; B is a power of two from 512 to 4096 near the width."""
+    background: NDArray[np.float16]
+    """[B, B, 3] radiance as it is; B is a power of two from 512 to 4096 near twice the width, for
+    as much as that is needed to look as sharp as the HDRI itself."""
     luminance: NDArray[np.float32]
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
@@ -204,9 +206,12 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     Sums stay in float32 or wider; only the results are clamped to half range, so a sun of 1e6 keeps
     its energy wherever it is spread over more than a few texels.
     """
-    background_size = int(np.clip(2 ** round(np.log2(radiance.shape[1])), 512, 4096))
+    background_size = int(np.clip(2 ** round(np.log2(2 * radiance.shape[1])), 512, 4096))
     source = prefilter.shrink(radiance, min(2 * background_size, _MAX_WORK_WIDTH))
-    background = prefilter.resample_octahedral(prefilter.smooth_poles(source), background_size, 2)
+    # a texel has sqrt(4 pi) / B radians a side, one of the source at most 2 pi / W
+    samples = 1 if source.shape[1] <= background_size else 2
+    poles = prefilter.smooth_poles(source)
+    background = prefilter.resample_octahedral(poles, background_size, samples)
 
     # about a texel and a half of the layers; wider lobes do with half of it
     fine = prefilter.shrink(source, 4 * SPECULAR_SIZE)
@@ -242,7 +247,7 @@ def _light(
         name=name,
         specular=specular.astype(np.float32),
         irradiance=irradiance.astype(np.float32),
-        background=background.astype(np.float32),
+        background=background,
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
     )
@@ -303,7 +308,7 @@ def _write_cache(light: EnvironmentLight, entry: Path) -> None:
                 file,
                 specular=light.specular.astype(np.float16),
                 irradiance=light.irradiance.astype(np.float16),
-                background=light.background.astype(np.float16),
+                background=light.background,
                 luminance=light.luminance,
             )
         temporary.replace(entry)

@@ -1,4 +1,5 @@
-"""A scene as a GLB file, for Blender and others: damaged container, baked atlas, cameras, light.
+"""A scene as a GLB file, for Blender and others: damaged container, spreader, their baked
+atlases, cameras, light.
 
 What glTF has no place for stands in `extras`: of the scene the environment and the Scene itself,
 of each camera node the exposure.
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import fastgen
-from fastgen.bake import atlas_size
+from fastgen.bake import Atlas, atlas_size
 from fastgen.camera import MM, view_of
 from fastgen.container import build_container
 from fastgen.damage import variant
@@ -23,12 +24,16 @@ from fastgen.gltf import Glb
 from fastgen.programs import INSIDE_ALBEDO
 from fastgen.records import to_plain
 from fastgen.scene import Camera, Scene
+from fastgen.spreader import build_spreader
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""
 
 SHEET_MM = 2.0
 """Thickness of the steel: where there are holes, the inside lies this far behind the outside."""
+
+SPREADER_TEXEL_MM = 8.0
+"""Width of a texel of the spreader's atlas."""
 
 _FLOOR_SLOPE = 0.7
 """What faces up more than this on the inside is the wooden floor."""
@@ -54,17 +59,7 @@ def export_glb(
     body = damaged_mesh(mesh, scene.damages)
     atlas = generator.bake(scene, texel_mm)
     glb = Glb(f"fastgen {fastgen.__version__}")
-    painted = glb.add_material(
-        {
-            "name": scene.surface.paint.name,
-            "pbrMetallicRoughness": {
-                "baseColorTexture": {"index": glb.add_texture("base_color", png(atlas.base_color))},
-                "metallicRoughnessTexture": {
-                    "index": glb.add_texture("surface", png(atlas.surface))
-                },
-            },
-        }
-    )
+    painted = _baked_material(glb, scene.surface.paint.name, atlas)
     glb.add_mesh(
         "container",
         painted,
@@ -77,6 +72,7 @@ def export_glb(
     )
     if variant(scene.damages) == "holed":
         _add_inside(glb, body)
+    _add_spreader(glb, generator, scene)
     for camera in scene.cameras if cameras is None else cameras:
         _add_camera(glb, generator, scene, camera)
     data = glb.data(
@@ -93,6 +89,39 @@ def export_glb(
         write(path, data)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def _baked_material(glb: Glb, name: str, atlas: Atlas, prefix: str = "") -> int:
+    textures = {"base_color": atlas.base_color, "surface": atlas.surface}
+    color, surface = (glb.add_texture(prefix + key, png(image)) for key, image in textures.items())
+    return glb.add_material(
+        {
+            "name": name,
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": color},
+                "metallicRoughnessTexture": {"index": surface},
+            },
+        }
+    )
+
+
+def _add_spreader(glb: Glb, generator: Generator, scene: Scene) -> None:
+    """What the container hangs on; its textures are coarse, for nothing on it is printed."""
+    spreader = scene.spreader
+    atlas = generator.bake_spreader(scene, SPREADER_TEXEL_MM)
+    if atlas is None:
+        return
+    mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
+    glb.add_mesh(
+        "spreader",
+        _baked_material(glb, "spreader", atlas, "spreader_"),
+        mesh.triangles,
+        {
+            "POSITION": mesh.positions_mm * MM @ _Y_UP.T,
+            "NORMAL": mesh.normals @ _Y_UP.T,
+            "TEXCOORD_0": atlas.uv(mesh.atlas_mm),
+        },
+    )
 
 
 def _add_inside(glb: Glb, body: DamagedMesh) -> None:

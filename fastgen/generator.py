@@ -175,6 +175,10 @@ class Generator:
         """
         return self._open().bake(scene, texel_mm)
 
+    def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
+        """As `bake`, of the spreader; None where the scene has none."""
+        return self._open().bake_spreader(scene, texel_mm)
+
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         return self._open().exposure(scene, camera, self.size)

@@ -5,6 +5,9 @@ import numpy as np
 
 from fastgen.environment import EnvironmentLight
 
+_RGB9_E5 = 0x8C3D
+"""OpenGL 4.5 core specification, section 8.5.2: holds up to 65,408."""
+
 
 class GpuLight:
     """Textures of one environment. Owned by the renderer, which releases it."""
@@ -18,7 +21,10 @@ class GpuLight:
         size = light.irradiance.shape[0]
         self.irradiance = ctx.texture((size, size), 4, _half(light.irradiance), dtype="f2")
         size = self.background_size
-        self.background = ctx.texture((size, size), 4, _half(light.background), dtype="f2")
+        # the largest by far: nine bits a channel and a common exponent take half of half floats
+        self.background = ctx.texture(
+            (size, size), 3, light.background.tobytes(), dtype="f2", internal_format=_RGB9_E5
+        )
         for texture in (self.specular, self.irradiance, self.background):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False

@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastgen.artwork import art_images, glyph_tiles
+from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
@@ -126,7 +126,8 @@ class Renderer:
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
         self._art = _mipmapped_array(self._ctx, art)
-        self._tiles = _mipmapped_array(self._ctx, tiles[..., None])
+        texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
+        self._tiles = _mipmapped_array(self._ctx, texels)
         self._noise = _noise_texture(self._ctx)
         table = dfg_table()
         self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
@@ -217,6 +218,16 @@ class Renderer:
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
         self._bind_surface(scene, mesh, None)
         return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
+
+    def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
+        """The spreader's material as textures, None where the scene has none."""
+        spreader = self._spreader(scene)
+        if spreader is None:
+            return None
+        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
+        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        self._bind_surface(scene, self._mesh(scene.container), spreader)
+        return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_CHART)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""

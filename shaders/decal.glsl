@@ -3,7 +3,7 @@
 uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decals.py
 uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
 uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
-uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline
+uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline; share of ink
 
 struct DecalHit {
     vec3 albedo;
@@ -21,26 +21,35 @@ float inside_box(vec2 p, vec2 half_size) {
     return min(d.x, d.y);
 }
 
+// ink of one glyph around a point `d` mm from its centre. Distances are sharp from near; once the
+// footprint nears the stroke's width, only averages of coverage keep the ink.
+float glyph_ink(vec2 d, float layer, float cap_mm, float footprint_mm) {
+    float tile_mm = GLYPH_TILE_CAPS * cap_mm;
+    vec2 uv = d / tile_mm + 0.5;
+    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 0.0;
+    float lod = log2(footprint_mm * GLYPH_TILE_SIZE / tile_mm);
+    // bilinear lookups widen a texel by about half
+    vec2 texel = textureLod(glyph_tiles, vec3(uv.x, 1.0 - uv.y, layer), max(lod - 0.5, 0.0)).rg;
+    float distance_mm = (texel.r - 0.5) * GLYPH_RANGE_CAPS * cap_mm;
+    float sharp = clamp(0.5 + distance_mm / footprint_mm, 0.0, 1.0);
+    return mix(sharp, texel.g, smoothstep(0.25, 1.25, lod));
+}
+
 float text_coverage(vec2 p, vec4 run, float footprint_mm) {
     float cap_mm = run.x;
-    vec2 nearest = vec2(1e9);
-    float layer = -1.0;
+    // centre and layer of the two nearest glyphs: from afar, two share a footprint
+    vec4 first = vec4(1e9, 1e9, 0.0, 1e9);
+    vec4 second = first;
     for (int i = 0; i < int(run.z); ++i) {
         int g = int(run.y) + i;
         vec4 glyph = texelFetch(glyph_table, ivec2(g & 255, g >> 8), 0);
         vec2 d = p - glyph.xy;
-        if (max(abs(d.x), abs(d.y)) < max(abs(nearest.x), abs(nearest.y))) {
-            nearest = d;
-            layer = glyph.z;
-        }
+        vec4 found = vec4(d, glyph.z, max(abs(d.x), abs(d.y)));
+        if (found.w < first.w) { second = first; first = found; }
+        else if (found.w < second.w) second = found;
     }
-    float tile_mm = GLYPH_TILE_CAPS * cap_mm;
-    vec2 uv = nearest / tile_mm + 0.5;
-    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 0.0;
-    float lod = max(log2(footprint_mm * GLYPH_TILE_SIZE / tile_mm), 0.0);
-    float value = textureLod(glyph_tiles, vec3(uv.x, 1.0 - uv.y, layer), lod).r;
-    float distance_mm = (value - 0.5) * GLYPH_RANGE_CAPS * cap_mm;
-    return clamp(0.5 + distance_mm / footprint_mm, 0.0, 1.0);
+    return min(glyph_ink(first.xy, first.z, cap_mm, footprint_mm) +
+               glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
 }
 
 void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float grain) {

@@ -18,7 +18,8 @@ from fastgen.damaged_mesh import damaged_mesh
 from fastgen.errors import ConfigError
 from fastgen.export import export_glb
 from fastgen.generator import Generator
-from fastgen.scene import Camera, Scene
+from fastgen.programs import SPREADER_ID
+from fastgen.scene import Camera, Scene, Spreader
 
 SIZE = (320, 240)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
@@ -163,6 +164,37 @@ def test_rays_at_the_exported_geometry_meet_it_at_the_rendered_depth(generator, 
     error = np.abs(depth[both] - sample.depth.ravel()[both])
     # insides lie the thickness of the steel deeper than what the renderer shows through a hole
     assert np.quantile(error, 0.995) < 3e-3
+
+
+@pytest.mark.parametrize("camera", ["A", "Cr"])
+def test_the_exported_spreader_is_where_the_renderer_shows_it(generator, tmp_path, camera):
+    scene = generator.scene(1)
+    scene = replace(bare(scene), spreader=Spreader(present=True, gap_mm=20.0))
+    export_glb(generator, scene, tmp_path / "held.glb", [scene.camera(camera)], 16.0)
+    exported = Exported(tmp_path / "held.glb")
+    sample = generator.render(scene=scene, camera=camera)
+    triangle, depth = exported.first_hits(camera, exported.whole)
+    first = len(exported.parts["container"].faces)
+    wrong = (triangle >= first).reshape(sample.ids.shape) != (sample.ids == SPREADER_ID)
+    assert wrong.mean() < 5e-4
+    seen = (triangle >= first) & (sample.ids.ravel() == SPREADER_ID)
+    assert seen.sum() > 100
+    # at outlines the two may meet different beams
+    assert np.quantile(np.abs(depth[seen] - sample.depth.ravel()[seen]), 0.995) < 1e-3
+
+
+def test_the_exported_spreader_wears_the_renderers_paint(generator, tmp_path):
+    scene = bare(generator.scene(0))
+    scene = replace(scene, spreader=Spreader(present=True, albedo=(0.5, 0.1, 0.02)))
+    scene = replace(
+        scene,
+        surface=replace(scene.surface, paint=replace(scene.surface.paint, tone_variation=0.0)),
+    )
+    export_glb(generator, scene, tmp_path / "held.glb", [], 16.0)
+    skin = Exported(tmp_path / "held.glb").parts["spreader"].visual.material.baseColorTexture
+    typical = np.median(np.asarray(skin.convert("RGB")).reshape(-1, 3), axis=0) / 255
+    linear = ((typical + 0.055) / 1.055) ** 2.4
+    np.testing.assert_allclose(linear, (0.5, 0.1, 0.02), rtol=0.03, atol=2e-3)
 
 
 def test_holes_are_open_to_a_millimetre(torn):

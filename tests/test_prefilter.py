@@ -153,8 +153,20 @@ def test_fine_checkerboard_does_not_alias_in_the_background():
     rows, columns = np.mgrid[0:512, 0:1024]
     board = np.repeat(((rows + columns) % 2).astype(np.float32)[..., None], 3, axis=2)
     light = prefilter_environment("board", board)
-    blurred = cv2.blur(light.background[1:-1, 1:-1], (8, 8))
+    blurred = cv2.blur(light.background[1:-1, 1:-1].astype(np.float32), (16, 16))
     assert np.abs(blurred - 0.5).max() < 0.06
+
+
+def test_the_background_is_as_sharp_as_the_hdri():
+    """Along the horizon an HDRI's smallest detail, stripes a texel wide, keeps its contrast."""
+    stripes = np.zeros((256, 512, 3), np.float32)
+    stripes[:, ::2] = 1.0
+    background = prefilter_environment("stripes", stripes).background
+    middle = 2 * np.pi * (np.arange(512) + 0.5) / 512
+    along = np.stack([-np.cos(middle), np.sin(middle), np.full(512, 1e-3)], axis=1)
+    seen = sample_octahedral(background, along)[:, 0]
+    # with as many texels as the HDRI has columns, under half of it was left
+    assert seen[::2].mean() - seen[1::2].mean() > 0.6
 
 
 @pytest.mark.parametrize(("row", "column"), [(12, 2), (12, 28), (20, 10), (31, 31), (25, 0)])

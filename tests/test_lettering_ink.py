@@ -1,0 +1,83 @@
+"""Ink that the shader lays down for a text, against the area of its letters."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen.artwork import glyph_coverage, glyph_tiles
+from fastgen.gl import open_context
+from fastgen.lettering import layout
+from tests.test_shading import blocks, run
+
+CAP_MM = 100.0
+STEP_MM = 5.0
+MARGIN_MM = 60.0
+
+BODY = (
+    "struct Material { vec3 albedo; };\n"
+    '#include "tone.glsl"\n#include "decal_cell.glsl"\n#include "decal.glsl"\n'
+    "vec4 f(vec4 x) { return vec4(text_coverage(x.xy, vec4(%r, 0.0, %d.0, 0.0), x.z)); }"
+)
+
+
+@pytest.fixture(scope="module")
+def text():
+    """A line of letters: its glyphs, and its ink on a grid of 1 mm, [H, W] from the lower left."""
+    tiles, fonts = glyph_tiles()
+    glyphs = layout(["CSQU 305438"], next(iter(fonts.values())), CAP_MM).glyphs
+    side = round(glyphs[0].x1 - glyphs[0].x0)
+    left, low = min(g.x0 for g in glyphs), glyphs[0].y0
+    ink = np.zeros((side, round(max(g.x1 for g in glyphs) - left) + 1))
+    for glyph in glyphs:
+        fine = cv2.resize(tiles[glyph.tile].astype(np.float32), (side, side))[::-1]
+        x = round(glyph.x0 - left)
+        ink[:, x : x + side] = np.maximum(ink[:, x : x + side], fine >= 127.5)
+    return glyphs, ink, (left, low)
+
+
+def seen_ink(text, footprint_mm):
+    """Coverage by the shader on a grid of STEP_MM: points [N, 2] in mm and values [N]."""
+    glyphs, ink, (left, low) = text
+    height, width = ink.shape
+    x = np.arange(-MARGIN_MM, width + MARGIN_MM, STEP_MM) + left
+    y = np.arange(-MARGIN_MM, height + MARGIN_MM, STEP_MM) + low
+    points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    table = np.zeros((1, 256, 4), np.float32)
+    for row, g in zip(table[0], glyphs, strict=False):
+        row[:3] = (g.x0 + g.x1) / 2, (g.y0 + g.y1) / 2, g.tile
+    tiles, _ = glyph_tiles()
+    with open_context() as gl:
+        texels = np.ascontiguousarray(np.stack([tiles, glyph_coverage(tiles)], axis=-1))
+        array = gl.ctx.texture_array((64, 64, len(tiles)), 2, texels.tobytes(), alignment=1)
+        array.build_mipmaps()
+        array.filter = (gl.ctx.LINEAR_MIPMAP_LINEAR, gl.ctx.LINEAR)
+        array.repeat_x = array.repeat_y = False
+        placed = gl.ctx.texture((256, 1), 4, table.tobytes(), dtype="f4")
+        placed.filter = (gl.ctx.NEAREST, gl.ctx.NEAREST)
+        held = blocks(gl)
+        textures = {"glyph_tiles": array, "glyph_table": placed}
+        values = []
+        for rows in np.array_split(points, -(-len(points) // 8192)):
+            inputs = np.c_[rows, np.full(len(rows), footprint_mm), np.zeros(len(rows))]
+            values.append(run(gl, BODY % (CAP_MM, len(glyphs)), inputs, textures)[:, 0])
+        del held
+    return points, np.concatenate(values)
+
+
+@pytest.mark.parametrize("footprint_mm", [3.0, 7.0, 10.0, 15.0, 20.0, 30.0, 40.0])
+def test_a_text_keeps_its_ink_at_every_distance(text, footprint_mm):
+    _, values = seen_ink(text, footprint_mm)
+    assert values.sum() * STEP_MM**2 == pytest.approx(text[1].sum(), rel=0.06)
+
+
+@pytest.mark.parametrize("footprint_mm", [10.0, 20.0])
+def test_a_text_looks_like_the_mean_of_its_letters(text, footprint_mm):
+    """Against the ink averaged over squares as wide as the footprint."""
+    _, ink, (left, low) = text
+    points, values = seen_ink(text, footprint_mm)
+    pad = int(MARGIN_MM) + 40
+    side = int(footprint_mm) | 1
+    mean = cv2.blur(np.pad(ink, pad), (side, side))
+    column, row = np.rint(points - (left, low)).astype(int).T + pad
+    error = values - mean[row, column]
+    assert np.sqrt((error**2).mean()) < 0.06
