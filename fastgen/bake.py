@@ -1,4 +1,4 @@
-"""Material layers of a container or a spreader as textures, baked by the GLSL that shades images."""
+"""Material layers of a container or a spreader as textures, baked by the shading GLSL itself."""
 
 from dataclasses import dataclass
 from typing import Any
