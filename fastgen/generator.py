@@ -5,8 +5,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastgen.bake import Atlas
-from fastgen.camera import view_of
+from fastgen.camera import View, view_of
 from fastgen.config import Config
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
 from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
@@ -16,7 +19,7 @@ from fastgen.labels import label
 from fastgen.programs import LAYERS
 from fastgen.records import nearest
 from fastgen.renderer import Renderer
-from fastgen.sample import Sample
+from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Camera, Scene
 from fastgen.visibility import Shot
@@ -119,11 +122,13 @@ class Generator:
         camera: str | Camera = "A",
         scene: Scene | None = None,
         layer: str = "all",
+        normals: bool = False,
     ) -> Sample:
         """One labelled image of scene `index`, or of `scene` when that is given.
 
         camera: the name of one of the scene's cameras, or a Camera of your own.
-        layer: 'all', or one material layer by itself (see programs.LAYERS).
+        layer: 'all', or one material layer by itself (see programs.LAYERS). normals: give
+        Sample.normals too, which costs another draw.
         """
         if layer not in LAYERS:
             raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
@@ -142,7 +147,19 @@ class Generator:
             camera=camera,
             view=view,
             objects=objects,
+            normals=self._normals(frame, scene, camera, view) if normals else None,
         )
+
+    def _normals(
+        self, frame: Frame, scene: Scene, camera: Camera, view: View
+    ) -> NDArray[np.float32]:
+        """From the layer that shows them, where 0..255 stands for -1..1 along the world's axes."""
+        shown = self._open().render(scene, camera, self.size, "normals").image
+        world = shown.astype(np.float32) / 127.5 - 1
+        normals = (world @ view.rotation.T.astype(np.float32)).astype(np.float32)
+        normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
+        normals[frame.ids == 0] = 0
+        return normals
 
     def render_cuda(
         self,

@@ -67,9 +67,15 @@ class Object:
 
 @dataclass(frozen=True, eq=False)
 class Sample(Frame):
-    """A Frame with its labels, and the scene and camera it was made from."""
+    """A Frame with its labels, and the scene and camera it was made from.
+
+    normals: float32 [H, W, 3], unit normals in view space (x right, y down, z forward) to about a
+    hundredth, averaged like colours over the surfaces that a pixel sees, 0 where void; None unless
+    asked for.
+    """
 
     scene: Scene
     camera: Camera
     view: View
     objects: list[Object]
+    normals: NDArray[np.float32] | None = None

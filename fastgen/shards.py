@@ -191,7 +191,9 @@ class Maker:
 
     def _image(self, index: int, camera: str) -> tuple[Files, Record]:
         job = self._job
-        sample = self._generator.render(scene=self._generator.scene(index), camera=camera)
+        scene = self._generator.scene(index)
+        wanted = "normals" in job.formats
+        sample = self._generator.render(scene=scene, camera=camera, normals=wanted)
         item = Item(
             sample,
             split_of(job.config, job.seed, index),

@@ -235,11 +235,11 @@ def test_a_scene_that_always_fails_is_told_of_and_the_rest_goes_on(tmp_path, cap
     asked = []
 
     class Broken(Generator):
-        def render(self, *, scene, camera):
+        def render(self, *, scene, camera, normals):
             asked.append(scene.index)
             if scene.index == 1:
                 raise RuntimeError("no such luck")
-            return super().render(scene=scene, camera=camera)
+            return super().render(scene=scene, camera=camera, normals=normals)
 
     def run_inside(job, tasks, on_report):
         maker = Maker(job, False, on_report)

@@ -10,6 +10,7 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
 from fastgen.gpu_mesh import facing_groups
+from fastgen.scene import Spreader
 from tests import oracle
 
 CAMERAS = ("A", "B", "Cl", "Cr")
@@ -158,3 +159,18 @@ def test_a_lone_marker_moves_no_other_pixel(generator):
     covered = np.isin(sample.ids, markers)
     same_text = (sample.ids > 1) & ~covered
     np.testing.assert_array_equal(same_text, (without.ids > 1) & ~covered)
+
+
+def test_normals_are_those_of_the_triangles_seen():
+    with Generator(SOUND, seed=5, size=SIZE, quality="draft") as generator:
+        for camera in ("A", "Cl"):
+            scene = replace(generator.scene(1), spreader=Spreader())
+            sample = generator.render(scene=scene, camera=camera, normals=True)
+            mesh = build_container(scene.container.kind, scene.container.profiles)
+            hits = oracle.cast(mesh, sample.view, scene)
+            world = mesh.normals[mesh.triangles[hits.triangle, 0]]
+            truth = world @ sample.view.rotation.T
+            both = hits.hit & (sample.ids > 0)
+            error = np.linalg.norm(sample.normals - truth, axis=-1)[both]
+            assert np.quantile(error, 0.99) < 0.03
+            assert not sample.normals[sample.ids == 0].any()

@@ -93,7 +93,8 @@ def test_ignored_objects_and_damage_stay_out_of_the_marker_labels():
 def samples():
     with Generator(seed=2, size=(320, 320)) as generator:
         damaged = [i for i in range(30) if generator.scene(i).damages][:4]
-        return [generator.render(index=i, camera=c) for i in damaged for c in ("A", "Cl", "Cr")]
+        views = [(i, c) for i in damaged for c in ("A", "Cl", "Cr")]
+        return [generator.render(index=i, camera=c, normals=True) for i, c in views]
 
 
 def item_of(sample):
@@ -146,7 +147,7 @@ def test_yolo_outlines_are_the_borders_of_their_masks(samples):
 def test_an_image_of_nothing_has_files_and_no_annotation():
     away = Camera("A", (0.0, -8000.0, 1000.0), (0.0, -20000.0, 1000.0), 14.5)
     with Generator(seed=2, size=(64, 64)) as generator:
-        sample = generator.render(index=0, camera=away)
+        sample = generator.render(index=0, camera=away, normals=True)
     assert not sample.damage.any()
     files, record = assemble(item_of(sample), list(known_formats().values()))
     assert files["imdg/labels/train/000000_A.txt"] == b""

@@ -1,0 +1,23 @@
+"""Surface normals as 8-bit PNG: x, y, z of view space (x right, y down, z forward) as red, green,
+blue, 0..255 for -1..1; 128 thrice where void."""
+
+from typing import Any
+
+import numpy as np
+
+from fastgen.encode import png
+from fastgen.formats import Files, Format, Item
+
+
+class _Normals(Format):
+    name = "normals"
+
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        normals = item.sample.normals
+        if normals is None:
+            raise ValueError("normals: render the sample with normals=True")
+        pixels = np.asarray(np.rint(normals * 127.5 + 127.5), np.uint8)
+        return {f"normals/{item.split}/{item.stem}.png": png(pixels)}, None
+
+
+FORMAT = _Normals()
