@@ -1,4 +1,4 @@
-"""Material layers of a container or a spreader as textures, baked by the GLSL that shades images."""
+"""A container's or spreader's material layers as textures, baked by the GLSL that shades images."""
 
 from dataclasses import dataclass
 from typing import Any
