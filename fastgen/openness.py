@@ -1,9 +1,10 @@
-"""How open each vertex of a mesh lies to the sky: found once a mesh, by depth maps from all around.
+"""How open each vertex of a container lies to the sky, found once by depth maps from all around.
 
 A point is hidden from a direction where a back face (one turned away from that direction) stands
 before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
 """
 
+import hashlib
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen import cache
 from fastgen.mesh import Mesh
 from fastgen.programs import link
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
@@ -18,17 +20,20 @@ from fastgen.spreader import CABLE_TIER, tier_of_vertices
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface."""
 
+_VERSION = 1
+"""Part of the disk cache's key: count up whenever the openness changes."""
+
 _MAP_SIZE = (2048, 512)
 """Texels along and across a container: 6 mm for the longest."""
 
-_COARSE_SIZE = (1024, 512)
+_COARSE_SIZE = (512, 256)
 """For what is not beside the surface that it hides."""
 
-_INSET = 0.2
-"""Share of the way from a vertex to the middle of its facets at which it is probed, so that a
-crease is not seen from the crease itself."""
+_INSET = 0.5
+"""Share of the way from a vertex to the middle of its facets at which it is probed: what is
+interpolated between the vertices is then right on average, where creases would be too dark."""
 
-_INSET_LIMIT_MM = 12.0
+_INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
 _CAPACITY = 128
@@ -94,12 +99,14 @@ class SkyProbe:
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
+        # depth maps are the driver's, and so is what is found with them
+        self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
         self._own: OrderedDict[Mesh, Directions] = OrderedDict()
-        self._found: OrderedDict[tuple[Mesh, Mesh | None], tuple[bytes, bytes]] = OrderedDict()
+        self._found: OrderedDict[tuple[Mesh, Mesh | None], bytes] = OrderedDict()
 
-    def openness(self, container: Mesh, spreader: Mesh | None) -> tuple[bytes, bytes]:
-        """`encoded` openness of the vertices of a container and of the spreader that holds it."""
+    def openness(self, container: Mesh, spreader: Mesh | None) -> bytes:
+        """`encoded` openness of a container's vertices under the spreader that holds it."""
         key = (container, spreader)
         if key not in self._found:
             self._found[key] = self._measured(container, spreader)
@@ -108,23 +115,31 @@ class SkyProbe:
         self._found.move_to_end(key)
         return self._found[key]
 
-    def _measured(self, container: Mesh, spreader: Mesh | None) -> tuple[bytes, bytes]:
+    def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
         points = probe_points(container)
         if container not in self._own:
             body = _Body(container.positions_mm, container.triangles)
-            self._own[container] = self._open_to(body, points, _MAP_SIZE)
+            self._own[container] = self._kept(body, points, _MAP_SIZE)
             if len(self._own) > _CAPACITY:
                 self._own.popitem(last=False)
         open_to = self._own[container]
-        if spreader is None:
-            return encoded(container.normals, open_to).tobytes(), b""
-        body = _held(container, spreader)
-        both = np.concatenate([points, probe_points(spreader)])
-        clear = self._open_to(body, both, _COARSE_SIZE)
-        return (
-            encoded(container.normals, open_to & clear[: len(points)]).tobytes(),
-            encoded(spreader.normals, clear[len(points) :]).tobytes(),
-        )
+        if spreader is not None:
+            open_to = open_to & self._kept(_without_cables(spreader), points, _COARSE_SIZE)
+        return encoded(container.normals, open_to).tobytes()
+
+    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+        """As _open_to, from the disk cache where it is there."""
+        about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
+        digest = hashlib.sha256(about)
+        for array in (body.positions_mm, body.triangles, points_mm):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        entry = cache.default_folder() / f"openness-{digest.hexdigest()[:32]}.npz"
+        bits = cache.read(entry).get("bits")
+        shape = (len(points_mm), -(-DIRECTIONS // 8))
+        if bits is None or bits.shape != shape or bits.dtype != np.uint8:
+            bits = np.packbits(self._open_to(body, points_mm, size), axis=1)
+            cache.write(entry, {"bits": bits}, compress=True)
+        return np.unpackbits(bits.astype(np.uint8), axis=1, count=DIRECTIONS).astype(bool)
 
     def _open_to(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         ctx = self._ctx
@@ -141,14 +156,15 @@ class SkyProbe:
         # what is probed outside of the box of occluders may be hidden too
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
         found = np.empty((len(points_mm), DIRECTIONS), bool)
+        corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
             to_map = _map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
             target.clear(depth=1.0)
-            self._program["to_map"].write(to_map.T.astype(np.float32).tobytes())
+            self._program["to_map"] = tuple(to_map.T.ravel())
             array.render(moderngl.TRIANGLES)
             nearest = np.frombuffer(depth.read(alignment=1), np.float32)
             at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
-            texel = np.clip((at[:, :2] + 1) / 2 * size, 0, np.array(size) - 1).astype(np.int64)
+            texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)
             bias = _BIAS_MM * np.linalg.norm(to_map[2, :3])
             before = nearest[texel[:, 1] * size[0] + texel[:, 0]] * 2 - 1
             found[:, i] = at[:, 2] - bias <= before
@@ -176,17 +192,8 @@ def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
     return matrix
 
 
-def _held(container: Mesh, spreader: Mesh) -> _Body:
-    """The spreader less its cables, and a box in place of the container."""
+def _without_cables(spreader: Mesh) -> _Body:
     solid = tier_of_vertices(spreader) != CABLE_TIER
     triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
-    low, high = container.bounds_mm
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    box = low + corners * (high - low)
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))], np.uint32)
     used, numbers = np.unique(triangles, return_inverse=True)
-    return _Body(
-        np.concatenate([spreader.positions_mm[used], box]).astype(np.float32),
-        np.concatenate([numbers.reshape(-1, 3), faces + len(used)]).astype(np.uint32),
-    )
+    return _Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))

@@ -156,10 +156,9 @@ class Renderer:
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
         mesh, spreader = self._mesh(scene.container), self._spreader(scene)
-        body, held = self._probe.openness(mesh.mesh, spreader.mesh if spreader else None)
-        mesh.set_openness(body)
-        if spreader is not None:
-            spreader.set_openness(held)
+        mesh.set_openness(
+            self._probe.openness(mesh.mesh, spreader.mesh if spreader is not None else None)
+        )
         light_data = self._light_of(scene.environment.name)
         light = self._lights.get(scene.environment.name, lambda: GpuLight(ctx, light_data))
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
