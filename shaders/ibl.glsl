@@ -61,7 +61,7 @@ vec3 with_bounces(float share, vec3 albedo) {
 // hemisphere: its half-angle's cosine is sqrt(1 - share). All of it where nothing hides the sky.
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
     float rim = sqrt(1.0 - sky.share);
-    float soft = 0.2 + 0.8 * roughness;
+    float soft = 0.1 + 0.4 * roughness;
     return smoothstep(rim - soft, rim, dot(mirror, sky.direction) + 1e-3);
 }
 
