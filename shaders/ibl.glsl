@@ -1,4 +1,5 @@
-// vec3 lit(Material m, vec3 normal, vec3 view, Openness sky): radiance reflected toward view from the environment.
+// vec3 lit(Material m, vec3 normal, vec3 view, Openness sky): radiance of the environment reflected
+// toward view.
 // Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
 
 uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
