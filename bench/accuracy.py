@@ -4,8 +4,8 @@
 
 Exports each scene (`fastgen export`), renders the file with Cycles (bench/path_traced.py; PYTHON is
 a Python 3.11 with bpy==4.5.15), applies the same exposure and tone curve to its linear radiance and
-compares with the rasterizer's image: FLIP, SSIM and PSNR over the whole image and over the
-container's pixels. Cycles' own noise is the same measure between two of its renders of different
+compares with the rasterizer's image: FLIP, SSIM and PSNR over the whole image and over the pixels
+of the container and its spreader. Cycles' own noise is the same measure between two of its renders of different
 seeds. Before that, silhouettes and depths through the pixel centres must coincide. References are
 kept in bench/references and made again only where scene, size, samples or seed differ.
 
@@ -32,6 +32,7 @@ from skimage.metrics import structural_similarity
 from fastgen import Config, Generator
 from fastgen.environment import bundled_hdris, find_hdris
 from fastgen.export import export_glb
+from fastgen.programs import SPREADER_ID
 from fastgen.sample import Sample
 
 CAMERAS = ("A", "B", "Cl", "Cr")
@@ -189,7 +190,8 @@ def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
     return {
         "sky": ~inside & ~edges,
         "edges": edges,
-        "markers and text": ~edges & (sample.ids > 1),
+        "markers and text": ~edges & (sample.ids > 1) & (sample.ids < SPREADER_ID),
+        "spreader": ~edges & (sample.ids == SPREADER_ID),
         "open sheet": plain & (openness >= OCCLUDED),
         "occluded sheet": plain & (openness < OCCLUDED),
     }

@@ -5,13 +5,11 @@ with Rec. 709 primaries. A yaw in degrees turns the environment about +z, counte
 from above: radiance(direction) = map(Rz(-yaw) direction).
 """
 
+import functools
 import hashlib
 import json
-import os
 import re
-import tempfile
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import cv2
@@ -19,7 +17,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen import prefilter
+from fastgen import cache, prefilter
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
 
@@ -47,6 +45,7 @@ _MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a floa
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DFG_POINTS = 4096
+_MAPS = ("specular", "irradiance", "background", "luminance")
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
 
@@ -267,7 +266,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
             key = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise AssetError(f"{path}: cannot read this HDRI: {error.strerror}") from None
-    folder = Path(cache_dir) if cache_dir is not None else _default_cache_dir()
+    folder = Path(cache_dir) if cache_dir is not None else cache.default_folder()
     entry = folder / f"{key[:32]}-{PREFILTER_VERSION}.npz"
     cached = _read_cache(path.stem, entry)
     if cached is None:
@@ -276,45 +275,27 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
     return cached
 
 
-def _default_cache_dir() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    # the XDG base directory specification asks to ignore relative paths
-    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "fastgen"
-
-
 def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
+    stored = cache.read(entry)
     try:
-        with np.load(entry, allow_pickle=False) as stored:
-            specular, irradiance, background, luminance = (
-                stored[key] for key in ("specular", "irradiance", "background", "luminance")
-            )
-    except Exception:  # absent, or damaged in one of the many ways of an archive: build it again
+        specular, irradiance, background, luminance = (stored[field] for field in _MAPS)
+    except KeyError:
         return None
     if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
         return None
-    return _light(name, specular, irradiance, background, luminance)
+    return _light(
+        name,
+        specular.astype(np.float16),
+        irradiance.astype(np.float16),
+        background.astype(np.float16),
+        luminance.astype(np.float32),
+    )
 
 
 def _write_cache(light: EnvironmentLight, entry: Path) -> None:
-    temporary = None
-    try:
-        entry.parent.mkdir(parents=True, exist_ok=True)
-        # several workers may write the same entry: each its own file, and the last rename wins
-        with tempfile.NamedTemporaryFile(
-            dir=entry.parent, prefix=entry.stem, suffix=".part", delete=False
-        ) as file:
-            temporary = Path(file.name)
-            np.savez(
-                file,
-                specular=light.specular.astype(np.float16),
-                irradiance=light.irradiance.astype(np.float16),
-                background=light.background,
-                luminance=light.luminance,
-            )
-        temporary.replace(entry)
-    except OSError:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
+    specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
+    maps = (specular, irradiance, light.background, light.luminance)
+    cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
 
 
 def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
@@ -331,7 +312,7 @@ def irradiance_at(
     return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 
 
-@cache
+@functools.cache
 def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     height = _LUMINANCE_WIDTH // 2
     weight = np.repeat(prefilter.row_solid_angle(height), _LUMINANCE_WIDTH)
@@ -359,7 +340,7 @@ def metered_luminance(
     return float(log_average), float(weight @ luminance)
 
 
-@cache
+@functools.cache
 def dfg_table(size: int = 32) -> NDArray[np.float32]:
     """Split-sum scale and bias (A, B), float32 [size, size, 2]: specular albedo = A F0 + B.
 

@@ -7,6 +7,7 @@ import moderngl
 import numpy as np
 
 from fastgen.mesh import Mesh
+from fastgen.openness import encoded
 
 _SLACK_MM = 120.0
 """Frames stand back from the castings' plane (mesh.GROUP_SLACK_MM), and sheets may sag a little."""
@@ -54,17 +55,26 @@ class GpuMesh:
         vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart + first_chart
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
+        self._open_sky = encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
+        self._openness = ctx.buffer(self._open_sky)
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * 2 * len(mesh.groups))
         self._views = ctx.buffer(np.arange(2, dtype=np.uint32).tobytes())
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
+        contents = [content, (self._openness, "4f1", "in_openness")]
         views = (self._views, "1u/i", "in_inner")
         self._arrays = {
             damage: ctx.vertex_array(
-                program, [content, views] if "in_inner" in program else [content], self._indices
+                program, contents + [views] * ("in_inner" in program), self._indices
             )
             for damage, program in programs.items()
         }
+
+    def set_openness(self, values: bytes) -> None:
+        """Let the next draws have `values`, of openness.encoded; until then all sky is open."""
+        if values is not self._open_sky:
+            self._openness.write(values)
+            self._open_sky = values
 
     def draw(
         self,
@@ -93,7 +103,7 @@ class GpuMesh:
 
     def release(self) -> None:
         """Free all GL objects."""
-        buffers = (self._vertices, self._indices, self._commands, self._views)
+        buffers = (self._vertices, self._indices, self._openness, self._commands, self._views)
         items: list[Any] = [*self._arrays.values(), *buffers]
         for item in items:
             item.release()

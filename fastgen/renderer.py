@@ -27,6 +27,7 @@ from fastgen.gpu_light import GpuLight
 from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.mesh import Mesh
 from fastgen.noise import noise_tiles
+from fastgen.openness import SkyProbe
 from fastgen.programs import (
     DAMAGE_BLOCK,
     DAMAGE_VARIANTS,
@@ -120,6 +121,7 @@ class Renderer:
         self._charts: _Kept[moderngl.Texture] = _Kept(64)
         self._lights: _Kept[GpuLight] = _Kept(24)
         self._scenes: _Kept[_SceneDecals] = _Kept(2)
+        self._probe = SkyProbe(self._ctx)
         self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
         self._view_block = self._ctx.buffer(reserve=VIEW_BLOCK.size)
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
@@ -154,6 +156,9 @@ class Renderer:
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
         mesh, spreader = self._mesh(scene.container), self._spreader(scene)
+        mesh.set_openness(
+            self._probe.openness(mesh.mesh, spreader.mesh if spreader is not None else None)
+        )
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
@@ -183,6 +188,7 @@ class Renderer:
             "surface_keys": targets.keys,
             "sheet_points": targets.points,
             "sheet_depths": targets.depths,
+            "openness_points": targets.openness,
             "specular_light": light.specular,
             "irradiance_light": light.irradiance,
             "background_light": light.background,
@@ -293,7 +299,7 @@ class Renderer:
         for kept in (*caches, self._charts, self._lights, self._scenes):
             kept.release()
         blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
-        for item in (*blocks, *self._geometry.values()):
+        for item in (*blocks, *self._geometry.values(), self._probe):
             item.release()
         for texture in (self._art, self._tiles, self._noise, self._dfg):
             texture.release()

@@ -25,6 +25,7 @@ UNITS = {
     "glyph_table": 12,
     "rest_points": 13,
     "sheet_depths": 14,
+    "openness_points": 15,
 }
 
 

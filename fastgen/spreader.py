@@ -16,6 +16,8 @@ from fastgen.mesh import Mesh
 from fastgen.spreader_parts import TIERS, Hang, cables, ends, flippers, frame, headblock
 from fastgen.unfold import assemble
 
+CABLE_TIER = TIERS.index("cables")
+
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 GAP_LIMITS_MM = (0.0, 200.0)
@@ -40,11 +42,16 @@ def build_spreader(
     return _built(kind, flippers_down, gap_mm)
 
 
+def tier_of_vertices(mesh: Mesh) -> NDArray[np.intp]:
+    """Which of TIERS each vertex of a spreader belongs to, [V]."""
+    return np.array([TIERS.index(chart.name.split(".")[1]) for chart in mesh.charts])[mesh.chart]
+
+
 @lru_cache(maxsize=128)
 def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
     """Lowest and highest coordinates [3] in mm of each of TIERS of a spreader."""
-    tiers = np.array([chart.name.split(".")[1] for chart in mesh.charts])[mesh.chart]
-    parts = [mesh.positions_mm[tiers == tier] for tier in TIERS]
+    tiers = tier_of_vertices(mesh)
+    parts = [mesh.positions_mm[tiers == tier] for tier in range(len(TIERS))]
     return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
 
 

@@ -80,8 +80,10 @@ class Targets:
         # two textures of two and one numbers are cheaper to draw to than one of four
         self.points = ctx.texture(stored, 2, dtype="f4")
         self.depths = ctx.texture(stored, 1, dtype="f4")
+        self.openness = ctx.texture(stored, 4)
         self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        attached = [t for t in (self.keys, self.points, self.depths, self.rest) if t is not None]
+        always = [self.keys, self.points, self.depths, self.openness]
+        attached = [*always, self.rest] if self.rest is not None else always
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth = ctx.depth_renderbuffer(stored)

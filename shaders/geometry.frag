@@ -3,15 +3,17 @@
 #include "blocks.glsl"
 
 in vec2 atlas_mm;
+in vec4 openness;
 flat in uint surface_key;
 
 layout(location = 0) out uint out_key;
 layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
 layout(location = 2) out float out_depth;  // m
+layout(location = 3) out vec4 out_openness;   // Openness, packed
 #if DAMAGED
 in vec3 rest_mm;
 
-layout(location = 3) out vec4 out_rest;    // rest position in mm, -
+layout(location = 4) out vec4 out_rest;    // rest position in mm, -
 #endif
 
 void main() {
@@ -19,6 +21,7 @@ void main() {
     out_sheet = atlas_mm;
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
     out_depth = 1.0 / gl_FragCoord.w;
+    out_openness = openness;
 #if DAMAGED
     out_rest = vec4(rest_mm, 0.0);
 #endif

@@ -10,11 +10,13 @@ layout(location = 0) in vec3 in_position_mm;
 layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_chart;
+layout(location = 5) in vec4 in_openness;
 #if HOLED
 layout(location = 4) in uint in_inner;   // one an instance: 0 the outer view, 1 what holes show
 #endif
 
 out vec2 atlas_mm;
+out vec4 openness;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
@@ -22,6 +24,7 @@ out vec3 rest_mm;
 
 void main() {
     atlas_mm = in_atlas_mm;
+    openness = in_openness;
     surface_key = pack_surface_key(in_chart, in_normal);
     vec3 position_mm = in_position_mm;
 #if DAMAGED

@@ -1,4 +1,5 @@
-// vec3 lit(Material m, vec3 normal, vec3 view): radiance reflected toward view from the environment.
+// vec3 lit(Material m, vec3 normal, vec3 view, Openness sky): radiance of the environment reflected
+// toward view.
 // Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
 
 uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
@@ -42,7 +43,30 @@ vec3 background(vec3 direction) {
     return textureLod(background_light, uv, 0.0).rgb;
 }
 
-vec3 lit(Material m, vec3 normal, vec3 view) {
+// what of the sky a point sees: the mean direction of its light, and the share of the hemisphere
+struct Openness {
+    vec3 direction;
+    float share;
+};
+
+// Light that gets here by way of what hides the sky, which is taken for the same paint: Jimenez et
+// al. 2016, Practical Realtime Strategies for Accurate Indirect Occlusion, section 4.
+vec3 with_bounces(float share, vec3 albedo) {
+    vec3 a = 2.0404 * albedo - 0.3324;
+    vec3 b = -4.7951 * albedo + 0.6417;
+    vec3 c = 2.7552 * albedo + 0.6903;
+    return clamp(((share * a + b) * share + c) * share, share, 1.0);
+}
+
+// Share of a lobe about `mirror` within the cone of open sky, which holds the share of the
+// hemisphere: its half-angle's cosine is sqrt(1 - share). All of it where nothing hides the sky.
+float open_lobe(Openness sky, vec3 mirror, float roughness) {
+    float rim = sqrt(1.0 - sky.share);
+    float soft = 0.1 + 0.4 * roughness;
+    return smoothstep(rim - soft, rim, dot(mirror, sky.direction) + 1e-3);
+}
+
+vec3 lit(Material m, vec3 normal, vec3 view, Openness sky) {
     float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
     vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
     float all = dfg.x + dfg.y;
@@ -57,5 +81,9 @@ vec3 lit(Material m, vec3 normal, vec3 view) {
     // rough lobes lean to the normal: Lagarde and de Rousiers 2014, section 4.9.3
     vec3 mirror = reflect(-view, normal);
     mirror = normalize(mix(mirror, normal, m.roughness * m.roughness));
-    return diffuse * diffuse_radiance(normal) + specular * prefiltered(mirror, m.roughness);
+    vec3 around = diffuse_radiance(sky.direction) * with_bounces(sky.share, m.albedo);
+    // where the sky is hidden the mirror shows the paint that hides it
+    vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, m.roughness),
+                        open_lobe(sky, mirror, m.roughness));
+    return diffuse * around + specular * mirrored;
 }

@@ -22,6 +22,7 @@ uniform sampler2D rest_points;
 
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
+uniform sampler2D openness_points;
 
 struct Shaded {
     vec3 color;   // displayed, linear
@@ -34,9 +35,15 @@ vec3 view_ray(vec2 pixel) {
     return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
 }
 
-vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view) {
+// as openness.py encodes it
+Openness openness_at(ivec2 sample_at) {
+    vec4 stored = texelFetch(openness_points, sample_at, 0);
+    return Openness(normalize(stored.xyz * 255.0 - 128.0), stored.w);
+}
+
+vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 #if LAYER == LAYER_ALL
-    return neutral_tone(exposure * lit(s.material, normal, view));
+    return neutral_tone(exposure * lit(s.material, normal, view, sky));
 #elif LAYER == LAYER_NORMALS
     return srgb_decode(normal * 0.5 + 0.5);
 #elif LAYER == LAYER_REFLECTION
@@ -92,12 +99,14 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     return p;
 }
 
-vec3 part_color(Part p, uint key, vec3 view) {
+vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec3 normal = key_normal(key);
+    Openness sky = openness_at(sample_at);
 #if WITH_DAMAGE
     normal = bent_normal(p.bend, normal);
+    sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    return layer_color(p.surface, normal, view);
+    return layer_color(p.surface, normal, view, sky);
 }
 
 // a pixel all of whose samples see the same surface
@@ -106,7 +115,7 @@ Shaded single_surface(ivec2 pixel) {
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
-    return Shaded(part_color(p, key, view), p.id, p.damage, p.depth);
+    return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth);
 }
 
 #if WITH_HOLES

@@ -50,15 +50,16 @@ void main() {
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
         for (int side = 0; side < MAX_SIDES && of_part != 0u; ++side) {
             uint key = 0u;
+            ivec2 side_offset = offset;
             for (int i = TENT_SAMPLES - 1; i >= 0; --i)
-                if ((of_part & 1u << i) != 0u) key = keys[i];
+                if ((of_part & 1u << i) != 0u) { key = keys[i]; side_offset = TENT_OFFSET[i]; }
             float weight = 0.0;
             uint of_side = 0u;
             for (int i = 0; i < TENT_SAMPLES; ++i)
                 if (keys[i] == key) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
             of_part &= ~of_side;
             left &= ~of_side;
-            vec3 lit_color = part_color(p, key, view);
+            vec3 lit_color = part_color(p, middle + side_offset, key, view);
 #if WITH_HOLES
             if (chart == PORTAL_CHART) {
                 Shaded through = through_hole(middle + offset, key, ray);

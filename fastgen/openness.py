@@ -1,0 +1,199 @@
+"""How open each vertex of a container lies to the sky, found once by depth maps from all around.
+
+A point is hidden from a direction where a back face (one turned away from that direction) stands
+before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
+"""
+
+import hashlib
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import cache
+from fastgen.mesh import Mesh
+from fastgen.programs import link
+from fastgen.spreader import CABLE_TIER, tier_of_vertices
+
+DIRECTIONS = 96
+"""Of the whole sphere, so that about half of them bear on a surface."""
+
+_VERSION = 1
+"""Part of the disk cache's key: count up whenever the openness changes."""
+
+_MAP_SIZE = (2048, 512)
+"""Texels along and across a container: 6 mm for the longest."""
+
+_COARSE_SIZE = (512, 256)
+"""For what is not beside the surface that it hides."""
+
+_INSET = 0.5
+"""Share of the way from a vertex to the middle of its facets at which it is probed: what is
+interpolated between the vertices is then right on average, where creases would be too dark."""
+
+_INSET_LIMIT_MM = 30.0
+_LIFT_MM = 2.0
+_BIAS_MM = 1.0
+_CAPACITY = 128
+
+Array = NDArray[np.float64]
+Directions = NDArray[np.bool_]
+"""Whether each of V points is open to each of sky_directions(): [V, DIRECTIONS]."""
+
+
+def sky_directions() -> Array:
+    """Unit vectors [DIRECTIONS, 3] spread evenly over the sphere: a Fibonacci spiral."""
+    i = np.arange(DIRECTIONS)
+    z = 1 - (2 * i + 1) / DIRECTIONS
+    turn = np.pi * (3 - 5**0.5) * i
+    flat = np.sqrt(1 - z * z)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
+    counter-clockwise from outside."""
+
+    positions_mm: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+
+
+def probe_points(mesh: Mesh) -> Array:
+    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases."""
+    positions = mesh.positions_mm.astype(np.float64)
+    middle = positions[mesh.triangles].mean(axis=1)
+    corners = mesh.triangles.ravel()
+    count = np.maximum(np.bincount(corners, minlength=len(positions)), 1)[:, None]
+    weights = np.repeat(middle, 3, axis=0)
+    total = [np.bincount(corners, weights[:, k], minlength=len(positions)) for k in range(3)]
+    inset = _INSET * (np.stack(total, axis=1) / count - positions)
+    length = np.linalg.norm(inset, axis=1, keepdims=True)
+    inset *= np.minimum(1.0, _INSET_LIMIT_MM / np.maximum(length, 1e-6))
+    return positions + inset + _LIFT_MM * mesh.normals
+
+
+def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.uint8]:
+    """Openness of surfaces with unit `normals` [V, 3] as the shader reads it, uint8 [V, 4].
+
+    The mean direction of the cosine-weighted open sky, as 128 + 127 d, and its share of the whole
+    hemisphere as 255 s.
+    """
+    directions = sky_directions()
+    n = np.asarray(normals, np.float64)
+    cosine = np.maximum(n @ directions.T, 0.0)
+    whole = cosine.sum(axis=1, keepdims=True)
+    seen = cosine * open_to
+    share = seen.sum(axis=1, keepdims=True) / whole
+    # the integral over a whole hemisphere is 2/3 n; what the directions miss of it is made good
+    mean = 2 / 3 * n + (seen - cosine) @ directions / whole
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    mean = np.where(length > 1e-3, mean / np.maximum(length, 1e-3), n)
+    return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1)).astype(np.uint8)
+
+
+class SkyProbe:
+    """Finds the openness of meshes on one GL context. Owned by the renderer, which releases it."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        # depth maps are the driver's, and so is what is found with them
+        self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
+        self._program = link(ctx, "occluder.vert", "occluder.frag", {})
+        self._own: OrderedDict[Mesh, Directions] = OrderedDict()
+        self._found: OrderedDict[tuple[Mesh, Mesh | None], bytes] = OrderedDict()
+
+    def openness(self, container: Mesh, spreader: Mesh | None) -> bytes:
+        """`encoded` openness of a container's vertices under the spreader that holds it."""
+        key = (container, spreader)
+        if key not in self._found:
+            self._found[key] = self._measured(container, spreader)
+            if len(self._found) > _CAPACITY:
+                self._found.popitem(last=False)
+        self._found.move_to_end(key)
+        return self._found[key]
+
+    def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
+        points = probe_points(container)
+        if container not in self._own:
+            body = _Body(container.positions_mm, container.triangles)
+            self._own[container] = self._kept(body, points, _MAP_SIZE)
+            if len(self._own) > _CAPACITY:
+                self._own.popitem(last=False)
+        open_to = self._own[container]
+        if spreader is not None:
+            open_to = open_to & self._kept(_without_cables(spreader), points, _COARSE_SIZE)
+        return encoded(container.normals, open_to).tobytes()
+
+    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+        """As _open_to, from the disk cache where it is there."""
+        about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
+        digest = hashlib.sha256(about)
+        for array in (body.positions_mm, body.triangles, points_mm):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        entry = cache.default_folder() / f"openness-{digest.hexdigest()[:32]}.npz"
+        bits = cache.read(entry).get("bits")
+        shape = (len(points_mm), -(-DIRECTIONS // 8))
+        if bits is None or bits.shape != shape or bits.dtype != np.uint8:
+            bits = np.packbits(self._open_to(body, points_mm, size), axis=1)
+            cache.write(entry, {"bits": bits}, compress=True)
+        return np.unpackbits(bits.astype(np.uint8), axis=1, count=DIRECTIONS).astype(bool)
+
+    def _open_to(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+        ctx = self._ctx
+        vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
+        indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
+        array = ctx.vertex_array(self._program, [(vertices, "3f", "in_position_mm")], indices)
+        depth = ctx.depth_texture(size)
+        target = ctx.framebuffer([], depth)
+        target.use()
+        ctx.scissor = None
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.front_face, ctx.cull_face = "ccw", "front"
+        low, high = body.positions_mm.min(axis=0), body.positions_mm.max(axis=0)
+        # what is probed outside of the box of occluders may be hidden too
+        low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
+        found = np.empty((len(points_mm), DIRECTIONS), bool)
+        corner = np.array(size) - 1
+        for i, toward in enumerate(sky_directions()):
+            to_map = _map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
+            target.clear(depth=1.0)
+            self._program["to_map"] = tuple(to_map.T.ravel())
+            array.render(moderngl.TRIANGLES)
+            nearest = np.frombuffer(depth.read(alignment=1), np.float32)
+            at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
+            texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)
+            bias = _BIAS_MM * np.linalg.norm(to_map[2, :3])
+            before = nearest[texel[:, 1] * size[0] + texel[:, 0]] * 2 - 1
+            found[:, i] = at[:, 2] - bias <= before
+        ctx.cull_face = "back"
+        for item in (target, depth, array, vertices, indices):
+            item.release()
+        return found
+
+    def release(self) -> None:
+        """Free the program."""
+        self._program.release()
+
+
+def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
+    """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
+    the box's x axis lies along the view's."""
+    along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
+    along /= np.linalg.norm(along)
+    axes = np.stack([along, np.cross(toward, along), -toward])
+    center = (low + high) / 2
+    half = np.abs(axes) @ ((high - low) / 2) * 1.001
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes / half[:, None]
+    matrix[:3, 3] = -matrix[:3, :3] @ center
+    return matrix
+
+
+def _without_cables(spreader: Mesh) -> _Body:
+    solid = tier_of_vertices(spreader) != CABLE_TIER
+    triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
+    used, numbers = np.unique(triangles, return_inverse=True)
+    return _Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))

@@ -1,0 +1,4 @@
+// Nothing but depth.
+#version 430 core
+
+void main() {}
