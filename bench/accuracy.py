@@ -7,7 +7,8 @@ a Python 3.11 with bpy==4.5.15), applies the same exposure and tone curve to its
 compares with the rasterizer's image: FLIP, SSIM and PSNR over the whole image and over the pixels
 of the container and its spreader. Cycles' own noise is the same measure between two of its renders
 of different seeds. Before that, silhouettes and depths through the pixel centres must coincide.
-References are kept in bench/references and made again only where scene, size, samples or seed differ.
+References are kept in bench/references and made again only where scene, size, samples or seed
+differ.
 
 Also needs what `pip install '.[accuracy]'` brings.
 """
