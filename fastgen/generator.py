@@ -83,6 +83,8 @@ class Generator:
         )
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
+        # a scene's cameras are mostly rendered one after the other
+        self._latest: tuple[tuple[Config, int, int], Scene] | None = None
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
@@ -114,7 +116,10 @@ class Generator:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
         if index != int(index) or index < 0:
             raise ConfigError(f"index: {index!r} is not a whole number of 0 or more")
-        return sample_scene(self.config, self.seed, int(index), self.environments)
+        key = (self.config, self.seed, int(index))
+        if self._latest is None or self._latest[0] != key:
+            self._latest = key, sample_scene(*key, self.environments)
+        return self._latest[1]
 
     def render(
         self,
