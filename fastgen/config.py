@@ -219,9 +219,24 @@ class Config:
         return from_plain(Config, PRESETS[name])
 
     @staticmethod
+    def checked(config: Any) -> "Config":
+        """`config` held to the bounds that files are held to, the preset in place of None.
+
+        Raises ConfigError naming the field that does not fit: Python checks no types.
+        """
+        if config is None:
+            return Config.preset()
+        if not isinstance(config, Config):
+            raise ConfigError(
+                f"config: {type(config).__name__} is no Config; take Config.preset, Config.load "
+                "or Config.from_values"
+            )
+        return Config.from_values(config.to_plain())
+
+    @staticmethod
     def from_values(data: Any, base: "Config | None" = None) -> "Config":
         """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
-        return from_plain(Config, data, base=base or Config.preset())
+        return from_plain(Config, data, base=Config.preset() if base is None else base)
 
     @staticmethod
     def load(path: str | Path, base: "Config | None" = None) -> "Config":

@@ -35,10 +35,10 @@ def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[
     return {"lo": lo, "hi": hi, "unit": unit}
 
 
-def nearest(word: str, choices: typing.Iterable[str]) -> str:
+def nearest(word: Any, choices: typing.Iterable[str]) -> str:
     """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
     names = sorted(choices)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     if close:
         return f" (did you mean {close[0]}?)"
     return f" (choose from {', '.join(names)})"
@@ -52,7 +52,8 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if is_number and least <= value <= most and value == int(value):
         return int(value)
-    wanted = f"{least} or more" if most >= 2**63 - 1 else f"{least} to {most}"
+    too_large = is_number and value > most
+    wanted = f"{least} to {most}" if too_large or most < 2**63 - 1 else f"{least} or more"
     raise ConfigError(f"{name}: {_short(value)} is not a whole number of {wanted}")
 
 
