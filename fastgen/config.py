@@ -250,10 +250,10 @@ class Config:
             data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+        except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
         try:
-            return Config.from_values(data or {}, base)
+            return Config.from_values({} if data is None else data, base)
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
 

@@ -129,7 +129,8 @@ def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any
 def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
     pair = [value, value] if isinstance(value, (int, float)) else value
     if not isinstance(pair, (list, tuple)) or len(pair) != 2:
-        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {_short(value)}")
+        got = f"{_short(value)}{_as_number(value)}"
+        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
     lo, hi = (_scalar(float, item, path, meta) for item in pair)
     if lo > hi:
         raise ConfigError(f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
@@ -169,7 +170,7 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
             raise ConfigError(f"{path}: expected {kind}, got {_short(value)}")
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ConfigError(f"{path}: expected a number, got {_short(value)}")
+        raise ConfigError(f"{path}: expected a number, got {_short(value)}{_as_number(value)}")
     lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
     # an int may be too large for a float, and infinity lies within bounds that have no end
     if not max(lo, -sys.float_info.max) <= value <= min(hi, sys.float_info.max):
@@ -179,3 +180,11 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
     if hint is int and value != int(value):
         raise ConfigError(f"{path}: expected a whole number, got {_short(value)}")
     return hint(value)
+
+
+def _as_number(value: Any) -> str:
+    """A hint for text that reads as a number: YAML 1.1 takes 1e-2 for text, and quotes make it."""
+    try:
+        return f" (a text; write {float(value):g} without quotes)" if isinstance(value, str) else ""
+    except ValueError:
+        return ""
