@@ -176,7 +176,7 @@ def spans(pixels: Array, rows: int | None = None) -> Runs:
     top = lowest(first)
     height = highest(first) - top
     start = np.cumsum(height) - height
-    # a row of a convex polygon is crossed by one edge that goes down the image, and one that goes up
+    # a row of a convex polygon is crossed by one edge that goes down, and one that goes up
     following = np.roll(first, -1, axis=1)
     rows_crossed = np.abs(following - first)
     edge = np.flatnonzero(rows_crossed)
