@@ -42,10 +42,17 @@ def channels(path: Path) -> dict[str, Array]:
     return {name.removeprefix("ViewLayer."): c.pixels for name, c in file.channels().items()}
 
 
-def radiance(path: Path) -> Array:
-    """Linear radiance [H, W, 3] of Cycles' file."""
+def radiance(path: Path) -> tuple[Array, NDArray[np.bool_]]:
+    """Linear radiance [H, W, 3] of Cycles' file, and where it was rendered."""
     planes = channels(path)
-    return np.stack([planes[f"Combined.{c}"] for c in "RGB"], axis=-1)
+    return np.stack([planes[f"Combined.{c}"] for c in "RGB"], axis=-1), planes["Combined.A"] > 0.5
+
+
+def whole_radiance(raw: Path, number: int, seed: int) -> Array:
+    """The image as a whole with what was rendered finer around the objects."""
+    whole, _ = radiance(raw / f"{number:02d}_{seed}_whole.exr")
+    finer, there = radiance(raw / f"{number:02d}_{seed}.exr")
+    return np.where(there[..., None], finer, whole)
 
 
 def traced(raw: Path, case: Case) -> Reference:
@@ -55,7 +62,7 @@ def traced(raw: Path, case: Case) -> Reference:
     inside = centers["IndexOB.X"] > 0.5
     depth_m = np.where(inside, centers["Depth.Z"], np.inf)[::DEPTH_STEP, ::DEPTH_STEP]
     scene = Scene.from_json((raw / f"{number:02d}.json").read_text(encoding="utf-8"))
-    images = filtered(radiance(raw / f"{number:02d}_1.exr"))
+    images = filtered(whole_radiance(raw, number, 1))
     return Reference(scene, exposure_of(case, scene), images, inside, depth_m, centers["AO.R"])
 
 
@@ -68,14 +75,13 @@ def exposure_of(case: Case, scene: Scene) -> float:
 def floor(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
     """Measures by filter between two seeds; empty where the second was not traced."""
     exposure = reference.exposure
-    second = raw / f"{number:02d}_2.exr"
-    if not second.exists():
+    if not (raw / f"{number:02d}_2.exr").exists():
         return {}
     return {
         name: Comparison.of(
             displayed(reference.radiance[name], exposure), displayed(image, exposure)
         ).both(reference.inside)
-        for name, image in filtered(radiance(second)).items()
+        for name, image in filtered(whole_radiance(raw, number, 2)).items()
     }
 
 
@@ -90,7 +96,8 @@ def series(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
             continue
         found[way] = {}
         for samples, seconds in json.loads(timed.read_text(encoding="utf-8")).items():
-            image = displayed(radiance(raw / f"{number:02d}_{way}_{samples}.exr"), exposure)
+            light, _ = radiance(raw / f"{number:02d}_{way}_{samples}.exr")
+            image = displayed(light, exposure)
             both = Comparison.of(expected, image).both(reference.inside)
             found[way][samples] = {"seconds": seconds, "measures": both}
     return found
@@ -103,7 +110,7 @@ def main() -> None:
     options = parser.parse_args()
     known: dict[str, Any] = {"samples": SAMPLES, "floor": {}, "series": {}}
     for case in cases():
-        if not (options.raw / f"{case.number:02d}_centers.exr").exists():
+        if not (options.raw / f"{case.number:02d}_1.exr").exists():
             continue
         whole = traced(options.raw, case)
         save(whole, FOLDER, case.number)

@@ -5,10 +5,12 @@
 PYTHON is a Python 3.11 into which `pip install bpy==4.5.15` was done; it needs nothing of fastgen.
 All that decides the image stands in the GLB file and its extras: geometry, textures, camera, image
 size, the yaw of the environment. Output is a 32-bit multilayer EXR: scene-linear radiance without
-exposure or tone curve, each pixel the plain mean over its square. Where --centers is given, it
-holds instead depth, object index and ambient occlusion of what the ray through each pixel centre
-meets. Several numbers of --samples, say 1,4,16, make one image each, `{samples}` in the name of the
-output standing for the number; the processor seconds of each are printed as JSON.
+exposure or tone curve, each pixel the plain mean over its square. --background N gives that many
+samples to the image as a whole, which goes to --whole, and --samples only to the rectangle around
+all objects; -o is empty outside of it. --centers FILE gets depth, object index and ambient
+occlusion of what the ray through each pixel centre meets. Several numbers of --samples, say 1,4,16,
+make one image each, `{samples}` in the name of the output standing for the number. The processor
+seconds of each number are printed as JSON.
 """
 
 import argparse
@@ -21,7 +23,10 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy_extras.object_utils import world_to_camera_view
 
+_CENTER_SAMPLES = 16  # of ambient occlusion; depth and index take the first
+_MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # the narrowest filter that Cycles takes: a ray through the pixel centre
 
 
@@ -87,8 +92,28 @@ def prepare(seed: int, threads: int, scale: int) -> None:
     image.color_depth = "32"
 
 
+def frame_objects() -> None:
+    """From now on only the rectangle around all objects is rendered."""
+    scene = bpy.context.scene
+    graph = bpy.context.evaluated_depsgraph_get()
+    seen = []
+    for item in (o for o in bpy.data.objects if o.type == "MESH"):
+        mesh = item.evaluated_get(graph).to_mesh()
+        points = (item.matrix_world @ vertex.co for vertex in mesh.vertices)
+        seen += [world_to_camera_view(scene, scene.camera, point) for point in points]
+    settings = scene.render
+    settings.use_border, settings.use_crop_to_border = True, False
+    for axis, pixels in (("x", settings.resolution_x), ("y", settings.resolution_y)):
+        places = [getattr(point, axis) for point in seen]
+        margin = _MARGIN_PX / pixels
+        setattr(settings, f"border_min_{axis}", max(min(places) - margin, 0.0))
+        setattr(settings, f"border_max_{axis}", min(max(places) + margin, 1.0))
+
+
 def look_through_centers() -> None:
     """From now on only rays through the pixel centres, and what they meet."""
+    bpy.context.scene.render.resolution_percentage = 100
+    bpy.context.scene.render.use_border = False
     cycles = bpy.context.scene.cycles
     cycles.pixel_filter_type = "GAUSSIAN"
     cycles.filter_width = _CENTER_WIDTH_PX
@@ -123,14 +148,17 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--scale", type=int, default=1, help="times as many pixels a side")
     parser.add_argument("--denoise", action="store_true")
-    parser.add_argument("--centers", action="store_true")
+    parser.add_argument("--background", type=int)
+    parser.add_argument("--whole", type=Path)
+    parser.add_argument("--centers", type=Path)
     parser.add_argument("-o", dest="out", required=True)
     options = parser.parse_args()
     os.nice(19)
     load(options.file, options.camera, options.hdri)
     prepare(options.seed, options.threads, options.scale)
-    if options.centers:
-        look_through_centers()
+    if options.background:
+        render(options.whole, options.background, options.denoise)
+        frame_objects()
     counts = [int(word) for word in options.samples.split(",")]
     if len(counts) > 1:  # the first render also builds what the later ones find ready
         render(Path(options.out.replace("{samples}", "0")), 1, options.denoise)
@@ -138,6 +166,9 @@ def main() -> None:
     for count in counts:
         path = Path(options.out.replace("{samples}", str(count)))
         seconds[count] = render(path, count, options.denoise)
+    if options.centers:
+        look_through_centers()
+        render(options.centers, _CENTER_SAMPLES, denoise=False)
     print("seconds " + json.dumps(seconds), flush=True)
 
 

@@ -6,13 +6,14 @@ PYTHON is a Python 3.11 with bpy==4.5.15. What is there already is not traced ag
 was stopped goes on where it was; as is, it takes 45 minutes of two cores. What Cycles writes goes
 to --raw; `bench/pack_references.py` makes bench/references from it. `--twice`: so many cases are
 traced a second time with another seed, to know Cycles' own noise. `--series`: of so many, images at
-1 to 256 samples follow, with denoising and without.
+1 to 256 samples follow, and denoised ones.
 """
 
 import argparse
 import json
 import os
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
@@ -23,11 +24,13 @@ from fastgen import Generator
 from fastgen.environment import bundled_hdris
 from fastgen.export import export_glb
 
-SERIES = (1, 2, 4, 8, 16, 32, 64, 128, 256)
+SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
+BACKGROUND_SAMPLES = 16
+"""Of each half pixel outside the rectangle around all objects: what is there is a smooth picture,
+and light never meets anything."""
+
 TEXEL_MM = 3.0
 """A quarter of the closest camera's pixel: finer than what 320 pixels a side can show."""
-
-CENTER_SAMPLES = 16  # of ambient occlusion; depth and index take the first
 
 
 class Tracer:
@@ -40,41 +43,45 @@ class Tracer:
         folder.mkdir(parents=True, exist_ok=True)
 
     def reference(self, case: Case, seed: int) -> None:
-        """NN_seed.exr, and of the first seed NN_centers.exr and NN.json, the scene."""
+        """NN_seed.exr and NN_seed_whole.exr, and of the first seed NN_centers.exr."""
         name = f"{case.number:02d}"
-        samples = str(SAMPLES // SCALE**2)
-        self._trace(case, f"{name}_{seed}.exr", seed, samples, ["--scale", str(SCALE)])
+        done = self._folder / f"{name}_{seed}.exr"
+        if done.exists():
+            return
+        part = self._folder / f"part_{name}_{seed}.exr"
+        more = ["--scale", SCALE, "--background", BACKGROUND_SAMPLES]
+        more += ["--whole", self._folder / f"{name}_{seed}_whole.exr"]
         if seed == 1:
-            self._trace(case, f"{name}_centers.exr", seed, str(CENTER_SAMPLES), ["--centers"])
+            more += ["--centers", self._folder / f"{name}_centers.exr"]
+        self._run(case, part, seed, str(SAMPLES // SCALE**2), more)
+        part.replace(done)
 
-    def series(self, case: Case, denoise: bool) -> None:
-        """NN_spp_N.exr for each N of SERIES, or NN_denoised_N.exr, and the seconds as JSON."""
-        name = f"{case.number:02d}_{'denoised' if denoise else 'spp'}"
+    def series(self, case: Case, way: str) -> None:
+        """NN_way_N.exr for each number N of samples, and their seconds in NN_way.json.
+
+        way: a key of SERIES.
+        """
+        name = f"{case.number:02d}_{way}"
         seconds = self._folder / f"{name}.json"
         if seconds.exists():
             return
-        counts = ",".join(str(n) for n in SERIES)
-        found = self._run(case, f"{name}_{{samples}}.exr", 7, counts, ["--denoise"] * denoise)
+        counts = ",".join(str(n) for n in SERIES[way])
+        more = ["--denoise"] if way == "denoised" else []
+        found = self._run(case, self._folder / f"{name}_{{samples}}.exr", 7, counts, more)
         seconds.write_text(found, encoding="utf-8")
 
-    def _trace(self, case: Case, name: str, seed: int, samples: str, more: list[str]) -> None:
-        if (self._folder / name).exists():
-            return
-        self._run(case, f"part_{name}", seed, samples, more)
-        (self._folder / f"part_{name}").replace(self._folder / name)
-
-    def _run(self, case: Case, out: str, seed: int, samples: str, more: list[str]) -> str:
+    def _run(self, case: Case, out: Path, seed: int, samples: str, more: Sequence[object]) -> str:
         """What the tracer says of its seconds."""
         glb = self._exported(case)
         tracer = Path(__file__).with_name("path_traced.py")
         command = [self._python, tracer, glb, "--camera", case.camera]
-        command += ["--hdri", bundled_hdris()[case.light], "-o", self._folder / out]
-        command += ["--samples", samples, "--seed", str(seed), "--threads", str(self._threads)]
+        command += ["--hdri", bundled_hdris()[case.light], "-o", out]
+        command += ["--samples", samples, "--seed", seed, "--threads", self._threads, *more]
         done = subprocess.run(
-            [str(word) for word in [*command, *more]], check=True, stdout=subprocess.PIPE, text=True
+            [str(word) for word in command], check=True, stdout=subprocess.PIPE, text=True
         )
         (line,) = (line for line in done.stdout.splitlines() if line.startswith("seconds "))
-        print(f"{case.number:02d} {case.camera:2s} {case.light:8s} {out} {line}", flush=True)
+        print(f"{case.number:02d} {case.camera:2s} {case.light:8s} {out.name} {line}", flush=True)
         return line.removeprefix("seconds ")
 
     def _exported(self, case: Case) -> Path:
@@ -106,8 +113,8 @@ def main() -> None:
     for case in cases()[: options.cases]:
         tracer.reference(case, 1)
     for case in cases()[: options.series]:
-        for denoise in (False, True):
-            tracer.series(case, denoise)
+        for way in SERIES:
+            tracer.series(case, way)
     for case in cases()[: options.twice]:
         tracer.reference(case, 2)
 
