@@ -22,6 +22,7 @@ from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Camera, Scene
+from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -74,6 +75,14 @@ class Generator:
         self.seed = int(seed)
         self.size = (int(width), int(height))
         self.backend = backend
+        for name, rig in self.config.cameras.items():
+            for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
+                view_of(
+                    Camera(
+                        name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
+                    ),
+                    self.size,
+                )
         self._samples_per_axis = QUALITY[quality]
         self._device_index = device_index
         self._hdris = (
@@ -136,7 +145,7 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
+        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene, camera)
         objects = label(Shot(frame, scene, view, mesh, spreader, self.config))
         return Sample(
             image=frame.image,

@@ -20,6 +20,7 @@ from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
+from fastgen.divided_mesh import divided
 from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
@@ -43,6 +44,13 @@ from fastgen.shading import UNITS, Shading
 from fastgen.spreader import build_spreader, tier_bounds_mm
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
+
+_BOW_STEPS = 17
+"""Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
+
+_LENS_EDGE_MM = 200.0
+"""Longest edge of what a lens bends, as of the container's walls: its triangles' corners are bent,
+their edges stay straight, and with 100 pixels to a metre that is 0.1 pixels off."""
 
 
 class _Releasable(Protocol):
@@ -155,10 +163,8 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh, spreader = self._mesh(scene.container), self._spreader(scene)
-        mesh.set_openness(
-            self._probe.openness(mesh.mesh, spreader.mesh if spreader is not None else None)
-        )
+        mesh, spreader = self._mesh(scene.container), self._spreader(scene, camera)
+        mesh.set_openness(self._probe.openness(mesh.mesh, _spreader_mesh(scene)))
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
@@ -227,7 +233,7 @@ class Renderer:
 
     def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
         """The spreader's material as textures, None where the scene has none."""
-        spreader = self._spreader(scene)
+        spreader = self._spreader(scene, None)
         if spreader is None:
             return None
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
@@ -266,10 +272,15 @@ class Renderer:
         """The rest mesh of a container, as it is drawn."""
         return self._mesh(container).mesh
 
-    def spreader_mesh(self, scene: Scene) -> Mesh | None:
-        """The spreader's mesh as it is drawn, None where the scene has none."""
-        spreader = self._spreader(scene)
-        return spreader.mesh if spreader else None
+    def spreader_mesh(self, scene: Scene, camera: Camera | None = None) -> Mesh | None:
+        """The spreader's mesh as it is drawn for `camera`, None where the scene has none.
+
+        For a lens its triangles are smaller; without a camera they are as they were built.
+        """
+        mesh = _spreader_mesh(scene)
+        if mesh is None or camera is None or camera.lens is None:
+            return mesh
+        return divided(mesh, _LENS_EDGE_MM)
 
     def _mesh(self, container: Container) -> GpuMesh:
         def make() -> GpuMesh:
@@ -278,11 +289,10 @@ class Renderer:
 
         return self._meshes.get(container, make)
 
-    def _spreader(self, scene: Scene) -> GpuMesh | None:
-        spreader = scene.spreader
-        if not spreader.present:
+    def _spreader(self, scene: Scene, camera: Camera | None) -> GpuMesh | None:
+        mesh = self.spreader_mesh(scene, camera)
+        if mesh is None:
             return None
-        mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
         return self._spreaders.get(
             mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
         )
@@ -311,6 +321,14 @@ class Renderer:
         self.release()
 
 
+def _spreader_mesh(scene: Scene) -> Mesh | None:
+    """The scene's spreader as it is built."""
+    spreader = scene.spreader
+    if not spreader.present:
+        return None
+    return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
+
+
 def _mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
     """uint8 [K, H, W, C] as a mip-mapped texture array, clamped at the borders."""
     count, height, width, channels = images.shape
@@ -334,6 +352,9 @@ def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
 
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
+    if view.distortion:  # what lies between two corners may bow out farther than both
+        a, b = corners_mm[:, None, None], corners_mm[:, None]
+        corners_mm = (a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)).reshape(-1, 3)
     pixels, depth = view.project(corners_mm)
     if depth.min() <= NEAR_M:
         return None
@@ -368,4 +389,5 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
+        **view.lens_values(targets.scale),
     }

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
 from fastgen.records import from_plain, to_plain
+from fastgen.sensor.parts import Lens
 
 Color = tuple[float, float, float]
 Vec2 = tuple[float, float]
@@ -173,9 +174,10 @@ class EnvironmentView:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera. The sensor's width spans the image's width, whatever its aspect ratio.
+    """A camera. The sensor's width spans the image's width, whatever its aspect ratio.
 
     exposure_ev: deviation from the metered exposure, in stops. roll_deg turns the image clockwise.
+    lens: how it distorts, None for a pinhole.
     """
 
     name: str
@@ -185,6 +187,7 @@ class Camera:
     roll_deg: float = 0.0
     sensor_width_mm: float = 36.0
     exposure_ev: float = 0.0
+    lens: Lens | None = None
 
 
 @dataclass(frozen=True)
