@@ -105,7 +105,7 @@ class View:
         """The uniforms of shaders/lens.glsl; scale: of the image in clip space, see Targets."""
         width, height = self.size
         return {
-            **(self.distortion.shader_values() if self.distortion else PINHOLE),
+            **(self.distortion.shader_values if self.distortion else PINHOLE),
             "lens_scale": (
                 2 * self.focal_px / width * scale[0],
                 2 * self.focal_px / height * scale[1],

@@ -18,7 +18,7 @@ from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import Range, bounds, from_plain, nearest, to_plain
-from fastgen.sensor_config import LensConfig
+from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
 UNIT = bounds(0.0, 1.0)
@@ -167,6 +167,8 @@ class Config:
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
 

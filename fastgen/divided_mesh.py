@@ -7,6 +7,16 @@ import numpy as np
 
 from fastgen.mesh import Mesh
 
+_LENS_EDGE_MM = 400.0
+"""Longest edge of the spreader where a lens bends it; containers are built with shorter ones. A
+triangle's corners are bent, its edges stay straight: with 100 pixels to a metre and lines that curve
+with a radius of 600 pixels, as in a wide fisheye, this is a third of a pixel off."""
+
+
+def as_drawn(mesh: Mesh, bent: bool) -> Mesh:
+    """The triangles that stand for `mesh` in an image; bent: whether a lens bends that."""
+    return divided(mesh, _LENS_EDGE_MM) if bent else mesh
+
 
 @lru_cache(maxsize=32)
 def divided(mesh: Mesh, edge_mm: float) -> Mesh:

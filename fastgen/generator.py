@@ -145,7 +145,7 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene, camera)
+        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
         objects = label(Shot(frame, scene, view, mesh, spreader, self.config))
         return Sample(
             image=frame.image,

@@ -13,6 +13,7 @@ from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
 from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
+from fastgen.divided_mesh import as_drawn
 from fastgen.facets import Facets, decal_facets, mesh_facets
 from fastgen.mesh import Mesh
 from fastgen.programs import CONTAINER_ID, SPREADER_ID
@@ -191,7 +192,8 @@ def _spreader(shot: Shot) -> list[Object]:
         return []
     shown = shot.frame.ids == SPREADER_ID
     area = int(np.count_nonzero(shown))
-    seen = project(mesh_facets(None, shot.spreader, list(shot.spreader.groups), 0), shot.view)
+    mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
+    seen = project(mesh_facets(None, mesh, list(mesh.groups), 0), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
     (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
     return [

@@ -6,6 +6,7 @@ on as straight lines instead, so that what lies far beside the image stays besid
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -98,14 +99,15 @@ class Distortion:
                 ideal = self._straight(points - self._shift(ideal))
         return ideal
 
-    def shader_values(self) -> dict[str, ArrayLike]:
+    @cached_property
+    def shader_values(self) -> Mapping[str, ArrayLike]:
         """What shaders/lens.glsl needs of it.
 
         The way back is fitted there: seen over ideal radius, as a polynomial of the seen radius
         squared, over all of the image.
         """
-        seen = self._bent[1:]
-        ideal = np.tan(self._table[1:]) if self._fisheye else self._table[1:]
+        t = np.linspace(0, self._end, 65)[1:]
+        seen, ideal = self._curve(t), np.tan(t) if self._fisheye else t
         basis = np.polynomial.polynomial.polyvander(seen**2, _FIT_TERMS - 1)
         fit, *_ = np.linalg.lstsq(basis, seen / ideal, rcond=None)
         return {

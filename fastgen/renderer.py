@@ -20,7 +20,7 @@ from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
-from fastgen.divided_mesh import divided
+from fastgen.divided_mesh import as_drawn
 from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
@@ -47,10 +47,6 @@ from fastgen.targets import Region, Targets, bands
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
-
-_LENS_EDGE_MM = 200.0
-"""Longest edge of what a lens bends, as of the container's walls: its triangles' corners are bent,
-their edges stay straight, and with 100 pixels to a metre that is 0.1 pixels off."""
 
 
 class _Releasable(Protocol):
@@ -163,8 +159,9 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh, spreader = self._mesh(scene.container), self._spreader(scene, camera)
-        mesh.set_openness(self._probe.openness(mesh.mesh, _spreader_mesh(scene)))
+        mesh = self._mesh(scene.container)
+        spreader = self._spreader(scene, camera.lens is not None)
+        mesh.set_openness(self._probe.openness(mesh.mesh, self.spreader_mesh(scene)))
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
@@ -233,7 +230,7 @@ class Renderer:
 
     def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
         """The spreader's material as textures, None where the scene has none."""
-        spreader = self._spreader(scene, None)
+        spreader = self._spreader(scene, False)
         if spreader is None:
             return None
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
@@ -272,15 +269,12 @@ class Renderer:
         """The rest mesh of a container, as it is drawn."""
         return self._mesh(container).mesh
 
-    def spreader_mesh(self, scene: Scene, camera: Camera | None = None) -> Mesh | None:
-        """The spreader's mesh as it is drawn for `camera`, None where the scene has none.
-
-        For a lens its triangles are smaller; without a camera they are as they were built.
-        """
-        mesh = _spreader_mesh(scene)
-        if mesh is None or camera is None or camera.lens is None:
-            return mesh
-        return divided(mesh, _LENS_EDGE_MM)
+    def spreader_mesh(self, scene: Scene) -> Mesh | None:
+        """The spreader's mesh as it is built, None where the scene has none."""
+        spreader = scene.spreader
+        if not spreader.present:
+            return None
+        return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
 
     def _mesh(self, container: Container) -> GpuMesh:
         def make() -> GpuMesh:
@@ -289,10 +283,12 @@ class Renderer:
 
         return self._meshes.get(container, make)
 
-    def _spreader(self, scene: Scene, camera: Camera | None) -> GpuMesh | None:
-        mesh = self.spreader_mesh(scene, camera)
-        if mesh is None:
+    def _spreader(self, scene: Scene, bent: bool) -> GpuMesh | None:
+        """bent: whether a lens bends it."""
+        built = self.spreader_mesh(scene)
+        if built is None:
             return None
+        mesh = as_drawn(built, bent)
         return self._spreaders.get(
             mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
         )
@@ -319,14 +315,6 @@ class Renderer:
 
     def __exit__(self, *_: object) -> None:
         self.release()
-
-
-def _spreader_mesh(scene: Scene) -> Mesh | None:
-    """The scene's spreader as it is built."""
-    spreader = scene.spreader
-    if not spreader.present:
-        return None
-    return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
 
 
 def _mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:

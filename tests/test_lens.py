@@ -95,7 +95,7 @@ def test_what_lies_farther_out_is_seen_farther_out(name):
 @pytest.mark.parametrize("name", LENSES)
 def test_the_shader_sees_the_sky_where_it_is(name):
     view = view_of(camera(*LENSES[name]), SIZE)
-    values = view.distortion.shader_values()
+    values = view.distortion.shader_values
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     at = (np.stack([x, y], axis=-1) - view.center_px) / view.focal_px
 
@@ -294,3 +294,10 @@ def test_a_lens_without_distortion_is_a_pinhole():
     np.testing.assert_allclose(lens.project(points)[0], plain.project(points)[0], atol=1e-9)
     assert isinstance(plain, View)
     assert lens.half_angle_deg == pytest.approx(plain.half_angle_deg)
+
+
+def test_a_rig_that_cannot_be_drawn_is_refused_at_once():
+    lens = {"model": "fisheye", "k1": [-0.1, 0.2]}
+    config = Config.from_values({"cameras": {"A": {"focal_mm": 11, "lens": lens}}})
+    with pytest.raises(ConfigError, match=r"cameras.A.lens: .* take a larger focal_mm"):
+        Generator(config)

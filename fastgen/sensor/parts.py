@@ -1,4 +1,4 @@
-"""What a Scene says of its lenses: plain frozen data, see fastgen/scene.py."""
+"""What a Scene says of its lenses, sensors and weather: plain frozen data."""
 
 from dataclasses import dataclass
 
@@ -33,3 +33,71 @@ class Lens:
             raise ConfigError(
                 f"lens.coefficients: {self.model} takes {wanted}, got {len(self.coefficients)}"
             )
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A sensor's noise, see sensor/noise.py. full_well_e: electrons that make white; read_noise_e:
+    standard deviation without light, in electrons; seed: of this image's noise."""
+
+    full_well_e: float
+    read_noise_e: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """Text that the camera burns in: lines of it, in which corner (top or bottom, left or right),
+    height of its capitals as a share of the image's."""
+
+    text: str
+    corner: str
+    height: float
+
+
+@dataclass(frozen=True)
+class Defocus:
+    """A thin lens focused at focus_mm along the optical axis, its aperture focal_mm / f_number."""
+
+    focus_mm: float
+    f_number: float
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What one camera does to one image, see sensor/develop.py; the defaults do nothing.
+
+    motion: how far the image moves while the shutter is open, as a share of its width, right and
+    down. vignetting: light lost in the corners, 0..1. exposure_error_ev: stops. gains: of red,
+    green and blue, white balance's error. jpeg_quality: 0 for none.
+    """
+
+    defocus: Defocus | None = None
+    motion: tuple[float, float] = (0.0, 0.0)
+    vignetting: float = 0.0
+    exposure_error_ev: float = 0.0
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    noise: Noise | None = None
+    stamp: Stamp | None = None
+    jpeg_quality: int = 0
+
+
+@dataclass(frozen=True)
+class Rain:
+    """Falling drops. rate_mm_h: of water; shutter_s: for how long each draws its streak; wind: its
+    speed across the image over that of the fall; seed: of where they are."""
+
+    rate_mm_h: float
+    shutter_s: float
+    wind: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Weather:
+    """Between container and camera, and on the container. visibility_mm: of fog, 0 without; wetness
+    of painted surfaces 0..1."""
+
+    visibility_mm: float = 0.0
+    rain: Rain | None = None
+    wetness: float = 0.0
