@@ -26,6 +26,7 @@ from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -90,6 +91,14 @@ class Generator:
             if value not in known:
                 raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, known)}")
         self.backend = backend
+        for name, rig in self.config.cameras.items():
+            for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
+                view_of(
+                    Camera(
+                        name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
+                    ),
+                    self.size,
+                )
         self._samples_per_axis = QUALITY[quality]
         self._device_index = None if device_index is None else whole("device_index", device_index)
         if not isinstance(hdri_dir, str | Path | None):
