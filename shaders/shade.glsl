@@ -25,7 +25,7 @@ uniform sampler2D sheet_depths;
 uniform sampler2D openness_points;
 
 struct Shaded {
-    vec3 color;   // displayed, linear
+    vec3 color;   // exposed radiance; of a single layer, what is displayed
     uint id;
     uint damage;
     float depth;
@@ -41,9 +41,17 @@ Openness openness_at(ivec2 sample_at) {
     return Openness(normalize(stored.xyz * 255.0 - 128.0), stored.w);
 }
 
+// to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
+vec3 developed(vec3 color) {
+#if LAYER == LAYER_ALL
+    color = neutral_tone(color);
+#endif
+    return srgb_encode(color);
+}
+
 vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 #if LAYER == LAYER_ALL
-    return neutral_tone(exposure * lit(s.material, normal, view, sky));
+    return exposure * lit(s.material, normal, view, sky);
 #elif LAYER == LAYER_NORMALS
     return srgb_decode(normal * 0.5 + 0.5);
 #elif LAYER == LAYER_REFLECTION
@@ -55,7 +63,7 @@ vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 
 Shaded sky(vec3 ray) {
 #if LAYER == LAYER_ALL
-    vec3 color = neutral_tone(exposure * background(ray));
+    vec3 color = exposure * background(ray);
 #else
     vec3 color = vec3(1.0);
 #endif
@@ -129,7 +137,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     if (inner_key != 0u && hole_at(rest_mm) < 0) {
         vec3 seen = inside(-key_normal(inner_key), rest_mm);
 #if LAYER == LAYER_ALL
-        seen = neutral_tone(exposure * seen);
+        seen *= exposure;
 #endif
         s = Shaded(seen, CONTAINER_ID, 0u, depth);
     }
