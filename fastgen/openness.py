@@ -53,7 +53,7 @@ def sky_directions() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Body:
+class Body:
     """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
     counter-clockwise from outside."""
 
@@ -118,17 +118,17 @@ class SkyProbe:
     def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
         points = probe_points(container)
         if container not in self._own:
-            body = _Body(container.positions_mm, container.triangles)
+            body = Body(container.positions_mm, container.triangles)
             self._own[container] = self._kept(body, points, _MAP_SIZE)
             if len(self._own) > _CAPACITY:
                 self._own.popitem(last=False)
         open_to = self._own[container]
         if spreader is not None:
-            open_to = open_to & self._kept(_without_cables(spreader), points, _COARSE_SIZE)
+            open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
         directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
         return encoded(container.normals, directions).tobytes()
 
-    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def _kept(self, body: Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
@@ -142,7 +142,7 @@ class SkyProbe:
             cache.write(entry, {"bits": bits}, compress=True)
         return bits.astype(np.uint8)
 
-    def _open_to(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+    def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         ctx = self._ctx
         vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
         indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
@@ -159,7 +159,7 @@ class SkyProbe:
         found = np.empty((len(points_mm), DIRECTIONS), bool)
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
-            to_map = _map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
+            to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
             target.clear(depth=1.0)
             self._program["to_map"] = tuple(to_map.T.ravel())
             array.render(moderngl.TRIANGLES)
@@ -179,7 +179,7 @@ class SkyProbe:
         self._program.release()
 
 
-def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
+def map_matrix(toward: Array, low: Array, high: Array) -> Array:
     """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
     the box's x axis lies along the view's."""
     along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
@@ -193,8 +193,8 @@ def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
     return matrix
 
 
-def _without_cables(spreader: Mesh) -> _Body:
+def without_cables(spreader: Mesh) -> Body:
     solid = tier_of_vertices(spreader) != CABLE_TIER
     triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
     used, numbers = np.unique(triangles, return_inverse=True)
-    return _Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
+    return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))

@@ -4,6 +4,9 @@
 #include "keys_around.glsl"
 #include "tone.glsl"
 #include "ibl.glsl"
+#if SUN
+#include "sun.glsl"
+#endif
 #include "layers.glsl"
 #include "ageing.glsl"
 #include "dirt.glsl"
@@ -114,7 +117,14 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    return layer_color(p.surface, normal, view, sky);
+    vec3 color = layer_color(p.surface, normal, view, sky);
+#if SUN && LAYER == LAYER_ALL
+    float depth = texelFetch(sheet_depths, sample_at, 0).r;
+    vec2 place = vec2(sample_at - SAMPLES_PER_AXIS / 2) / float(SAMPLES_PER_AXIS) + 0.5;
+    float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
+    color += exposure * share * sunlit(p.surface.material, normal, view);
+#endif
+    return color;
 }
 
 // a pixel all of whose samples see the same surface
