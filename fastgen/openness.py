@@ -1,4 +1,4 @@
-"""How open each vertex of a container lies to the sky, found once by depth maps from all around.
+"""How open each vertex of a container or spreader lies to the sky, found once by depth maps from all around.
 
 A point is hidden from a direction where a back face (one turned away from that direction) stands
 before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
@@ -28,6 +28,9 @@ _MAP_SIZE = (2048, 512)
 
 _COARSE_SIZE = (512, 256)
 """For what is not beside the surface that it hides."""
+
+_SPREADER_SIZE = (1024, 512)
+"""For the spreader itself: 14 mm, a quarter of its beams' least gaps."""
 
 _INSET = 0.5
 """Share of the way from a vertex to the middle of its facets at which it is probed: what is
@@ -61,8 +64,9 @@ class Body:
     triangles: NDArray[np.uint32]
 
 
-def probe_points(mesh: Mesh) -> Array:
-    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases."""
+def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
+    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases,
+    no further than inset_limit_mm from the vertex."""
     positions = mesh.positions_mm.astype(np.float64)
     middle = positions[mesh.triangles].mean(axis=1)
     corners = mesh.triangles.ravel()
@@ -71,7 +75,7 @@ def probe_points(mesh: Mesh) -> Array:
     total = [np.bincount(corners, weights[:, k], minlength=len(positions)) for k in range(3)]
     inset = _INSET * (np.stack(total, axis=1) / count - positions)
     length = np.linalg.norm(inset, axis=1, keepdims=True)
-    inset *= np.minimum(1.0, _INSET_LIMIT_MM / np.maximum(length, 1e-6))
+    inset *= np.minimum(1.0, inset_limit_mm / np.maximum(length, 1e-6))
     return positions + inset + _LIFT_MM * mesh.normals
 
 
@@ -94,6 +98,11 @@ def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.ui
     return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1)).astype(np.uint8)
 
 
+def _encoded_bits(mesh: Mesh, open_to: NDArray[np.uint8]) -> bytes:
+    directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
+    return encoded(mesh.normals, directions).tobytes()
+
+
 class SkyProbe:
     """Finds the openness of meshes on one GL context. Owned by the renderer, which releases it."""
 
@@ -109,11 +118,27 @@ class SkyProbe:
         """`encoded` openness of a container's vertices under the spreader that holds it."""
         key = (container, spreader)
         if key not in self._found:
-            self._found[key] = self._measured(container, spreader)
-            if len(self._found) > _CAPACITY:
-                self._found.popitem(last=False)
+            self._keep(key, self._measured(container, spreader))
         self._found.move_to_end(key)
         return self._found[key]
+
+    def openness_of_spreader(self, spreader: Mesh, container: Mesh) -> bytes:
+        """`encoded` openness of a spreader's vertices above the container that it holds."""
+        key = (spreader, container)
+        if key not in self._found:
+            # its faces are long and run into one another: their ends stand for nothing
+            points = probe_points(spreader, np.inf)
+            own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
+            below = self._kept(
+                Body(container.positions_mm, container.triangles), points, _COARSE_SIZE
+            )
+            self._keep(key, _encoded_bits(spreader, own & below))
+        return self._found[key]
+
+    def _keep(self, key: tuple[Mesh, Mesh | None], values: bytes) -> None:
+        self._found[key] = values
+        if len(self._found) > _CAPACITY:
+            self._found.popitem(last=False)
 
     def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
         points = probe_points(container)
@@ -125,8 +150,7 @@ class SkyProbe:
         open_to = self._own[container]
         if spreader is not None:
             open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
-        directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
-        return encoded(container.normals, directions).tobytes()
+        return _encoded_bits(container, open_to)
 
     def _kept(self, body: Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""

@@ -159,7 +159,11 @@ class Renderer:
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
         mesh, spreader = self._mesh(scene.container), self._spreader(scene)
-        mesh.set_openness(self._probe.openness(mesh.mesh, _shading_spreader(scene)))
+        usual = _shading_spreader(scene)
+        mesh.set_openness(self._probe.openness(mesh.mesh, usual))
+        if spreader is not None and usual is not None:
+            held = build_container(scene.container.kind)
+            spreader.set_openness(self._probe.openness_of_spreader(usual, held))
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
