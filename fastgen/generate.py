@@ -270,7 +270,8 @@ def _finish(
         failed += manifest["failed"]
         for record in manifest["records"]:
             counts[record["split"]].update(_counts(record))
-            images.append((record["split"], record["stem"]))
+            if job.fmt == "seafront":
+                images.append((record["split"], record["stem"]))
     files: dict[str, list[Any]] = {}
 
     def put(path: str, pieces: Iterable[bytes]) -> None:
