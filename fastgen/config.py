@@ -18,6 +18,7 @@ from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import Range, bounds, from_plain, nearest, to_plain
+from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
 UNIT = bounds(0.0, 1.0)
@@ -99,7 +100,8 @@ class CameraConfig:
     """One camera of the rig: it looks at the middle of a face from a varied position.
 
     azimuth_deg turns the camera about the vertical through that middle (0: straight at the face,
-    positive: it stands to the right, seen from the camera); elevation_deg lifts it.
+    positive: it stands to the right, seen from the camera); elevation_deg lifts it. lens: its
+    distortion, none for a pinhole; a fisheye's focal_mm is what an angle of one radian spans.
     """
 
     face: str
@@ -111,6 +113,7 @@ class CameraConfig:
     target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e5, 1e5, "mm"))
     sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
     exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
+    lens: LensConfig | None = None
 
 
 def _seafront_rig() -> dict[str, CameraConfig]:
@@ -180,6 +183,8 @@ class Config:
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
 
@@ -195,6 +200,8 @@ class Config:
             if camera.face not in FACES:
                 hint = nearest(camera.face, FACES)
                 raise ConfigError(f"cameras.{name}.face: unknown face {camera.face!r}{hint}")
+            if camera.lens:
+                camera.lens.check(f"cameras.{name}.lens")
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")
         for name, color in self.surface.colors.items():

@@ -26,6 +26,7 @@ from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -90,6 +91,14 @@ class Generator:
             if value not in known:
                 raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, known)}")
         self.backend = backend
+        for name, rig in self.config.cameras.items():
+            for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
+                view_of(
+                    Camera(
+                        name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
+                    ),
+                    self.size,
+                )
         self._samples_per_axis = QUALITY[quality]
         self._device_index = None if device_index is None else whole("device_index", device_index)
         if not isinstance(hdri_dir, str | Path | None):
@@ -97,6 +106,8 @@ class Generator:
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
+        # a scene's cameras are mostly rendered one after the other
+        self._latest: tuple[tuple[Config, int, int], Scene] | None = None
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
@@ -127,7 +138,10 @@ class Generator:
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
-        return sample_scene(self.config, self.seed, whole("index", index), self.environments)
+        key = (self.config, self.seed, whole("index", index))
+        if self._latest is None or self._latest[0] != key:
+            self._latest = key, sample_scene(*key, self.environments)
+        return self._latest[1]
 
     def render(
         self,

@@ -31,6 +31,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
+from fastgen.sensor.sampling import sample_lens
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -67,10 +68,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         container=container,
         surface=surface,
         environment=_environment(config, streams, environments),
-        cameras=tuple(
-            _camera(name, rig, kind, streams(f"camera.{name}"))
-            for name, rig in config.cameras.items()
-        ),
+        cameras=tuple(_camera(name, rig, kind, streams) for name, rig in config.cameras.items()),
         decals=sample_decals(
             config.markings,
             kind,
@@ -167,8 +165,9 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     )
 
 
-def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -> Camera:
+def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
     """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    rng = streams(f"camera.{name}")
     length, width, height = KINDS[kind].size_mm
     outward, middle = {
         "front": ((0, -1, 0), (0, -width / 2, height / 2)),
@@ -196,6 +195,7 @@ def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -
         roll_deg=round(_between(rng, rig.roll_deg), 3),
         sensor_width_mm=rig.sensor_width_mm,
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
+        lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
 
 
