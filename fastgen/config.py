@@ -221,7 +221,7 @@ class Config:
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
         """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
-        if name not in PRESETS:
+        if name not in tuple(PRESETS):
             raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
         return from_plain(Config, PRESETS[name])
 
@@ -255,8 +255,9 @@ class Config:
         """
         try:
             data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+        except (OSError, TypeError) as error:
+            words = error.strerror if isinstance(error, OSError) else "give a path"
+            raise ConfigError(f"{path}: cannot be read ({words})") from None
         except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
         try:
