@@ -104,6 +104,7 @@ SCENE_BLOCK = Block(
         ("float", "scratch_coverage"),
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
+        ("float", "wetness"),
         ("float", "background_size"),
     ),
 )
