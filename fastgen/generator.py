@@ -15,7 +15,13 @@ from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
-from fastgen.environment import EnvironmentLight, bundled_hdris, hdris_by_name, load_environment
+from fastgen.environment import (
+    EnvironmentLight,
+    bundled_hdris,
+    hdris_by_name,
+    irradiance_at,
+    load_environment,
+)
 from fastgen.errors import ConfigError
 from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.labels import label
@@ -24,8 +30,9 @@ from fastgen.records import nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Color, Scene
 from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
@@ -33,6 +40,10 @@ MIN_SIZE, MAX_SIZE = 64, 4096
 
 QUALITY = {"draft": 1, "balanced": 2, "high": 3}
 """Samples along each axis of a pixel by quality."""
+
+
+_BRIGHTEST_AIR = 0.65
+"""Light of fog that an exposure meter lets through: short of the tone curve's shoulder."""
 
 
 def find_camera(scene: Scene, name: str | None = None) -> Camera:
@@ -166,6 +177,9 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
+        if layer == "all" and is_needed(camera, scene.weather):
+            airlight = self._airlight(scene, camera)
+            frame = develop(frame, view, camera, scene.weather, airlight)
         mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
@@ -180,6 +194,15 @@ class Generator:
             objects=objects,
             normals=self._normals(frame, scene, camera, view) if normals else None,
         )
+
+    def _airlight(self, scene: Scene, camera: Camera) -> Color:
+        """Mean light from around in the camera's exposure, no more than its meter would admit."""
+        light = self._light(scene.environment.name)
+        around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+        mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
+        mean = mean * self.exposure(scene, camera)
+        red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
+        return red, green, blue
 
     def _normals(
         self, frame: Frame, scene: Scene, camera: Camera, view: View
@@ -199,6 +222,8 @@ class Generator:
         scene: Scene | None = None,
     ) -> CudaFrame:
         """As `render`, but the frame stays on the GPU, without objects; good until the next call.
+
+        The sensor's part and fog and rain, which the CPU adds, are left out.
 
         Raises ContextError where `cuda_reason` gives one.
         """

@@ -104,6 +104,7 @@ SCENE_BLOCK = Block(
         ("float", "scratch_coverage"),
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
+        ("float", "wetness"),
         ("float", "background_size"),
     ),
 )
@@ -173,9 +174,7 @@ def noise_deviation() -> NDArray[np.float32]:
     return noise_tiles().lost_deviation.reshape(-1, 4)
 
 
-def _constants(
-    samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool
-) -> str:
+def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"

@@ -183,8 +183,8 @@ class Renderer:
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
 
         if damage != "sound":
-            values = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
-            self._damage_block.write(DAMAGE_BLOCK.pack(values))
+            shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
+            self._damage_block.write(DAMAGE_BLOCK.pack(shapes))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
 
         holes = [corners_mm(d) for d in damages if d.kind == "perforation"]

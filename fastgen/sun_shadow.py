@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from fastgen.mesh import Mesh
 from fastgen.openness import Body, map_matrix, without_cables
-from fastgen.programs import link
 
 MAP_SIZE = (2048, 1024)
 """Texels along and across: 7 mm for the longest container."""
