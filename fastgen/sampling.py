@@ -6,6 +6,7 @@ drawing one value more does not change the others in any scene.
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
