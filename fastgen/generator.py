@@ -12,7 +12,13 @@ from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
-from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
+from fastgen.environment import (
+    EnvironmentLight,
+    bundled_hdris,
+    bundled_weights,
+    find_hdris,
+    load_environment,
+)
 from fastgen.errors import ConfigError
 from fastgen.gl import GLContext, open_context
 from fastgen.labels import label
@@ -81,6 +87,7 @@ class Generator:
             if hdri_dir
             else bundled_hdris()
         )
+        self._weights = dict.fromkeys(sorted(self._hdris), 1.0) if hdri_dir else bundled_weights()
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
         self._gl: GLContext | None = None
@@ -88,9 +95,9 @@ class Generator:
         self._cuda: CudaFrames | None = None
 
     @property
-    def environments(self) -> tuple[str, ...]:
-        """Names of the HDRIs that scenes may draw."""
-        return tuple(sorted(self._hdris))
+    def environments(self) -> dict[str, float]:
+        """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
+        return dict(self._weights)
 
     def environment_digest(self, name: str) -> str:
         """SHA-256 in hexadecimal of an HDRI's file."""
@@ -201,9 +208,10 @@ class Generator:
         return self._open().exposure(scene, camera, self.size)
 
     def preload(self) -> None:
-        """Load every light now, so that neither time nor memory grows as scenes first meet them."""
+        """Load every light that scenes draw, so that neither time nor memory grows later."""
         renderer = self._open()
-        for name in self.environments:
+        drawn = [name for name, weight in self._weights.items() if weight > 0]
+        for name in self.config.environment.names or drawn:
             renderer.preload(name)
 
     def close(self) -> None:
