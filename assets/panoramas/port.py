@@ -154,9 +154,8 @@ class Builder:
             for row in range(rows):
                 ry = y - beam / 2 + (row - (rows - 1) / 2) * 2.5
                 color_run = int(self.rng.integers(len(PALETTE)))
-                outer = row in (0, 1, rows - 2, rows - 1)
                 levels = max(tall - int(self.rng.integers(0, 3)), 1)
-                for level in range(0 if outer else max(levels - 3, 0), levels):
+                for level in range(levels):
                     if self.rng.random() < 0.4:
                         color_run = int(self.rng.integers(len(PALETTE)))
                     z = SEA_M + 14.6 + level * models.HEIGHT
