@@ -128,7 +128,11 @@ def _seafront_rig() -> dict[str, CameraConfig]:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The light. names: HDRIs to choose from by file name without ending; empty means all found."""
+    """The light. names: HDRIs to choose from, all alike, by file name without ending.
+
+    Without names all that --hdri finds come, or of the bundled ones all but the interiors, ports
+    more often than others.
+    """
 
     names: tuple[str, ...] = ()
     yaw_deg: Range = field(default=Range(0, 360), metadata=bounds(-360.0, 360.0, "degrees"))

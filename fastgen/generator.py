@@ -18,6 +18,7 @@ from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
 from fastgen.environment import (
     EnvironmentLight,
     bundled_hdris,
+    bundled_weights,
     hdris_by_name,
     irradiance_at,
     load_environment,
@@ -115,6 +116,9 @@ class Generator:
         if not isinstance(hdri_dir, str | Path | None):
             raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
+        self._weights = (
+            bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
+        )
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
         # a scene's cameras are mostly rendered one after the other
@@ -125,9 +129,9 @@ class Generator:
         self._process = 0
 
     @property
-    def environments(self) -> tuple[str, ...]:
-        """Names of the HDRIs that scenes may draw."""
-        return tuple(sorted(self._hdris))
+    def environments(self) -> dict[str, float]:
+        """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
+        return dict(self._weights)
 
     def environment_digest(self, name: str) -> str:
         """SHA-256 in hexadecimal of an HDRI's file. Raises ConfigError for an unknown name."""
@@ -257,9 +261,10 @@ class Generator:
         return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
-        """Load every light now, so that neither time nor memory grows as scenes first meet them."""
+        """Load every light that scenes draw, so that neither time nor memory grows later."""
         renderer = self._open()
-        for name in self.environments:
+        drawn = [name for name, weight in self._weights.items() if weight > 0]
+        for name in self.config.environment.names or drawn:
             renderer.preload(name)
 
     def close(self) -> None:

@@ -5,7 +5,7 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -45,11 +45,11 @@ def stream(seed: int, index: int, name: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
-def sample_scene(config: Config, seed: int, index: int, environments: Sequence[str]) -> Scene:
+def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
     """The scene number `index` of the dataset that `config` and `seed` describe.
 
-    environments: names of the HDRIs at hand; config.environment.names chooses among them.
-    Raises ConfigError when it names one that is not there.
+    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
+    among them, all alike. Raises ConfigError when it names one that is not there.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -146,14 +146,18 @@ def _surface(config: Config, streams: Streams) -> Surface:
     )
 
 
-def _environment(config: Config, streams: Streams, environments: Sequence[str]) -> EnvironmentView:
-    wanted = config.environment.names or tuple(environments)
+def _environment(
+    config: Config, streams: Streams, environments: Mapping[str, float]
+) -> EnvironmentView:
+    wanted = config.environment.names
     for name in wanted:
         if name not in environments:
             raise ConfigError(
                 f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
             )
-    name = str(streams("environment").choice(sorted(wanted)))
+    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
+    share = np.array(list(weights.values())) / sum(weights.values())
+    name = str(streams("environment").choice(list(weights), p=share))
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
 
 
