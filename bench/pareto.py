@@ -230,10 +230,8 @@ def main() -> None:
         "| --- | --- | --- | --- | --- |",
     ]
     for point in points:
-        mark = "yes" if point in best else ""
-        lines.append(
-            f"| {point.renderer} | {point.setting} | {point.rate:.3g} | {point.error:.3f} | {mark} |"
-        )
+        figures = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
+        lines.append(f"| {point.renderer} | {point.setting} | {figures} |")
     write_section("pareto", lines)
     save("pareto", {"machine": about, "points": [vars(point) for point in points]})
     draw(points, caption, options.chart)
