@@ -165,9 +165,7 @@ def noise_deviation() -> NDArray[np.float32]:
     return noise_tiles().lost_deviation.reshape(-1, 4)
 
 
-def _constants(
-    samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool
-) -> str:
+def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
