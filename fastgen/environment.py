@@ -11,6 +11,7 @@ import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -41,6 +42,9 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 MIN_WIDTH, MAX_WIDTH = 256, 16384
 """Widths of an HDRI that can be used, in texels."""
 
+PORT_WEIGHT = 2.5
+"""How much oftener than another place out of doors a bundled port comes where none is named."""
+
 _ASPECT_TOLERANCE = 0.02
 _MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a float32 sum
 _LUMINANCE_WIDTH = 32
@@ -66,8 +70,9 @@ class EnvironmentLight:
     irradiance: NDArray[np.float32]
     """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
     background: NDArray[np.float16]
-    """[B, B, 3] radiance as it is; B is a power of two from 512 to 4096 near twice the width, for
-    as much as that is needed to look as sharp as the HDRI itself."""
+    """[B, B, 3] radiance as it is; B is a power of two from 512 to 2048 near twice the width, for
+    as much as that is needed to look as sharp as the HDRI itself, and 4096 where that is wider than
+    4096: a finer one shows in no picture of a usual size, but takes 100 MB."""
     luminance: NDArray[np.float32]
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
@@ -109,10 +114,26 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
 def bundled_hdris() -> dict[str, Path]:
     """Name -> file of every environment that ships with fastgen, sorted by name.
 
-    Their sources and licences (all CC0) stand in assets/hdri/SOURCES.md.
+    Their sources and licences stand in assets/hdri/SOURCES.md.
     """
+    return {name: asset_path("hdri", entry["file"]) for name, entry in _index().items()}
+
+
+def bundled_weights() -> dict[str, float]:
+    """Name -> weight in the draw of every environment that ships with fastgen, sorted by name.
+
+    Interiors weigh 0: they come where a configuration names them.
+    """
+    kinds = {name: entry["kind"] for name, entry in _index().items()}
+    return {
+        name: 0.0 if "interior" in kind else PORT_WEIGHT if "port" in kind else 1.0
+        for name, kind in kinds.items()
+    }
+
+
+def _index() -> dict[str, dict[str, Any]]:
     index = json.loads(asset_path("hdri", "index.json").read_text(encoding="utf-8"))
-    return {name: asset_path("hdri", entry["file"]) for name, entry in sorted(index.items())}
+    return dict(sorted(index.items()))
 
 
 def load_radiance(path: str | Path) -> NDArray[np.float32]:
@@ -225,10 +246,13 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     Sums stay in float32 or wider; only the results are clamped to half range, so a sun of 1e6 keeps
     its energy wherever it is spread over more than a few texels.
     """
-    background_size = int(np.clip(2 ** round(np.log2(2 * radiance.shape[1])), 512, 4096))
+    width = radiance.shape[1]
+    background_size = int(np.clip(2 ** round(np.log2(2 * width)), 512, 2048))
+    if width > 4096:
+        background_size = 4096
     source = prefilter.shrink(radiance, min(2 * background_size, _MAX_WORK_WIDTH))
     # a texel has sqrt(4 pi) / B radians a side, one of the source at most 2 pi / W
-    samples = 1 if source.shape[1] <= background_size else 2
+    samples = 1 if source.shape[1] <= 1.5 * background_size else 2
     poles = prefilter.smooth_poles(source)
     background = prefilter.resample_octahedral(poles, background_size, samples)
 

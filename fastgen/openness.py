@@ -1,5 +1,4 @@
-"""How open each vertex of a container or spreader lies to the sky, found once by depth maps from
-all around.
+"""How open each vertex of a container or spreader lies to the sky, by depth maps from all around.
 
 A point is hidden from a direction where a back face (one turned away from that direction) stands
 before it. Back faces rather than front ones: a lit surface is then no occluder of itself.

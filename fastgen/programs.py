@@ -104,6 +104,7 @@ SCENE_BLOCK = Block(
         ("float", "scratch_coverage"),
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
+        ("float", "wetness"),
         ("float", "background_size"),
     ),
 )
@@ -119,6 +120,14 @@ VIEW_BLOCK = Block(
         ("float", "exposure"),
         ("vec3", "ray_down"),
         ("vec2", "yaw"),
+        ("vec4", "lens_radial"),
+        ("vec4", "lens_back", 2),
+        ("vec2", "lens_tangential"),
+        ("vec2", "lens_scale"),  # of the ideal image plane in clip space
+        ("vec2", "lens_center"),
+        ("vec2", "lens_end"),  # where its formula ends, and the slope there
+        ("float", "lens_focal"),
+        ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
         ("mat4", "ray_to_shadow"),  # from the eye to a point in m, to a place in the sun's map
         ("vec3", "sun_direction"),
         ("float", "sun_radius"),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from fastgen import prefilter
 
 CAP_DEG = 3.0
-"""Radius around the brightest place that counts as the sun: its disc and what blurs it."""
+"""Radius about the brightest place that counts as the sun: its disc, blurred by texels and haze."""
 
 MIN_SHARE = 0.15
 """Of the irradiance on a surface that faces it; what brings less casts no shadow worth its time."""

@@ -2,6 +2,7 @@
 
 #include "octahedral.glsl"
 #include "keys_around.glsl"
+#include "lens.glsl"
 #include "tone.glsl"
 #include "ibl.glsl"
 #if SUN
@@ -13,6 +14,7 @@
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
+#include "wet.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "material.glsl"
@@ -35,6 +37,7 @@ struct Shaded {
 };
 
 vec3 view_ray(vec2 pixel) {
+    pixel = straightened(pixel);
     return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
 }
 
