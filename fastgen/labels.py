@@ -98,8 +98,9 @@ def visible_boxes(
     [count] areas in pixels. Ids 0 and 1 (void and container) are left out, None and 0, as are those
     of `count` and above.
     """
-    rows, columns = np.nonzero((ids > CONTAINER_ID) & (ids < count))
-    found = ids[rows, columns].astype(np.int64)
+    at = np.flatnonzero((ids > CONTAINER_ID) & (ids < count))
+    rows, columns = np.divmod(at, ids.shape[1])
+    found = ids.ravel()[at].astype(np.int64)
     areas = np.bincount(found, minlength=count)[:count]
     shape = ids.shape
     x0, y0 = np.full(count, shape[1]), np.full(count, shape[0])
@@ -123,12 +124,18 @@ def _decal_facets(scene: Scene, mesh: Mesh) -> Facets:
 @lru_cache(maxsize=4)
 def outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
     """Outlines [N, points, 3] of the labelled decals after damage; a scene's cameras share them."""
-    rest = np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
+    decals = [decal for decal in scene.decals if decal.class_name]
+    rest = np.empty((len(decals), 4 * _EDGE_POINTS, 3))
+    for face in {decal.face for decal in decals}:
+        rows = [row for row, decal in enumerate(decals) if decal.face == face]
+        edges = np.stack([_outline(decals[row]) for row in rows])
+        positions, _ = mesh.sheet_to_surface(face, edges.reshape(-1, 2))
+        rest[rows] = positions.reshape(len(rows), -1, 3)
     return deform(scene.damages, rest)
 
 
-def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
-    """World points [4 * _EDGE_POINTS, 3] in mm along a decal's edge on the sheet, at rest.
+def _outline(decal: Decal) -> NDArray[np.float64]:
+    """Sheet points [4 * _EDGE_POINTS, 2] in mm along a decal's edge.
 
     A marker's edge is the diamond inscribed in its rectangle, other decals' the rectangle itself.
     It starts at the lowest corner of a diamond, the lower left one of a rectangle, and goes round
@@ -145,8 +152,7 @@ def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
     )
     angle = np.deg2rad(decal.rotation_deg)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    positions, _ = mesh.sheet_to_surface(decal.face, edge @ turn.T + np.array(decal.center_mm))
-    return np.asarray(positions, np.float64)
+    return np.asarray(edge @ turn.T + np.array(decal.center_mm), np.float64)
 
 
 def _container(shot: Shot) -> Object:

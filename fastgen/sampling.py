@@ -5,17 +5,17 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
-from fastgen.container import KINDS, WallProfiles, build_container
+from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
 from fastgen.markings import sample_decals
-from fastgen.mesh import Mesh
+from fastgen.mesh import SHEET_FACES, Mesh
 from fastgen.records import Range
 from fastgen.scene import (
     Ageing,
@@ -45,11 +45,11 @@ def stream(seed: int, index: int, name: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
-def sample_scene(config: Config, seed: int, index: int, environments: Sequence[str]) -> Scene:
+def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
     """The scene number `index` of the dataset that `config` and `seed` describe.
 
-    environments: names of the HDRIs at hand; config.environment.names chooses among them.
-    Raises ConfigError when it names one that is not there.
+    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
+    among them, all alike. Raises ConfigError when it names one that is not there.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -59,7 +59,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
     weights = np.array(list(kinds.values()))
     kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
     scale = float(streams("corrugation").choice(config.container.depth_scale))
-    container = Container(kind, _scaled(config.container.profiles, scale))
+    container = Container(kind, config.container.profiles.deepened(scale))
     mesh = build_container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
@@ -96,20 +96,12 @@ def split_of(config: Config, seed: int, index: int) -> str:
 
 def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
     """Width and height in mm of the unfolded sheet of each face that carries decals."""
-    faces = ("front", "back", "door", "no_door", "roof")
-    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in faces}
+    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
     return {face: (rect[2], rect[3]) for face, rect in rects.items()}
 
 
 def _between(rng: np.random.Generator, values: Range) -> float:
     return float(rng.uniform(values.lo, values.hi))
-
-
-def _scaled(profiles: WallProfiles, scale: float) -> WallProfiles:
-    def deeper(wave):  # type: ignore[no-untyped-def]
-        return replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
-
-    return WallProfiles(deeper(profiles.side), deeper(profiles.end), deeper(profiles.roof))
 
 
 def _surface(config: Config, streams: Streams) -> Surface:
@@ -154,14 +146,18 @@ def _surface(config: Config, streams: Streams) -> Surface:
     )
 
 
-def _environment(config: Config, streams: Streams, environments: Sequence[str]) -> EnvironmentView:
-    wanted = config.environment.names or tuple(environments)
+def _environment(
+    config: Config, streams: Streams, environments: Mapping[str, float]
+) -> EnvironmentView:
+    wanted = config.environment.names
     for name in wanted:
         if name not in environments:
             raise ConfigError(
                 f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
             )
-    name = str(streams("environment").choice(sorted(wanted)))
+    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
+    share = np.array(list(weights.values())) / sum(weights.values())
+    name = str(streams("environment").choice(list(weights), p=share))
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
 
 

@@ -206,6 +206,10 @@ class Scene:
     spreader: Spreader = field(default_factory=Spreader)
     weather: Weather = field(default_factory=Weather)
 
+    def __hash__(self) -> int:
+        """By what names a scene alone: hashing a hundred decals would cost more than it finds."""
+        return hash((self.seed, self.index))
+
     def camera(self, name: str) -> Camera:
         """The camera of that name. Raises KeyError naming those that exist."""
         for camera in self.cameras:
@@ -225,7 +229,7 @@ class Scene:
         """
         try:
             data = json.loads(text)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             raise ConfigError(f"scene: is no JSON ({error})") from None
         if isinstance(data, dict) and "scene" in data:  # a scene file of a dataset
             data = data["scene"]

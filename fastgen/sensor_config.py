@@ -104,17 +104,15 @@ class SensorConfig:
         """Hold values to the choices that no single bound can express."""
         for corner in self.stamp.corners:
             if corner not in CORNERS:
-                raise ConfigError(
-                    f"sensor.stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}"
-                )
+                raise ConfigError(f"stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}")
         if not self.stamp.corners:
-            raise ConfigError("sensor.stamp.corners: the list is empty; give at least one")
+            raise ConfigError("stamp.corners: the list is empty; give at least one")
         for name, (low, high) in (
             ("stamp.years", self.stamp.years),
             ("jpeg_quality", self.jpeg_quality),
         ):
             if low > high:
-                raise ConfigError(f"sensor.{name}: the lowest value {low} is above {high}; swap")
+                raise ConfigError(f"{name}: the lowest value {low} is above {high}; swap")
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from fastgen.camera import View
 from fastgen.config import LabelConfig
 from fastgen.encode import jpeg
 from fastgen.errors import ConfigError
-from fastgen.records import nearest, to_plain
+from fastgen.records import nearest
 from fastgen.sample import Sample
 from fastgen.scene import Scene
 
@@ -155,4 +155,4 @@ def view_values(view: View) -> dict[str, Any]:
 @lru_cache(maxsize=2)
 def _scene_json(scene: Scene) -> bytes:
     """The scene as JSON text; all cameras of a scene share it."""
-    return orjson.dumps(to_plain(scene))
+    return orjson.dumps(scene)
