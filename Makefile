@@ -8,7 +8,7 @@ SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f 
 
 .PHONY: setup dataset test lint clean system
 
-setup: $(VENV)/.installed
+setup: $(VENV)/.dev
 
 # libGL libraries that rendering without a screen needs; libosmesa6 is gone from the newest releases
 system:
@@ -25,14 +25,21 @@ system:
 	        libosmesa6 || echo 'no libosmesa6 in this release: the osmesa backend will be missing'; }; \
 	else echo 'Install Mesa (EGL, DRI drivers, OSMesa) with your package manager.'; fi
 
-$(VENV)/.installed: $(SOURCES) | system
+$(BIN)/python: | system
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo 'fastgen needs Python 3.11 or later: set PYTHON to one'; exit 1; }
-	[ -x $(BIN)/python ] || $(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check '.[dev]'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: $(SOURCES) | $(BIN)/python
+	$(BIN)/pip install --quiet --disable-pip-version-check .
 	@touch $@
 
-dataset: setup
+# what the tests need is much larger than the package: PyTorch, Ray and other libraries' readers
+$(VENV)/.dev: $(SOURCES) | $(BIN)/python
+	$(BIN)/pip install --quiet --disable-pip-version-check '.[dev]'
+	@touch $(VENV)/.installed $@
+
+dataset: $(VENV)/.installed
 	$(BIN)/fastgen generate dataset --images 48 --size 640x640
 	@echo 'Look at dataset/contact_sheet.png'
 

@@ -102,7 +102,7 @@ class SkyProbe:
         # depth maps are the driver's, and so is what is found with them
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
-        self._own: OrderedDict[Mesh, Directions] = OrderedDict()
+        self._own: OrderedDict[Mesh, NDArray[np.uint8]] = OrderedDict()
         self._found: OrderedDict[tuple[Mesh, Mesh | None], bytes] = OrderedDict()
 
     def openness(self, container: Mesh, spreader: Mesh | None) -> bytes:
@@ -125,10 +125,11 @@ class SkyProbe:
         open_to = self._own[container]
         if spreader is not None:
             open_to = open_to & self._kept(_without_cables(spreader), points, _COARSE_SIZE)
-        return encoded(container.normals, open_to).tobytes()
+        directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
+        return encoded(container.normals, directions).tobytes()
 
-    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
-        """As _open_to, from the disk cache where it is there."""
+    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """As _open_to, packed along the directions; from the disk cache where it is there."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
         for array in (body.positions_mm, body.triangles, points_mm):
@@ -139,7 +140,7 @@ class SkyProbe:
         if bits is None or bits.shape != shape or bits.dtype != np.uint8:
             bits = np.packbits(self._open_to(body, points_mm, size), axis=1)
             cache.write(entry, {"bits": bits}, compress=True)
-        return np.unpackbits(bits.astype(np.uint8), axis=1, count=DIRECTIONS).astype(bool)
+        return bits.astype(np.uint8)
 
     def _open_to(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         ctx = self._ctx
