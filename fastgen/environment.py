@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen import cache, prefilter
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
+from fastgen.sun import Sun, split_sun
 
 PREFILTER_VERSION = 4
 """Part of the cache key: count up whenever the prefiltered arrays change."""
@@ -49,7 +50,8 @@ _MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a floa
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DFG_POINTS = 4096
-_MAPS = ("specular", "irradiance", "background", "luminance")
+_MAPS = ("specular", "irradiance", "background", "luminance", "sun")
+_SUN_WIDTH = 2048  # a texel is a third of the real sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
 
@@ -59,7 +61,7 @@ class EnvironmentLight:
     but for the background.
 
     The octahedral maps have a border of one texel (prefilter.py says how uv meets it). Their values
-    are exactly representable as half floats.
+    are exactly representable as half floats. `specular` and `irradiance` lack what `sun` has.
     """
 
     name: str
@@ -75,6 +77,8 @@ class EnvironmentLight:
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
     """Mean of the luminance over the whole sphere."""
+    sun: Sun | None
+    """The one strong compact light, None where there is none."""
 
 
 def find_hdris(folder: str | Path) -> list[Path]:
@@ -253,7 +257,9 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     background = prefilter.resample_octahedral(poles, background_size, samples)
 
     # about a texel and a half of the layers; wider lobes do with half of it
-    fine = prefilter.shrink(source, 4 * SPECULAR_SIZE)
+    narrow = prefilter.shrink(source, _SUN_WIDTH)
+    sun, sunless = split_sun(narrow)
+    fine = prefilter.shrink(sunless, 4 * SPECULAR_SIZE)
     coarse = prefilter.shrink(fine, 2 * SPECULAR_SIZE)
     layers = []
     for roughness in ROUGHNESS_LEVELS:
@@ -266,8 +272,8 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     diffuse = prefilter.convolve(coarse, prefilter.cosine_lobe)
     irradiance = prefilter.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
 
-    cells = prefilter.shrink(coarse, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells)
+    cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells, sun)
 
 
 def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -280,6 +286,7 @@ def _light(
     irradiance: NDArray[np.float16],
     background: NDArray[np.float16],
     luminance: NDArray[np.float32],
+    sun: Sun | None,
 ) -> EnvironmentLight:
     weight = prefilter.row_solid_angle(luminance.shape[0]) / (4 * np.pi)
     return EnvironmentLight(
@@ -289,6 +296,7 @@ def _light(
         background=background,
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
+        sun=sun,
     )
 
 
@@ -318,7 +326,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
 def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
     stored = cache.read(entry)
     try:
-        specular, irradiance, background, luminance = (stored[field] for field in _MAPS)
+        specular, irradiance, background, luminance, sun = (stored[field] for field in _MAPS)
     except KeyError:
         return None
     if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
@@ -329,12 +337,21 @@ def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
         irradiance.astype(np.float16),
         background.astype(np.float16),
         luminance.astype(np.float32),
+        _unpacked_sun(sun.astype(np.float64)),
     )
+
+
+def _unpacked_sun(stored: NDArray[np.float64]) -> Sun | None:
+    if not len(stored):
+        return None
+    x, y, z, red, green, blue, radius = (float(v) for v in stored)
+    return Sun((x, y, z), (red, green, blue), radius)
 
 
 def _write_cache(light: EnvironmentLight, entry: Path) -> None:
     specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
-    maps = (specular, irradiance, light.background, light.luminance)
+    sun = np.array([*light.sun.direction, *light.sun.light, light.sun.radius] if light.sun else [])
+    maps = (specular, irradiance, light.background, light.luminance, sun)
     cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
 
 
@@ -348,8 +365,13 @@ def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
 def irradiance_at(
     env: EnvironmentLight, normals: ArrayLike, yaw_deg: float = 0.0
 ) -> NDArray[np.float32]:
-    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3]."""
-    return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
+    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], sun included."""
+    normals = to_map_frame(normals, yaw_deg)
+    found = prefilter.sample_octahedral(env.irradiance, normals)
+    if env.sun is not None:
+        cosine = np.maximum(normals @ np.array(env.sun.direction), 0.0)
+        found += (cosine[:, None] * env.sun.light).astype(np.float32)
+    return found
 
 
 @functools.cache

@@ -6,6 +6,10 @@ drawing one value more does not change the others in any scene.
 
 import hashlib
 from collections.abc import Callable, Mapping
+<<<<<<< HEAD
+=======
+from dataclasses import replace
+>>>>>>> 65b99167b3c14acaaf0d9a00daf5054a09ae010c
 
 import numpy as np
 
@@ -31,7 +35,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
-from fastgen.sensor.sampling import sample_lens
+from fastgen.sensor.sampling import sample_lens, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -68,7 +72,10 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         container=container,
         surface=surface,
         environment=_environment(config, streams, environments),
-        cameras=tuple(_camera(name, rig, kind, streams) for name, rig in config.cameras.items()),
+        cameras=tuple(
+            _with_sensor(_camera(name, rig, kind, streams), config, streams)
+            for name, rig in config.cameras.items()
+        ),
         decals=sample_decals(
             config.markings,
             kind,
@@ -79,6 +86,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         ),
         damages=damages,
         spreader=_spreader(config.spreader, streams),
+        weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
     )
 
 
@@ -201,6 +209,14 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
         lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
+
+
+def _with_sensor(camera: Camera, config: Config, streams: Streams) -> Camera:
+    distance_mm = float(np.linalg.norm(np.subtract(camera.position_mm, camera.target_mm)))
+    sensor = sample_sensor(
+        config.sensor, distance_mm, lambda part: streams(f"sensor.{camera.name}.{part}")
+    )
+    return replace(camera, sensor=sensor)
 
 
 def _rounded(point: np.ndarray) -> Vec3:
