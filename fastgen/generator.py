@@ -20,10 +20,7 @@ from fastgen.environment import (
     bundled_hdris,
     bundled_weights,
     hdris_by_name,
-<<<<<<< HEAD
-=======
     irradiance_at,
->>>>>>> 65b99167b3c14acaaf0d9a00daf5054a09ae010c
     load_environment,
 )
 from fastgen.errors import ConfigError
@@ -119,14 +116,9 @@ class Generator:
         if not isinstance(hdri_dir, str | Path | None):
             raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
-<<<<<<< HEAD
-        own = hdri_dir is not None
-        self._weights = dict.fromkeys(sorted(self._hdris), 1.0) if own else bundled_weights()
-=======
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
->>>>>>> 65b99167b3c14acaaf0d9a00daf5054a09ae010c
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
         # a scene's cameras are mostly rendered one after the other

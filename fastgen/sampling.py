@@ -6,10 +6,7 @@ drawing one value more does not change the others in any scene.
 
 import hashlib
 from collections.abc import Callable, Mapping
-<<<<<<< HEAD
-=======
 from dataclasses import replace
->>>>>>> 65b99167b3c14acaaf0d9a00daf5054a09ae010c
 
 import numpy as np
 
