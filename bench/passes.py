@@ -39,7 +39,7 @@ class PassTimer:
     def __enter__(self) -> "PassTimer":
         self._wrap(Targets, "begin_samples", lambda *_: "clear")
         self._wrap(GpuMesh, "draw", lambda *_: "geometry")
-        self._wrap(Shading, "_run", lambda stage, name, _: name if stage == "shade" else stage)
+        self._wrap(Shading, "_run", lambda stage, name, *_: name if stage == "shade" else stage)
         self._wrap(Shading, "_dispatch", lambda name, *_: name)
         return self
 
@@ -51,17 +51,17 @@ class PassTimer:
         original = getattr(owner, method)
         self._kept.append((owner, method, original))
 
-        def timed(this: object, *args: Any) -> None:
+        def timed(this: object, *args: Any, **named_args: Any) -> None:
             name = named(*args)
             if self.count_pixels:
                 query = self._ctx.query(samples=True)
                 with query:
-                    original(this, *args)
+                    original(this, *args, **named_args)
                 self.pixels[name] = self.pixels.get(name, 0) + query.samples
                 return
             self._ctx.finish()
             began = time.process_time()
-            original(this, *args)
+            original(this, *args, **named_args)
             self._ctx.finish()
             self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - began
 

@@ -85,85 +85,121 @@ def covers(
     """What each owner's polygons [K, M, 2] cover, their union, in an image of `size`."""
     rows = np.ptp(pixels[..., 1]) if pixels.size else 0.0
     step = max(int(np.ceil(rows / _MOST_ROWS)), 1)
-    polygon, row, left, right = spans(pixels / step)
-    whose = owner[polygon]
-    total = _union_length(whose, row, left, right, count) * step**2
+    runs = spans(pixels / step if step > 1 else pixels)
     if step > 1:  # of something enormous the image sees a small part, which is counted as it is
-        polygon, row, left, right = spans(pixels, size[1])
-        whose = owner[polygon]
+        total = _union_length(runs, owner, count) * step**2
+        runs = spans(pixels, size[1])
+    else:
+        outside = _union_length(_outside(runs, size), owner, count)
+    polygon, row, left, right = runs
     left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
     inside = (right > left) & (row >= 0) & (row < size[1])
-    whose, row, left, right = whose[inside], row[inside], left[inside], right[inside]
-    result = [Cover(NOTHING.mask, (0, 0), int(total[i])) for i in range(count)]
-    present, first = np.unique(whose, return_index=True)
-    ends = np.append(first[1:], len(whose))[: len(first)]
-    for i, begin, end in zip(present.tolist(), first, ends, strict=True):
-        runs = slice(begin, end)
-        x0, y0 = int(left[runs].min()), int(row[runs].min())
-        width, height = int(right[runs].max()) - x0, int(row[runs].max()) + 1 - y0
-        at = (row[runs] - y0) * (width + 1) - x0
-        # a row has one cell more, where runs that reach its end are closed
-        cells = height * (width + 1)
-        steps = np.bincount(at + left[runs], minlength=cells)
-        steps -= np.bincount(at + right[runs], minlength=cells)
-        mask = (np.cumsum(steps) > 0).reshape(height, width + 1)[:, :-1]
-        beyond = max(int(total[i]) - int(np.count_nonzero(mask)), 0)
-        result[i] = Cover(mask, (x0, y0), beyond)
+    whose = owner[polygon[inside]]
+    row, left, right = row[inside], left[inside], right[inside]
+    result = []
+    borders = np.searchsorted(whose, np.arange(count + 1)).tolist()
+    for i, part in enumerate(map(slice, borders, borders[1:])):
+        mask, corner = _union(row[part], left[part], right[part])
+        beyond = outside[i] if step == 1 else max(total[i] - np.count_nonzero(mask), 0)
+        result.append(Cover(mask, corner, int(beyond)))
     return result
 
 
-def _union_length(
-    whose: NDArray[np.int64],
-    row: NDArray[np.int64],
-    left: NDArray[np.int64],
-    right: NDArray[np.int64],
-    count: int,
-) -> NDArray[np.int64]:
+Runs = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+
+
+def _outside(runs: Runs, size: tuple[int, int]) -> Runs:
+    """What of `runs`, see spans, lies outside an image of `size`."""
+    polygon, row, left, right = runs
+    off = (row < 0) | (row >= size[1])
+    before, behind = ~off & (left < 0), ~off & (right > size[0])
+    return (
+        np.concatenate([polygon[off], polygon[before], polygon[behind]]),
+        np.concatenate([row[off], row[before], row[behind]]),
+        np.concatenate([left[off], left[before], np.maximum(left[behind], size[0])]),
+        np.concatenate([right[off], np.minimum(right[before], 0), right[behind]]),
+    )
+
+
+def _merged(
+    start: NDArray[np.int64], end: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ascending starts and ends of the union of intervals, of which there is at least one."""
+    start, end = np.sort(start), np.sort(end)
+    # as many have ended as have begun: a gap follows
+    apart = start[1:] > end[:-1]
+    return start[np.append(True, apart)], end[np.append(apart, True)]
+
+
+def _union(
+    row: NDArray[np.int64], left: NDArray[np.int64], right: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], tuple[int, int]]:
+    """Mask [h, w] of the union of runs, and its corner (x, y)."""
+    if not len(row):
+        return NOTHING.mask, NOTHING.corner
+    x0, y0 = int(left.min()), int(row.min())
+    width, height = int(right.max()) - x0, int(row.max()) + 1 - y0
+    at = (row - y0) * width - x0
+    edges = np.stack(_merged(at + left, at + right), axis=1).ravel()
+    lengths = np.diff(edges, prepend=0, append=width * height)
+    return np.repeat(np.arange(len(lengths)) % 2 == 1, lengths).reshape(height, width), (x0, y0)
+
+
+def _union_length(runs: Runs, owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     """Pixels in the union of each owner's runs, int [count]."""
+    polygon, row, left, right = runs
     if not len(row):
         return np.zeros(count, np.int64)
     # one long line of all rows of all owners, none of which reaches into the next
     low, top = int(left.min()), int(row.min())
     width, height = int(right.max()) - low + 1, int(row.max()) - top + 1
-    line = (whose * height + row - top) * width - low
-    order = np.argsort(line + left, kind="stable")
-    start, end = (line + left)[order], (line + right)[order]
-    reached = np.concatenate([[start[0]], np.maximum.accumulate(end)[:-1]])
-    fresh = np.maximum(end - np.maximum(start, reached), 0)
-    return np.bincount(whose[order], weights=fresh, minlength=count).astype(np.int64)
+    line = (owner[polygon] * height + row - top) * width - low
+    start, end = _merged(line + left, line + right)
+    whose = start // (width * height)
+    return np.bincount(whose, weights=end - start, minlength=count).astype(np.int64)
 
 
-def spans(
-    pixels: Array, rows: int | None = None
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def spans(pixels: Array, rows: int | None = None) -> Runs:
     """Runs of pixel centres in convex polygons [K, M, 2]: polygon, row, first and past-last column.
 
     One entry for each polygon and row, those of no pixel left out. rows: only rows from 0 up to
     this one.
     """
-    first = np.ceil(lowest(pixels[..., 1]) - 0.5).astype(np.int64)
-    last = np.ceil(highest(pixels[..., 1]) - 0.5).astype(np.int64)
+    x, y = pixels[..., 0], pixels[..., 1]
+    after = np.roll(pixels, -1, axis=1)
+    drop = after[..., 1] - y
+    slope = np.divide(after[..., 0] - x, drop, out=np.zeros_like(drop), where=drop != 0)
+    # the first row whose centres a corner is not below
+    first = np.ceil(y - 0.5).astype(np.int64)
     if rows is not None:
-        first, last = np.clip(first, 0, rows), np.clip(last, 0, rows)
-    height = last - first
+        first = np.clip(first, 0, rows)
+    top = lowest(first)
+    height = highest(first) - top
+    start = np.cumsum(height) - height
+    # a row of a convex polygon is crossed by one edge that goes down, and one that goes up
+    following = np.roll(first, -1, axis=1)
+    rows_crossed = np.abs(following - first)
+    edge = np.flatnonzero(rows_crossed)
+    whose = edge // pixels.shape[1]
+    length = rows_crossed.ravel()[edge]
+    begin = np.minimum(first, following).ravel()[edge]
+    rises = (following < first).ravel()[edge]
+    count = int(height.sum())
+    ends = np.cumsum(length)
+    step = np.arange(int(length.sum())) - np.repeat(ends - length, length)
+    y_center = np.repeat(begin, length) + step + 0.5
+    at = np.repeat(start[whose] + begin - top[whose] + rises * count, length) + step
+    crossings = np.empty(2 * count)
+    crossings[at] = np.repeat(x.ravel()[edge], length) + (
+        y_center - np.repeat(y.ravel()[edge], length)
+    ) * np.repeat(slope.ravel()[edge], length)
+    falling, rising = crossings.reshape(2, count)
+    left = np.ceil(np.minimum(falling, rising) - 0.5).astype(np.int64)
+    right = np.ceil(np.maximum(falling, rising) - 0.5).astype(np.int64)
+    some = np.flatnonzero(right > left)
     polygon = np.repeat(np.arange(len(pixels)), height)
-    offset = np.arange(len(polygon)) - np.repeat(np.cumsum(height) - height, height)
-    row = first[polygon] + offset
-    y = row + 0.5
-    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
-    for k in range(pixels.shape[1]):
-        a, b = pixels[:, k], pixels[:, (k + 1) % pixels.shape[1]]
-        drop = b[:, 1] - a[:, 1]
-        slope = np.divide(b[:, 0] - a[:, 0], drop, out=np.zeros_like(drop), where=drop != 0)
-        crosses = (a[polygon, 1] <= y) != (b[polygon, 1] <= y)
-        x = a[polygon, 0] + (y - a[polygon, 1]) * slope[polygon]
-        left = np.where(crosses, np.minimum(left, x), left)
-        right = np.where(crosses, np.maximum(right, x), right)
-    some = right > left
-    polygon, row, left, right = polygon[some], row[some], left[some], right[some]
-    begin, end = (np.ceil(x - 0.5).astype(np.int64) for x in (left, right))
-    some = end > begin
-    return polygon[some], row[some], begin[some], end[some]
+    row = np.arange(count) + np.repeat(top - start, height)
+    return polygon[some], row[some], left[some], right[some]
 
 
 _MOST_POINTS = 4_000_000

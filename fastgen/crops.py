@@ -11,7 +11,7 @@ from fastgen.sample import Object, Sample
 _CROP_MARGIN_PX = 3
 _LEGIBLE_FRACTION = 0.85
 _CORNER = 16
-"""labels.outline_mm puts this many points on each side of an outline."""
+"""labels.outlines_mm puts this many points on each side of an outline."""
 
 
 def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDArray[np.uint8]]]:

@@ -86,6 +86,22 @@ def find_hdris(folder: str | Path) -> list[Path]:
     return found
 
 
+def hdris_by_name(folder: str | Path) -> dict[str, Path]:
+    """Name -> file of the HDRIs in a folder, as `find_hdris` finds them.
+
+    Raises AssetError where two files differ in their ending alone.
+    """
+    named: dict[str, Path] = {}
+    for path in find_hdris(folder):
+        if path.stem in named:
+            raise AssetError(
+                f"{folder}: {named[path.stem].name} and {path.name} are both called "
+                f"{path.stem!r} in scenes; rename one"
+            )
+        named[path.stem] = path
+    return named
+
+
 def bundled_hdris() -> dict[str, Path]:
     """Name -> file of every environment that ships with fastgen, sorted by name.
 

@@ -7,6 +7,7 @@ Polygon Clipping".
 
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from fastgen.mesh import Mesh
 from fastgen.scene import Damage, Decal, Scene
 
 Array = NDArray[np.float64]
+_Number = TypeVar("_Number", bound=np.number[Any])
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,12 +131,12 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
     return kept, left
 
 
-def lowest(values: Array) -> Array:
+def lowest(values: NDArray[_Number]) -> NDArray[_Number]:
     """Least of [K, M, ...] over M; NumPy's own reduction is slow along so short an axis."""
     return reduce(np.minimum, np.moveaxis(values, 1, 0))
 
 
-def highest(values: Array) -> Array:
+def highest(values: NDArray[_Number]) -> NDArray[_Number]:
     """Greatest of [K, M, ...] over M, as `lowest`."""
     return reduce(np.maximum, np.moveaxis(values, 1, 0))
 

@@ -1,5 +1,6 @@
 """Frame + Scene -> Objects: boxes, areas and visibility of everything labelled, vectorised."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -12,6 +13,7 @@ from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
 from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
+from fastgen.divided_mesh import as_drawn
 from fastgen.facets import Facets, decal_facets, mesh_facets
 from fastgen.mesh import Mesh
 from fastgen.programs import CONTAINER_ID, SPREADER_ID
@@ -21,6 +23,9 @@ from fastgen.visibility import Shot, float_box, mask_box, visibility
 
 _EDGE_POINTS = 16
 """Points along each side of a decal's outline, which follows the corrugation."""
+
+_PIECES = 24
+"""Along each side of the container's outer box, where a lens bends it."""
 
 CASTINGS = tuple(
     f"{end}_{side}_{level}"
@@ -93,8 +98,9 @@ def visible_boxes(
     [count] areas in pixels. Ids 0 and 1 (void and container) are left out, None and 0, as are those
     of `count` and above.
     """
-    rows, columns = np.nonzero((ids > CONTAINER_ID) & (ids < count))
-    found = ids[rows, columns].astype(np.int64)
+    at = np.flatnonzero((ids > CONTAINER_ID) & (ids < count))
+    rows, columns = np.divmod(at, ids.shape[1])
+    found = ids.ravel()[at].astype(np.int64)
     areas = np.bincount(found, minlength=count)[:count]
     shape = ids.shape
     x0, y0 = np.full(count, shape[1]), np.full(count, shape[0])
@@ -118,12 +124,18 @@ def _decal_facets(scene: Scene, mesh: Mesh) -> Facets:
 @lru_cache(maxsize=4)
 def outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
     """Outlines [N, points, 3] of the labelled decals after damage; a scene's cameras share them."""
-    rest = np.stack([outline_mm(decal, mesh) for decal in scene.decals if decal.class_name])
+    decals = [decal for decal in scene.decals if decal.class_name]
+    rest = np.empty((len(decals), 4 * _EDGE_POINTS, 3))
+    for face in {decal.face for decal in decals}:
+        rows = [row for row, decal in enumerate(decals) if decal.face == face]
+        edges = np.stack([_outline(decals[row]) for row in rows])
+        positions, _ = mesh.sheet_to_surface(face, edges.reshape(-1, 2))
+        rest[rows] = positions.reshape(len(rows), -1, 3)
     return deform(scene.damages, rest)
 
 
-def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
-    """World points [4 * _EDGE_POINTS, 3] in mm along a decal's edge on the sheet, at rest.
+def _outline(decal: Decal) -> NDArray[np.float64]:
+    """Sheet points [4 * _EDGE_POINTS, 2] in mm along a decal's edge.
 
     A marker's edge is the diamond inscribed in its rectangle, other decals' the rectangle itself.
     It starts at the lowest corner of a diamond, the lower left one of a rectangle, and goes round
@@ -140,8 +152,7 @@ def outline_mm(decal: Decal, mesh: Mesh) -> NDArray[np.float64]:
     )
     angle = np.deg2rad(decal.rotation_deg)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    positions, _ = mesh.sheet_to_surface(decal.face, edge @ turn.T + np.array(decal.center_mm))
-    return np.asarray(positions, np.float64)
+    return np.asarray(edge @ turn.T + np.array(decal.center_mm), np.float64)
 
 
 def _container(shot: Shot) -> Object:
@@ -153,7 +164,7 @@ def _container(shot: Shot) -> Object:
     frame, view = shot.frame, shot.view
     shown = (frame.ids > 0) & (frame.ids != SPREADER_ID)
     area = int(np.count_nonzero(shown))
-    points = _container_points(shot.scene, shot.mesh)
+    points = _container_points(shot.scene, shot.mesh, view.distortion is not None)
     pixels, depth = view.project(points)
     x, y = pixels.T.copy()
     bounds = np.array([x.min(), y.min(), x.max(), y.max()])
@@ -162,6 +173,8 @@ def _container(shot: Shot) -> Object:
         (bounds,) = boxes(everything.pixels, everything.owner, 1)
     corners = _corners_mm(shot.scene)
     sides = corners[list(_SIDES)]
+    if view.distortion:
+        sides = _pieces(sides)
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
     (alone,) = covers(box.pixels, box.owner, 1, view.size)
     castings, polygon = _castings(shot, corners)
@@ -185,7 +198,8 @@ def _spreader(shot: Shot) -> list[Object]:
         return []
     shown = shot.frame.ids == SPREADER_ID
     area = int(np.count_nonzero(shown))
-    seen = project(mesh_facets(None, shot.spreader, list(shot.spreader.groups), 0), shot.view)
+    mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
+    seen = project(mesh_facets(None, mesh, list(mesh.groups), 0), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
     (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
     return [
@@ -202,11 +216,23 @@ def _spreader(shot: Shot) -> list[Object]:
 
 
 @lru_cache(maxsize=4)
-def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """Points [P, 3] in mm after damage: from any side the container's outermost are among them."""
+def _container_points(scene: Scene, mesh: Mesh, bent: bool) -> NDArray[np.float64]:
+    """Points [P, 3] in mm after damage: from any side the container's outermost are among them.
+
+    bent: whether a lens bends what is seen, so that others than corners of the hull may be.
+    """
     if scene.damages:
         return deform(scene.damages, mesh.points_mm)
-    return mesh.points_mm[mesh.hull]
+    return mesh.points_mm if bent else mesh.points_mm[mesh.hull]
+
+
+def _pieces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Four-sided `sides` [K, 4, 3] cut into smaller ones of the same winding, [K * n * n, 4, 3]."""
+    across, up = np.meshgrid(*[np.linspace(0, 1, _PIECES + 1)] * 2, indexing="ij")
+    weights = np.stack([(1 - across) * (1 - up), across * (1 - up), across * up, (1 - across) * up])
+    grid = np.einsum("wxy,kwc->kxyc", weights, sides)
+    corners = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
+    return np.stack(corners, axis=3).reshape(-1, 4, 3)
 
 
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
@@ -243,8 +269,14 @@ def _castings(
     ]
     if depth.min() <= 0:
         return tuple(found), ()
-    hull = cv2.convexHull(pixels.astype(np.float32))
-    return tuple(found), tuple(np.round(hull.reshape(-1), 2).astype(float).tolist())
+    straight, _ = replace(shot.view, distortion=None).project(corners)
+    hull = cv2.convexHull(straight.astype(np.float32), returnPoints=False).ravel()
+    outline = pixels[hull]
+    if shot.view.distortion:  # lines of the world are curves in the image
+        along = np.arange(_EDGE_POINTS)[:, None] / _EDGE_POINTS
+        lines = zip(corners[hull], corners[np.roll(hull, -1)], strict=True)
+        outline, _ = shot.view.project(np.concatenate([a + along * (b - a) for a, b in lines]))
+    return tuple(found), tuple(np.round(outline.reshape(-1), 2).tolist())
 
 
 def _behind(

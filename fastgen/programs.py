@@ -119,6 +119,14 @@ VIEW_BLOCK = Block(
         ("float", "exposure"),
         ("vec3", "ray_down"),
         ("vec2", "yaw"),
+        ("vec4", "lens_radial"),
+        ("vec4", "lens_back", 2),
+        ("vec2", "lens_tangential"),
+        ("vec2", "lens_scale"),  # of the ideal image plane in clip space
+        ("vec2", "lens_center"),
+        ("vec2", "lens_end"),  # where its formula ends, and the slope there
+        ("float", "lens_focal"),
+        ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
     ),
 )
 

@@ -20,6 +20,7 @@ from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
+from fastgen.divided_mesh import as_drawn
 from fastgen.environment import EnvironmentLight, dfg_table
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
@@ -43,6 +44,9 @@ from fastgen.shading import UNITS, Shading
 from fastgen.spreader import build_spreader, tier_bounds_mm
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
+
+_BOW_STEPS = 17
+"""Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
 
 
 class _Releasable(Protocol):
@@ -155,7 +159,8 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh, spreader = self._mesh(scene.container), self._spreader(scene)
+        mesh = self._mesh(scene.container)
+        spreader = self._spreader(scene, camera.lens is not None)
         mesh.set_openness(self._probe.openness(mesh.mesh, _shading_spreader(scene)))
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
@@ -225,7 +230,7 @@ class Renderer:
 
     def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
         """The spreader's material as textures, None where the scene has none."""
-        spreader = self._spreader(scene)
+        spreader = self._spreader(scene, False)
         if spreader is None:
             return None
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
@@ -265,9 +270,11 @@ class Renderer:
         return self._mesh(container).mesh
 
     def spreader_mesh(self, scene: Scene) -> Mesh | None:
-        """The spreader's mesh as it is drawn, None where the scene has none."""
-        spreader = self._spreader(scene)
-        return spreader.mesh if spreader else None
+        """The spreader's mesh as it is built, None where the scene has none."""
+        spreader = scene.spreader
+        if not spreader.present:
+            return None
+        return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
 
     def _mesh(self, container: Container) -> GpuMesh:
         def make() -> GpuMesh:
@@ -276,11 +283,12 @@ class Renderer:
 
         return self._meshes.get(container, make)
 
-    def _spreader(self, scene: Scene) -> GpuMesh | None:
-        spreader = scene.spreader
-        if not spreader.present:
+    def _spreader(self, scene: Scene, bent: bool) -> GpuMesh | None:
+        """bent: whether a lens bends it."""
+        built = self.spreader_mesh(scene)
+        if built is None:
             return None
-        mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
+        mesh = as_drawn(built, bent)
         return self._spreaders.get(
             mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
         )
@@ -339,6 +347,9 @@ def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
 
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
+    if view.distortion:  # what lies between two corners may bow out farther than both
+        a, b = corners_mm[:, None, None], corners_mm[:, None]
+        corners_mm = (a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)).reshape(-1, 3)
     pixels, depth = view.project(corners_mm)
     if depth.min() <= NEAR_M:
         return None
@@ -373,4 +384,5 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
+        **view.lens_values(targets.scale),
     }

@@ -6,16 +6,15 @@ drawing one value more does not change the others in any scene.
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
-from fastgen.container import KINDS, WallProfiles, build_container
+from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
 from fastgen.markings import sample_decals
-from fastgen.mesh import Mesh
+from fastgen.mesh import SHEET_FACES, Mesh
 from fastgen.records import Range
 from fastgen.scene import (
     Ageing,
@@ -32,6 +31,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
+from fastgen.sensor.sampling import sample_lens
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -58,7 +58,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
     weights = np.array(list(kinds.values()))
     kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
     scale = float(streams("corrugation").choice(config.container.depth_scale))
-    container = Container(kind, _scaled(config.container.profiles, scale))
+    container = Container(kind, config.container.profiles.deepened(scale))
     mesh = build_container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
@@ -68,10 +68,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         container=container,
         surface=surface,
         environment=_environment(config, streams, environments),
-        cameras=tuple(
-            _camera(name, rig, kind, streams(f"camera.{name}"))
-            for name, rig in config.cameras.items()
-        ),
+        cameras=tuple(_camera(name, rig, kind, streams) for name, rig in config.cameras.items()),
         decals=sample_decals(
             config.markings,
             kind,
@@ -94,20 +91,12 @@ def split_of(config: Config, seed: int, index: int) -> str:
 
 def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
     """Width and height in mm of the unfolded sheet of each face that carries decals."""
-    faces = ("front", "back", "door", "no_door", "roof")
-    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in faces}
+    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
     return {face: (rect[2], rect[3]) for face, rect in rects.items()}
 
 
 def _between(rng: np.random.Generator, values: Range) -> float:
     return float(rng.uniform(values.lo, values.hi))
-
-
-def _scaled(profiles: WallProfiles, scale: float) -> WallProfiles:
-    def deeper(wave):  # type: ignore[no-untyped-def]
-        return replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
-
-    return WallProfiles(deeper(profiles.side), deeper(profiles.end), deeper(profiles.roof))
 
 
 def _surface(config: Config, streams: Streams) -> Surface:
@@ -176,8 +165,9 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     )
 
 
-def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -> Camera:
+def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
     """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    rng = streams(f"camera.{name}")
     length, width, height = KINDS[kind].size_mm
     outward, middle = {
         "front": ((0, -1, 0), (0, -width / 2, height / 2)),
@@ -205,6 +195,7 @@ def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -
         roll_deg=round(_between(rng, rig.roll_deg), 3),
         sensor_width_mm=rig.sensor_width_mm,
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
+        lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+import cv2
 import moderngl
 import numpy as np
 
@@ -154,7 +155,8 @@ class Targets:
         self.copy_to(color, labels, depth)
         pairs = labels.view(np.uint16).reshape(height, width, 2)
         return Frame(
-            image=np.ascontiguousarray(color[..., :3]),
+            # NumPy takes 20 times as long to leave a channel out
+            image=np.asarray(cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), np.uint8),
             ids=np.ascontiguousarray(pairs[..., 0]),
             damage=np.ascontiguousarray(pairs[..., 1]),
             depth=depth,

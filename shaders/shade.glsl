@@ -2,6 +2,7 @@
 
 #include "octahedral.glsl"
 #include "keys_around.glsl"
+#include "lens.glsl"
 #include "tone.glsl"
 #include "ibl.glsl"
 #include "layers.glsl"
@@ -32,6 +33,7 @@ struct Shaded {
 };
 
 vec3 view_ray(vec2 pixel) {
+    pixel = straightened(pixel);
     return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
 }
 

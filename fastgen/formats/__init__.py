@@ -19,7 +19,7 @@ from fastgen.camera import View
 from fastgen.config import LabelConfig
 from fastgen.encode import jpeg
 from fastgen.errors import ConfigError
-from fastgen.records import nearest, to_plain
+from fastgen.records import nearest
 from fastgen.sample import Sample
 from fastgen.scene import Scene
 
@@ -139,10 +139,14 @@ def _scene_file(item: Item) -> bytes:
 
 def view_values(view: View) -> dict[str, Any]:
     """Camera in OpenCV's convention (x right, y down, z forward), but for pixel coordinates: here
-    the first pixel's centre is (0.5, 0.5). rotation and translation_mm take world to camera."""
+    the first pixel's centre is (0.5, 0.5). rotation and translation_mm take world to camera.
+    distortion: OpenCV's coefficients, of cv2.fisheye where distortion_model is fisheye, none for a
+    pinhole."""
+    lens = view.distortion.lens if view.distortion else None
     return {
         "intrinsics": view.intrinsics.tolist(),
-        "distortion": [],
+        "distortion_model": lens.model if lens else "pinhole",
+        "distortion": list(lens.coefficients) if lens else [],
         "rotation": view.rotation.tolist(),
         "translation_mm": view.translation_mm.tolist(),
     }
@@ -151,4 +155,4 @@ def view_values(view: View) -> dict[str, Any]:
 @lru_cache(maxsize=2)
 def _scene_json(scene: Scene) -> bytes:
     """The scene as JSON text; all cameras of a scene share it."""
-    return orjson.dumps(to_plain(scene))
+    return orjson.dumps(scene)

@@ -6,9 +6,10 @@ from typing import Any
 from torch.utils.data import DataLoader, Sampler
 
 from fastgen.errors import ConfigError
+from fastgen.records import whole
 from fastgen.sampling import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
-from fastgen.torch.plan import shard, whole
+from fastgen.torch.plan import shard
 from fastgen.torch.targets import Collate
 
 
