@@ -43,27 +43,30 @@ SCENE_SEED = 11
 FIRST_TRAINING = 10000
 SIZE = (192, 192)
 VIEWS = len(CAMERAS)
+LONG = ", long"
 
 
 @dataclass(frozen=True)
 class Study:
     """How much of everything. test, train: scenes rendered by both. numbers: training scenes of
-    the comparison at equal number. more: of the larger ones that only we render. seeds: trainings
-    of each comparison; ablation_seeds: of each element."""
+    the comparison at equal number. more: of the larger ones that only we render. steps: of
+    every training; long_steps: of the largest sets once more. seeds: trainings of each comparison;
+    few_seeds: of each element and of the long ones."""
 
     test: int
     train: int
     numbers: tuple[int, ...]
     more: tuple[int, ...]
     steps: int
+    long_steps: int
     seeds: int
-    ablation_seeds: int
+    few_seeds: int
     elements: tuple[str, ...] = tuple(ELEMENTS)
 
 
 STUDIES = {
-    "cpu": Study(20, 30, (4, 12, 30), (100, 320, 960), 400, 5, 5),
-    "smoke": Study(1, 2, (1, 2), (3,), 4, 2, 2, ("spreader", SHADE)),
+    "cpu": Study(14, 20, (4, 10, 20), (80, 250, 750), 250, 1000, 5, 3),
+    "smoke": Study(1, 2, (1, 2), (3,), 4, 8, 2, 2, ("spreader", SHADE)),
 }
 
 
@@ -96,14 +99,19 @@ class Trainings:
     done: dict[tuple[str, int], list[Outcome]] = field(default_factory=dict)
 
     def add(self, name: str, crops: CropSet, scenes: int, seed: int) -> None:
-        """Train on `scenes` scenes of a set; the seed draws them, weights and order."""
+        """Train on `scenes` scenes of a set; the seed draws them, weights and order.
+
+        LONG at the end of the name trains for the study's long_steps.
+        """
         path = self.work.cache / f"run_{name}_{scenes}_{seed}.npz".replace(" ", "_")
         if not path.exists():
             every = np.unique(crops.scenes)
             chosen = np.random.default_rng(seed).permutation(every)[:scenes]
             part = crops.of(chosen.tolist())
             pixels, classes = torch.from_numpy(part.pixels), torch.from_numpy(part.classes)
-            net = fit(pixels, classes, self.work.study.steps, seed, len(MARKER_CLASSES))
+            study = self.work.study
+            steps = study.long_steps if name.endswith(LONG) else study.steps
+            net = fit(pixels, classes, steps, seed, len(MARKER_CLASSES))
             right = [
                 named(net, torch.from_numpy(test.pixels)).numpy() == test.classes
                 for test in self.tests
@@ -125,7 +133,9 @@ class Trainings:
 
     def difference(self, a: tuple[str, int], b: tuple[str, int]) -> Mean:
         """Score of `a` less that of `b` on the same crops of Cycles' images, in points."""
-        return interval(self.right(*a) - self.right(*b), self.tests[0].scenes)
+        right_a, right_b = self.right(*a), self.right(*b)
+        seeds = min(len(right_a), len(right_b))  # of one the first few alone are trained
+        return interval(right_a[:seeds] - right_b[:seeds], self.tests[0].scenes)
 
 
 def asked(argv: Sequence[str] | None) -> Work:
@@ -197,51 +207,63 @@ def trained(work: Work, sets: dict[str, CropSet]) -> Trainings:
             made.add("ours", sets["ours train"], scenes, seed)
         for scenes in study.more:
             made.add("ours", sets["ours more"], scenes, seed)
-        for name in study.elements if seed < study.ablation_seeds else ():
-            made.add(f"no {name}", sets[f"no {name}"], study.train, seed)
+        if seed < study.few_seeds:
+            for name in study.elements:
+                made.add(f"no {name}", sets[f"no {name}"], study.train, seed)
+            for source in ("traced", "ours"):
+                made.add(source + LONG, sets[f"{source} train"], study.train, seed)
+            made.add("ours" + LONG, sets["ours more"], max(study.more), seed)
     return made
 
 
-def tables(made: Trainings, costs: dict[str, float]) -> list[Table]:
-    """What the same number of images, the same time, and each element come to."""
-    study = made.work.study
-    equal, timed, worth = [], [], []
-    for scenes in study.numbers:
-        images = str(scenes * VIEWS)
-        both = made.mean("ours", scenes), made.mean("traced", scenes)
-        apart = made.difference(("ours", scenes), ("traced", scenes))
-        home = made.mean("ours", scenes, "on_ours"), made.mean("traced", scenes, "on_ours")
-        equal.append([images, *map(told, both), signed(apart), *map(told, home)])
-
-        spent = scenes * VIEWS * costs["traced"]
-        bought = [n for n in (*study.numbers, *study.more) if n * VIEWS * costs["ours"] <= spent]
-        if bought:
-            most = max(bought)
-            row = [f"{spent:.0f}", images, told(both[1]), str(most * VIEWS)]
-            row += [f"{most * VIEWS * costs['ours']:.0f}", told(made.mean("ours", most))]
-            timed.append([*row, signed(made.difference(("ours", most), ("traced", scenes)))])
-    for name in study.elements:
-        without_it = f"no {name}", study.train
-        loss = made.difference(("ours", study.train), without_it)
-        worth.append([name, told(made.mean(*without_it)), signed(loss)])
-    heads = (
+def equal_number(made: Trainings) -> Table:
+    """What the same number of images of the same scenes teaches."""
+    study, rows = made.work.study, []
+    for end, scenes in [*(("", n) for n in study.numbers), (LONG, study.train)]:
+        a, b = ("ours" + end, scenes), ("traced" + end, scenes)
+        images = f"{scenes * VIEWS}{end}"
+        row = [images, len(made.done[a]), told(made.mean(*a)), told(made.mean(*b))]
+        row += [signed(made.difference(a, b))]
+        rows.append([*row, told(made.mean(*a, "on_ours")), told(made.mean(*b, "on_ours"))])
+    heads = [
         "images",
-        "trained on ours",
-        "on Cycles'",
+        "seeds",
+        "ours",
+        "Cycles'",
         "difference",
         "ours, on ours",
         "Cycles', on ours",
-    )
-    heads_timed = "core-seconds", "images", "Cycles'", "our images", "core-seconds", "ours"
-    return [
-        Table("The same number of images: right on Cycles' test images, %", heads, equal),
-        Table("The same rendering time, %", [*heads_timed, "difference"], timed),
-        Table(
-            f"What elements are worth, {study.train * VIEWS} of our images, %",
-            ["without", "right on Cycles'", "costs, points"],
-            worth,
-        ),
     ]
+    return Table("The same number of images, %", heads, rows)
+
+
+def equal_time(made: Trainings, costs: dict[str, float]) -> Table:
+    """What the same rendering time teaches: of our trainings the largest that it pays for."""
+    study, rows = made.work.study, []
+    for end, scenes in [*(("", n) for n in study.numbers), (LONG, study.train)]:
+        spent = scenes * VIEWS * costs["traced"]
+        sizes = [n for n in (*study.numbers, *study.more) if ("ours" + end, n) in made.done]
+        most = max([n for n in sizes if n * VIEWS * costs["ours"] <= spent], default=0)
+        if most == 0:
+            continue
+        a, b = ("ours" + end, most), ("traced" + end, scenes)
+        row = [f"{scenes * VIEWS}{end}", f"{spent:.0f}", told(made.mean(*b))]
+        row += [str(most * VIEWS), f"{most * VIEWS * costs['ours']:.0f}", told(made.mean(*a))]
+        rows.append([*row, signed(made.difference(a, b))])
+    heads = ["Cycles' images", "core-s", "score", "our images", "core-s", "score", "difference"]
+    return Table("The same rendering time, %", heads, rows)
+
+
+def elements_worth(made: Trainings) -> Table:
+    """What leaving single elements out of our images costs."""
+    size = made.work.study.train
+    rows = []
+    for name in made.work.study.elements:
+        lacking = f"no {name}", size
+        lost = made.difference(("ours", size), lacking)
+        rows.append([name, told(made.mean(*lacking)), signed(lost)])
+    title = f"Without an element, {size * VIEWS} of our images, %"
+    return Table(title, ["without", "score", "points it is worth"], rows)
 
 
 def told(mean: Mean) -> str:
@@ -264,7 +286,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     made = trained(work, sets)
     costs = {"traced": sets["traced train"].core_s, "ours": sets["ours more"].core_s}
 
-    listed = tables(made, costs)
+    listed = [equal_number(made), equal_time(made, costs), elements_worth(made)]
     curves = {
         name: [(scenes * VIEWS * costs[source], *made.mean(source, scenes)) for scenes in numbers]
         for name, source, numbers in (
