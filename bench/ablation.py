@@ -7,13 +7,15 @@ and draws them again. Printed are the FLIP that this changes over the pixels of 
 spreader at 640x640, mean over the cases and worst case; the share of those pixels that change
 visibly, by more than VISIBLE; by how much the image without it is farther from Cycles' reference at
 320x320 (negative: nearer); and the processor time of a draw that is saved, a mean with its standard
-error. Elements that a case does not have count as no change. Leaves bench/results/ablation.json.
+error. Elements that a case does not have count as no change. Leaves its
+table in docs/accuracy.md and bench/results/ablation.json; with --only, neither.
 """
 
 import argparse
 import os
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +27,7 @@ from ablation_elements import ELEMENTS, Absence, Element
 from image_error import displayed, flip
 from numpy.typing import NDArray
 from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
-from results import machine, parse_size, save
+from results import machine, parse_size, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.sample import Frame
@@ -33,6 +35,9 @@ from fastgen.scene import Scene
 
 QUALITY = "balanced"
 VISIBLE = 0.1
+MARGIN_PX = 32
+"""Around the objects, beyond what FLIP's filters carry over to them from the border."""
+
 
 Array = NDArray[np.floating]
 
@@ -72,6 +77,35 @@ class Drawer:
         return self._generator.exposure(scene, scene.camera(case.camera))
 
 
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A case with everything in it. image: sRGB in 0..1 at the size asked for; there: its pixels of
+    objects; around: the window of it that holds them; error: mean FLIP to Cycles' image."""
+
+    case: Case
+    reference: Reference
+    exposure: float
+    image: Array
+    there: NDArray[np.bool_]
+    around: tuple[slice, slice]
+    error: float
+
+    @staticmethod
+    def of(case: Case, full: Drawer, size: tuple[int, int]) -> "Whole":
+        """Drawn by `full`."""
+        reference = load(case.number)
+        frame = full.frame(case, reference.scene, size)
+        there = frame.ids > 0
+        around = tuple(
+            slice(max(places.min() - MARGIN_PX, 0), places.max() + MARGIN_PX)
+            for places in np.nonzero(there)
+        )
+        exposure = full.exposure(case, reference.scene)
+        error = error_to(reference, exposure, full.frame(case, reference.scene, SIZE))
+        image = frame.image / 255.0
+        return Whole(case, reference, exposure, image, there, (around[0], around[1]), error)
+
+
 def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
     """Mean FLIP to Cycles' image over the pixels of objects."""
     expected = displayed(reference.radiance[FILTERS[QUALITY]], exposure)
@@ -79,28 +113,21 @@ def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
 
 
 def without(
-    element: Element,
-    chosen: list[Case],
-    full: Drawer,
-    size: tuple[int, int],
-    repeats: int,
+    element: Element, wholes: list[Whole], full: Drawer, size: tuple[int, int], repeats: int
 ) -> dict[str, Any]:
     """The row of an element."""
     absence = Absence(element)
     changes, visible, farther, saved = [], [], [], []
     with Drawer(absence) as less:
-        for case in chosen:
-            reference = load(case.number)
-            scene = reference.scene
-            whole, part = full.frame(case, scene, size), less.frame(case, scene, size)
-            change = flip(whole.image / 255.0, part.image / 255.0)[whole.ids > 0]
+        for whole in wholes:
+            case, scene = whole.case, whole.reference.scene
+            part = less.frame(case, scene, size).image / 255.0
+            error = flip(whole.image[whole.around], part[whole.around])
+            change = error[whole.there[whole.around]]
             changes.append(float(change.mean()))
             visible.append(float((change > VISIBLE).mean()))
-            exposure = full.exposure(case, scene)
-            errors = [
-                error_to(reference, exposure, d.frame(case, scene, SIZE)) for d in (less, full)
-            ]
-            farther.append(errors[0] - errors[1])
+            small = less.frame(case, scene, SIZE)
+            farther.append(error_to(whole.reference, whole.exposure, small) - whole.error)
             pairs = [
                 [drawer.seconds(case, scene, size) for drawer in (full, less)]
                 for _ in range(repeats)
@@ -129,26 +156,30 @@ def main() -> None:
     size = parse_size(options.size)
     chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
     about = machine()
-    print(f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}\n")
-    print(
+    lines = [
+        f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}, no GPU.",
+        "",
         "| without | FLIP of objects, mean (worst case) | visible change | farther from Cycles "
-        "| core-ms saved |\n| --- | --- | --- | --- | --- |"
-    )
+        "| core-ms saved |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     rows: dict[str, Any] = {}
     with Drawer(Absence(Element("", "nothing"))) as full:
+        wholes = [Whole.of(case, full, size) for case in chosen]
         for element in ELEMENTS:
             if options.only not in f"{element.group} {element.name}":
                 continue
-            row = rows[element.name] = without(element, chosen, full, size, options.repeats)
-            print(
+            row = rows[element.name] = without(element, wholes, full, size, options.repeats)
+            lines.append(
                 f"| {element.name} | {row['flip']:.4f} ({row['worst']:.4f}) | {row['visible']:.2%} "
-                f"| {row['farther']:+.4f} | {row['saved_ms']:.1f} ± {row['saved_error_ms']:.1f} |",
-                flush=True,
+                f"| {row['farther']:+.4f} | {row['saved_ms']:.1f} ± {row['saved_error_ms']:.1f} |"
             )
-    save(
-        "ablation",
-        {"machine": about, "size": options.size, "cases": len(chosen), "elements": rows},
-    )
+            print(lines[-1], file=sys.stderr, flush=True)
+    if options.only:
+        return
+    write_section("ablation", lines)
+    figures = {"machine": about, "size": options.size, "cases": len(chosen), "elements": rows}
+    save("ablation", figures)
 
 
 if __name__ == "__main__":

@@ -93,13 +93,18 @@ def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
     return lambda *args: _edited_mesh(build(*args), edit)
 
 
+@lru_cache(maxsize=64)
+def _all_open(mesh: Mesh) -> bytes:
+    return openness.encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
+
+
 def _probe(open_sky: bool) -> Callable[..., bytes]:
     """In place of SkyProbe.openness: that of the unedited meshes, or no occlusion at all."""
     measured = openness.SkyProbe.openness
 
     def found(self: openness.SkyProbe, container: Mesh, spreader: Mesh | None) -> bytes:
         if open_sky:
-            return openness.encoded(container.normals, np.ones((1, 1), bool)).tobytes()
+            return _all_open(container)
         source = _SOURCES.get(container, container)
         return measured(self, source, _SOURCES.get(spreader, spreader) if spreader else None)
 

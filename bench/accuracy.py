@@ -10,8 +10,8 @@ own noise (the same measure between two of its renders of different seeds) and, 
 how many samples Cycles is as far from the reference as we are, and what that takes it.
 
 Needs no Blender; `--blender-python PYTHON` traces what is missing, see trace_references.py.
-Leaves bench/results/accuracy.json, docs/accuracy.jpg, and a picture a case in --out. Also needs
-what `pip install '.[accuracy]'` brings.
+Leaves its tables in docs/accuracy.md, bench/results/accuracy.json, docs/accuracy.jpg, and a picture
+a case in --out. Also needs what `pip install '.[accuracy]'` brings.
 """
 
 import argparse
@@ -23,7 +23,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
@@ -34,7 +33,7 @@ from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
 from reference_set import DEPTH_STEP, FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
-from results import ROOT, machine, save
+from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
@@ -108,8 +107,8 @@ def compared(
     )
 
 
-def all_results(quality: str, chosen: Iterable[Case]) -> list[Result]:
-    """Every case at a quality; prints how geometry coincides, for the first time it is seen."""
+def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
+    """Every case at a quality, and a line on how geometry coincides."""
     found, same, apart = [], [], []
     with Generator(Config.preset(), SEED, SIZE, quality=quality) as generator:
         for case in chosen:
@@ -119,11 +118,11 @@ def all_results(quality: str, chosen: Iterable[Case]) -> list[Result]:
             same.append(coincide)
             apart.append(apart_mm)
             found.append(compared(generator, case, reference, FILTERS[quality], sample))
-    print(
+    coincidence = (
         f"{quality}: silhouettes coincide in {np.mean(same):.4%} of pixels (least "
         f"{min(same):.3%}), 99 % of depths to {np.median(apart):.2f} mm (worst {max(apart):.2f})"
     )
-    return found
+    return found, coincidence
 
 
 def row(title: str, rows: list[tuple[float, ...]]) -> str:
@@ -138,10 +137,22 @@ def row(title: str, rows: list[tuple[float, ...]]) -> str:
     return f"| {title} | " + " | ".join(cells) + " |"
 
 
-def show_groups(results: dict[str, list[Result]]) -> None:
+def overall(results: dict[str, list[Result]], figures: Figures) -> list[str]:
+    """A row a quality, then what Cycles' own noise amounts to."""
+    columns = [f"{m}, {where}" for where in ("whole", "objects") for m in ("FLIP", "SSIM", "PSNR")]
+    lines = ["| mean (worst) | " + " | ".join(columns) + " |", "| --- |" + " --- |" * 6]
+    lines += [row(name, [result.measures for result in r]) for name, r in results.items()]
+    for name in sorted(set(FILTERS.values())):
+        rows = figures.floor_rows(name)
+        if rows:
+            lines.append(row(f"Cycles against itself, {name} ({len(rows)} cases)", rows))
+    return lines
+
+
+def by_group(results: dict[str, list[Result]]) -> list[str]:
     """Mean (worst) object FLIP of each group of cases, a column a quality."""
-    print("\n| object FLIP, mean (worst) | cases | " + " | ".join(results) + " |")
-    print("| --- |" + " --- |" * (len(results) + 1))
+    lines = ["| object FLIP, mean (worst) | cases | " + " | ".join(results) + " |"]
+    lines.append("| --- |" + " --- |" * (len(results) + 1))
     for group in GROUPS.values():
         first = next(iter(results.values()))
         for name in dict.fromkeys(group(result.case) for result in first):
@@ -149,46 +160,46 @@ def show_groups(results: dict[str, list[Result]]) -> None:
             for listed in results.values():
                 flips = [r.measures[3] for r in listed if group(r.case) == name]
                 cells.append(f"{np.mean(flips):.3f} ({max(flips):.3f})")
-            print(f"| {name} | {len(flips)} | " + " | ".join(cells) + " |")
+            lines.append(f"| {name} | {len(flips)} | " + " | ".join(cells) + " |")
+    return lines
 
 
-def show_parts(quality: str, listed: list[Result]) -> None:
+def by_part(quality: str, listed: list[Result]) -> list[str]:
     """Where in the images the error lies."""
     shares: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for result in listed:
         for part, values in result.parts.items():
             shares[part].append(values)
     totals = np.array([[p[:2] for p in values] for values in shares.values()]).sum(axis=(0, 1))
-    print(f"\n| part of the image, {quality} | of pixels | of error | FLIP | brighter, stops |")
-    print("| --- | --- | --- | --- | --- |")
+    lines = [f"| part of the image, {quality} | of pixels | of error | FLIP | brighter, stops |"]
+    lines.append("| --- | --- | --- | --- | --- |")
     for part, values in shares.items():
         pixels, error, stops = np.array(values).T
-        print(
+        lines.append(
             f"| {part} | {pixels.sum() / totals[0]:.1%} | {error.sum() / totals[1]:.1%} | "
             f"{error.sum() / max(pixels.sum(), 1):.3f} | {np.nanmean(stops):+.2f} "
             f"({np.nanmin(stops):+.2f} to {np.nanmax(stops):+.2f}) |"
         )
+    return lines
 
 
-def show_equal_samples(results: dict[str, list[Result]], figures: Figures) -> dict[str, Any]:
+def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
     """'As accurate as Cycles at N samples' of each quality, over the cases that have a series."""
-    said: dict[str, Any] = {}
+    columns = ("quality", "pixels", "FLIP", "core-ms")
+    columns += ("as Cycles at", "which takes", "denoised at", "which takes")
+    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 7]
     for quality, listed in results.items():
         timed = [r for r in listed if r.case.number in figures.series]
+        numbers = [r.case.number for r in timed]
         seconds = float(np.mean([r.seconds for r in timed]))
-        for way in ("spp", "denoised"):
-            for where, column in (("whole image", 0), ("objects", 3)):
-                ours = float(np.mean([r.measures[column] for r in timed]))
-                curve = figures.curve([r.case.number for r in timed], way, column)
-                equal = equal_samples(curve, ours)
-                said[f"{quality} {way} {where}"] = {**vars(equal), "ours_s": seconds}
-                ratio = f"{equal.seconds / seconds:.0f} times" if equal.seconds else "-"
-                name = "Cycles" if way == "spp" else "Cycles, denoised,"
-                print(
-                    f"{quality}, {where}: FLIP {ours:.3f} in {seconds * 1e3:.0f} ms, as {name} at "
-                    f"{equal.words} samples; its processor time is {ratio} ours"
-                )
-    return said
+        for where, column in (("whole image", 0), ("objects", 3)):
+            error = float(np.mean([r.measures[column] for r in timed]))
+            cells = [quality, where, f"{error:.3f}", f"{seconds * 1e3:.0f}"]
+            for way in ("spp", "denoised"):
+                equal = equal_samples(figures.curve(numbers, way, column), error)
+                cells += [f"{equal.words} samples", f"{equal.seconds / seconds:.0f} times as long"]
+            lines.append("| " + " | ".join(cells) + " |")
+    return lines
 
 
 def main() -> None:
@@ -212,30 +223,27 @@ def main() -> None:
     if not chosen:
         raise SystemExit(2)
     figures = Figures.load()
-    results = {name: all_results(name, chosen) for name in options.qualities.split(",")}
-
+    results, lines = {}, []
+    for quality in options.qualities.split(","):
+        results[quality], coincidence = all_results(quality, chosen)
+        lines.append(f"- {coincidence}")
     about = machine()
-    print(f"\n{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}")
-    columns = [f"{m}, {where}" for where in ("whole", "objects") for m in ("FLIP", "SSIM", "PSNR")]
-    print("\n| mean (worst) | " + " | ".join(columns) + " |")
-    print("| --- |" + " --- |" * 6)
+    title = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}, no GPU."
+    lines = [title, "", *overall(results, figures), "", *lines, ""]
+    if figures.series:
+        lines += [f"Over the {len(figures.series)} cases that have a series of Cycles:", ""]
+        lines += [*as_samples(results, figures), ""]
+    lines += [*by_group(results), ""]
     for quality, listed in results.items():
-        print(row(quality, [result.measures for result in listed]))
-    for name in sorted(set(FILTERS.values())):
-        rows = figures.floor_rows(name)
-        if rows:
-            print(row(f"Cycles against itself, {name} ({len(rows)} cases)", rows))
-    show_groups(results)
-    for quality, listed in results.items():
-        show_parts(quality, listed)
-    print()
-    said = show_equal_samples(results, figures) if figures.series else {}
+        if quality != "draft":
+            lines += [*by_part(quality, listed), ""]
+    write_section("accuracy", lines[:-1])
 
     measures = {
         quality: {f"{r.case.number:02d}": [*r.measures, r.seconds] for r in listed}
         for quality, listed in results.items()
     }
-    save("accuracy", {"machine": about, "measures": measures, "equal_samples": said})
+    save("accuracy", {"machine": about, "measures": measures})
     shown = results.get("balanced") or next(iter(results.values()))
     write_picture(
         options.picture, contact_picture([(r.case, r.panels) for r in shown[:CONTACT_CASES]])

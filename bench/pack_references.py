@@ -103,33 +103,41 @@ def series(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
     return found
 
 
+def loss(whole: Reference, stored: Reference) -> float:
+    """Greatest mean FLIP over object pixels between what was traced and what is kept."""
+    pairs = (
+        [displayed(reference.radiance[name], whole.exposure) for reference in (whole, stored)]
+        for name in whole.radiance
+    )
+    return max(Comparison.of(*pair).both(whole.inside)[3] for pair in pairs)
+
+
 def main() -> None:
-    """Pack all that is traced."""
+    """Pack what was traced since the last time."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--raw", type=Path, default=Path(__file__).parent / ".raw_references")
     options = parser.parse_args()
+    listing = FOLDER / "cycles.json"
     known: dict[str, Any] = {"samples": SAMPLES, "floor": {}, "series": {}}
+    if listing.exists():
+        known = json.loads(listing.read_text(encoding="utf-8"))
+    last = listing.stat().st_mtime if listing.exists() else 0.0
     for case in cases():
-        if not (options.raw / f"{case.number:02d}_1.exr").exists():
+        name = f"{case.number:02d}"
+        files = list(options.raw.glob(f"{name}_*.*"))
+        traced_already = (options.raw / f"{name}_1.exr").exists()
+        if not traced_already or max(file.stat().st_mtime for file in files) < last:
             continue
         whole = traced(options.raw, case)
         save(whole, FOLDER, case.number)
-        stored = load(case.number)
-        losses = [
-            Comparison.of(
-                displayed(whole.radiance[name], whole.exposure),
-                displayed(stored.radiance[name], whole.exposure),
-            ).both(whole.inside)[3]
-            for name in whole.radiance
-        ]
-        size = sum(path.stat().st_size for path in FOLDER.glob(f"{case.number:02d}.*"))
-        print(f"{case.number:02d} {size / 1e3:.0f} kB, FLIP of compression {max(losses):.4f}")
-        for name, of in (("floor", floor), ("series", series)):
+        size = sum(path.stat().st_size for path in FOLDER.glob(f"{name}.*"))
+        lost = loss(whole, load(case.number))
+        print(f"{name} {size / 1e3:.0f} kB, FLIP of compression {lost:.4f}", flush=True)
+        for kind, of in (("floor", floor), ("series", series)):
             figures = of(options.raw, case.number, whole)
             if figures:
-                known[name][str(case.number)] = figures
-    text = json.dumps(known, indent=1)
-    (FOLDER / "cycles.json").write_text(text + "\n", encoding="utf-8")
+                known[kind][str(case.number)] = figures
+    listing.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ second of one core, from processor time. On the same axes: Cycles at 1 to 256 sa
 without denoising (from bench/references/cycles.json: colour only, opening the scene left out), and
 pyrender, where `python bench/peers.py --install --only pyrender` was done. pyrender has no
 image-based light; its picture is scaled to the mean light of the reference's object pixels.
-Leaves bench/results/pareto.json and docs/pareto.png.
+Leaves its table in docs/accuracy.md, bench/results/pareto.json and docs/pareto.png.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from cycles_figures import Figures
 from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
 from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
-from results import ROOT, machine, save
+from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator, environment, renderer
 from fastgen.camera import view_of
@@ -223,14 +223,16 @@ def main() -> None:
     ]
     points += cycles(chosen, Figures.load()) + pyrender(chosen, options.repeats)
     best = front(points)
-    print(
-        f"{caption}\n\n| renderer | setting | images/s of a core | FLIP of objects | on the front |"
-    )
-    print("| --- | --- | --- | --- | --- |")
+    lines = [
+        f"{caption}, no GPU.",
+        "",
+        "| renderer | setting | images/s of a core | FLIP of objects | on the front |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for point in points:
-        rate = f"{point.rate:.3g}"
-        mark = "yes" if point in best else ""
-        print(f"| {point.renderer} | {point.setting} | {rate} | {point.error:.3f} | {mark} |")
+        figures = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
+        lines.append(f"| {point.renderer} | {point.setting} | {figures} |")
+    write_section("pareto", lines)
     save("pareto", {"machine": about, "points": [vars(point) for point in points]})
     draw(points, caption, options.chart)
 

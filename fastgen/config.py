@@ -128,7 +128,11 @@ def _seafront_rig() -> dict[str, CameraConfig]:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The light. names: HDRIs to choose from by file name without ending; empty means all found."""
+    """The light. names: HDRIs to choose from, all alike, by file name without ending.
+
+    Without names all that --hdri finds come, or of the bundled ones all but the interiors, ports
+    more often than others.
+    """
 
     names: tuple[str, ...] = ()
     yaw_deg: Range = field(default=Range(0, 360), metadata=bounds(-360.0, 360.0, "degrees"))
@@ -221,9 +225,9 @@ class Config:
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
         """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
-        if name not in PRESETS:
+        if name not in tuple(PRESETS):
             raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
-        return from_plain(Config, PRESETS[name])
+        return from_plain(Config, PRESETS[name], base=Config())
 
     @staticmethod
     def checked(config: Any) -> "Config":
@@ -255,8 +259,9 @@ class Config:
         """
         try:
             data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+        except (OSError, TypeError) as error:
+            words = error.strerror if isinstance(error, OSError) else "give a path"
+            raise ConfigError(f"{path}: cannot be read ({words})") from None
         except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
         try:
@@ -270,7 +275,38 @@ class Config:
         return plain
 
 
-PRESETS: dict[str, dict[str, Any]] = {"seafront": {}}
+PRESETS: dict[str, dict[str, Any]] = {
+    "seafront": {},
+    # as cameras on cranes deliver: wide lenses, weather, and what electronics do to an image
+    "crane": {
+        "cameras": {
+            "A": {
+                "focal_mm": 22.0,
+                "lens": {"model": "fisheye", "k1": [-0.035, -0.005], "k2": [0.0, 0.006]},
+            },
+            "B": {
+                "lens": {"k1": [-0.24, -0.16], "k2": [0.03, 0.07], "p1": [-1e-3, 1e-3]},
+            },
+            "Cl": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
+            "Cr": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
+        },
+        "sensor": {
+            "defocus": {"probability": 0.15},
+            "motion": {"probability": 0.25},
+            "vignetting": [0.0, 0.5],
+            "exposure_error_ev": [-0.7, 0.7],
+            "white_balance_ev": [-0.15, 0.15],
+            "noise": {"probability": 0.9},
+            "stamp": {"probability": 0.3},
+            "jpeg_quality": [45, 92],
+        },
+        "weather": {
+            "fog_probability": 0.12,
+            "rain_probability": 0.15,
+            "wet_probability": 0.1,
+        },
+    },
+}
 
 
 def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:

@@ -9,8 +9,8 @@ from fastgen.mesh import Mesh
 
 _LENS_EDGE_MM = 400.0
 """Longest edge of the spreader where a lens bends it; containers are built with shorter ones. A
-triangle's corners are bent, its edges stay straight: at 100 pixels a metre and lines that curve
-with a radius of 600 pixels, as in a wide fisheye, this is a third of a pixel off."""
+triangle's corners are bent, its edges stay straight: with 100 pixels to a metre and a radius of
+curvature of 600 pixels, as in a wide fisheye, this is a third of a pixel off."""
 
 
 def as_drawn(mesh: Mesh, bent: bool) -> Mesh:

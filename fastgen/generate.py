@@ -40,6 +40,9 @@ from fastgen.storage import Folder, Remote, storage_of
 MANIFEST = "dataset.json"
 CONTACT_SHEET = "contact_sheet.png"
 
+_MOST = 10**9
+"""Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
+
 Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
 """Makes the shards of `tasks` and reports on the way; see `run_here`."""
 
@@ -129,8 +132,8 @@ def _checked(job: Job, worker_count: int) -> Job:
         ("workers", worker_count),
         ("shard", job.shard_scenes),
     ):
-        if value < 1:
-            raise ConfigError(f"{name}: {value} is out of range; give 1 or more")
+        if not 1 <= value <= _MOST:
+            raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
     if job.fmt not in FORMATS:
         raise ConfigError(f"format: {job.fmt!r} is unknown{nearest(job.fmt, FORMATS)}")
     for name in job.cameras:
@@ -270,7 +273,8 @@ def _finish(
         failed += manifest["failed"]
         for record in manifest["records"]:
             counts[record["split"]].update(_counts(record))
-            images.append((record["split"], record["stem"]))
+            if job.fmt == "seafront":
+                images.append((record["split"], record["stem"]))
     files: dict[str, list[Any]] = {}
 
     def put(path: str, pieces: Iterable[bytes]) -> None:

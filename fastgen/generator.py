@@ -15,7 +15,14 @@ from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
-from fastgen.environment import EnvironmentLight, bundled_hdris, hdris_by_name, load_environment
+from fastgen.environment import (
+    EnvironmentLight,
+    bundled_hdris,
+    bundled_weights,
+    hdris_by_name,
+    irradiance_at,
+    load_environment,
+)
 from fastgen.errors import ConfigError
 from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.labels import label
@@ -24,8 +31,9 @@ from fastgen.records import nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Color, Scene
 from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
@@ -33,6 +41,10 @@ MIN_SIZE, MAX_SIZE = 64, 4096
 
 QUALITY = {"draft": 1, "balanced": 2, "high": 3}
 """Samples along each axis of a pixel by quality."""
+
+
+_BRIGHTEST_AIR = 0.65
+"""Light of fog that an exposure meter lets through: short of the tone curve's shoulder."""
 
 
 def find_camera(scene: Scene, name: str | None = None) -> Camera:
@@ -104,6 +116,9 @@ class Generator:
         if not isinstance(hdri_dir, str | Path | None):
             raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
+        self._weights = (
+            bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
+        )
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
         # a scene's cameras are mostly rendered one after the other
@@ -114,9 +129,9 @@ class Generator:
         self._process = 0
 
     @property
-    def environments(self) -> tuple[str, ...]:
-        """Names of the HDRIs that scenes may draw."""
-        return tuple(sorted(self._hdris))
+    def environments(self) -> dict[str, float]:
+        """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
+        return dict(self._weights)
 
     def environment_digest(self, name: str) -> str:
         """SHA-256 in hexadecimal of an HDRI's file. Raises ConfigError for an unknown name."""
@@ -166,6 +181,9 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
+        if layer == "all" and is_needed(camera, scene.weather):
+            airlight = self._airlight(scene, camera)
+            frame = develop(frame, view, camera, scene.weather, airlight)
         mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
@@ -180,6 +198,15 @@ class Generator:
             objects=objects,
             normals=self._normals(frame, scene, camera, view) if normals else None,
         )
+
+    def _airlight(self, scene: Scene, camera: Camera) -> Color:
+        """Mean light from around in the camera's exposure, no more than its meter would admit."""
+        light = self._light(scene.environment.name)
+        around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+        mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
+        mean = mean * self.exposure(scene, camera)
+        red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
+        return red, green, blue
 
     def _normals(
         self, frame: Frame, scene: Scene, camera: Camera, view: View
@@ -199,6 +226,8 @@ class Generator:
         scene: Scene | None = None,
     ) -> CudaFrame:
         """As `render`, but the frame stays on the GPU, without objects; good until the next call.
+
+        The sensor's part and fog and rain, which the CPU adds, are left out.
 
         Raises ContextError where `cuda_reason` gives one.
         """
@@ -232,9 +261,10 @@ class Generator:
         return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
-        """Load every light now, so that neither time nor memory grows as scenes first meet them."""
+        """Load every light that scenes draw, so that neither time nor memory grows later."""
         renderer = self._open()
-        for name in self.environments:
+        drawn = [name for name, weight in self._weights.items() if weight > 0]
+        for name in self.config.environment.names or drawn:
             renderer.preload(name)
 
     def close(self) -> None:

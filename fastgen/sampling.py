@@ -5,7 +5,8 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
-from fastgen.sensor.sampling import sample_lens
+from fastgen.sensor.sampling import sample_lens, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -44,11 +45,11 @@ def stream(seed: int, index: int, name: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
-def sample_scene(config: Config, seed: int, index: int, environments: Sequence[str]) -> Scene:
+def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
     """The scene number `index` of the dataset that `config` and `seed` describe.
 
-    environments: names of the HDRIs at hand; config.environment.names chooses among them.
-    Raises ConfigError when it names one that is not there.
+    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
+    among them, all alike. Raises ConfigError when it names one that is not there.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -68,7 +69,10 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         container=container,
         surface=surface,
         environment=_environment(config, streams, environments),
-        cameras=tuple(_camera(name, rig, kind, streams) for name, rig in config.cameras.items()),
+        cameras=tuple(
+            _with_sensor(_camera(name, rig, kind, streams), config, streams)
+            for name, rig in config.cameras.items()
+        ),
         decals=sample_decals(
             config.markings,
             kind,
@@ -79,6 +83,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         ),
         damages=damages,
         spreader=_spreader(config.spreader, streams),
+        weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
     )
 
 
@@ -141,14 +146,18 @@ def _surface(config: Config, streams: Streams) -> Surface:
     )
 
 
-def _environment(config: Config, streams: Streams, environments: Sequence[str]) -> EnvironmentView:
-    wanted = config.environment.names or tuple(environments)
+def _environment(
+    config: Config, streams: Streams, environments: Mapping[str, float]
+) -> EnvironmentView:
+    wanted = config.environment.names
     for name in wanted:
         if name not in environments:
             raise ConfigError(
                 f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
             )
-    name = str(streams("environment").choice(sorted(wanted)))
+    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
+    share = np.array(list(weights.values())) / sum(weights.values())
+    name = str(streams("environment").choice(list(weights), p=share))
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
 
 
@@ -197,6 +206,14 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
         lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
+
+
+def _with_sensor(camera: Camera, config: Config, streams: Streams) -> Camera:
+    distance_mm = float(np.linalg.norm(np.subtract(camera.position_mm, camera.target_mm)))
+    sensor = sample_sensor(
+        config.sensor, distance_mm, lambda part: streams(f"sensor.{camera.name}.{part}")
+    )
+    return replace(camera, sensor=sensor)
 
 
 def _rounded(point: np.ndarray) -> Vec3:

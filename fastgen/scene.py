@@ -229,7 +229,7 @@ class Scene:
         """
         try:
             data = json.loads(text)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             raise ConfigError(f"scene: is no JSON ({error})") from None
         if isinstance(data, dict) and "scene" in data:  # a scene file of a dataset
             data = data["scene"]

@@ -24,6 +24,9 @@ MAX_DECALS = 4096
 _SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
 """How many numbers Damage.shape holds."""
 
+_FAR = 1e6
+"""Millimetres, or degrees, that no number of a sensible scene passes: the GPU counts in float32."""
+
 _ART_KINDS = ("marker", "sticker", "emblem")
 _LABELS = ("", *DETECTION_CLASSES[1:])
 
@@ -77,15 +80,16 @@ def _one_of(name: str, choices: Iterable[str], path: str) -> None:
         raise ConfigError(f"{path}: {name!r} is unknown{nearest(name, known)}")
 
 
-def _finite(part: Any, *names: str) -> None:
+def _bounded(part: Any, *names: str) -> None:
     for name in names:
         value = getattr(part, name)
-        if not all(map(math.isfinite, value if isinstance(value, tuple) else (value,))):
-            raise ConfigError(f"{name}: {value!r} is not finite")
+        numbers = value if isinstance(value, tuple) else (value,)
+        if not all(-_FAR <= number <= _FAR for number in numbers):
+            raise ConfigError(f"{name}: {value!r} is out of range; give -{_FAR:g} to {_FAR:g}")
 
 
 def _positive(part: Any, *names: str) -> None:
-    _finite(part, *names)
+    _bounded(part, *names)
     for name in names:
         value = getattr(part, name)
         if not min(value if isinstance(value, tuple) else (value,)) > 0:
@@ -94,7 +98,7 @@ def _positive(part: Any, *names: str) -> None:
 
 def _check_camera(camera: Camera) -> None:
     _positive(camera, "focal_mm", "sensor_width_mm")
-    _finite(camera, "position_mm", "target_mm", "roll_deg", "exposure_ev")
+    _bounded(camera, "position_mm", "target_mm", "roll_deg", "exposure_ev")
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"target_mm: {camera.target_mm} is where the camera itself stands")
 
@@ -104,7 +108,7 @@ def _check_decal(decal: Decal) -> None:
     _one_of(decal.face, SHEET_FACES, "face")
     _one_of(decal.class_name, _LABELS, "class_name")
     _positive(decal, "size_mm")
-    _finite(decal, "center_mm", "rotation_deg", "albedo", "wear")
+    _bounded(decal, "center_mm", "rotation_deg", "albedo", "wear")
     if decal.kind == "text":
         _one_of(decal.font, glyph_tiles()[1], "font")
         _positive(decal, "cap_mm")
@@ -117,7 +121,7 @@ def _check_decal(decal: Decal) -> None:
 def _check_damage(damage: Damage) -> None:
     _one_of(damage.kind, DAMAGE_CLASSES, "kind")
     _positive(damage, "size_mm")
-    _finite(damage, "origin_mm", "along", "across", "inward", "depth_mm", "shape")
+    _bounded(damage, "origin_mm", "along", "across", "inward", "depth_mm", "shape")
     axes = np.array([damage.along, damage.across, damage.inward])
     if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-3:
         raise ConfigError("along, across, inward: are not three unit vectors at right angles")

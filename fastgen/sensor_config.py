@@ -93,7 +93,7 @@ class SensorConfig:
 
     defocus: DefocusConfig = field(default_factory=DefocusConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
-    vignetting: Range = field(default=_ZERO, metadata=_SHARE)
+    vignetting: Range = field(default=_ZERO, metadata=bounds(0.0, 0.95))
     exposure_error_ev: Range = field(default=_ZERO, metadata=bounds(-6.0, 6.0, "stops"))
     white_balance_ev: Range = field(default=_ZERO, metadata=bounds(-2.0, 2.0, "stops"))
     noise: NoiseConfig = field(default_factory=NoiseConfig)
@@ -104,17 +104,15 @@ class SensorConfig:
         """Hold values to the choices that no single bound can express."""
         for corner in self.stamp.corners:
             if corner not in CORNERS:
-                raise ConfigError(
-                    f"sensor.stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}"
-                )
+                raise ConfigError(f"stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}")
         if not self.stamp.corners:
-            raise ConfigError("sensor.stamp.corners: the list is empty; give at least one")
+            raise ConfigError("stamp.corners: the list is empty; give at least one")
         for name, (low, high) in (
             ("stamp.years", self.stamp.years),
             ("jpeg_quality", self.jpeg_quality),
         ):
             if low > high:
-                raise ConfigError(f"sensor.{name}: the lowest value {low} is above {high}; swap")
+                raise ConfigError(f"{name}: the lowest value {low} is above {high}; swap")
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ class WeatherConfig:
     visibility_mm: Range = field(default=Range(2.5e4, 3e5), metadata=bounds(1000, 1e8, "mm"))
     rain_probability: float = field(default=0.0, metadata=_SHARE)
     rate_mm_h: Range = field(default=Range(2, 50), metadata=bounds(0.1, 300, "mm/h"))
-    shutter_s: Range = field(default=Range(0.002, 0.016), metadata=bounds(1e-5, 0.1, "s"))
+    shutter_s: Range = field(default=Range(0.0005, 0.004), metadata=bounds(1e-5, 0.1, "s"))
     wind: Range = field(default=Range(-0.5, 0.5), metadata=bounds(-3.0, 3.0))
     wet_probability: float = field(default=0.0, metadata=_SHARE)
     wetness: Range = field(default=Range(0.3, 1.0), metadata=_SHARE)

@@ -82,7 +82,7 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
         ("decals", {"kind": "text", "font": "comic"}, r"decals\[0\].font: 'comic' is unknown"),
         ("decals", {"kind": "marker", "art": "C1.9"}, r"decals\[0\].art: 'C1.9' is unknown"),
         ("decals", {"size_mm": (0.0, 5.0)}, r"decals\[0\].size_mm: \(0.0, 5.0\) is out of range"),
-        ("decals", {"center_mm": (0.0, math.inf)}, r"decals\[0\].center_mm: .* is not finite"),
+        ("decals", {"center_mm": (0.0, math.inf)}, r"decals\[0\].center_mm: .* is out of range"),
         ("damages", {"kind": "dent"}, r"damages\[0\].kind: 'dent' is unknown"),
         ("damages", {"shape": (1.0,)}, r"damages\[0\].shape: a concave has 0 numbers, not 1"),
         ("damages", {"size_mm": (9.0, -1.0)}, r"damages\[0\].size_mm: .* is out of range"),

@@ -127,7 +127,7 @@ def test_ids_and_depth_are_what_rays_through_the_pixels_say(seen):
         assert (damage != sample.damage).sum() <= 3e-4 * wrong.size
         both = ~wrong & np.isfinite(hits.depth_m) & np.isfinite(sample.depth)
         apart = np.abs(hits.depth_m[both] - sample.depth[both])
-        assert np.quantile(apart, 0.99) < 1e-3
+        assert np.quantile(apart, 0.99) < 3e-3
         assert ids.max() > 1
 
 

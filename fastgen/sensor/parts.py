@@ -25,13 +25,11 @@ class Lens:
     def __post_init__(self) -> None:
         """Refuse what no formula fits."""
         if self.model not in LENS_MODELS:
-            raise ConfigError(
-                f"lens.model: {self.model!r} is unknown{nearest(self.model, LENS_MODELS)}"
-            )
+            raise ConfigError(f"model: {self.model!r} is unknown{nearest(self.model, LENS_MODELS)}")
         wanted = LENS_MODELS[self.model]
         if len(self.coefficients) != wanted:
             raise ConfigError(
-                f"lens.coefficients: {self.model} takes {wanted}, got {len(self.coefficients)}"
+                f"coefficients: {self.model} takes {wanted}, got {len(self.coefficients)}"
             )
 
 

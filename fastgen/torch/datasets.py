@@ -8,6 +8,7 @@ import torch
 from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
 from fastgen.config import Config
+from fastgen.errors import ConfigError
 from fastgen.records import whole
 from fastgen.sample import Sample
 from fastgen.sampling import sample_scene
@@ -70,6 +71,8 @@ class ContainerDataset(Dataset[Item]):
     ) -> None:
         length = whole("length", length, 1, MAX_LENGTH)
         self.config = Config.checked(config)
+        if not (transforms is None or callable(transforms)):
+            raise ConfigError(f"transforms: {transforms!r} is no function of image and target")
         self.task, self.form, self.as_float = task, form, as_float
         self.seed, self.length = seed, length
         self.transforms, self.curriculum = transforms, curriculum

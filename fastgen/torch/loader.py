@@ -1,6 +1,6 @@
 """Loader: a DataLoader that shares positions among ranks and resumes at the very next sample."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
@@ -122,6 +122,8 @@ class Loader:
 
         Raises ConfigError where it is of a loader that makes other samples, naming what differs.
         """
+        if not isinstance(state, Mapping) or not isinstance(state.get("made", {}), Mapping):
+            raise ConfigError(f"state: {state!r} is not what state_dict returned")
         ours = self.state_dict()
         for key in ours:
             if key not in state:

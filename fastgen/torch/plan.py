@@ -9,7 +9,7 @@ import torch
 from fastgen.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import DOOR_CLASSES
-from fastgen.records import nearest
+from fastgen.records import nearest, whole
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
 
@@ -98,6 +98,8 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
     """
     if curriculum is None:
         return base
+    if not callable(curriculum):
+        raise ConfigError(f"curriculum: {curriculum!r} is no function of the epoch")
     made = curriculum(epoch)
     if not isinstance(made, Config | Mapping):
         raise ConfigError(f"curriculum: epoch {epoch} gives {made!r}, not a Config or a mapping")
@@ -124,7 +126,8 @@ def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
         return 0, 1
     if rank is None or world_size is None:
         raise ConfigError("rank, world_size: give both or neither")
-    if not 0 <= rank < world_size:
+    rank, world_size = whole("rank", rank), whole("world_size", world_size, 1)
+    if rank >= world_size:
         raise ConfigError(f"rank: {rank} is out of range; world_size {world_size} has 0 and up")
     return rank, world_size
 
