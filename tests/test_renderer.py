@@ -11,6 +11,7 @@ from fastgen.container import build_container
 from fastgen.generator import Generator
 from fastgen.gpu_mesh import facing_groups
 from fastgen.scene import Spreader
+from fastgen.sensor.light import displayed, light_of
 from tests import oracle
 
 CAMERAS = ("A", "B", "Cl", "Cr")
