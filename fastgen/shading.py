@@ -29,6 +29,10 @@ UNITS = {
 }
 
 
+_OCTAHEDRON = 24
+"""Corners of its eight triangles."""
+
+
 def _mask(write: bool) -> Any:
     """For all three attachments; moderngl's annotation knows the mask of a single one."""
     return [(write,) * 4] * 3
@@ -79,7 +83,7 @@ class Shading:
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
         self._run("shade", "plain", "sound", regions)
-        self._run("shade", "sky", "sound", [None])
+        self._draw_sky()
         self._ctx.scissor = None
         self._ctx.memory_barrier()
         targets.bind_images()
@@ -96,15 +100,32 @@ class Shading:
         them theirs."""
         key = (stage, pixel_class, damage)
         if key not in self._arrays:
-            program = link(
-                self._ctx, "fullscreen.vert", f"{stage}.frag", UNITS, **self._variant(*key[1:])
-            )
-            program["class_depth"] = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
-            self._programs.append(program)
-            self._arrays[key] = self._ctx.vertex_array(program, [])
+            depth = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
+            self._link(key, "fullscreen.vert", f"{stage}.frag", depth)
         for region in regions:
             self._ctx.scissor = region
             self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
+
+    def _draw_sky(self) -> None:
+        """Shade all pixels that are still of the first class."""
+        if self._layer != "all":
+            self._run("shade", "sky", "sound", [None])
+            return
+        key = ("sky", "sky", "sound")
+        if key not in self._arrays:
+            # clipping may round depths: they lie between the first two classes
+            self._link(key, "sky.vert", "sky.frag", CLASS_DEPTH_STEP / 2)
+        self._ctx.scissor = None
+        self._ctx.depth_func = ">="
+        self._arrays[key].render(moderngl.TRIANGLES, vertices=_OCTAHEDRON)
+
+    def _link(
+        self, key: tuple[str, str, str], vertex: str, fragment: str, class_depth: float
+    ) -> None:
+        program = link(self._ctx, vertex, fragment, UNITS, **self._variant(*key[1:]))
+        program["class_depth"] = class_depth
+        self._programs.append(program)
+        self._arrays[key] = self._ctx.vertex_array(program, [])
 
     def _dispatch(self, pixel_class: str, lists: PixelLists) -> None:
         """Shade the listed pixels of a class."""
