@@ -220,7 +220,9 @@ class Renderer:
             frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
         regions = bands([_region(view, box) for box in boxes])
-        shading.draw(targets, regions, damage, near, sun=shadow is not None)
+        shading.draw(
+            targets, regions, damage, near, sun=shadow is not None, bent=camera.lens is not None
+        )
         return targets
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
