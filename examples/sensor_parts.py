@@ -16,7 +16,7 @@ from fastgen.sensor.electronics import stamped
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 
 SIZE = (320, 240)
-INDEX = 17
+INDEX = 3
 
 SENSORS = {
     "defocus": Sensor(defocus=Defocus(1500, 1.4)),
@@ -37,7 +37,7 @@ LENSES = {
 
 WEATHERS = {
     "fog, 25 m": Weather(visibility_mm=25e3),
-    "rain, 60 mm/h": Weather(rain=Rain(60, 0.001, 0.2, 5)),
+    "rain, 80 mm/h": Weather(rain=Rain(80, 0.002, 0.2, 5)),
     "wet": Weather(wetness=1.0),
 }
 
@@ -64,7 +64,7 @@ def main(path: Path) -> None:
     """Write the picture, five tiles a row."""
     with Generator(Config.preset(), seed=7, size=SIZE) as generator:
         scene = generator.scene(INDEX)
-        camera = replace(scene.camera("A"), focal_mm=18.0)
+        camera = replace(scene.camera("A"), focal_mm=16.0)
         images = tiles(generator, scene, camera)
     rows = [np.concatenate(images[i : i + 5], axis=1) for i in range(0, len(images), 5)]
     write(path, jpeg(np.concatenate(rows)))

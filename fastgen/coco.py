@@ -23,11 +23,11 @@ def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int])
     mask of `size` (width, height). Runs go down the columns and begin with zeros.
     """
     (x, y), (width, height) = corner, size
-    padded = np.zeros((part.shape[1], part.shape[0] + 2), bool)
-    padded[:, 1:-1] = part.T
+    padded = np.zeros((part.shape[0] + 2, part.shape[1]), bool)
+    padded[1:-1] = part
     # where columns begin and end to be set, in the order of the whole mask
-    column, row = np.nonzero(padded[:, 1:] != padded[:, :-1])
-    edges = (x + column) * height + y + row
+    row, column = np.divmod(np.flatnonzero(padded[1:] != padded[:-1]), part.shape[1])
+    edges = np.sort((x + column) * height + y + row)
     # a run that goes on in the next column ends and begins at one place
     again = np.flatnonzero(edges[1:] == edges[:-1])
     edges = np.delete(edges, np.concatenate([again, again + 1]))

@@ -13,6 +13,9 @@ from fastgen.camera import NEAR_M, View
 from fastgen.facets import Facets, clip, highest, lowest
 
 Array = NDArray[np.float64]
+Runs = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+"""Runs of pixels, int [R] each: whose polygon, row, first column, and the one past the last."""
+
 
 _MOST_ROWS = 100_000
 """Objects that cross more rows than this are counted on a coarser grid, to a thousandth."""
@@ -105,11 +108,8 @@ def covers(
     return result
 
 
-Runs = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
-
-
 def _outside(runs: Runs, size: tuple[int, int]) -> Runs:
-    """What of `runs`, see spans, lies outside an image of `size`."""
+    """What of `runs` lies outside an image of `size`."""
     polygon, row, left, right = runs
     off = (row < 0) | (row >= size[1])
     before, behind = ~off & (left < 0), ~off & (right > size[0])
@@ -160,10 +160,9 @@ def _union_length(runs: Runs, owner: NDArray[np.int64], count: int) -> NDArray[n
 
 
 def spans(pixels: Array, rows: int | None = None) -> Runs:
-    """Runs of pixel centres in convex polygons [K, M, 2]: polygon, row, first and past-last column.
+    """Runs of pixel centres in convex polygons [K, M, 2], one for each polygon and row.
 
-    One entry for each polygon and row, those of no pixel left out. rows: only rows from 0 up to
-    this one.
+    Those of no pixel are left out. rows: only rows from 0 up to this one.
     """
     x, y = pixels[..., 0], pixels[..., 1]
     after = np.roll(pixels, -1, axis=1)
@@ -176,7 +175,7 @@ def spans(pixels: Array, rows: int | None = None) -> Runs:
     top = lowest(first)
     height = highest(first) - top
     start = np.cumsum(height) - height
-    # a row of a convex polygon is crossed by one edge that goes down, and one that goes up
+    # of a convex polygon one edge crosses a row on its way down the image, and one on its way up
     following = np.roll(first, -1, axis=1)
     rows_crossed = np.abs(following - first)
     edge = np.flatnonzero(rows_crossed)
@@ -231,11 +230,13 @@ def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
     length = right - left
     run = np.repeat(np.arange(len(row)), length)
     column = left[run] + np.arange(len(run)) - np.repeat(np.cumsum(length) - length, length)
+    met, polygon = np.unique(polygon, return_inverse=True)
+    corners, depth_m, rest_mm = seen.pixels[met], seen.depth_m[met], seen.rest_mm[met]
     polygon, row = polygon[run], row[run]
-    origin = seen.pixels[:, :1]
-    flat = np.concatenate([seen.pixels - origin, np.ones_like(seen.depth_m)[..., None]], axis=2)
-    values = np.concatenate([seen.rest_mm, np.ones_like(seen.rest_mm[..., :1])], axis=2)
-    to_values = np.linalg.pinv(flat) @ (values / seen.depth_m[..., None])
+    origin = corners[:, :1]
+    flat = np.concatenate([corners - origin, np.ones_like(depth_m)[..., None]], axis=2)
+    values = np.concatenate([rest_mm, np.ones_like(rest_mm[..., :1])], axis=2)
+    to_values = np.linalg.pinv(flat) @ (values / depth_m[..., None])
     pixel = np.stack([column, row], axis=1)
     at = np.concatenate([pixel + 0.5 - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
     found = np.einsum("pi,pij->pj", at, to_values[polygon])

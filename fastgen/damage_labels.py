@@ -63,7 +63,8 @@ def _cover(
     pixel, rest_mm = pixel[~known], points.rest_mm[~known]
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     part |= in_hole(damage, rest_mm)
-    covered = np.concatenate([pixel[part], np.argwhere(shown)[:, ::-1]])
+    rows, columns = np.divmod(np.flatnonzero(shown), size[0])
+    covered = np.concatenate([pixel[part], np.stack([columns, rows], axis=1)])
     if not len(covered):
         return NOTHING, unbounded
     bounds = np.concatenate([covered.min(axis=0), covered.max(axis=0) + 1]).astype(np.float64)

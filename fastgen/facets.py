@@ -7,7 +7,7 @@ Polygon Clipping".
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from fastgen.mesh import Mesh
 from fastgen.scene import Damage, Decal, Scene
 
 Array = NDArray[np.float64]
-_Number = TypeVar("_Number", bound=np.number[Any])
+Number = TypeVar("Number", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +67,16 @@ def damage_facets(scene: Scene, mesh: Mesh, damage: Damage, owner: int) -> Facet
     """The triangles that `damage` may have touched, whole."""
     axes = np.array([damage.along, damage.across, damage.inward])
     origin = np.array(damage.origin_mm)
-    box = (corners_mm(damage) - origin) @ axes.T
-    local = ((mesh.positions_mm - origin) @ axes.T)[mesh.triangles]
+    within = corners_mm(damage)
+    low, high = mesh.triangle_bounds_mm
+    # few triangles come near even along the world's axes
+    near = (high >= within.min(axis=0)).all(axis=1) & (low <= within.max(axis=0)).all(axis=1)
+    index = np.flatnonzero(near)
+    box = (within - origin) @ axes.T
+    local = (mesh.positions_mm[mesh.triangles[index]] - origin) @ axes.T
     near = (highest(local) >= box.min(axis=0)).all(axis=1)
     near &= (lowest(local) <= box.max(axis=0)).all(axis=1)
-    index = np.flatnonzero(near)
+    index = index[near]
     corners, kept = _corners(scene, mesh, index)
     return Facets(corners, kept, np.full(len(index), owner))
 
@@ -131,12 +136,12 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
     return kept, left
 
 
-def lowest(values: NDArray[_Number]) -> NDArray[_Number]:
+def lowest(values: NDArray[Number]) -> NDArray[Number]:
     """Least of [K, M, ...] over M; NumPy's own reduction is slow along so short an axis."""
     return reduce(np.minimum, np.moveaxis(values, 1, 0))
 
 
-def highest(values: NDArray[_Number]) -> NDArray[_Number]:
+def highest(values: NDArray[Number]) -> NDArray[Number]:
     """Greatest of [K, M, ...] over M, as `lowest`."""
     return reduce(np.maximum, np.moveaxis(values, 1, 0))
 

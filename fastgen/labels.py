@@ -199,7 +199,7 @@ def _spreader(shot: Shot) -> list[Object]:
     shown = shot.frame.ids == SPREADER_ID
     area = int(np.count_nonzero(shown))
     mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
-    seen = project(mesh_facets(None, mesh, list(mesh.groups), 0), shot.view)
+    seen = project(_all_facets(mesh), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
     (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
     return [
@@ -213,6 +213,12 @@ def _spreader(shot: Shot) -> list[Object]:
             **visibility(shot, alone, shown, True, area),
         )
     ]
+
+
+@lru_cache(maxsize=16)
+def _all_facets(mesh: Mesh) -> Facets:
+    """Of a mesh that nothing damages; scenes share them."""
+    return mesh_facets(None, mesh, list(mesh.groups), 0)
 
 
 @lru_cache(maxsize=4)
@@ -284,14 +290,13 @@ def _behind(
 ) -> NDArray[np.bool_]:
     """Which of points [N, 3] the mesh hides from the eye, bool [N]; Moeller and Trumbore 1997."""
     a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
-    ray = (points - eye_mm)[:, None]
-    p = np.cross(ray, c - a)
-    scale = np.einsum("ntk,tk->nt", p, b - a)
-    scale[np.abs(scale) < 1e-9] = np.inf
-    offset = eye_mm - a
-    u = np.einsum("ntk,tk->nt", p, offset) / scale
+    ray, offset = points - eye_mm, eye_mm - a
+    # their triple products, turned so that nothing is crossed for each ray anew
     q = np.cross(offset, b - a)
-    v = np.einsum("ntk,tk->nt", np.broadcast_to(ray, p.shape), q) / scale
+    scale = ray @ np.cross(c - a, b - a).T
+    scale[np.abs(scale) < 1e-9] = np.inf
+    u = ray @ np.cross(c - a, offset).T / scale
+    v = ray @ q.T / scale
     along = (q * (c - a)).sum(axis=1) / scale
     met = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0) & (along < 1)
     return np.asarray(met.any(axis=1), bool)

@@ -145,6 +145,12 @@ class Mesh:
         return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
 
     @cached_property
+    def triangle_bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lowest and highest coordinates [T, 3] of each triangle."""
+        a, b, c = self.positions_mm[self.triangles].transpose(1, 0, 2)
+        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+    @cached_property
     def points_mm(self) -> NDArray[np.float64]:
         """Positions [P, 3] of all vertices, those that coincide only once."""
         return np.unique(self.positions_mm, axis=0).astype(np.float64)

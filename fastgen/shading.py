@@ -30,6 +30,10 @@ UNITS = {
 }
 
 
+_OCTAHEDRON = 24
+"""Corners of its eight triangles."""
+
+
 def _mask(write: bool) -> Any:
     """For all three attachments; moderngl's annotation knows the mask of a single one."""
     return [(write,) * 4] * 3
@@ -56,12 +60,14 @@ class Shading:
         damage: str,
         near_damage: Sequence[Region | None],
         sun: bool = False,
+        bent: bool = False,
     ) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
         None where that is not known. sun: whether there is one, with its shadow map bound.
+        bent: whether a lens bends the view.
         """
         image = targets.image
         image.use()
@@ -81,7 +87,7 @@ class Shading:
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
         self._run("shade", "plain", "sound", regions, sun)
-        self._run("shade", "sky", "sound", [None])
+        self._draw_sky(bent)
         self._ctx.scissor = None
         self._ctx.memory_barrier()
         targets.bind_images()
@@ -103,15 +109,32 @@ class Shading:
         them theirs."""
         key = (stage, pixel_class, damage, sun)
         if key not in self._arrays:
-            program = link(
-                self._ctx, "fullscreen.vert", f"{stage}.frag", UNITS, **self._variant(*key[1:])
-            )
-            program["class_depth"] = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
-            self._programs.append(program)
-            self._arrays[key] = self._ctx.vertex_array(program, [])
+            depth = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
+            self._link(key, "fullscreen.vert", f"{stage}.frag", depth)
         for region in regions:
             self._ctx.scissor = region
             self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
+
+    def _draw_sky(self, bent: bool) -> None:
+        """Shade all pixels that are still of the first class."""
+        if bent or self._layer != "all":
+            self._run("shade", "sky", "sound", [None])
+            return
+        key = ("sky", "sky", "sound", False)
+        if key not in self._arrays:
+            # clipping may round depths: they lie between the first two classes
+            self._link(key, "sky.vert", "sky.frag", CLASS_DEPTH_STEP / 2)
+        self._ctx.scissor = None
+        self._ctx.depth_func = ">="
+        self._arrays[key].render(moderngl.TRIANGLES, vertices=_OCTAHEDRON)
+
+    def _link(
+        self, key: tuple[str, str, str, bool], vertex: str, fragment: str, class_depth: float
+    ) -> None:
+        program = link(self._ctx, vertex, fragment, UNITS, **self._variant(*key[1:]))
+        program["class_depth"] = class_depth
+        self._programs.append(program)
+        self._arrays[key] = self._ctx.vertex_array(program, [])
 
     def _dispatch(self, pixel_class: str, lists: PixelLists, sun: bool) -> None:
         """Shade the listed pixels of a class."""

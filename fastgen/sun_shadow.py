@@ -7,10 +7,11 @@ Casting Curved Shadows on Curved Surfaces; filtered as Reeves et al. 1987 do, in
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.mesh import Mesh
 from fastgen.openness import Body, map_matrix, without_cables
+from fastgen.sun import Sun
 
 MAP_SIZE = (2048, 1024)
 """Texels along and across: 7 mm for the longest container."""
@@ -21,20 +22,35 @@ Array = NDArray[np.float64]
 
 
 class ShadowMap:
-    """What a sun in one direction meets first. Owned by the renderer, which releases it."""
+    """What a sun meets first of `container` and the `spreader` that holds it, less its cables.
 
-    def __init__(self, ctx: moderngl.Context, bodies: list[Body], toward: Array) -> None:
+    Owned by the renderer, which releases it. program: of occluder.vert. toward: unit vector [3] to
+    the sun in the container's frame.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        program: moderngl.Program,
+        container: Mesh,
+        spreader: Mesh | None,
+        toward: Array,
+    ) -> None:
+        bodies = [Body(container.positions_mm, container.triangles)]
+        if spreader is not None:
+            bodies.append(without_cables(spreader))
         low = np.min([body.positions_mm.min(axis=0) for body in bodies], axis=0)
         high = np.max([body.positions_mm.max(axis=0) for body in bodies], axis=0)
+        self.toward = toward
         self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
         self.depth = ctx.depth_texture(MAP_SIZE)
         self.depth.compare_func = "<="
         self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.depth.repeat_x = self.depth.repeat_y = False
         self._target = ctx.framebuffer([], self.depth)
+        self._draw(ctx, program, bodies)
 
-    def draw(self, ctx: moderngl.Context, program: moderngl.Program, bodies: list[Body]) -> None:
-        """Fill the map. program: of occluder.vert."""
+    def _draw(self, ctx: moderngl.Context, program: moderngl.Program, bodies: list[Body]) -> None:
         self._target.use()
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
@@ -64,20 +80,15 @@ class ShadowMap:
             item.release()
 
 
-def shadow_map(
-    ctx: moderngl.Context,
-    program: moderngl.Program,
-    container: Mesh,
-    spreader: Mesh | None,
-    toward: Array,
-) -> ShadowMap:
-    """The shadow of `container` and the `spreader` that holds it, less its cables.
-
-    toward: unit vector to the sun in the container's frame. program: of occluder.vert.
-    """
-    bodies = [Body(container.positions_mm, container.triangles)]
-    if spreader is not None:
-        bodies.append(without_cables(spreader))
-    made = ShadowMap(ctx, bodies, toward)
-    made.draw(ctx, program, bodies)
-    return made
+def sun_values(sun: Sun | None, shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
+    """Members of VIEW_BLOCK about the sun for a camera at eye_m [3], zeros without one."""
+    if sun is None or shadow is None:
+        zero = np.zeros(3)
+        none: dict[str, ArrayLike] = {"ray_to_shadow": np.zeros((4, 4)), "sun_radius": 0.0}
+        return {**none, "sun_direction": zero, "sun_light": zero}
+    return {
+        "ray_to_shadow": shadow.from_ray(eye_m),
+        "sun_direction": shadow.toward,
+        "sun_radius": sun.radius,
+        "sun_light": sun.light,
+    }

@@ -43,7 +43,7 @@ def nested(path, value):
 def sampled(config, count=2):
     """Scenes of `config`, seen to hold finite numbers alone, before and after their damage."""
     for index in range(count):
-        scene = sample_scene(config, 1, index, ("x",))
+        scene = sample_scene(config, 1, index, {"x": 1.0})
         json.dumps(dataclasses.asdict(scene), allow_nan=False)
         places = [damage.origin_mm for damage in scene.damages]
         assert all(math.isfinite(v) for place in places for v in deform(scene.damages, place))

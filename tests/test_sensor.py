@@ -13,7 +13,7 @@ from fastgen.scene import Camera, Scene
 from fastgen.sensor.blur import blur_radius_px, defocused, moved
 from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
 from fastgen.sensor.light import displayed, light_of
-from fastgen.sensor.parts import Defocus, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from fastgen.sensor.weather import foggy, rained
 
 SIZE = (160, 120)
@@ -237,3 +237,19 @@ def test_water_darkens_what_is_porous():
 def test_bad_values_are_named(values, words):
     with pytest.raises(ConfigError, match=words):
         Config.from_values(values)
+
+
+@pytest.mark.parametrize("lens", [None, Lens("fisheye", (-0.02, 0.0, 0.0, 0.0))])
+def test_fog_counts_the_way_along_each_ray(lens):
+    camera = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0, lens=lens)
+    with Generator(seed=6, size=SIZE) as generator:
+        scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
+        sample = generator.render(scene=scene, camera=camera)
+        clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
+        air = np.array(generator._airlight(scene, camera))
+    _, rays = sample.view.rays()
+    forward = sample.view.rotation[2]
+    away = np.minimum(sample.depth / (rays @ forward), 300)
+    left = np.exp(-3.912 * away / 40)[..., None]
+    expected = displayed((light_of(clear.image) * left + air * (1 - left)).astype(np.float32))
+    assert np.abs(expected.astype(int) - sample.image).max() <= 1

@@ -62,6 +62,44 @@ def confusion(counts: NDArray[np.int64], names: Sequence[str], path: Path) -> No
     _save(figure, path)
 
 
+def score_by_cost(
+    curves: Mapping[str, Sequence[tuple[float, float, float, float]]], cost: str, path: Path
+) -> None:
+    """Points (cost, score, low, high) of each curve, scores in percent, cost on a log axis."""
+    figure, axes = pyplot.subplots(figsize=(6, 3.6))
+    for name, points in curves.items():
+        x, y, low, high = np.array(points).T
+        (line,) = axes.plot(x, y, marker="o", label=name)
+        axes.fill_between(x, low, high, color=line.get_color(), alpha=0.2, linewidth=0)
+    axes.set(xlabel=cost, ylabel="right on Cycles' test images, %", xscale="log", ylim=(0, 100))
+    axes.grid(alpha=0.3)
+    axes.legend(loc="lower right")
+    _save(figure, path)
+
+
+def worth(losses: Mapping[str, tuple[float, float, float]], label: str, path: Path) -> None:
+    """A point and its interval (mean, low, high) for each name, in rows."""
+    figure, axes = pyplot.subplots(figsize=(6, 0.8 + 0.3 * len(losses)))
+    mean, low, high = np.array(list(losses.values())).T
+    rows = np.arange(len(losses))
+    axes.errorbar(mean, rows, xerr=[mean - low, high - mean], fmt="o", capsize=3)
+    axes.axvline(0, color="0.5", linewidth=0.8)
+    axes.set_yticks(rows, list(losses))
+    axes.invert_yaxis()
+    axes.set(xlabel=label)
+    _save(figure, path)
+
+
+def pairs(above: NDArray[np.uint8], below: NDArray[np.uint8], path: Path, count: int = 16) -> None:
+    """Every so many crops [N, H, W, 3] of one set above their twins of another."""
+    chosen = np.linspace(0, len(above) - 1, count).astype(int)
+    figure, axes = pyplot.subplots(figsize=(0.6 * count, 1.4))
+    axes.imshow(np.vstack([np.hstack(list(crops[chosen])) for crops in (above, below)]))
+    axes.set_yticks([above.shape[1] * 0.5, above.shape[1] * 1.5], ["Cycles", "ours"])
+    axes.set_xticks([])
+    _save(figure, path)
+
+
 def pictures(
     images: Sequence[torch.Tensor], titles: Sequence[str], path: Path, columns: int = 4
 ) -> None:

@@ -26,7 +26,8 @@ def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], boo
     that is seen. The container's mask spans its damages: they are part of it."""
     own = [thing for thing in sample.objects if thing.class_name in SEGMENTATION_CLASSES]
     ignored = {thing.id: thing.ignored for thing in own}
-    for value in (0, *np.unique(sample.damage[sample.damage >= 200]).tolist()):
+    damaged = sample.damage.ravel()[np.flatnonzero(sample.damage >= 200)]
+    for value in (0, *np.unique(damaged).tolist()):
         mask = sample.damage == value if value else sample.damage > 0
         box = mask_box(mask)
         if box is not None:

@@ -7,6 +7,7 @@ labels are those of what is there, at the middle of the exposure.
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from fastgen.camera import View
@@ -14,7 +15,7 @@ from fastgen.sample import Frame
 from fastgen.scene import Camera, Color
 from fastgen.sensor.blur import blur_radius_px, defocused, moved
 from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
-from fastgen.sensor.light import displayed, light_of
+from fastgen.sensor.light import Light, displayed, light_of
 from fastgen.sensor.parts import Sensor, Weather
 from fastgen.sensor.weather import foggy, rained
 
@@ -30,12 +31,27 @@ def develop(frame: Frame, view: View, camera: Camera, weather: Weather, airlight
     airlight: mean light of the sky in the frame's exposure: that of fog, and of drops.
     """
     sensor = camera.sensor or Sensor()
-    light = light_of(frame.image)
-    sky = np.array(airlight, np.float32)
+    encoding = replace(Sensor(), stamp=sensor.stamp, jpeg_quality=sensor.jpeg_quality)
+    image = frame.image
+    if sensor != encoding or is_needed(replace(camera, sensor=None), weather):
+        light = _weathered(light_of(image), frame, view, weather, np.array(airlight, np.float32))
+        image = displayed(_exposed(light, frame, view, camera, sensor))
+    if sensor.stamp:
+        image = stamped(image, sensor.stamp)
+    if sensor.jpeg_quality:
+        image = through_jpeg(image, sensor.jpeg_quality)
+    return replace(frame, image=image)
+
+
+def _weathered(light: Light, frame: Frame, view: View, weather: Weather, sky: Light) -> Light:
     if weather.visibility_mm:
         light = foggy(light, _ray_m(frame, view), weather.visibility_mm, sky)
     if weather.rain:
         light = rained(light, frame.depth, view, weather.rain, sky)
+    return light
+
+
+def _exposed(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sensor) -> Light:
     width, _ = view.size
     if sensor.defocus:
         light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
@@ -44,18 +60,18 @@ def develop(frame: Frame, view: View, camera: Camera, weather: Weather, airlight
     gains = np.array(sensor.gains, np.float32) * np.float32(2.0**sensor.exposure_error_ev)
     if sensor.vignetting:
         light = light * falloff(view.size, sensor.vignetting)
-    light = light * gains
-    if sensor.noise:
-        light = noisy(light, sensor.noise)
-    image = displayed(light)
-    if sensor.stamp:
-        image = stamped(image, sensor.stamp)
-    if sensor.jpeg_quality:
-        image = through_jpeg(image, sensor.jpeg_quality)
-    return replace(frame, image=image)
+    if (gains != 1).any():
+        planes = zip(cv2.split(light), gains, strict=True)
+        light = np.asarray(cv2.merge([plane * gain for plane, gain in planes]))
+    return noisy(light, sensor.noise) if sensor.noise else light
 
 
 def _ray_m(frame: Frame, view: View) -> np.ndarray:
     """Distance along each pixel's ray, float32 [H, W]."""
-    _, rays = view.rays()
-    return np.asarray(frame.depth / (rays @ view.rotation[2]), np.float32)
+    if view.distortion:
+        _, rays = view.rays()
+        return np.asarray(frame.depth / (rays @ view.rotation[2]), np.float32)
+    (width, height), (x, y) = view.size, view.center_px
+    across = (np.arange(width, dtype=np.float32) + 0.5 - x) / view.focal_px
+    down = (np.arange(height, dtype=np.float32) + 0.5 - y) / view.focal_px
+    return np.asarray(frame.depth * np.sqrt(1 + across**2 + down[:, None] ** 2), np.float32)

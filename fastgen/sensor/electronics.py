@@ -40,7 +40,9 @@ def noisy(light: Light, noise: Noise) -> Light:
     variance = np.maximum(light, 0) * well + np.float32(noise.read_noise_e**2)
     spread = np.sqrt(variance, out=variance)
     spread *= rng.standard_normal(light.shape, np.float32)
-    return np.asarray(light + spread / well, np.float32)
+    spread /= well
+    spread += light
+    return np.asarray(spread, np.float32)
 
 
 def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:

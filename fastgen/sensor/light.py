@@ -4,6 +4,9 @@ Eight bits of display hold light to a hundredth where it is neither in the last 
 nor above white; what was clipped there comes back as _BRIGHTEST.
 """
 
+from typing import Any
+
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,31 +33,48 @@ _ENCODED = np.rint(
 
 def light_of(image: NDArray[np.uint8]) -> Light:
     """The light that `displayed` would show as an sRGB image uint8 [H, W, 3]."""
-    shown = _DECODED[image]
-    peak = np.minimum(shown.max(axis=2), _TOP)
-    bright = peak > _START
-    if bright.any():
-        new_peak = peak[bright][:, None]
-        old_peak = _ROOM**2 / (1 - new_peak) - _ROOM + _START
-        white = _DESATURATION * (old_peak - new_peak) + 1
-        part = np.minimum(shown[bright], new_peak)
-        shown[bright] = np.maximum((part - new_peak) * (old_peak * white / new_peak) + old_peak, 0)
-    low = shown.min(axis=2)
-    taken = np.where(low < 0.04, np.sqrt(low / np.float32(6.25)) - low, np.float32(0.04))
-    return np.asarray(shown + taken[..., None], np.float32)
+    red, green, blue = planes = cv2.split(image)
+    peak = cv2.max(cv2.max(red, green), blue)
+    scale, offset = _UNSHOWN_SCALE[peak], _UNSHOWN_OFFSET[peak]
+    low = _DECODED[cv2.min(cv2.min(red, green), blue)] * scale + offset
+    low = np.maximum(low, 0)
+    offset += np.where(low < 0.04, np.sqrt(low / np.float32(6.25)) - low, np.float32(0.04))
+    return _joined([np.maximum(_DECODED[plane] * scale + offset, 0) for plane in planes])
 
 
 def displayed(light: Light) -> NDArray[np.uint8]:
     """Light through the tone curve and sRGB's encoding, uint8 [H, W, 3]; below 0 is black."""
-    light = np.maximum(light, 0)
-    low = light.min(axis=2)
+    red, green, blue = planes = [np.maximum(plane, 0) for plane in cv2.split(light)]
+    low = cv2.min(cv2.min(red, green), blue)
     taken = np.where(low < 0.08, low - np.float32(6.25) * low * low, np.float32(0.04))
-    shown = light - taken[..., None]
-    peak = shown.max(axis=2)
-    bright = peak > _START
-    if bright.any():
-        old_peak = peak[bright][:, None]
-        new_peak = 1 - _ROOM**2 / (old_peak + _ROOM - _START)
-        keep = 1 / (old_peak * (_DESATURATION * (old_peak - new_peak) + 1))
-        shown[bright] = shown[bright] * (new_peak * keep) + (new_peak - new_peak * old_peak * keep)
-    return _ENCODED[np.rint(np.clip(shown, 0, 1) * 65535).astype(np.uint16)]
+    scale, offset = _shown(np.maximum(np.maximum(red, green), blue) - taken)
+    offset -= taken * scale
+    shown = [
+        np.clip(plane * scale + offset, 0, 1) * np.float32(65535) + np.float32(0.5)
+        for plane in planes
+    ]
+    return _joined([_ENCODED[plane.astype(np.uint16)] for plane in shown])
+
+
+def _shown(peak: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The tone curve's shoulder as a factor and a summand, by the brightest channel."""
+    # where that is below the start, the formula leaves everything as it is
+    old = np.maximum(peak, _START)
+    new = 1 - _ROOM**2 / (old + _ROOM - _START)
+    keep = 1 / (old * (_DESATURATION * (old - new) + 1))
+    return np.asarray(new * keep, np.float32), np.asarray(new - new * old * keep, np.float32)
+
+
+def _unshown() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The inverse of `_shown`, by the brightest channel's eight bits."""
+    new = np.clip(_DECODED, _START, _TOP)
+    old = _ROOM**2 / (1 - new) - _ROOM + _START
+    scale = old * (_DESATURATION * (old - new) + 1) / new
+    return np.asarray(scale, np.float32), np.asarray(old - new * scale, np.float32)
+
+
+_UNSHOWN_SCALE, _UNSHOWN_OFFSET = _unshown()
+
+
+def _joined(planes: list[NDArray[Any]]) -> NDArray[Any]:
+    return np.asarray(cv2.merge(planes))

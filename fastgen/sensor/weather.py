@@ -1,5 +1,6 @@
 """Fog and falling rain between the camera and what it sees, in linear light."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,8 +29,8 @@ def foggy(light: Light, ray_m: NDArray[np.float32], visibility_mm: float, airlig
     ray_m: float32 [H, W], distance along each ray, inf for the surroundings. airlight: [3].
     """
     distance = np.minimum(ray_m, _BACKDROP_M)
-    left = np.exp(-_CONTRAST * 1e3 / visibility_mm * distance)[..., None].astype(np.float32)
-    return np.asarray(airlight + left * (light - airlight), np.float32)
+    left = np.exp(np.float32(-_CONTRAST * 1e3 / visibility_mm) * distance)
+    return _mixed(light, airlight, 1 - left)
 
 
 def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, sky: Light) -> Light:
@@ -57,8 +58,13 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
     wide_px = size_mm * 1e-3 / z * view.focal_px
     share = np.minimum(size_mm * 1e-3 / (speed * rain.shutter_s), 1.0)
     cover = _streaks(start, fall_px, rain.wind, wide_px, share, z, depth_m)
-    cover = cover[..., None]
-    return np.asarray(light + cover * (_DROP_LIGHT * sky - light), np.float32)
+    return _mixed(light, _DROP_LIGHT * sky, cover)
+
+
+def _mixed(light: Light, other: Light, share: NDArray[np.float32]) -> Light:
+    """Light [H, W, 3] and `other` [3], of which each pixel gets its `share` [H, W]."""
+    planes = zip(cv2.split(light), other, strict=True)
+    return np.asarray(cv2.merge([plane + share * (one - plane) for plane, one in planes]))
 
 
 def _streaks(

@@ -1,0 +1,60 @@
+"""The sky behind the container, against rays into the environment's map."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen import Generator
+from fastgen.camera import view_of
+from fastgen.prefilter import sample_octahedral
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(seed=5, size=(160, 96)) as made:
+        yield made
+
+
+def displayed(radiance):
+    """Exposed radiance [..., 3] to sRGB 0..255: Khronos PBR Neutral, section 2; IEC 61966-2-1."""
+    low = radiance.min(axis=-1, keepdims=True)
+    color = radiance - np.where(low < 0.08, low - 6.25 * low**2, 0.04)
+    peak = color.max(axis=-1, keepdims=True)
+    start, d = 0.76, 0.24
+    new_peak = 1 - d * d / np.maximum(peak + d - start, d)
+    shrunk = color * new_peak / np.maximum(peak, start)
+    white = 1 - 1 / (0.15 * (peak - new_peak) + 1)
+    color = np.where(peak < start, color, shrunk * (1 - white) + new_peak * white)
+    curve = 1.055 * np.maximum(color, 1e-9) ** (1 / 2.4) - 0.055
+    return 255 * np.where(color <= 0.0031308, 12.92 * color, curve)
+
+
+# ahead, straight up and down, and across the map's seams; most of the container out of sight
+@pytest.mark.parametrize("toward", [(1, 0.2, 0.1), (0, 0.01, 1), (-1, -1, -0.3), (0.02, 1, -3)])
+@pytest.mark.parametrize("roll_deg", [0.0, 37.0])
+def test_the_sky_is_the_environment_along_each_pixels_ray(generator, toward, roll_deg):
+    scene = generator.scene(2)
+    eye = np.array([9000.0, 7000.0, 1500.0])
+    camera = replace(
+        scene.cameras[0],
+        position_mm=tuple(eye),
+        target_mm=tuple(eye + 1000 * np.array(toward)),
+        focal_mm=18.0,
+        roll_deg=roll_deg,
+    )
+    sample = generator.render(scene=scene, camera=camera)
+    _, rays = view_of(camera, generator.size).rays()
+    yaw = np.deg2rad(scene.environment.yaw_deg)
+    turn = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
+    light = generator._light(scene.environment.name)
+    directions = (rays @ turn.T).reshape(-1, 3)
+    radiance = sample_octahedral(light.background.astype(np.float32), directions)
+    radiance = radiance.reshape(rays.shape)
+    expected = displayed(generator.exposure(scene, camera) * radiance)
+    # pixels beside the container hold some of it
+    sky = cv2.erode((sample.ids == 0).astype(np.uint8), np.ones((5, 5))) > 0
+    assert sky.mean() > 0.3
+    # the map on the GPU has nine bits a channel
+    assert np.abs(sample.image[sky] - expected[sky]).max() < 2.5

@@ -1,0 +1,114 @@
+"""The sun taken out of an environment, and its shadow, against integrals and rays."""
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from fastgen.container import build_container
+from fastgen.environment import irradiance_at, load_environment, prefilter_environment
+from fastgen.gl import open_context
+from fastgen.openness import probe_points
+from fastgen.programs import link
+from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
+from fastgen.sun import split_sun
+from fastgen.sun_shadow import MAP_SIZE, ShadowMap
+from tests.sky_samples import even_directions, texel_grid
+from tests.test_environment import write_exr
+
+TOWARD = np.array([0.6, -0.64, 0.48])
+RADIUS = np.deg2rad(0.9)
+DISC = np.array([9000.0, 8000.0, 6000.0])
+
+
+def sunny(height=512):
+    """A sky that brightens upward and to the sun, and a disc of constant radiance."""
+    direction, solid_angle = texel_grid(height)
+    sky = 1.0 + 0.5 * direction[..., 2:] + np.exp((direction @ TOWARD - 1)[..., None] / 0.01)
+    sky = sky * np.array([0.5, 0.7, 1.0])
+    disc = np.arccos(np.clip(direction @ TOWARD, -1, 1)) < RADIUS
+    return (sky + disc[..., None] * DISC).astype(np.float32), direction, solid_angle, disc
+
+
+def test_direction_light_and_radius_of_a_known_sun_are_found():
+    radiance, _, solid_angle, disc = sunny()
+    sun, rest = split_sun(radiance)
+    assert sun is not None
+    assert np.degrees(np.arccos(sun.direction @ TOWARD)) < 0.05
+    np.testing.assert_allclose(sun.light, DISC * solid_angle[disc].sum() / np.pi, rtol=0.01)
+    assert sun.radius == pytest.approx(RADIUS, rel=0.05)
+    assert rest.max() < 5
+
+
+def test_sun_and_rest_together_light_surfaces_as_the_whole_does():
+    radiance, direction, solid_angle, _ = sunny()
+    light = prefilter_environment("sunny", radiance)
+    assert light.sun is not None
+    normals = even_directions(40)
+    cosine = np.maximum(direction.reshape(-1, 3) @ normals.T, 0) * solid_angle.reshape(-1, 1)
+    expected = cosine.T @ radiance.reshape(-1, 3) / np.pi
+    np.testing.assert_allclose(irradiance_at(light, normals), expected, rtol=0.02)
+
+
+def test_an_even_sky_and_a_broad_lamp_have_no_sun():
+    direction, _ = texel_grid(256)
+    lamp = 50 * np.exp((direction @ TOWARD - 1)[..., None] / 0.02) * np.ones(3)
+    for radiance in (np.ones_like(lamp), np.zeros_like(lamp), 0.1 + lamp):
+        sun, rest = split_sun(radiance.astype(np.float32))
+        assert sun is None
+        np.testing.assert_array_equal(rest, radiance.astype(np.float32))
+
+
+def test_the_sun_comes_back_from_the_cache(tmp_path):
+    file = write_exr(tmp_path / "sunny.exr", sunny(128)[0])
+    first = load_environment(file, tmp_path / "cache")
+    assert first.sun is not None
+    assert load_environment(file, tmp_path / "cache").sun == first.sun
+
+
+@pytest.fixture(scope="module")
+def gl():
+    with open_context() as made:
+        yield made
+
+
+@pytest.mark.parametrize("toward", [(0.55, -0.6, 0.58), (0.8, -0.58, 0.14)])
+def test_shadows_of_the_spreader_are_those_of_rays(gl, toward):
+    """On all sheets that face the sun, high or low: the map says what Embree says."""
+    toward = np.array(toward) / np.linalg.norm(toward)
+    container, spreader = build_container("20"), build_spreader("20")
+    program = link(gl.ctx, "occluder.vert", "occluder.frag", {})
+    shadow = ShadowMap(gl.ctx, program, container, spreader, toward)
+    depth = np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(MAP_SIZE[::-1])
+
+    lit = np.flatnonzero(container.normals @ toward > 0.1)
+    picked = np.random.default_rng(0).choice(lit, 3000, replace=False)
+    points = probe_points(container)[picked]
+    eye_m = np.array([3.0, -9.0, 2.0])
+    matrix = shadow.from_ray(eye_m)
+    at = (points / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
+    column, row = (at[:, :2] * MAP_SIZE).astype(int).T
+    found = at[:, 2] <= depth[row, column]
+
+    # around each point too: within a texel of a shadow's border the map may say either
+    aside = np.cross(container.normals[picked], toward)
+    steps = (aside, np.cross(container.normals[picked], aside))
+    around = [np.zeros(3), *(sign * 10 * step for sign in (-1, 1) for step in steps)]
+    rays = np.concatenate([points + step for step in around])
+    free = np.ones(len(rays), bool)
+    solid = tier_of_vertices(spreader) != CABLE_TIER
+    for mesh, kept in (
+        (container, slice(None)),
+        (spreader, solid[spreader.triangles[:, 0]]),
+    ):
+        triangles = mesh.triangles.astype(np.int64)[kept]
+        body = trimesh.Trimesh(mesh.positions_mm, triangles, process=False)
+        free &= ~RayMeshIntersector(body).intersects_any(rays, np.tile(toward, (len(rays), 1)))
+    free = free.reshape(len(around), -1)
+    # what lies within another part is seen by nobody
+    body = trimesh.Trimesh(container.positions_mm, container.triangles.astype(np.int64))
+    buried = RayMeshIntersector(body).intersects_any(points, container.normals[picked])
+    clear = (free == free[0]).all(axis=0) & ~buried
+    assert 0.05 < free[0, clear].mean() < 0.95
+    assert (found == free[0])[clear].mean() > 0.98
+    shadow.release()
