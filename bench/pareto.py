@@ -104,8 +104,8 @@ VARIANTS = (
     Variant("balanced, no noise layers", absent=LAYERS),
     Variant("balanced, no reflections", absent=("reflections altogether",)),
     Variant("balanced, coarse mesh", patches=_coarse_mesh),
-    Variant("balanced, light maps of half the side", patches=_light_maps(0.5)),
-    Variant("balanced, light maps of twice the side", patches=_light_maps(2.0)),
+    Variant("balanced, half light maps", patches=_light_maps(0.5)),
+    Variant("balanced, double light maps", patches=_light_maps(2.0)),
 )
 
 
