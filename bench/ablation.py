@@ -43,17 +43,25 @@ Array = NDArray[np.floating]
 
 
 class Drawer:
-    """Draws scenes with or without an element; a context manager over a generator of its own."""
+    """Draws scenes without an element; a context manager over a generator of its own.
 
-    def __init__(self, absence: Absence) -> None:
+    whole: draws with everything in; where only the scene differs, its generator does for both.
+    """
+
+    def __init__(self, absence: Absence, whole: "Drawer | None" = None) -> None:
         self._absence = absence
-        self._generator = Generator(Config.preset(), SEED, SIZE, quality=QUALITY)
+        self._shared = whole is not None and absence.element.scene is not None
+        if whole is not None and self._shared:
+            self._generator = whole._generator
+        else:
+            self._generator = Generator(Config.preset(), SEED, SIZE, quality=QUALITY)
 
     def __enter__(self) -> "Drawer":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._generator.close()
+        if not self._shared:
+            self._generator.close()
 
     def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
         """The case's view of the scene."""
@@ -118,7 +126,7 @@ def without(
     """The row of an element."""
     absence = Absence(element)
     changes, visible, farther, saved = [], [], [], []
-    with Drawer(absence) as less:
+    with Drawer(absence, full) as less:
         for whole in wholes:
             case, scene = whole.case, whole.reference.scene
             part = less.frame(case, scene, size).image / 255.0

@@ -64,7 +64,9 @@ class Absence:
             yield renderer, "build_container", _built(renderer.build_container, element.container)
         if element.spreader:
             yield renderer, "build_spreader", _built(renderer.build_spreader, element.spreader)
-        yield openness.SkyProbe, "openness", _probe(element.open_sky)
+        probe = openness.SkyProbe
+        yield probe, "openness", _probe(probe.openness, element.open_sky)
+        yield probe, "openness_of_spreader", _probe(probe.openness_of_spreader, element.open_sky)
 
     def _edited(self, expand: Callable[..., str]) -> Callable[..., str]:
         def edited(*args: Any, **kwargs: Any) -> str:
@@ -98,15 +100,16 @@ def _all_open(mesh: Mesh) -> bytes:
     return openness.encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
 
 
-def _probe(open_sky: bool) -> Callable[..., bytes]:
-    """In place of SkyProbe.openness: that of the unedited meshes, or no occlusion at all."""
-    measured = openness.SkyProbe.openness
+def _probe(measured: Callable[..., bytes], open_sky: bool) -> Callable[..., bytes]:
+    """In place of a method of SkyProbe that gives the first mesh's openness beside the second: what
+    it finds for the unedited meshes, or no occlusion at all."""
 
-    def found(self: openness.SkyProbe, container: Mesh, spreader: Mesh | None) -> bytes:
+    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None) -> bytes:
         if open_sky:
-            return _all_open(container)
-        source = _SOURCES.get(container, container)
-        return measured(self, source, _SOURCES.get(spreader, spreader) if spreader else None)
+            return _all_open(mesh)
+        return measured(
+            self, _SOURCES.get(mesh, mesh), _SOURCES.get(other, other) if other else None
+        )
 
     return found
 
@@ -192,6 +195,16 @@ ELEMENTS = (
     Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),
     Element("shape", "spreader: twist locks", spreader=without_charts(".locks.")),
     Element("light", "occlusion of the sky", open_sky=True),
+    Element(
+        "light",
+        "shadow of the sun",
+        text=(
+            (
+                "float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);",
+                "float share = 1.0;",
+            ),
+        ),
+    ),
     Element(
         "light",
         "bounces in occluded places",

@@ -71,7 +71,7 @@ class Variant:
 
 def _coarse_mesh() -> Patches:
     build = renderer.build_container
-    return [(renderer, "build_container", lambda kind, profiles: build(kind, profiles, 2000.0))]
+    return [(renderer, "build_container", lambda *kind: build(*kind, max_edge_mm=2000.0))]
 
 
 def _light_maps(scale: float) -> Callable[[], Patches]:
@@ -100,11 +100,12 @@ VARIANTS = (
     Variant("draft, no occlusion", "draft", (OCCLUSION,)),
     Variant("balanced, no occlusion", absent=(OCCLUSION,)),
     Variant("high, no occlusion", "high", (OCCLUSION,)),
+    Variant("balanced, no shadow of the sun", absent=("shadow of the sun",)),
     Variant("balanced, no noise layers", absent=LAYERS),
     Variant("balanced, no reflections", absent=("reflections altogether",)),
     Variant("balanced, coarse mesh", patches=_coarse_mesh),
-    Variant("balanced, light maps of half the side", patches=_light_maps(0.5)),
-    Variant("balanced, light maps of twice the side", patches=_light_maps(2.0)),
+    Variant("balanced, half light maps", patches=_light_maps(0.5)),
+    Variant("balanced, double light maps", patches=_light_maps(2.0)),
 )
 
 

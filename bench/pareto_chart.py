@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.ticker import FormatStrFormatter, NullLocator
 
 MARKS = {
     "fastgen": ("o", "#c4441f"),
@@ -35,14 +36,15 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 
 def draw(points: Sequence[Point], caption: str, path: Path) -> None:
-    """Write the chart as PNG; both axes logarithmic, better is down and to the right."""
-    figure, axes = plt.subplots(figsize=(10, 6))
+    """Write the chart as PNG: all points on logarithmic axes, and ours again, named, beside them.
+    Better is down and to the right."""
+    figure, (whole, near) = plt.subplots(1, 2, figsize=(13, 6.5), width_ratios=(3, 2))
     best = front(points)
-    axes.plot(
+    whole.plot(
         [p.rate for p in best],
         [p.error for p in best],
         color="#999999",
-        lw=6,
+        lw=7,
         alpha=0.35,
         solid_capstyle="round",
         label="Pareto front",
@@ -52,57 +54,55 @@ def draw(points: Sequence[Point], caption: str, path: Path) -> None:
         mine = [p for p in points if p.renderer == renderer]
         if not mine:
             continue
+        line = "-" if renderer.startswith("Cycles") else "none"
         rates, errors = [p.rate for p in mine], [p.error for p in mine]
-        line = "-" if renderer.startswith("Cycles") else ""
-        axes.plot(rates, errors, line, marker=marker, color=color, label=renderer, ms=6, lw=1.2)
-        for point in mine:
-            if renderer.startswith("Cycles"):
-                axes.annotate(
-                    point.setting,
-                    (point.rate, point.error),
-                    xytext=(4, 5),
-                    textcoords="offset points",
-                    fontsize=7,
-                    color=color,
-                )
-    _name_ours([p for p in points if p.renderer == "fastgen"], axes)
-    axes.set(xscale="log", yscale="log")
-    axes.set_xlabel(f"labelled images a second of one core (Cycles: colour only)\n{caption}")
-    axes.set_ylabel("FLIP of container and spreader against Cycles at 1,024 samples")
+        whole.plot(rates, errors, ls=line, marker=marker, color=color, label=renderer, ms=6, lw=1.2)
+        if renderer.startswith("Cycles"):
+            for point in mine:
+                _note(whole, point, point.setting, color)
+    whole.set(xscale="log", yscale="log")
+    whole.set_xlabel(f"images a second of one core (Cycles: colour only)\n{caption}")
+    whole.set_ylabel("FLIP of objects against Cycles at 1,024 samples")
     ticks = [0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7]
     low, high = min(p.error for p in points) / 1.2, max(p.error for p in points) * 1.2
     shown = [tick for tick in ticks if low < tick < high]
-    axes.set_yticks(shown, [f"{tick:g}" for tick in shown])
-    axes.yaxis.set_minor_locator(plt.NullLocator())
-    axes.set_ylim(low, high)
-    axes.grid(alpha=0.3)
-    axes.legend(loc="upper left", title="numbers: samples a pixel")
+    whole.set_yticks(shown, [f"{tick:g}" for tick in shown])
+    whole.yaxis.set_minor_locator(NullLocator())
+    whole.set_ylim(low, high)
+    whole.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    whole.grid(alpha=0.3)
+    whole.legend(loc="upper left", title="numbers: samples a pixel", fontsize=9)
+    _name_ours([p for p in points if p.renderer == "fastgen"], near)
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=100)
     plt.close(figure)
 
 
+def _note(axes: plt.Axes, point: Point, text: str, color: str) -> None:
+    axes.annotate(
+        text,
+        (point.rate, point.error),
+        xytext=(5, 4),
+        textcoords="offset points",
+        fontsize=8,
+        color=color,
+    )
+
+
 def _name_ours(points: Sequence[Point], axes: plt.Axes) -> None:
-    """The settings as a list in an inset that shows their cluster larger."""
-    if not points:
-        return
-    inset = axes.inset_axes((0.44, 0.6, 0.55, 0.38))
+    """Numbered points with their settings below; linear axes."""
     marker, color = MARKS["fastgen"]
     ranked = sorted(points, key=lambda p: p.error)
     for number, point in enumerate(ranked, 1):
-        inset.plot(point.rate, point.error, marker=marker, color=color, ms=5)
-        inset.annotate(
-            str(number),
-            (point.rate, point.error),
-            xytext=(4, 3),
-            textcoords="offset points",
-            fontsize=7,
-        )
-    rates = [p.rate for p in points]
-    inset.set_xlim(min(rates) * 0.95, max(rates) + 1.3 * (max(rates) - min(rates)))
-    inset.margins(y=0.12)
-    inset.tick_params(labelsize=6)
-    names = "\n".join(f"{i} {p.setting}" for i, p in enumerate(ranked, 1))
-    inset.text(0.99, 0.97, names, transform=inset.transAxes, fontsize=6.5, va="top", ha="right")
-    inset.set_title("fastgen", fontsize=8, color=color)
+        axes.plot(point.rate, point.error, marker=marker, color=color, ms=6)
+        _note(axes, point, str(number), "black")
+    names = [f"{number}  {point.setting}" for number, point in enumerate(ranked, 1)]
+    half = -(-len(names) // 2)
+    columns = ["\n".join(names[:half]), "\n".join(names[half:])]
+    for x, text in zip((0.0, 0.56), columns, strict=True):
+        axes.text(x, -0.16, text, transform=axes.transAxes, fontsize=8, va="top")
+    axes.set_title("fastgen alone", fontsize=10, color=color)
+    axes.set_xlabel("labelled images a second of one core")
+    axes.margins(0.1)
+    axes.grid(alpha=0.3)

@@ -127,7 +127,9 @@ def test_front_holds_exactly_the_points_that_none_beats():
 def test_every_text_that_an_ablation_changes_stands_in_a_shader():
     shaders = ("shade.frag", "shade_listed.comp")
     text = "".join(
-        programs.expand(shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class)
+        programs.expand(
+            shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class, sun=True
+        )
         for name in shaders
         for pixel_class in ("plain", "mixed_decal")
     )
