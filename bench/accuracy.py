@@ -1,298 +1,259 @@
 """How far are the images from a path tracer's?
 
-    python bench/accuracy.py --blender-python PYTHON [--scenes 8] [--size 320x320] [--samples 256]
+    python bench/accuracy.py [--cases 32] [--qualities draft,balanced,high]
 
-Exports each scene (`fastgen export`), renders the file with Cycles (bench/path_traced.py; PYTHON is
-a Python 3.11 with bpy==4.5.15), applies the same exposure and tone curve to its linear radiance and
-compares with the rasterizer's image: FLIP, SSIM and PSNR over the whole image and over the pixels
-of the container and its spreader. Cycles' own noise is the same measure between two of its renders
-of different seeds. Before that, silhouettes and depths through the pixel centres must coincide.
-References are kept in bench/references and made again only where scene, size, samples or seed
-differ.
+Renders the 32 cases of bench/references at every quality and compares with what Cycles made of the
+same exported scenes at 1,024 samples, under the same light, exposure, tone curve and pixel filter:
+FLIP, SSIM and PSNR over the whole image and over the pixels of the container and its spreader.
+Before that, silhouettes and depths through the pixel centres must coincide. Beside it stand Cycles'
+own noise (the same measure between two of its renders of different seeds) and, for each quality, at
+how many samples Cycles is as far from the reference as we are, and what that takes it.
 
-Also needs what `pip install '.[accuracy]'` brings.
+Needs no Blender; `--blender-python PYTHON` traces what is missing, see trace_references.py.
+Leaves its tables in docs/accuracy.md, bench/results/accuracy.json, docs/accuracy.jpg, and a picture
+a case in --out. Also needs what `pip install '.[accuracy]'` brings.
 """
 
 import argparse
-import hashlib
 import os
 import subprocess
+import sys
+import time
 from collections import defaultdict
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import cv2
-import flip_evaluator
 import numpy as np
-import OpenEXR
+from cycles_figures import Figures, equal_samples
+from error_pictures import contact_picture, picture, write_picture
+from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
+from reference_set import DEPTH_STEP, FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator
-from fastgen.environment import bundled_hdris, find_hdris
-from fastgen.export import export_glb
-from fastgen.programs import SPREADER_ID
 from fastgen.sample import Sample
 
-CAMERAS = ("A", "B", "Cl", "Cr")
 MIN_COINCIDENCE = 0.999
-STEP_M = 0.15
-OCCLUDED = 0.8  # ambient occlusion below this is a corner or the valley of a wave
+REPEATS = 3
+CONTACT_CASES = 8
 
 Array = NDArray[np.floating]
 
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """A Cycles render, [H, W, ...]. radiance: linear, no exposure. openness: ambient occlusion,
-    1 in the open. inside: what the rays through pixel centres hit; depth_m: how far along the
-    axis."""
-
-    radiance: Array
-    openness: Array
-    inside: NDArray[np.bool_]
-    depth_m: Array
-
-
-def neutral_tone(color: Array) -> Array:
-    """Khronos PBR Neutral tone curve, twin of shaders/tone.glsl; linear [..., 3] in and out."""
-    start, desaturation = 0.8 - 0.04, 0.15
-    low = color.min(axis=-1, keepdims=True)
-    color = color - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
-    peak = color.max(axis=-1, keepdims=True)
-    d = 1.0 - start
-    new_peak = 1.0 - d * d / (np.maximum(peak, start) + d - start)
-    bright = color * new_peak / np.maximum(peak, start)
-    share = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0)
-    return np.where(peak < start, color, bright + share * (new_peak - bright))
-
-
-def srgb_encode(color: Array) -> Array:
-    """Linear [..., 3] in 0..1 to sRGB in 0..1 (IEC 61966-2-1)."""
-    color = np.clip(color, 0.0, 1.0)
-    curve = 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.where(color <= 0.0031308, 12.92 * color, curve)
-
-
-def srgb_decode(color: Array) -> Array:
-    """sRGB [..., 3] in 0..1 to linear in 0..1."""
-    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
-
-
-class References:
-    """Cycles renders of exported scenes, kept in a folder."""
-
-    def __init__(self, folder: Path, python: Path | None, samples: int) -> None:
-        self._folder = folder
-        self._python = python
-        self._samples = samples
-        folder.mkdir(parents=True, exist_ok=True)
-
-    def get(self, glb: Path, camera: str, hdri: Path, seed: int) -> Reference:
-        """The reference of an exported file, rendered if it is not there yet."""
-        digest = hashlib.sha256(glb.read_bytes() + hdri.read_bytes())
-        tracer = Path(__file__).with_name("path_traced.py")
-        digest.update(tracer.read_bytes())
-        digest.update(f"{camera} {self._samples} {seed}".encode())
-        kept = self._folder / f"{digest.hexdigest()[:24]}.npz"
-        if not kept.exists():
-            image = self._run(glb, camera, hdri, seed, [])
-            center = self._run(glb, camera, hdri, seed, ["--centers"])
-            radiance = np.stack([image[f"Combined.{c}"] for c in "RGB"], axis=-1)
-            aside = kept.with_suffix(".part.npz")
-            np.savez_compressed(
-                aside,
-                radiance=radiance,
-                openness=image["AO.R"],
-                inside=center["IndexOB.X"] > 0.5,
-                depth_m=center["Depth.Z"],
-            )
-            aside.replace(kept)
-        with np.load(kept) as stored:
-            return Reference(**stored)
-
-    def _run(
-        self, glb: Path, camera: str, hdri: Path, seed: int, more: list[str]
-    ) -> dict[str, Array]:
-        if self._python is None:
-            raise SystemExit("a reference is missing: give --blender-python, see --help")
-        out = self._folder / "new.exr"
-        tracer = Path(__file__).with_name("path_traced.py")
-        command = [self._python, tracer, glb, "--camera", camera, "--hdri", hdri, "-o", out, *more]
-        command += ["--samples", str(self._samples), "--seed", str(seed)]
-        subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
-        channels = OpenEXR.File(str(out), separate_channels=True).channels()
-        out.unlink()
-        return {name.removeprefix("ViewLayer."): c.pixels for name, c in channels.items()}
+GROUPS: dict[str, Callable[[Case], str]] = {
+    "camera": lambda case: case.camera,
+    "light": lambda case: case.light,
+    "damage": lambda case: "damaged" if case.damaged else "sound",
+    "rust": lambda case: "rusty" if case.rusty else "clean",
+}
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
-    """Two sRGB images in 0..1, [H, W, 3], and their difference by pixel."""
+class Result:
+    """A case at one quality. measures: as Comparison.both gives them; parts: by part of the image,
+    pixels, their sum of FLIP and the median of stops by which ours is brighter; seconds: processor
+    time of a labelled image; panels: ours, the reference's and FLIP."""
 
-    flip_map: Array
-    similarity_map: Array
-    squared: Array
-
-    @staticmethod
-    def of(reference: Array, test: Array) -> "Comparison":
-        """Compare `test` with `reference`. Andersson et al. 2020, FLIP; at its default viewing
-        distance, 67 pixels a degree."""
-        a, b = reference.astype(np.float32), test.astype(np.float32)
-        flip_map, _, _ = flip_evaluator.evaluate(a, b, "LDR", applyMagma=False)
-        _, similarity = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
-        return Comparison(flip_map[..., 0], similarity.mean(axis=2), ((a - b) ** 2).mean(axis=2))
-
-    def measures(self, where: NDArray[np.bool_]) -> tuple[float, float, float]:
-        """Mean FLIP, SSIM, and PSNR in dB over a mask [H, W]."""
-        psnr = -10 * np.log10(max(float(self.squared[where].mean()), 1e-12))
-        return float(self.flip_map[where].mean()), float(self.similarity_map[where].mean()), psnr
+    case: Case
+    measures: tuple[float, ...]
+    parts: dict[str, tuple[int, float, float]]
+    seconds: float
+    panels: tuple[Array, Array, Array]
 
 
-def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:
-    """Pixels beside a change of object, or a step in depth larger than a wall's waves."""
-    near = np.where(np.isfinite(depth_m), depth_m, 1e3)
-    found = np.zeros(ids.shape, bool)
-    for axis in (0, 1):
-        step = (np.abs(np.diff(near, axis=axis)) > STEP_M) | (
-            np.diff(ids.astype(int), axis=axis) != 0
-        )
-        for side in ((1, 0), (0, 1)):
-            pad = [(0, 0), (0, 0)]
-            pad[axis] = side
-            found |= np.pad(step, pad)
-    return found
-
-
-def stops_over(test: Array, reference: Array) -> float:
-    """Median stops by which displayed linear light of pixels [N, 3] exceeds the reference's."""
-    if not len(test):
-        return float("nan")
-    light, expected = (srgb_decode(image).mean(axis=-1) + 1e-4 for image in (test, reference))
-    return float(np.median(np.log2(light / expected)))
-
-
-def picture(test: Array, reference: Array, error: Array) -> NDArray[np.uint8]:
-    """Ours, Cycles', FLIP from black to white at 0.5, and who is brighter (red: we are)."""
-    signed = (test - reference).mean(axis=2)
-    lean = np.stack([np.maximum(signed, 0), np.zeros_like(signed), np.maximum(-signed, 0)], axis=2)
-    flat = np.repeat(np.clip(error * 2, 0, 1)[..., None], 3, axis=2)
-    row = np.hstack([test, reference, flat, np.clip(lean * 4, 0, 1)])
-    return np.asarray(row * 255 + 0.5, np.uint8)[..., ::-1]
-
-
-def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
-    """Masks [H, W] of the parts of an image in which errors have causes of their own."""
+def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[float, float]:
+    """Share of pixels whose silhouette coincides, and the 99 % quantile of depth error in mm."""
     inside = sample.ids > 0
-    edges = borders(sample.ids, sample.depth)
-    plain = inside & ~edges & (sample.ids == 1)
-    return {
-        "sky": ~inside & ~edges,
-        "edges": edges,
-        "markers and text": ~edges & (sample.ids > 1) & (sample.ids < SPREADER_ID),
-        "spreader": ~edges & (sample.ids == SPREADER_ID),
-        "open sheet": plain & (openness >= OCCLUDED),
-        "occluded sheet": plain & (openness < OCCLUDED),
+    same = float((inside == reference.inside).mean())
+    if same < MIN_COINCIDENCE:
+        raise SystemExit(
+            f"case {case.number}: {1 - same:.2%} of pixels see another object than the reference: "
+            "the geometry has changed; delete its files in bench/references and trace it again"
+        )
+    step = (slice(None, None, DEPTH_STEP),) * 2
+    both = inside[step] & np.isfinite(reference.depth_m)
+    apart_m = np.abs(sample.depth[step][both] - reference.depth_m[both])
+    return same, float(np.quantile(apart_m, 0.99)) * 1e3
+
+
+def compared(
+    generator: Generator, case: Case, reference: Reference, filter_name: str, sample: Sample
+) -> Result:
+    """The measures of `sample`, and the time that another one like it takes."""
+    scene, camera = reference.scene, reference.scene.camera(case.camera)
+    exposure = generator.exposure(scene, camera)
+    expected = displayed(reference.radiance[filter_name], exposure)
+    ours = sample.image / 255.0
+    error = Comparison.of(expected, ours)
+    parts = {
+        part: (
+            int(mask.sum()),
+            float(error.flip_map[mask].sum()),
+            stops_over(ours[mask], expected[mask]),
+        )
+        for part, mask in divided(sample, reference.openness).items()
     }
+    spent = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        generator.render(scene=scene, camera=camera)
+        spent.append(time.process_time() - began)
+    return Result(
+        case, error.both(reference.inside), parts, min(spent), (ours, expected, error.flip_map)
+    )
 
 
-def table(title: str, rows: list[tuple[float, ...]]) -> None:
-    """Print the mean and the worst of (FLIP, SSIM, PSNR) whole and object, a row a scene."""
+def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
+    """Every case at a quality, and a line on how geometry coincides."""
+    found, same, apart = [], [], []
+    with Generator(Config.preset(), SEED, SIZE, quality=quality) as generator:
+        for case in chosen:
+            reference = load(case.number)
+            sample = generator.render(scene=reference.scene, camera=case.camera)
+            coincide, apart_mm = check_geometry(case, reference, sample)
+            same.append(coincide)
+            apart.append(apart_mm)
+            found.append(compared(generator, case, reference, FILTERS[quality], sample))
+    coincidence = (
+        f"{quality}: silhouettes coincide in {np.mean(same):.4%} of pixels (least "
+        f"{min(same):.3%}), 99 % of depths to {np.median(apart):.2f} mm (worst {max(apart):.2f})"
+    )
+    return found, coincidence
+
+
+def row(title: str, rows: list[tuple[float, ...]]) -> str:
+    """A line of mean (worst) FLIP, SSIM and PSNR of the whole image, then of objects."""
     values = np.array(rows)
     worst = [values[:, i].max() if i % 3 == 0 else values[:, i].min() for i in range(6)]
-    lines = (
-        [("mean", values.mean(axis=0)), ("worst", worst)] if len(rows) > 1 else [("", values[0])]
-    )
-    for name, six in lines:
-        words = [f"{v:7.2f}" if i % 3 == 2 else f"{v:7.4f}" for i, v in enumerate(six)]
-        print(f"{title:8s} {name:5s}  whole {' '.join(words[:3])}   object {' '.join(words[3:])}")
+    digits = (3, 3, 1, 3, 3, 1)
+    cells = [
+        f"{mean:.{n}f} ({bad:.{n}f})"
+        for mean, bad, n in zip(values.mean(axis=0), worst, digits, strict=True)
+    ]
+    return f"| {title} | " + " | ".join(cells) + " |"
+
+
+def overall(results: dict[str, list[Result]], figures: Figures) -> list[str]:
+    """A row a quality, then what Cycles' own noise amounts to."""
+    columns = [f"{m}, {where}" for where in ("whole", "objects") for m in ("FLIP", "SSIM", "PSNR")]
+    lines = ["| mean (worst) | " + " | ".join(columns) + " |", "| --- |" + " --- |" * 6]
+    lines += [row(name, [result.measures for result in r]) for name, r in results.items()]
+    for name in sorted(set(FILTERS.values())):
+        rows = figures.floor_rows(name)
+        if rows:
+            lines.append(row(f"Cycles against itself, {name} ({len(rows)} cases)", rows))
+    return lines
+
+
+def by_group(results: dict[str, list[Result]]) -> list[str]:
+    """Mean (worst) object FLIP of each group of cases, a column a quality."""
+    lines = ["| object FLIP, mean (worst) | cases | " + " | ".join(results) + " |"]
+    lines.append("| --- |" + " --- |" * (len(results) + 1))
+    for group in GROUPS.values():
+        first = next(iter(results.values()))
+        for name in dict.fromkeys(group(result.case) for result in first):
+            cells = []
+            for listed in results.values():
+                flips = [r.measures[3] for r in listed if group(r.case) == name]
+                cells.append(f"{np.mean(flips):.3f} ({max(flips):.3f})")
+            lines.append(f"| {name} | {len(flips)} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def by_part(quality: str, listed: list[Result]) -> list[str]:
+    """Where in the images the error lies."""
+    shares: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    for result in listed:
+        for part, values in result.parts.items():
+            shares[part].append(values)
+    totals = np.array([[p[:2] for p in values] for values in shares.values()]).sum(axis=(0, 1))
+    lines = [f"| part of the image, {quality} | of pixels | of error | FLIP | brighter, stops |"]
+    lines.append("| --- | --- | --- | --- | --- |")
+    for part, values in shares.items():
+        pixels, error, stops = np.array(values).T
+        lines.append(
+            f"| {part} | {pixels.sum() / totals[0]:.1%} | {error.sum() / totals[1]:.1%} | "
+            f"{error.sum() / max(pixels.sum(), 1):.3f} | {np.nanmean(stops):+.2f} "
+            f"({np.nanmin(stops):+.2f} to {np.nanmax(stops):+.2f}) |"
+        )
+    return lines
+
+
+def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
+    """'As accurate as Cycles at N samples' of each quality, over the cases that have a series."""
+    columns = ("quality", "pixels", "FLIP", "core-ms")
+    columns += ("as Cycles at", "which takes", "denoised at", "which takes")
+    lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 7]
+    for quality, listed in results.items():
+        timed = [r for r in listed if r.case.number in figures.series]
+        numbers = [r.case.number for r in timed]
+        seconds = float(np.mean([r.seconds for r in timed]))
+        for where, column in (("whole image", 0), ("objects", 3)):
+            error = float(np.mean([r.measures[column] for r in timed]))
+            cells = [quality, where, f"{error:.3f}", f"{seconds * 1e3:.0f}"]
+            for way in ("spp", "denoised"):
+                equal = equal_samples(figures.curve(numbers, way, column), error)
+                cells += [f"{equal.words} samples", f"{equal.seconds / seconds:.0f} times as long"]
+            lines.append("| " + " | ".join(cells) + " |")
+    return lines
 
 
 def main() -> None:
-    """Print the measures of each scene and over all, and write a picture a scene."""
+    """Print the tables and write the pictures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--scenes", type=int, default=8)
-    parser.add_argument("--seed", type=int, default=3)
-    parser.add_argument("--size", default="320x320")
-    parser.add_argument("--samples", type=int, default=256)
-    parser.add_argument("--noise-scenes", type=int, default=2, help="how many to render twice")
-    parser.add_argument("--quality", default="balanced")
+    parser.add_argument("--cases", type=int, default=len(cases()))
+    parser.add_argument("--qualities", default="draft,balanced,high")
     parser.add_argument("--blender-python", type=Path)
-    parser.add_argument("--hdri", help="folder of .hdr and .exr files to light with")
-    parser.add_argument("--references", type=Path, default=Path(__file__).parent / "references")
-    parser.add_argument("--out", type=Path, default=Path("accuracy"), help="folder of pictures")
+    parser.add_argument("--picture", type=Path, default=ROOT / "docs" / "accuracy.jpg")
+    parser.add_argument("--out", type=Path, help="folder of a picture a case and quality")
     options = parser.parse_args()
-    width, height = (int(side) for side in options.size.split("x"))
-    references = References(options.references, options.blender_python, options.samples)
-    options.out.mkdir(parents=True, exist_ok=True)
-    hdris = bundled_hdris()
-    if options.hdri:
-        hdris = {path.stem: path for path in find_hdris(options.hdri)}
-    glb = options.references / "scene.glb"
-    rows, floors = [], []
-    shares: dict[str, list[tuple[float, ...]]] = defaultdict(list)
-    with Generator(
-        Config.preset(),
-        options.seed,
-        (width, height),
-        hdri_dir=options.hdri,
-        quality=options.quality,
-    ) as generator:
-        for index in range(options.scenes):
-            scene = generator.scene(index)
-            name = CAMERAS[index % len(CAMERAS)]
-            camera = scene.camera(name)
-            sample = generator.render(scene=scene, camera=name)
-            export_glb(generator, scene, glb, [camera])
-            hdri = hdris[scene.environment.name]
-            reference = references.get(glb, name, hdri, 1)
-            exposure = generator.exposure(scene, camera)
-            expected = srgb_encode(neutral_tone(exposure * reference.radiance))
-            ours = sample.image / 255.0
+    if options.blender_python:
+        command = [sys.executable, str(Path(__file__).with_name("trace_references.py"))]
+        command += ["--blender-python", str(options.blender_python), "--cases", str(options.cases)]
+        subprocess.run(command, check=True)
+        packer = str(Path(__file__).with_name("pack_references.py"))
+        subprocess.run([sys.executable, packer], check=True)
+    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    if len(chosen) < options.cases:
+        print(f"{options.cases - len(chosen)} references are missing: give --blender-python")
+    if not chosen:
+        raise SystemExit(2)
+    figures = Figures.load()
+    results, lines = {}, []
+    for quality in options.qualities.split(","):
+        results[quality], coincidence = all_results(quality, chosen)
+        lines.append(f"- {coincidence}")
+    about = machine()
+    title = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}, no GPU."
+    lines = [title, "", *overall(results, figures), "", *lines, ""]
+    if figures.series:
+        lines += [f"Over the {len(figures.series)} cases that have a series of Cycles:", ""]
+        lines += [*as_samples(results, figures), ""]
+    lines += [*by_group(results), ""]
+    for quality, listed in results.items():
+        if quality != "draft":
+            lines += [*by_part(quality, listed), ""]
+    write_section("accuracy", lines[:-1])
 
-            inside = sample.ids > 0
-            same = float((inside == reference.inside).mean())
-            both = inside & reference.inside
-            apart_m = np.abs(sample.depth - reference.depth_m)[both]
-            print(
-                f"{index} {name:2s} {scene.environment.name:11s} silhouettes coincide in "
-                f"{same:.3%}, 99 % of depths to {np.quantile(apart_m, 0.99) * 1e3:.3f} mm"
-            )
-            if same < MIN_COINCIDENCE:
-                raise SystemExit("the two do not see the same geometry: not comparable")
-
-            compared = Comparison.of(expected, ours)
-            rows.append((*compared.measures(inside | True), *compared.measures(inside)))
-            table("", rows[-1:])
-            total = float(compared.flip_map.sum())
-            for part, mask in divided(sample, reference.openness).items():
-                error = float(compared.flip_map[mask].sum())
-                stops = stops_over(ours[mask], expected[mask])
-                shares[part].append((float(mask.sum()), error, error / total, stops))
-            cv2.imwrite(
-                str(options.out / f"{index}_{name}.png"),
-                picture(ours, expected, compared.flip_map),
-            )
-            if index < options.noise_scenes:
-                second = references.get(glb, name, hdri, 2)
-                again = srgb_encode(neutral_tone(exposure * second.radiance))
-                floor = Comparison.of(expected, again)
-                floors.append((*floor.measures(inside | True), *floor.measures(inside)))
-    glb.unlink()
-    print(f"\n{len(rows)} scenes, {width}x{height}, {options.samples} samples: FLIP, SSIM, PSNR dB")
-    table("ours", rows)
-    if floors:
-        table("noise", floors)
-    for part, listed in shares.items():
-        pixels, error, share, stops = np.array(listed).T
-        mean = error.sum() / max(pixels.sum(), 1)
-        print(
-            f"{part:17s} {pixels.sum() / (len(rows) * width * height):5.1%} of pixels, "
-            f"{np.mean(share):5.1%} of error, FLIP {mean:.4f}, brighter than Cycles by "
-            f"{np.nanmean(stops):+.2f} stops ({np.nanmin(stops):+.2f} to {np.nanmax(stops):+.2f})"
-        )
+    measures = {
+        quality: {f"{r.case.number:02d}": [*r.measures, r.seconds] for r in listed}
+        for quality, listed in results.items()
+    }
+    save("accuracy", {"machine": about, "measures": measures})
+    shown = results.get("balanced") or next(iter(results.values()))
+    write_picture(
+        options.picture, contact_picture([(r.case, r.panels) for r in shown[:CONTACT_CASES]])
+    )
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+        for quality, listed in results.items():
+            for r in listed:
+                name = f"{quality}_{r.case.number:02d}_{r.case.camera}_{r.case.light}.png"
+                write_picture(options.out / name, picture(*r.panels))
 
 
 if __name__ == "__main__":

@@ -5,8 +5,12 @@
 PYTHON is a Python 3.11 into which `pip install bpy==4.5.15` was done; it needs nothing of fastgen.
 All that decides the image stands in the GLB file and its extras: geometry, textures, camera, image
 size, the yaw of the environment. Output is a 32-bit multilayer EXR: scene-linear radiance without
-exposure or tone curve, ambient occlusion, and, where --centers is given, depth and object index of
-what a single ray through each pixel centre meets instead.
+exposure or tone curve, each pixel the plain mean over its square. --background N gives that many
+samples to the image as a whole, which goes to --whole, and --samples only to the rectangle around
+all objects; -o is empty outside of it. --centers FILE gets depth, object index and ambient
+occlusion of what the ray through each pixel centre meets. Several numbers of --samples, say 1,4,16,
+make one image each, `{samples}` in the name of the output standing for the number. The processor
+seconds of each number are printed as JSON.
 """
 
 import argparse
@@ -14,11 +18,15 @@ import json
 import math
 import os
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
 import bpy
+from bpy_extras.object_utils import world_to_camera_view
 
+_CENTER_SAMPLES = 16  # of ambient occlusion; depth and index take the first
+_MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # the narrowest filter that Cycles takes: a ray through the pixel centre
 
 
@@ -62,30 +70,71 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     links.new(picture.outputs["Color"], nodes["Background"].inputs["Color"])
 
 
-def render(path: Path, samples: int, seed: int, threads: int, centers: bool) -> None:
-    """Path-trace the current scene into an EXR file."""
+def prepare(seed: int, threads: int, scale: int) -> None:
+    """Settings that all images share; `scale` times as many pixels a side as the file says."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.threads_mode = "FIXED"
     scene.render.threads = threads
-    scene.cycles.device = "CPU"
-    scene.cycles.samples = 1 if centers else samples
-    scene.cycles.seed = seed
-    scene.cycles.use_denoising = False
-    scene.cycles.use_adaptive_sampling = False
-    scene.cycles.sample_clamp_direct = scene.cycles.sample_clamp_indirect = 0.0
-    if centers:
-        scene.cycles.pixel_filter_type = "GAUSSIAN"
-        scene.cycles.filter_width = _CENTER_WIDTH_PX
-    layer = scene.view_layers[0]
-    layer.use_pass_z = layer.use_pass_object_index = centers
-    layer.use_pass_ambient_occlusion = not centers
+    scene.render.resolution_percentage = 100 * scale
+    scene.render.use_persistent_data = True
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.seed = seed
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles.pixel_filter_type = "BOX"
+    cycles.filter_width = 1.0
     scene.world.light_settings.distance = 10.0
     image = scene.render.image_settings
     image.file_format = "OPEN_EXR_MULTILAYER"
     image.color_depth = "32"
+
+
+def frame_objects() -> None:
+    """From now on only the rectangle around all objects is rendered."""
+    scene = bpy.context.scene
+    graph = bpy.context.evaluated_depsgraph_get()
+    seen = []
+    for item in (o for o in bpy.data.objects if o.type == "MESH"):
+        mesh = item.evaluated_get(graph).to_mesh()
+        points = (item.matrix_world @ vertex.co for vertex in mesh.vertices)
+        seen += [world_to_camera_view(scene, scene.camera, point) for point in points]
+    settings = scene.render
+    settings.use_border, settings.use_crop_to_border = True, False
+    for axis, pixels in (("x", settings.resolution_x), ("y", settings.resolution_y)):
+        places = [getattr(point, axis) for point in seen]
+        margin = _MARGIN_PX / pixels
+        setattr(settings, f"border_min_{axis}", max(min(places) - margin, 0.0))
+        setattr(settings, f"border_max_{axis}", min(max(places) + margin, 1.0))
+
+
+def look_through_centers() -> None:
+    """From now on only rays through the pixel centres, and what they meet."""
+    bpy.context.scene.render.resolution_percentage = 100
+    bpy.context.scene.render.use_border = False
+    cycles = bpy.context.scene.cycles
+    cycles.pixel_filter_type = "GAUSSIAN"
+    cycles.filter_width = _CENTER_WIDTH_PX
+    layer = bpy.context.scene.view_layers[0]
+    layer.use_pass_z = layer.use_pass_object_index = layer.use_pass_ambient_occlusion = True
+
+
+def render(path: Path, samples: int, denoise: bool) -> float:
+    """Path-trace the current scene into an EXR file; returns processor seconds, of all threads.
+
+    denoise: by Open Image Denoise, guided by albedo and normals, as Blender sets it up.
+    """
+    scene = bpy.context.scene
+    scene.cycles.samples = samples
+    scene.cycles.use_denoising = denoise
+    if denoise:
+        scene.cycles.denoiser = "OPENIMAGEDENOISE"
     scene.render.filepath = str(path)
+    began = time.process_time()
     bpy.ops.render.render(write_still=True)
+    return time.process_time() - began
 
 
 def main() -> None:
@@ -94,15 +143,33 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--camera", required=True)
     parser.add_argument("--hdri", type=Path, required=True)
-    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--samples", default="256")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--centers", action="store_true")
-    parser.add_argument("-o", dest="out", type=Path, required=True)
+    parser.add_argument("--scale", type=int, default=1, help="times as many pixels a side")
+    parser.add_argument("--denoise", action="store_true")
+    parser.add_argument("--background", type=int)
+    parser.add_argument("--whole", type=Path)
+    parser.add_argument("--centers", type=Path)
+    parser.add_argument("-o", dest="out", required=True)
     options = parser.parse_args()
     os.nice(19)
     load(options.file, options.camera, options.hdri)
-    render(options.out, options.samples, options.seed, options.threads, options.centers)
+    prepare(options.seed, options.threads, options.scale)
+    if options.background:
+        render(options.whole, options.background, options.denoise)
+        frame_objects()
+    counts = [int(word) for word in options.samples.split(",")]
+    if len(counts) > 1:  # the first render also builds what the later ones find ready
+        render(Path(options.out.replace("{samples}", "0")), 1, options.denoise)
+    seconds = {}
+    for count in counts:
+        path = Path(options.out.replace("{samples}", str(count)))
+        seconds[count] = render(path, count, options.denoise)
+    if options.centers:
+        look_through_centers()
+        render(options.centers, _CENTER_SAMPLES, denoise=False)
+    print("seconds " + json.dumps(seconds), flush=True)
 
 
 if __name__ == "__main__":

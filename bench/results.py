@@ -33,3 +33,19 @@ def save(name: str, figures: dict[str, Any]) -> None:
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+
+
+def write_section(
+    name: str, lines: list[str], document: Path = ROOT / "docs" / "accuracy.md"
+) -> None:
+    """Print `lines` of Markdown, and put them between the marks `begin NAME` and `end NAME` of the
+    document."""
+    print("\n".join(lines))
+    text = document.read_text(encoding="utf-8")
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    before, found, rest = text.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not (found and closed):
+        raise SystemExit(f"{document}: has no place for {name}: {begin.strip()} ... {end}")
+    whole = before + begin + "\n" + "\n".join(lines) + "\n\n" + end + after
+    document.write_text(whole, encoding="utf-8")

@@ -1,5 +1,6 @@
 """Material layers of a container or a spreader as textures, baked by the shading GLSL itself."""
 
+import numbers
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ MAX_ATLAS = 8192
 """Texels along a side that viewers can be trusted to take."""
 
 _TILE = 1024
+_COARSEST_MM = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +42,11 @@ class Atlas:
 
 def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
     """(width, height) in texels of `mesh`'s atlas. Raises ConfigError where that is too large."""
-    if not texel_mm > 0:
-        raise ConfigError(f"texel_mm: {texel_mm:g} is not a size; give millimetres above 0")
+    if not isinstance(texel_mm, numbers.Real) or not 0 < texel_mm <= _COARSEST_MM:
+        raise ConfigError(
+            f"texel_mm: {texel_mm} is not a size; give millimetres above 0, "
+            f"at most {_COARSEST_MM:g}"
+        )
     width, height = (int(np.ceil(side / texel_mm)) for side in mesh.atlas_size_mm)
     if max(width, height) > MAX_ATLAS:
         least = np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100

@@ -1,16 +1,22 @@
-"""Pinhole projection: a Camera and an image size to matrices, and points to pixels.
+"""Projection: a Camera and an image size to matrices, and points to pixels.
 
 Pixel coordinates: x to the right, y down, (0, 0) at the top left corner of the image, so pixel
 (column i, row j) has its centre at (i + 0.5, j + 0.5). View space: x right, y down, z forward
-along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1.
+along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1; a
+lens's distortion comes between the division by depth and the camera matrix, see lens.py.
 """
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from fastgen.errors import ConfigError
+from fastgen.lens import PINHOLE, Distortion
 from fastgen.scene import Camera
+from fastgen.sensor.parts import Lens
 
 MM = 1e-3
 """Metres in a millimetre: scene data is in mm, the GPU and view space in metres."""
@@ -24,13 +30,15 @@ class View:
     """A camera bound to an image size.
 
     rotation: float64 [3, 3], world to view. position_m: float64 [3], world metres.
-    focal_px: focal length in pixels, the same on both axes. size: (width, height).
+    focal_px: focal length in pixels, the same on both axes. size: (width, height). distortion: the
+    lens's, None for a pinhole.
     """
 
     rotation: NDArray[np.float64]
     position_m: NDArray[np.float64]
     focal_px: float
     size: tuple[int, int]
+    distortion: Distortion | None = None
 
     @property
     def center_px(self) -> tuple[float, float]:
@@ -63,7 +71,10 @@ class View:
         view = self.to_view(points_mm)
         depth = view[..., 2]
         safe = np.where(depth > 1e-9, depth, np.nan)
-        return view[..., :2] / safe[..., None] * self.focal_px + np.array(self.center_px), depth
+        plane = view[..., :2] / safe[..., None]
+        if self.distortion:
+            plane = self.distortion.apply(plane)
+        return plane * self.focal_px + np.array(self.center_px), depth
 
     def rays(
         self, pixels: NDArray[np.floating] | None = None
@@ -77,11 +88,34 @@ class View:
             x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
             pixels = np.stack(np.meshgrid(x, y), axis=-1)
         across = (np.asarray(pixels, np.float64) - self.center_px) / self.focal_px
+        if self.distortion:
+            across = self.distortion.remove(across)
         rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1) @ self.rotation
         return self.position_m / MM, rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
+    @property
+    def half_angle_deg(self) -> float:
+        """Angle between the optical axis and what the middle of the left border sees."""
+        edge = 0.5 * self.size[0] / self.focal_px
+        if self.distortion:
+            edge = float(np.linalg.norm(self.distortion.remove([-edge, 0.0])))
+        return float(np.degrees(np.arctan(edge)))
+
+    def lens_values(self, scale: tuple[float, float]) -> dict[str, ArrayLike]:
+        """The uniforms of shaders/lens.glsl; scale: of the image in clip space, see Targets."""
+        width, height = self.size
+        return {
+            **(self.distortion.shader_values if self.distortion else PINHOLE),
+            "lens_scale": (
+                2 * self.focal_px / width * scale[0],
+                2 * self.focal_px / height * scale[1],
+            ),
+            "lens_center": self.center_px,
+            "lens_focal": self.focal_px,
+        }
+
     def clip_matrix(self) -> NDArray[np.float64]:
-        """World metres to OpenGL clip space, float64 [4, 4].
+        """World metres to OpenGL clip space without the lens's distortion, float64 [4, 4].
 
         Clip y points down the image, so that row 0 of the framebuffer is the image's top row and
         no read-back needs flipping; front faces are then clockwise. Depth maps [NEAR_M, FAR_M]
@@ -103,7 +137,8 @@ class View:
 def view_of(camera: Camera, size: tuple[int, int]) -> View:
     """The view of `camera` for an image of `size` (width, height) in pixels.
 
-    The image's up direction is the world's z, turned clockwise by the camera's roll.
+    The image's up direction is the world's z, turned clockwise by the camera's roll. Raises
+    ConfigError for a lens that cannot be drawn, see lens.Distortion.
     """
     position = np.array(camera.position_mm, np.float64) * MM
     forward = np.array(camera.target_mm, np.float64) * MM - position
@@ -117,4 +152,16 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     rolled_right = np.cos(roll) * right - np.sin(roll) * down
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
-    return View(np.stack([rolled_right, rolled_down, forward]), position, focal_px, size)
+    distortion = None
+    if camera.lens is not None:
+        try:
+            distortion = _distortion(camera.lens, math.hypot(*size) / 2 / focal_px)
+        except ConfigError as error:
+            raise ConfigError(f"cameras.{camera.name}.{error}") from None
+    rotation = np.stack([rolled_right, rolled_down, forward])
+    return View(rotation, position, focal_px, size, distortion)
+
+
+@lru_cache(maxsize=64)
+def _distortion(lens: Lens, radius: float) -> Distortion:
+    return Distortion(lens, radius)

@@ -18,4 +18,7 @@ SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 SOUND_CONTAINER = 101
 """Mask value of undamaged container surface: category 1, instance 1 (seafront.txt 3.3.4)."""
 
+DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
+"""Mask values of damages: category * 100 + instance, which are their ids as well."""
+
 OBJECT_CLASSES = ("container", "spreader", "text", *MARKER_CLASSES, *DAMAGE_CLASSES)

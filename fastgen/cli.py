@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,24 +23,38 @@ from fastgen.on_ray import run_on_ray
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
 from fastgen.records import nearest
+from fastgen.repair import repair
 from fastgen.shards import FORMATS, SHARD_SCENES, Job
-from fastgen.verify import verify
+from fastgen.verify import examine
 
 SHOWN_LAYERS = (*LAYERS, "ids", "damage")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit code: 0 good, 1 faults found, 2 bad input."""
-    options = _parser().parse_args(arguments)
     try:
-        code: int = options.run(options)
+        try:
+            options = _parser().parse_args(arguments)
+            code: int = options.run(options)
+        finally:
+            sys.stdout.flush()
     except FastgenError as error:
-        print(f"fastgen: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
+        return _refused(str(error))
+    except BrokenPipeError:
+        # whoever read what we print, such as head, has gone; the interpreter would flush again
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except OSError as error:
+        return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
     except KeyboardInterrupt:
         print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
-        return 130
+        return 128 + signal.SIGINT
     return code
+
+
+def _refused(words: str) -> int:
+    print(f"fastgen: {' '.join(words.split())}", file=sys.stderr)
+    return 2
 
 
 class _Parser(argparse.ArgumentParser):
@@ -57,7 +72,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     make = commands.add_parser("generate", help="make a dataset, or finish one")
-    make.add_argument("out", metavar="OUT", help="a folder, or an address such as s3://...")
+    make.add_argument(
+        "out", type=_place, metavar="OUT", help="a folder, or an address such as s3://..."
+    )
     make.add_argument("--images", type=int, required=True, metavar="N")
     make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
     make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
@@ -82,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
 
     show = commands.add_parser("show", help="render one image")
     show.add_argument("--index", type=int, required=True, metavar="I")
-    show.add_argument("--camera", default="A")
+    show.add_argument("--camera", help="default: the first of the rig")
     show.add_argument("--layer", default="all", metavar="|".join(SHOWN_LAYERS))
     show.add_argument("--overlay", action="store_true", help="draw boxes, names and damage")
     show.add_argument("--size", default="640x640", metavar="WxH")
@@ -101,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument("--seed", type=int, default=0, metavar="S")
         command.add_argument("--preset", default="seafront")
         command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
-        command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
+        _add_hdri(command)
         command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
 
     for command in (make, show):
@@ -112,10 +129,27 @@ def _parser() -> argparse.ArgumentParser:
         ("verify", _verify, "check that a dataset is whole"),
     ):
         command = commands.add_parser(name, help=words)
-        command.add_argument("out", metavar="OUT")
+        command.add_argument("out", type=_place, metavar="OUT")
         command.set_defaults(run=run)
+    command.add_argument(
+        "--repair", action="store_true", help="make what is damaged or missing again"
+    )
+    command.add_argument("--workers", type=int, metavar="K", help="of a repair: default one a core")
+    _add_hdri(command)
     commands.add_parser("doctor", help="try the OpenGL backends").set_defaults(run=_doctor)
     return parser
+
+
+def _add_hdri(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
+
+
+def _place(text: str) -> str:
+    """OUT without slashes at its end, which would double in what is printed."""
+    place = text if text.endswith("://") else text.rstrip("/") or text[:1]
+    if not place:
+        raise argparse.ArgumentTypeError("is empty; give a folder or an address")
+    return place
 
 
 def _config(options: argparse.Namespace) -> Config:
@@ -149,14 +183,18 @@ def _generate(options: argparse.Namespace) -> int:
         shard_scenes=shard,
     )
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
-    cores = len(os.sched_getaffinity(0))
-    manifest = generate(job, cores if options.workers is None else options.workers, runner)
+    manifest = generate(job, _workers(options), runner)
     total = sum(split["images"] for split in manifest["counts"].values())
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
     print(f"{total} images in {options.out}{look}")
     for each in manifest["failed"]:
         print(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
     return 1 if manifest["failed"] else 0
+
+
+def _workers(options: argparse.Namespace) -> int:
+    given: int | None = options.workers
+    return len(os.sched_getaffinity(0)) if given is None else given
 
 
 def _show(options: argparse.Namespace) -> int:
@@ -205,13 +243,20 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _stats(options: argparse.Namespace) -> int:
-    print(stats.report(Path(options.out)))
+    print(stats.report(options.out))
     return 0
 
 
 def _verify(options: argparse.Namespace) -> int:
-    faults = verify(options.out)
+    if options.repair:
+        faults, hint = repair(options.out, _workers(options), options.hdri), ""
+    else:
+        found = examine(options.out)
+        faults = found.faults
+        hint = f"fastgen verify {options.out} --repair" if found.broken else ""
     print("\n".join(faults) if faults else f"{options.out}: whole and consistent")
+    if hint:
+        print(f"to make what is damaged or missing again: {hint}")
     return 1 if faults else 0
 
 

@@ -18,10 +18,12 @@ from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import Range, bounds, from_plain, nearest, to_plain
+from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
 UNIT = bounds(0.0, 1.0)
-LENGTH = bounds(0.0, 1e6, "mm")
+REACH = bounds(1.0, 1e6, "mm")
+"""What falls off over a reach is divided by it."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +55,9 @@ class SurfaceConfig:
     roughness: Range = field(default=Range(0.38, 0.62), metadata=bounds(0.045, 1.0))
     tone_variation: Range = field(default=Range(0.02, 0.12), metadata=UNIT)
     ageing_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
-    ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=LENGTH)
+    ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=REACH)
     dirt_strength: Range = field(default=Range(0.05, 0.55), metadata=UNIT)
-    dirt_reach_mm: Range = field(default=Range(60, 320), metadata=LENGTH)
+    dirt_reach_mm: Range = field(default=Range(60, 320), metadata=REACH)
     dirt_color: str = "#a8a59c"
     rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)  # squared: mostly low
     rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
@@ -77,24 +79,41 @@ class ContainerConfig:
     profiles: WallProfiles = field(default_factory=WallProfiles)
     depth_scale: tuple[float, ...] = field(default=(0.95, 1.06), metadata=bounds(0.2, 3.0))
 
+    def __post_init__(self) -> None:
+        """Hold weights and depths to what can be drawn and built."""
+        for kind in self.kinds:
+            if kind not in KINDS:
+                raise ConfigError(f"kinds.{kind}: unknown kind{nearest(kind, KINDS)}")
+        if sum(self.kinds.values()) <= 0:
+            raise ConfigError("kinds: all weights are 0; give at least one above 0")
+        if not self.depth_scale:
+            raise ConfigError("depth_scale: the list is empty; give at least one, as in [1.0]")
+        for i, scale in enumerate(self.depth_scale):
+            try:
+                self.profiles.deepened(scale)
+            except ConfigError as error:
+                raise ConfigError(f"depth_scale[{i}]: {error}") from None
+
 
 @dataclass(frozen=True)
 class CameraConfig:
     """One camera of the rig: it looks at the middle of a face from a varied position.
 
     azimuth_deg turns the camera about the vertical through that middle (0: straight at the face,
-    positive: it stands to the right, seen from the camera); elevation_deg lifts it.
+    positive: it stands to the right, seen from the camera); elevation_deg lifts it. lens: its
+    distortion, none for a pinhole; a fisheye's focal_mm is what an angle of one radian spans.
     """
 
     face: str
     focal_mm: float = field(metadata=bounds(1.0, 2000.0, "mm"))
-    distance_mm: Range = field(metadata=bounds(100.0, 1e6, "mm"))
+    distance_mm: Range = field(metadata=bounds(100.0, 1.5e5, "mm"))  # camera.FAR_M ends sight
     azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
     elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
     roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))
     target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e5, 1e5, "mm"))
     sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
     exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
+    lens: LensConfig | None = None
 
 
 def _seafront_rig() -> dict[str, CameraConfig]:
@@ -109,7 +128,11 @@ def _seafront_rig() -> dict[str, CameraConfig]:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The light. names: HDRIs to choose from by file name without ending; empty means all found."""
+    """The light. names: HDRIs to choose from, all alike, by file name without ending.
+
+    Without names all that --hdri finds come, or of the bundled ones all but the interiors, ports
+    more often than others.
+    """
 
     names: tuple[str, ...] = ()
     yaw_deg: Range = field(default=Range(0, 360), metadata=bounds(-360.0, 360.0, "degrees"))
@@ -164,26 +187,25 @@ class Config:
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
 
     def __post_init__(self) -> None:
         """Hold values to the choices that no single bound can express."""
-        for kind in self.container.kinds:
-            if kind not in KINDS:
-                raise ConfigError(f"container.kinds.{kind}: unknown kind{nearest(kind, KINDS)}")
-        if sum(self.container.kinds.values()) <= 0:
-            raise ConfigError("container.kinds: all weights are 0; give at least one above 0")
         if not self.cameras:
             raise ConfigError("cameras: the rig is empty; describe at least one camera")
         for name, camera in self.cameras.items():
-            if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
                 raise ConfigError(
-                    f"cameras.{name!r}: names become file names; use letters, digits, - and _"
+                    f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
                 )
             if camera.face not in FACES:
                 hint = nearest(camera.face, FACES)
                 raise ConfigError(f"cameras.{name}.face: unknown face {camera.face!r}{hint}")
+            if camera.lens:
+                camera.lens.check(f"cameras.{name}.lens")
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")
         for name, color in self.surface.colors.items():
@@ -192,24 +214,40 @@ class Config:
             raise ConfigError("surface.colors: the list is empty; give at least one color")
         if not self.surface.rust_colors:
             raise ConfigError("surface.rust_colors: the list is empty; give at least one color")
-        for color in (*self.surface.rust_colors, self.surface.dirt_color):
-            linear_color(color, "surface")
+        for i, color in enumerate(self.surface.rust_colors):
+            linear_color(color, f"surface.rust_colors[{i}]")
+        linear_color(self.surface.dirt_color, "surface.dirt_color")
         if not self.spreader.colors:
             raise ConfigError("spreader.colors: the list is empty; give at least one color")
-        for color in self.spreader.colors:
-            linear_color(color, "spreader.colors")
+        for i, color in enumerate(self.spreader.colors):
+            linear_color(color, f"spreader.colors[{i}]")
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
         """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
-        if name not in PRESETS:
+        if name not in tuple(PRESETS):
             raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
-        return from_plain(Config, PRESETS[name])
+        return from_plain(Config, PRESETS[name], base=Config())
+
+    @staticmethod
+    def checked(config: Any) -> "Config":
+        """`config` held to the bounds that files are held to, the preset in place of None.
+
+        Raises ConfigError naming the field that does not fit: Python checks no types.
+        """
+        if config is None:
+            return Config.preset()
+        if not isinstance(config, Config):
+            raise ConfigError(
+                f"config: {type(config).__name__} is no Config; take Config.preset, Config.load "
+                "or Config.from_values"
+            )
+        return Config.from_values(config.to_plain())
 
     @staticmethod
     def from_values(data: Any, base: "Config | None" = None) -> "Config":
         """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
-        return from_plain(Config, data, base=base or Config.preset())
+        return from_plain(Config, data, base=Config.preset() if base is None else base)
 
     @staticmethod
     def load(path: str | Path, base: "Config | None" = None) -> "Config":
@@ -221,12 +259,13 @@ class Config:
         """
         try:
             data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
+        except (OSError, TypeError) as error:
+            words = error.strerror if isinstance(error, OSError) else "give a path"
+            raise ConfigError(f"{path}: cannot be read ({words})") from None
+        except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
         try:
-            return Config.from_values(data or {}, base)
+            return Config.from_values({} if data is None else data, base)
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from None
 
@@ -236,7 +275,38 @@ class Config:
         return plain
 
 
-PRESETS: dict[str, dict[str, Any]] = {"seafront": {}}
+PRESETS: dict[str, dict[str, Any]] = {
+    "seafront": {},
+    # as cameras on cranes deliver: wide lenses, weather, and what electronics do to an image
+    "crane": {
+        "cameras": {
+            "A": {
+                "focal_mm": 22.0,
+                "lens": {"model": "fisheye", "k1": [-0.035, -0.005], "k2": [0.0, 0.006]},
+            },
+            "B": {
+                "lens": {"k1": [-0.24, -0.16], "k2": [0.03, 0.07], "p1": [-1e-3, 1e-3]},
+            },
+            "Cl": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
+            "Cr": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
+        },
+        "sensor": {
+            "defocus": {"probability": 0.15},
+            "motion": {"probability": 0.25},
+            "vignetting": [0.0, 0.5],
+            "exposure_error_ev": [-0.7, 0.7],
+            "white_balance_ev": [-0.15, 0.15],
+            "noise": {"probability": 0.9},
+            "stamp": {"probability": 0.3},
+            "jpeg_quality": [45, 92],
+        },
+        "weather": {
+            "fog_probability": 0.12,
+            "rain_probability": 0.15,
+            "wet_probability": 0.1,
+        },
+    },
+}
 
 
 def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
@@ -245,11 +315,8 @@ def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
     Raises ConfigError naming `path` when the text is no color.
     """
     digits = text.removeprefix("#")
-    try:
-        if len(digits) != 6:
-            raise ValueError
-        encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    except ValueError:
-        raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'") from None
+    if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
+        raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'")
+    encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
     return r, g, b

@@ -1,5 +1,6 @@
 """A contact sheet of a dataset, with the boxes as its label files on disk have them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -7,18 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES
+from fastgen.errors import OutputError
 from fastgen.overlay import draw_box
-from fastgen.sampling import SPLITS
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
 
-def contact_sheet(out: Path) -> NDArray[np.uint8]:
-    """Up to 24 images of the dataset in folder `out`, spread evenly, as one picture [H, W, 3]."""
-    images = [p for split in SPLITS for p in (out / "images" / split).glob("*.jpg")]
+def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.uint8]:
+    """Up to 24 of `images`, (split, stem) each, of the dataset in folder `out`.
+
+    They are spread evenly; returns one picture uint8 [H, W, 3]. Raises OutputError that names a
+    file which is not as it was written.
+    """
     by_camera: dict[str, list[Path]] = {}
-    for image in sorted(images, key=lambda p: p.stem):
-        by_camera.setdefault(image.stem.split("_", 1)[1], []).append(image)
+    for split, stem in sorted(images, key=lambda image: image[1]):
+        path = out / "images" / split / f"{stem}.jpg"
+        by_camera.setdefault(stem.split("_", 1)[1], []).append(path)
     # one camera after the other, each spread over the dataset
     count = min(len(images), _COLUMNS * _ROWS)
     share = -(-count // max(len(by_camera), 1))
@@ -32,14 +37,20 @@ def contact_sheet(out: Path) -> NDArray[np.uint8]:
     sheet = np.full((rows * _TILE_PX, _COLUMNS * _TILE_PX, 3), 32, np.uint8)
     for i, image_path in enumerate(chosen):
         y, x = i // _COLUMNS * _TILE_PX, i % _COLUMNS * _TILE_PX
-        tile = _tile(out, image_path)
+        try:
+            tile = _tile(out, image_path)
+        except (cv2.error, OSError, ValueError, IndexError):
+            raise OutputError(
+                f"{image_path}: it or its labels are damaged; run fastgen verify --repair"
+            ) from None
         sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
     return sheet
 
 
 def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
     stored = cv2.imread(str(path))
-    assert stored is not None, path
+    if stored is None:
+        raise ValueError
     image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))

@@ -4,7 +4,7 @@ Inset d: distance from the castings' outer plane of an end, e: from that of a si
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -61,22 +61,18 @@ class Wave:
         """Hold the widths to their sum and the depth to what the frame can take."""
         for name in ("outer_mm", "slope_mm", "inner_mm"):
             if not getattr(self, name) > 0:
-                raise ConfigError(
-                    f"wave.{name}: {getattr(self, name)} is no width; give mm above 0"
-                )
+                raise ConfigError(f"{name}: {getattr(self, name):g} is no width; give mm above 0")
         total = self.outer_mm + 2 * self.slope_mm + self.inner_mm
         if abs(total - self.pitch_mm) > 1e-6 * total:
             raise ConfigError(
-                f"wave.pitch_mm: {self.pitch_mm:g} is not outer + 2 slope + inner = {total:g}; "
+                f"pitch_mm: {self.pitch_mm:g} is not outer + 2 slope + inner = {total:g}; "
                 "make them agree"
             )
         if not _SHORTEST_MM <= self.pitch_mm <= 1000:
-            raise ConfigError(
-                f"wave.pitch_mm: {self.pitch_mm:g} is outside {_SHORTEST_MM:g} to 1000 mm"
-            )
+            raise ConfigError(f"pitch_mm: {self.pitch_mm:g} is outside {_SHORTEST_MM:g} to 1000 mm")
         if not 0 < self.depth_mm <= _DEEPEST_MM:
             raise ConfigError(
-                f"wave.depth_mm: {self.depth_mm:g} does not fit the frame; "
+                f"depth_mm: {self.depth_mm:g} does not fit the frame; "
                 f"give mm above 0, at most {_DEEPEST_MM:g}"
             )
 
@@ -88,6 +84,19 @@ class WallProfiles:
     side: Wave = field(default_factory=lambda: Wave(278.0, 36.0, 72.0, 68.0, 70.0))
     end: Wave = field(default_factory=lambda: Wave(250.0, 46.0, 110.0, 18.0, 104.0))
     roof: Wave = field(default_factory=lambda: Wave(209.0, 20.0, 91.0, 13.5, 91.0))
+
+    def deepened(self, scale: float) -> "WallProfiles":
+        """The profiles with their depths times `scale`, to a thousandth of a millimetre.
+
+        Raises ConfigError where that makes one too deep or too shallow.
+        """
+        waves = {}
+        for name, wave in vars(self).items():
+            try:
+                waves[name] = replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
+            except ConfigError as error:
+                raise ConfigError(f"{scale:g} times {name}: {error}") from None
+        return WallProfiles(**waves)
 
 
 CASTING_MM = (178.0, 162.0, 118.0)

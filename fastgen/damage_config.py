@@ -2,18 +2,26 @@
 
 from dataclasses import dataclass, field
 
-from fastgen.records import Range, bounds
+from fastgen.classes import DAMAGE_CLASSES
+from fastgen.errors import ConfigError
+from fastgen.mesh import SHEET_FACES
+from fastgen.records import Range, bounds, nearest
 
 UNIT = bounds(0.0, 1.0)
 MM = bounds(0.0, 20000.0, "mm")
+EXTENT = bounds(5.0, 20000.0, "mm")
+"""Fields are scaled by their extents, which must not vanish."""
+
+MAX_INSTANCES = 99
+"""A mask value is class * 100 + instance, so that a hundredth would pass for the next class."""
 
 
 @dataclass(frozen=True)
 class AxisConfig:
     """An edge or corner post pushed in. reach_mm: how far its neighbours are dragged along."""
 
-    length_mm: Range = field(default=Range(700, 1900), metadata=MM)
-    reach_mm: Range = field(default=Range(320, 650), metadata=MM)
+    length_mm: Range = field(default=Range(700, 1900), metadata=EXTENT)
+    reach_mm: Range = field(default=Range(320, 650), metadata=EXTENT)
     depth_mm: Range = field(default=Range(110, 260), metadata=MM)
 
 
@@ -21,8 +29,8 @@ class AxisConfig:
 class ConcaveConfig:
     """A whole area of a face bowed. outward: probability that it bulges instead."""
 
-    length_mm: Range = field(default=Range(900, 2600), metadata=MM)
-    width_mm: Range = field(default=Range(800, 2000), metadata=MM)
+    length_mm: Range = field(default=Range(900, 2600), metadata=EXTENT)
+    width_mm: Range = field(default=Range(800, 2000), metadata=EXTENT)
     depth_mm: Range = field(default=Range(110, 250), metadata=MM)
     outward: float = field(default=0.3, metadata=UNIT)
 
@@ -32,8 +40,8 @@ class DentedConfig:
     """A fine fold along a path. crease_mm: half width of the crease; sink_share: part of the depth
     that the surroundings sink by; turn_deg: angle of the path against the horizontal."""
 
-    length_mm: Range = field(default=Range(600, 1700), metadata=MM)
-    width_mm: Range = field(default=Range(180, 420), metadata=MM)
+    length_mm: Range = field(default=Range(600, 1700), metadata=EXTENT)
+    width_mm: Range = field(default=Range(180, 420), metadata=EXTENT)
     depth_mm: Range = field(default=Range(40, 90), metadata=MM)
     crease_mm: Range = field(default=Range(35, 70), metadata=bounds(5, 1000, "mm"))
     sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
@@ -58,7 +66,7 @@ class DamageConfig:
     """How often a container is damaged and how. count and kind are drawn uniformly (Table 2)."""
 
     probability: float = field(default=0.4, metadata=UNIT)
-    count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, 128))
+    count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, MAX_INSTANCES))
     kinds: tuple[str, ...] = ("axis", "concave", "dented", "perforation")
     faces: tuple[str, ...] = ("front", "back", "door", "no_door")
     mask_threshold_mm: float = field(default=5.0, metadata=bounds(0.1, 1000.0, "mm"))
@@ -66,3 +74,21 @@ class DamageConfig:
     concave: ConcaveConfig = field(default_factory=ConcaveConfig)
     dented: DentedConfig = field(default_factory=DentedConfig)
     perforation: PerforationConfig = field(default_factory=PerforationConfig)
+
+    def __post_init__(self) -> None:
+        """Hold names to those that exist and the counts to their order."""
+        for i, kind in enumerate(self.kinds):
+            if kind not in DAMAGE_CLASSES:
+                raise ConfigError(
+                    f"kinds[{i}]: unknown kind {kind!r}{nearest(kind, DAMAGE_CLASSES)}"
+                )
+        for i, face in enumerate(self.faces):
+            if face not in SHEET_FACES:
+                raise ConfigError(f"faces[{i}]: unknown face {face!r}{nearest(face, SHEET_FACES)}")
+        if not self.faces and set(self.kinds) - {"axis"}:
+            raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
+        low, high = self.count
+        if low > high:
+            raise ConfigError(
+                f"count: the lowest value {low} is above the highest {high}; swap them"
+            )

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.artwork import Font
+from fastgen.classes import DAMAGE_VALUES
 from fastgen.errors import FastgenError
 from fastgen.lettering import layout
 from fastgen.mesh import Mesh
-from fastgen.programs import DECAL_CELL_MM, DECAL_KINDS
+from fastgen.programs import CONTAINER_ID, DECAL_CELL_MM, DECAL_KINDS, SPREADER_ID
 from fastgen.scene import Decal, Scene
 
 DECAL_TEXELS = 5
@@ -43,12 +44,11 @@ class DecalTables:
 
 
 def object_ids(scene: Scene) -> list[int]:
-    """Id of each decal in the id target, 0 for those without a label: 2, 3, ... in scene order."""
-    ids, following = [], 2
-    for decal in scene.decals:
-        ids.append(following if decal.class_name else 0)
-        following += bool(decal.class_name)
-    return ids
+    """Id of each decal in the id target, 0 for those without a label: 2, 3, ... in scene order,
+    those of damages left out."""
+    numbers = range(CONTAINER_ID + 1, SPREADER_ID)
+    free = (number for number in numbers if number not in DAMAGE_VALUES)
+    return [next(free) if decal.class_name else 0 for decal in scene.decals]
 
 
 def pack_decals(

@@ -1,5 +1,6 @@
 """Pixels to bytes, and bytes to disk so that a file is there whole or not at all."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -38,5 +39,10 @@ def png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
 def write(path: Path, data: bytes | str) -> None:
     """Put `data` at `path`, written aside and renamed into place."""
     aside = path.with_name(f".{path.name}.part")
-    aside.write_bytes(data.encode() if isinstance(data, str) else data)
-    os.replace(aside, path)
+    try:
+        aside.write_bytes(data.encode() if isinstance(data, str) else data)
+        os.replace(aside, path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
+        raise

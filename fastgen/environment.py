@@ -11,6 +11,7 @@ import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,8 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen import cache, prefilter
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
+from fastgen.sun import Sun, split_sun
 
-PREFILTER_VERSION = 3
+PREFILTER_VERSION = 4
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -40,12 +42,16 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 MIN_WIDTH, MAX_WIDTH = 256, 16384
 """Widths of an HDRI that can be used, in texels."""
 
+PORT_WEIGHT = 2.5
+"""How much oftener than another place out of doors a bundled port comes where none is named."""
+
 _ASPECT_TOLERANCE = 0.02
 _MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a float32 sum
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DFG_POINTS = 4096
-_MAPS = ("specular", "irradiance", "background", "luminance")
+_MAPS = ("specular", "irradiance", "background", "luminance", "sun")
+_SUN_WIDTH = 2048  # a texel is a third of the real sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
 
@@ -55,7 +61,7 @@ class EnvironmentLight:
     but for the background.
 
     The octahedral maps have a border of one texel (prefilter.py says how uv meets it). Their values
-    are exactly representable as half floats.
+    are exactly representable as half floats. `specular` and `irradiance` lack what `sun` has.
     """
 
     name: str
@@ -64,12 +70,15 @@ class EnvironmentLight:
     irradiance: NDArray[np.float32]
     """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
     background: NDArray[np.float16]
-    """[B, B, 3] radiance as it is; B is a power of two from 512 to 4096 near twice the width, for
-    as much as that is needed to look as sharp as the HDRI itself."""
+    """[B, B, 3] radiance as it is; B is a power of two from 512 to 2048 near twice the width, for
+    as much as that is needed to look as sharp as the HDRI itself, and 4096 where that is wider than
+    4096: a finer one shows in no picture of a usual size, but takes 100 MB."""
     luminance: NDArray[np.float32]
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
     """Mean of the luminance over the whole sphere."""
+    sun: Sun | None
+    """The one strong compact light, None where there is none."""
 
 
 def find_hdris(folder: str | Path) -> list[Path]:
@@ -86,13 +95,45 @@ def find_hdris(folder: str | Path) -> list[Path]:
     return found
 
 
+def hdris_by_name(folder: str | Path) -> dict[str, Path]:
+    """Name -> file of the HDRIs in a folder, as `find_hdris` finds them.
+
+    Raises AssetError where two files differ in their ending alone.
+    """
+    named: dict[str, Path] = {}
+    for path in find_hdris(folder):
+        if path.stem in named:
+            raise AssetError(
+                f"{folder}: {named[path.stem].name} and {path.name} are both called "
+                f"{path.stem!r} in scenes; rename one"
+            )
+        named[path.stem] = path
+    return named
+
+
 def bundled_hdris() -> dict[str, Path]:
     """Name -> file of every environment that ships with fastgen, sorted by name.
 
-    Their sources and licences (all CC0) stand in assets/hdri/SOURCES.md.
+    Their sources and licences stand in assets/hdri/SOURCES.md.
     """
+    return {name: asset_path("hdri", entry["file"]) for name, entry in _index().items()}
+
+
+def bundled_weights() -> dict[str, float]:
+    """Name -> weight in the draw of every environment that ships with fastgen, sorted by name.
+
+    Interiors weigh 0: they come where a configuration names them.
+    """
+    kinds = {name: entry["kind"] for name, entry in _index().items()}
+    return {
+        name: 0.0 if "interior" in kind else PORT_WEIGHT if "port" in kind else 1.0
+        for name, kind in kinds.items()
+    }
+
+
+def _index() -> dict[str, dict[str, Any]]:
     index = json.loads(asset_path("hdri", "index.json").read_text(encoding="utf-8"))
-    return {name: asset_path("hdri", entry["file"]) for name, entry in sorted(index.items())}
+    return dict(sorted(index.items()))
 
 
 def load_radiance(path: str | Path) -> NDArray[np.float32]:
@@ -205,15 +246,20 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     Sums stay in float32 or wider; only the results are clamped to half range, so a sun of 1e6 keeps
     its energy wherever it is spread over more than a few texels.
     """
-    background_size = int(np.clip(2 ** round(np.log2(2 * radiance.shape[1])), 512, 4096))
+    width = radiance.shape[1]
+    background_size = int(np.clip(2 ** round(np.log2(2 * width)), 512, 2048))
+    if width > 4096:
+        background_size = 4096
     source = prefilter.shrink(radiance, min(2 * background_size, _MAX_WORK_WIDTH))
     # a texel has sqrt(4 pi) / B radians a side, one of the source at most 2 pi / W
-    samples = 1 if source.shape[1] <= background_size else 2
+    samples = 1 if source.shape[1] <= 1.5 * background_size else 2
     poles = prefilter.smooth_poles(source)
     background = prefilter.resample_octahedral(poles, background_size, samples)
 
     # about a texel and a half of the layers; wider lobes do with half of it
-    fine = prefilter.shrink(source, 4 * SPECULAR_SIZE)
+    narrow = prefilter.shrink(source, _SUN_WIDTH)
+    sun, sunless = split_sun(narrow)
+    fine = prefilter.shrink(sunless, 4 * SPECULAR_SIZE)
     coarse = prefilter.shrink(fine, 2 * SPECULAR_SIZE)
     layers = []
     for roughness in ROUGHNESS_LEVELS:
@@ -226,8 +272,8 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     diffuse = prefilter.convolve(coarse, prefilter.cosine_lobe)
     irradiance = prefilter.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
 
-    cells = prefilter.shrink(coarse, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells)
+    cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells, sun)
 
 
 def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -240,6 +286,7 @@ def _light(
     irradiance: NDArray[np.float16],
     background: NDArray[np.float16],
     luminance: NDArray[np.float32],
+    sun: Sun | None,
 ) -> EnvironmentLight:
     weight = prefilter.row_solid_angle(luminance.shape[0]) / (4 * np.pi)
     return EnvironmentLight(
@@ -249,6 +296,7 @@ def _light(
         background=background,
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
+        sun=sun,
     )
 
 
@@ -278,7 +326,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
 def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
     stored = cache.read(entry)
     try:
-        specular, irradiance, background, luminance = (stored[field] for field in _MAPS)
+        specular, irradiance, background, luminance, sun = (stored[field] for field in _MAPS)
     except KeyError:
         return None
     if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
@@ -289,12 +337,21 @@ def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
         irradiance.astype(np.float16),
         background.astype(np.float16),
         luminance.astype(np.float32),
+        _unpacked_sun(sun.astype(np.float64)),
     )
+
+
+def _unpacked_sun(stored: NDArray[np.float64]) -> Sun | None:
+    if not len(stored):
+        return None
+    x, y, z, red, green, blue, radius = (float(v) for v in stored)
+    return Sun((x, y, z), (red, green, blue), radius)
 
 
 def _write_cache(light: EnvironmentLight, entry: Path) -> None:
     specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
-    maps = (specular, irradiance, light.background, light.luminance)
+    sun = np.array([*light.sun.direction, *light.sun.light, light.sun.radius] if light.sun else [])
+    maps = (specular, irradiance, light.background, light.luminance, sun)
     cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
 
 
@@ -308,8 +365,13 @@ def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
 def irradiance_at(
     env: EnvironmentLight, normals: ArrayLike, yaw_deg: float = 0.0
 ) -> NDArray[np.float32]:
-    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3]."""
-    return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
+    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], sun included."""
+    normals = to_map_frame(normals, yaw_deg)
+    found = prefilter.sample_octahedral(env.irradiance, normals)
+    if env.sun is not None:
+        cosine = np.maximum(normals @ np.array(env.sun.direction), 0.0)
+        found += (cosine[:, None] * env.sun.light).astype(np.float32)
+    return found
 
 
 @functools.cache

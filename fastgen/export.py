@@ -24,6 +24,7 @@ from fastgen.gltf import Glb
 from fastgen.programs import INSIDE_ALBEDO
 from fastgen.records import to_plain
 from fastgen.scene import Camera, Scene
+from fastgen.scene_check import check_camera, check_scene
 from fastgen.spreader import build_spreader
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
@@ -42,7 +43,7 @@ _FLOOR_SLOPE = 0.7
 def export_glb(
     generator: Generator,
     scene: Scene,
-    path: Path,
+    path: str | Path,
     cameras: Iterable[Camera] | None = None,
     texel_mm: float = 4.0,
 ) -> None:
@@ -50,8 +51,12 @@ def export_glb(
 
     cameras: by default all of the scene. texel_mm: width of a texel of the baked atlas. Scenes
     with holes get insides, of one colour for the floor and one for the rest. Raises ConfigError
-    for a texel too small, OutputError when the file cannot be written.
+    for a texel too small or a scene that cannot be drawn, OutputError when the file cannot be
+    written.
     """
+    check_scene(scene)
+    chosen = [check_camera(camera) for camera in (scene.cameras if cameras is None else cameras)]
+    path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: no folder {path.parent}; make it first")
     mesh = build_container(scene.container.kind, scene.container.profiles)
@@ -73,7 +78,7 @@ def export_glb(
     if variant(scene.damages) == "holed":
         _add_inside(glb, body)
     _add_spreader(glb, generator, scene)
-    for camera in scene.cameras if cameras is None else cameras:
+    for camera in chosen:
         _add_camera(glb, generator, scene, camera)
     data = glb.data(
         {

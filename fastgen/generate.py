@@ -6,6 +6,7 @@ running again on the same place makes only what is missing.
 
 import json
 import os
+import reprlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
@@ -39,6 +40,9 @@ from fastgen.storage import Folder, Remote, storage_of
 MANIFEST = "dataset.json"
 CONTACT_SHEET = "contact_sheet.png"
 
+_MOST = 10**9
+"""Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
+
 Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
 """Makes the shards of `tasks` and reports on the way; see `run_here`."""
 
@@ -55,10 +59,20 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     storage = storage_of(job.out)
     if isinstance(storage, Folder):
         _make_folder(storage.root)
+    elif storage.lives_here and runner is None:
+        raise OutputError(
+            f"{job.out}: is the memory of this process, which the workers do not share; "
+            "give a folder or a store"
+        )
     with storage.locked():
         old = _claim(storage, job, settings)
         present = storage.sizes()
-        tasks = [Task(i) for i in range(job.shard_count) if not _is_made(job, storage, present, i)]
+        sums = old.get("shards", {})
+        tasks = [
+            Task(i)
+            for i in range(job.shard_count)
+            if not _is_made(job, storage, present, i, sums.get(str(i)))
+        ]
         names = ("backend", "renderer")
         made_by: dict[str, str] = {key: old[key] for key in names if key in old}
         if tasks:
@@ -118,8 +132,8 @@ def _checked(job: Job, worker_count: int) -> Job:
         ("workers", worker_count),
         ("shard", job.shard_scenes),
     ):
-        if value < 1:
-            raise ConfigError(f"{name}: {value} is out of range; give 1 or more")
+        if not 1 <= value <= _MOST:
+            raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
     if job.fmt not in FORMATS:
         raise ConfigError(f"format: {job.fmt!r} is unknown{nearest(job.fmt, FORMATS)}")
     for name in job.cameras:
@@ -160,7 +174,7 @@ def _settings(job: Job) -> dict[str, Any]:
         "cameras": list(job.cameras),
         "environments": {name: generator.environment_digest(name) for name in names},
         "shard_scenes": job.shard_scenes,
-        "config": job.config.to_plain(),
+        "config": generator.config.to_plain(),
     }
     plain: dict[str, Any] = json.loads(json.dumps(settings))
     return plain
@@ -200,8 +214,9 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
     for key, value in settings.items():
         if old.get(key) != value:
             raise OutputError(
-                f"{job.out}: was made with another {key}; repeat its settings to resume, "
-                f"or give another folder"
+                f"{job.out}: was made with other settings "
+                f"({_difference(key, old.get(key), value)}); "
+                f"repeat them to resume, or give another folder"
             )
     beyond = manifest_path(job.shard_count)
     made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
@@ -212,10 +227,27 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
     return old
 
 
-def _is_made(job: Job, storage: Folder | Remote, present: Mapping[str, int], shard: int) -> bool:
-    """Whether a shard is there with all that is wanted of it, and none of it has gone since."""
+def _difference(name: str, old: Any, new: Any) -> str:
+    """The first setting that differs, with both of its values."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        key = min(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
+        return _difference(f"{name}.{key}", old.get(key), new.get(key))
+    said = ["missing" if value is None else reprlib.repr(value) for value in (old, new)]
+    return f"{name} was {said[0]}, is now {said[1]}"
+
+
+def _is_made(
+    job: Job, storage: Folder | Remote, present: Mapping[str, int], shard: int, hashed: str | None
+) -> bool:
+    """Whether a shard is there with all that is wanted of it, and none of it has gone since.
+
+    hashed: of its manifest as dataset.json knows it, None where that was not sealed yet.
+    """
     try:
-        manifest = json.loads(storage.read(manifest_path(shard)))
+        data = storage.read(manifest_path(shard))
+        if hashed is not None and digest(data) != hashed:
+            return False
+        manifest = json.loads(data)
         wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
@@ -230,6 +262,7 @@ def _finish(
     """Write the files over all samples, and dataset.json, which seals everything, last."""
     shards: dict[str, str] = {}
     failed: list[dict[str, Any]] = []
+    images: list[tuple[str, str]] = []
     counts = {
         split: Counter({"images": 0, "objects": 0, "damages": 0, "crops": 0}) for split in SPLITS
     }
@@ -240,6 +273,8 @@ def _finish(
         failed += manifest["failed"]
         for record in manifest["records"]:
             counts[record["split"]].update(_counts(record))
+            if job.fmt == "seafront":
+                images.append((record["split"], record["stem"]))
     files: dict[str, list[Any]] = {}
 
     def put(path: str, pieces: Iterable[bytes]) -> None:
@@ -255,7 +290,7 @@ def _finish(
                 for path, content in each.dataset_files(split, _records(job, storage, split)):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder):
-            put(CONTACT_SHEET, [png(contact_sheet(storage.root))])
+            put(CONTACT_SHEET, [png(contact_sheet(storage.root, images))])
     result = {
         **settings,
         **made_by,

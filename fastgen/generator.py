@@ -1,27 +1,40 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
 import hashlib
+import os
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
-from fastgen.config import Config
+from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
-from fastgen.environment import EnvironmentLight, bundled_hdris, find_hdris, load_environment
+from fastgen.environment import (
+    EnvironmentLight,
+    bundled_hdris,
+    bundled_weights,
+    hdris_by_name,
+    irradiance_at,
+    load_environment,
+)
 from fastgen.errors import ConfigError
-from fastgen.gl import GLContext, open_context
+from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.labels import label
 from fastgen.programs import LAYERS
-from fastgen.records import nearest
+from fastgen.records import nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import sample_scene
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Color, Scene
+from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.develop import develop, is_needed
+from fastgen.sensor.sampling import extreme_lenses
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -30,9 +43,20 @@ QUALITY = {"draft": 1, "balanced": 2, "high": 3}
 """Samples along each axis of a pixel by quality."""
 
 
-def find_camera(scene: Scene, name: str) -> Camera:
-    """The camera of `scene` called `name`. Raises ConfigError that names the nearest one."""
+_BRIGHTEST_AIR = 0.65
+"""Light of fog that an exposure meter lets through: short of the tone curve's shoulder."""
+
+
+def find_camera(scene: Scene, name: str | None = None) -> Camera:
+    """The camera of `scene` called `name`, by default the first.
+
+    Raises ConfigError that names the nearest one.
+    """
     names = [camera.name for camera in scene.cameras]
+    if not names:
+        raise ConfigError("camera: the scene has none; give a Camera")
+    if name is None:
+        return scene.cameras[0]
     if name not in names:
         raise ConfigError(f"camera: {name!r} is unknown{nearest(name, names)}")
     return scene.camera(name)
@@ -46,6 +70,7 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel), balanced or high. Use it from
     one thread, and make one in each process.
 
+    A process that is forked off, or that gets it pickled, opens a context of its own.
     Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
     """
 
@@ -59,27 +84,40 @@ class Generator:
         quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
-        if seed != int(seed) or seed < 0:
-            raise ConfigError(f"seed: {seed!r} is not a whole number of 0 or more")
-        width, height = size
-        for side in size:
-            if not MIN_SIZE <= side <= MAX_SIZE or side != int(side):
-                raise ConfigError(
-                    f"size: {width}x{height} is out of range; "
-                    f"each side takes {MIN_SIZE} to {MAX_SIZE} pixels"
-                )
-        if quality not in QUALITY:
-            raise ConfigError(f"quality: {quality!r} is unknown{nearest(quality, QUALITY)}")
-        self.config = config or Config.preset()
-        self.seed = int(seed)
-        self.size = (int(width), int(height))
+        self._arguments = {
+            "config": config,
+            "seed": seed,
+            "size": size,
+            "backend": backend,
+            "hdri_dir": hdri_dir,
+            "quality": quality,
+            "device_index": device_index,
+        }
+        self.config = Config.checked(config)
+        self.seed = whole("seed", seed)
+        self.size = _whole_size(size)
+        for name, value, known in (
+            ("quality", quality, tuple(QUALITY)),
+            ("backend", backend, BACKENDS),
+        ):
+            if value not in known:
+                raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, known)}")
         self.backend = backend
+        for name, rig in self.config.cameras.items():
+            for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
+                view_of(
+                    Camera(
+                        name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
+                    ),
+                    self.size,
+                )
         self._samples_per_axis = QUALITY[quality]
-        self._device_index = device_index
-        self._hdris = (
-            {path.stem: path for path in find_hdris(Path(hdri_dir))}
-            if hdri_dir
-            else bundled_hdris()
+        self._device_index = None if device_index is None else whole("device_index", device_index)
+        if not isinstance(hdri_dir, str | Path | None):
+            raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
+        self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
+        self._weights = (
+            bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
         # kept on the CPU too, for metering; the least recently used fall out
         self._light = lru_cache(maxsize=24)(self._load_light)
@@ -88,15 +126,16 @@ class Generator:
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
+        self._process = 0
 
     @property
-    def environments(self) -> tuple[str, ...]:
-        """Names of the HDRIs that scenes may draw."""
-        return tuple(sorted(self._hdris))
+    def environments(self) -> dict[str, float]:
+        """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
+        return dict(self._weights)
 
     def environment_digest(self, name: str) -> str:
-        """SHA-256 in hexadecimal of an HDRI's file."""
-        return hashlib.sha256(self._hdris[name].read_bytes()).hexdigest()
+        """SHA-256 in hexadecimal of an HDRI's file. Raises ConfigError for an unknown name."""
+        return hashlib.sha256(self._hdri(name).read_bytes()).hexdigest()
 
     @property
     def renderer_name(self) -> str:
@@ -114,9 +153,7 @@ class Generator:
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
-        if index != int(index) or index < 0:
-            raise ConfigError(f"index: {index!r} is not a whole number of 0 or more")
-        key = (self.config, self.seed, int(index))
+        key = (self.config, self.seed, whole("index", index))
         if self._latest is None or self._latest[0] != key:
             self._latest = key, sample_scene(*key, self.environments)
         return self._latest[1]
@@ -124,16 +161,19 @@ class Generator:
     def render(
         self,
         index: int | None = None,
-        camera: str | Camera = "A",
+        camera: str | Camera | None = None,
         scene: Scene | None = None,
         layer: str = "all",
         normals: bool = False,
+        labels: LabelConfig | None = None,
     ) -> Sample:
         """One labelled image of scene `index`, or of `scene` when that is given.
 
-        camera: the name of one of the scene's cameras, or a Camera of your own.
-        layer: 'all', or one material layer by itself (see programs.LAYERS). normals: give
-        Sample.normals too, which costs another draw.
+        camera: the name of one of the scene's cameras, or a Camera of your own; by default the
+        scene's first. layer: 'all', or one material layer by itself (see programs.LAYERS).
+        normals: give Sample.normals too, which costs another draw. labels: what becomes of
+        objects that are hard to see, in place of config.labels.
+        Raises ConfigError for what cannot be drawn, by its name.
         """
         if layer not in LAYERS:
             raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
@@ -141,8 +181,12 @@ class Generator:
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
+        if layer == "all" and is_needed(camera, scene.weather):
+            airlight = self._airlight(scene, camera)
+            frame = develop(frame, view, camera, scene.weather, airlight)
         mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
-        objects = label(Shot(frame, scene, view, mesh, spreader, self.config))
+        config = self.config if labels is None else replace(self.config, labels=labels)
+        objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
             image=frame.image,
             ids=frame.ids,
@@ -154,6 +198,15 @@ class Generator:
             objects=objects,
             normals=self._normals(frame, scene, camera, view) if normals else None,
         )
+
+    def _airlight(self, scene: Scene, camera: Camera) -> Color:
+        """Mean light from around in the camera's exposure, no more than its meter would admit."""
+        light = self._light(scene.environment.name)
+        around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+        mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
+        mean = mean * self.exposure(scene, camera)
+        red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
+        return red, green, blue
 
     def _normals(
         self, frame: Frame, scene: Scene, camera: Camera, view: View
@@ -169,10 +222,12 @@ class Generator:
     def render_cuda(
         self,
         index: int | None = None,
-        camera: str | Camera = "A",
+        camera: str | Camera | None = None,
         scene: Scene | None = None,
     ) -> CudaFrame:
         """As `render`, but the frame stays on the GPU, without objects; good until the next call.
+
+        The sensor's part and fog and rain, which the CPU adds, are left out.
 
         Raises ContextError where `cuda_reason` gives one.
         """
@@ -195,30 +250,32 @@ class Generator:
 
         Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
         """
-        return self._open().bake(scene, texel_mm)
+        return self._open().bake(check_scene(scene), texel_mm)
 
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
         """As `bake`, of the spreader; None where the scene has none."""
-        return self._open().bake_spreader(scene, texel_mm)
+        return self._open().bake_spreader(check_scene(scene), texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        return self._open().exposure(scene, camera, self.size)
+        return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
-        """Load every light now, so that neither time nor memory grows as scenes first meet them."""
+        """Load every light that scenes draw, so that neither time nor memory grows later."""
         renderer = self._open()
-        for name in self.environments:
+        drawn = [name for name, weight in self._weights.items() if weight > 0]
+        for name in self.config.environment.names or drawn:
             renderer.preload(name)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
-        if self._cuda is not None:
-            self._cuda.release()
-        if self._renderer is not None:
-            self._renderer.release()
-        if self._gl is not None:
-            self._gl.release()
+        if self._process == os.getpid():
+            if self._cuda is not None:
+                self._cuda.release()
+            if self._renderer is not None:
+                self._renderer.release()
+            if self._gl is not None:
+                self._gl.release()
         self._cuda, self._renderer, self._gl = None, None, None
 
     def __enter__(self) -> Self:
@@ -227,8 +284,14 @@ class Generator:
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def __getstate__(self) -> dict[str, Any]:
+        return self._arguments
+
+    def __setstate__(self, arguments: dict[str, Any]) -> None:
+        self.__init__(**arguments)  # type: ignore[misc]
+
     def _chosen(
-        self, index: int | None, camera: str | Camera, scene: Scene | None
+        self, index: int | None, camera: str | Camera | None, scene: Scene | None
     ) -> tuple[Scene, Camera]:
         """The scene and camera that the arguments of a render name."""
         if (index is None) == (scene is None):
@@ -236,10 +299,17 @@ class Generator:
         if scene is None:
             assert index is not None
             scene = self.scene(index)
-        return scene, find_camera(scene, camera) if isinstance(camera, str) else camera
+        else:
+            check_scene(scene)
+        if camera is None or isinstance(camera, str):
+            return scene, find_camera(scene, camera)
+        return scene, check_camera(camera)
 
     def _open(self) -> Renderer:
+        if self._process != os.getpid():  # what was opened before a fork is the parent's
+            self.close()
         if self._renderer is None:
+            self._process = os.getpid()
             self._gl = open_context(self.backend, self._device_index)
             threshold_mm = self.config.damage.mask_threshold_mm
             self._renderer = Renderer(self._gl, self._light, self._samples_per_axis, threshold_mm)
@@ -248,7 +318,24 @@ class Generator:
             self._gl.make_current()  # another generator may have been at work in between
         return self._renderer
 
-    def _load_light(self, name: str) -> EnvironmentLight:
+    def _hdri(self, name: str) -> Path:
         if name not in self._hdris:
             raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, self._hdris)}")
-        return load_environment(self._hdris[name])
+        return self._hdris[name]
+
+    def _load_light(self, name: str) -> EnvironmentLight:
+        return load_environment(self._hdri(name))
+
+
+def _whole_size(size: Any) -> tuple[int, int]:
+    pair = list(size) if isinstance(size, Iterable) and not isinstance(size, str) else []
+    if len(pair) != 2:
+        raise ConfigError(f"size: {size!r} is no pair; give (width, height), as in (640, 640)")
+    try:
+        width, height = (whole("size", side, MIN_SIZE, MAX_SIZE) for side in pair)
+    except ConfigError:
+        raise ConfigError(
+            f"size: {pair[0]}x{pair[1]} is out of range; "
+            f"each side takes {MIN_SIZE} to {MAX_SIZE} pixels"
+        ) from None
+    return width, height

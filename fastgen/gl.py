@@ -37,6 +37,7 @@ _EGL_CONFIG = (0x3033, 0x0001, 0x3040, 0x0008, _EGL_NONE)
 _EGL_CONTEXT = (0x3098, 4, 0x30FB, 3, 0x30FD, 0x0001, _EGL_NONE)
 _EGL_ERRORS = {  # EGL 1.5 section 3.1, those that creating a context gives
     0x3001: "EGL_NOT_INITIALIZED",
+    0x3002: "EGL_BAD_ACCESS: the context is in use by another thread; open one in each",
     0x3003: "EGL_BAD_ALLOC",
     0x3005: "EGL_BAD_CONFIG",
     0x3009: "EGL_BAD_MATCH",

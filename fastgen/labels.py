@@ -1,5 +1,6 @@
 """Frame + Scene -> Objects: boxes, areas and visibility of everything labelled, vectorised."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -12,6 +13,7 @@ from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
 from fastgen.damage_labels import damage_objects
 from fastgen.decal_tables import object_ids
+from fastgen.divided_mesh import as_drawn
 from fastgen.facets import Facets, decal_facets, mesh_facets
 from fastgen.mesh import Mesh
 from fastgen.programs import CONTAINER_ID, SPREADER_ID
@@ -21,6 +23,9 @@ from fastgen.visibility import Shot, float_box, mask_box, visibility
 
 _EDGE_POINTS = 16
 """Points along each side of a decal's outline, which follows the corrugation."""
+
+_PIECES = 24
+"""Along each side of the container's outer box, where a lens bends it."""
 
 CASTINGS = tuple(
     f"{end}_{side}_{level}"
@@ -159,7 +164,7 @@ def _container(shot: Shot) -> Object:
     frame, view = shot.frame, shot.view
     shown = (frame.ids > 0) & (frame.ids != SPREADER_ID)
     area = int(np.count_nonzero(shown))
-    points = _container_points(shot.scene, shot.mesh)
+    points = _container_points(shot.scene, shot.mesh, view.distortion is not None)
     pixels, depth = view.project(points)
     x, y = pixels.T.copy()
     bounds = np.array([x.min(), y.min(), x.max(), y.max()])
@@ -168,6 +173,8 @@ def _container(shot: Shot) -> Object:
         (bounds,) = boxes(everything.pixels, everything.owner, 1)
     corners = _corners_mm(shot.scene)
     sides = corners[list(_SIDES)]
+    if view.distortion:
+        sides = _pieces(sides)
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
     (alone,) = covers(box.pixels, box.owner, 1, view.size)
     castings, polygon = _castings(shot, corners)
@@ -191,7 +198,8 @@ def _spreader(shot: Shot) -> list[Object]:
         return []
     shown = shot.frame.ids == SPREADER_ID
     area = int(np.count_nonzero(shown))
-    seen = project(_all_facets(shot.spreader), shot.view)
+    mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
+    seen = project(_all_facets(mesh), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
     (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
     return [
@@ -214,11 +222,23 @@ def _all_facets(mesh: Mesh) -> Facets:
 
 
 @lru_cache(maxsize=4)
-def _container_points(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """Points [P, 3] in mm after damage: from any side the container's outermost are among them."""
+def _container_points(scene: Scene, mesh: Mesh, bent: bool) -> NDArray[np.float64]:
+    """Points [P, 3] in mm after damage: from any side the container's outermost are among them.
+
+    bent: whether a lens bends what is seen, so that others than corners of the hull may be.
+    """
     if scene.damages:
         return deform(scene.damages, mesh.points_mm)
-    return mesh.points_mm[mesh.hull]
+    return mesh.points_mm if bent else mesh.points_mm[mesh.hull]
+
+
+def _pieces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Four-sided `sides` [K, 4, 3] cut into smaller ones of the same winding, [K * n * n, 4, 3]."""
+    across, up = np.meshgrid(*[np.linspace(0, 1, _PIECES + 1)] * 2, indexing="ij")
+    weights = np.stack([(1 - across) * (1 - up), across * (1 - up), across * up, (1 - across) * up])
+    grid = np.einsum("wxy,kwc->kxyc", weights, sides)
+    corners = grid[:, :-1, :-1], grid[:, 1:, :-1], grid[:, 1:, 1:], grid[:, :-1, 1:]
+    return np.stack(corners, axis=3).reshape(-1, 4, 3)
 
 
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
@@ -255,8 +275,14 @@ def _castings(
     ]
     if depth.min() <= 0:
         return tuple(found), ()
-    hull = cv2.convexHull(pixels.astype(np.float32))
-    return tuple(found), tuple(np.round(hull.reshape(-1), 2).astype(float).tolist())
+    straight, _ = replace(shot.view, distortion=None).project(corners)
+    hull = cv2.convexHull(straight.astype(np.float32), returnPoints=False).ravel()
+    outline = pixels[hull]
+    if shot.view.distortion:  # lines of the world are curves in the image
+        along = np.arange(_EDGE_POINTS)[:, None] / _EDGE_POINTS
+        lines = zip(corners[hull], corners[np.roll(hull, -1)], strict=True)
+        outline, _ = shot.view.project(np.concatenate([a + along * (b - a) for a, b in lines]))
+    return tuple(found), tuple(np.round(outline.reshape(-1), 2).tolist())
 
 
 def _behind(

@@ -9,11 +9,10 @@ import numpy as np
 from fastgen.artwork import Brand, Font, brands, glyph_tiles, stickers
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import KINDS
-from fastgen.errors import ConfigError
 from fastgen.identifier import Identifier, sample_identifier
 from fastgen.lettering import layout
 from fastgen.markings_config import MarkingsConfig
-from fastgen.records import Range, nearest
+from fastgen.records import Range
 from fastgen.scene import Color, Decal, Vec2
 from fastgen.weights import parts, weight_lines
 
@@ -92,12 +91,8 @@ def sample_decals(
 
     sheets: width and height in mm of each face's sheet. flats: sheet intervals (x0, x1) of the
     outer flats of corrugated faces. streams: an independent generator for each name.
-    Raises ConfigError when the configuration names a font, face or size that cannot be.
     """
     faces = {name: _Sheet(name, size) for name, size in sheets.items()}
-    for name in (*config.marker_faces, *config.brand, *config.main_text):
-        if name not in faces:
-            raise ConfigError(f"markings: unknown face {name!r}{nearest(name, faces)}")
     style = _style(config, kind, paint_albedo, streams)
     drawn: list[Decal] = []
     drawn += _height_marks(config, kind, faces, streams)
@@ -124,9 +119,6 @@ def _between(rng: np.random.Generator, values: Range) -> float:
 def _style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) -> _Style:
     _, fonts = glyph_tiles()
     names = config.fonts or tuple(sorted(fonts))
-    for name in names:
-        if name not in fonts:
-            raise ConfigError(f"markings.fonts: unknown font {name!r}{nearest(name, fonts)}")
     rng = streams("lettering")
     font = fonts[str(rng.choice(names))]
     light = float(np.array(paint) @ _REC_709) < 0.22

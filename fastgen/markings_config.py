@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from fastgen.artwork import glyph_tiles
 from fastgen.errors import ConfigError
-from fastgen.records import Range, bounds
+from fastgen.mesh import SHEET_FACES
+from fastgen.records import Range, bounds, nearest
 
 UNIT = bounds(0.0, 1.0)
 MM = bounds(0.0, 20000.0, "mm")
@@ -46,11 +48,19 @@ class MarkingsConfig:
     height_marks: float = field(default=0.85, metadata=UNIT)
 
     def __post_init__(self) -> None:
-        """Hold each pair of counts to its order, which no single bound can express."""
+        """Hold names to those that exist, and each pair of counts to its order."""
+        for name in ("marker_faces", "brand", "main_text"):
+            for face in getattr(self, name):
+                if face not in SHEET_FACES:
+                    raise ConfigError(f"{name}: unknown face {face!r}{nearest(face, SHEET_FACES)}")
+        if self.fonts:
+            _, known = glyph_tiles()
+            for font in self.fonts:
+                if font not in known:
+                    raise ConfigError(f"fonts: unknown font {font!r}{nearest(font, known)}")
         for name in ("markers_per_face", "stickers_per_face"):
             low, high = getattr(self, name)
             if low > high:
                 raise ConfigError(
-                    f"markings.{name}: the lowest value {low} is above the highest {high}; "
-                    "swap them"
+                    f"{name}: the lowest value {low} is above the highest {high}; swap them"
                 )

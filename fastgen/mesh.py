@@ -18,6 +18,9 @@ from fastgen.errors import ConfigError
 FACES = ("front", "back", "door", "no_door", "roof", "underside")
 """front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
 
+SHEET_FACES = ("front", "back", "door", "no_door", "roof")
+"""Those that can bear decals and damage."""
+
 MATERIALS = (
     *("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside"),
     *("spreader", "cable"),

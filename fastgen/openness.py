@@ -1,4 +1,4 @@
-"""How open each vertex of a container lies to the sky, found once by depth maps from all around.
+"""How open each vertex of a container or spreader lies to the sky, by depth maps from all around.
 
 A point is hidden from a direction where a back face (one turned away from that direction) stands
 before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
@@ -29,6 +29,9 @@ _MAP_SIZE = (2048, 512)
 _COARSE_SIZE = (512, 256)
 """For what is not beside the surface that it hides."""
 
+_SPREADER_SIZE = (1024, 512)
+"""For the spreader itself: 14 mm, a quarter of its beams' least gaps."""
+
 _INSET = 0.5
 """Share of the way from a vertex to the middle of its facets at which it is probed: what is
 interpolated between the vertices is then right on average, where creases would be too dark."""
@@ -53,7 +56,7 @@ def sky_directions() -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Body:
+class Body:
     """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
     counter-clockwise from outside."""
 
@@ -61,8 +64,9 @@ class _Body:
     triangles: NDArray[np.uint32]
 
 
-def probe_points(mesh: Mesh) -> Array:
-    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases."""
+def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
+    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases,
+    no further than inset_limit_mm from the vertex."""
     positions = mesh.positions_mm.astype(np.float64)
     middle = positions[mesh.triangles].mean(axis=1)
     corners = mesh.triangles.ravel()
@@ -71,7 +75,7 @@ def probe_points(mesh: Mesh) -> Array:
     total = [np.bincount(corners, weights[:, k], minlength=len(positions)) for k in range(3)]
     inset = _INSET * (np.stack(total, axis=1) / count - positions)
     length = np.linalg.norm(inset, axis=1, keepdims=True)
-    inset *= np.minimum(1.0, _INSET_LIMIT_MM / np.maximum(length, 1e-6))
+    inset *= np.minimum(1.0, inset_limit_mm / np.maximum(length, 1e-6))
     return positions + inset + _LIFT_MM * mesh.normals
 
 
@@ -94,6 +98,11 @@ def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.ui
     return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1)).astype(np.uint8)
 
 
+def _encoded_bits(mesh: Mesh, open_to: NDArray[np.uint8]) -> bytes:
+    directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
+    return encoded(mesh.normals, directions).tobytes()
+
+
 class SkyProbe:
     """Finds the openness of meshes on one GL context. Owned by the renderer, which releases it."""
 
@@ -109,26 +118,41 @@ class SkyProbe:
         """`encoded` openness of a container's vertices under the spreader that holds it."""
         key = (container, spreader)
         if key not in self._found:
-            self._found[key] = self._measured(container, spreader)
-            if len(self._found) > _CAPACITY:
-                self._found.popitem(last=False)
+            self._keep(key, self._measured(container, spreader))
         self._found.move_to_end(key)
         return self._found[key]
+
+    def openness_of_spreader(self, spreader: Mesh, container: Mesh) -> bytes:
+        """`encoded` openness of a spreader's vertices above the container that it holds."""
+        key = (spreader, container)
+        if key not in self._found:
+            # its faces are long and run into one another: their ends stand for nothing
+            points = probe_points(spreader, np.inf)
+            own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
+            below = self._kept(
+                Body(container.positions_mm, container.triangles), points, _COARSE_SIZE
+            )
+            self._keep(key, _encoded_bits(spreader, own & below))
+        return self._found[key]
+
+    def _keep(self, key: tuple[Mesh, Mesh | None], values: bytes) -> None:
+        self._found[key] = values
+        if len(self._found) > _CAPACITY:
+            self._found.popitem(last=False)
 
     def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
         points = probe_points(container)
         if container not in self._own:
-            body = _Body(container.positions_mm, container.triangles)
+            body = Body(container.positions_mm, container.triangles)
             self._own[container] = self._kept(body, points, _MAP_SIZE)
             if len(self._own) > _CAPACITY:
                 self._own.popitem(last=False)
         open_to = self._own[container]
         if spreader is not None:
-            open_to = open_to & self._kept(_without_cables(spreader), points, _COARSE_SIZE)
-        directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
-        return encoded(container.normals, directions).tobytes()
+            open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
+        return _encoded_bits(container, open_to)
 
-    def _kept(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def _kept(self, body: Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
@@ -142,7 +166,7 @@ class SkyProbe:
             cache.write(entry, {"bits": bits}, compress=True)
         return bits.astype(np.uint8)
 
-    def _open_to(self, body: _Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+    def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         ctx = self._ctx
         vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
         indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
@@ -159,7 +183,7 @@ class SkyProbe:
         found = np.empty((len(points_mm), DIRECTIONS), bool)
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
-            to_map = _map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
+            to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
             target.clear(depth=1.0)
             self._program["to_map"] = tuple(to_map.T.ravel())
             array.render(moderngl.TRIANGLES)
@@ -179,7 +203,7 @@ class SkyProbe:
         self._program.release()
 
 
-def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
+def map_matrix(toward: Array, low: Array, high: Array) -> Array:
     """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
     the box's x axis lies along the view's."""
     along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
@@ -193,8 +217,8 @@ def _map_matrix(toward: Array, low: Array, high: Array) -> Array:
     return matrix
 
 
-def _without_cables(spreader: Mesh) -> _Body:
+def without_cables(spreader: Mesh) -> Body:
     solid = tier_of_vertices(spreader) != CABLE_TIER
     triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
     used, numbers = np.unique(triangles, return_inverse=True)
-    return _Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
+    return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))

@@ -104,6 +104,7 @@ SCENE_BLOCK = Block(
         ("float", "scratch_coverage"),
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
+        ("float", "wetness"),
         ("float", "background_size"),
     ),
 )
@@ -119,6 +120,18 @@ VIEW_BLOCK = Block(
         ("float", "exposure"),
         ("vec3", "ray_down"),
         ("vec2", "yaw"),
+        ("vec4", "lens_radial"),
+        ("vec4", "lens_back", 2),
+        ("vec2", "lens_tangential"),
+        ("vec2", "lens_scale"),  # of the ideal image plane in clip space
+        ("vec2", "lens_center"),
+        ("vec2", "lens_end"),  # where its formula ends, and the slope there
+        ("float", "lens_focal"),
+        ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
+        ("mat4", "ray_to_shadow"),  # from the eye to a point in m, to a place in the sun's map
+        ("vec3", "sun_direction"),
+        ("float", "sun_radius"),
+        ("vec3", "sun_light"),  # irradiance / pi on what faces it
     ),
 )
 
@@ -161,7 +174,7 @@ def noise_deviation() -> NDArray[np.float32]:
     return noise_tiles().lost_deviation.reshape(-1, 4)
 
 
-def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str) -> str:
+def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
@@ -219,6 +232,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str)
         "PORTAL_CHART": f"{PORTAL_CHART}u",
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "TAKEN": "0xffffffffu",
+        "SUN": int(sun),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,
     }
@@ -241,12 +255,13 @@ def expand(
     layer: str = "all",
     pixel_class: str = "sky",
     damage: str = "sound",
+    sun: bool = False,
 ) -> str:
     """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
-            constants = _constants(samples_per_axis, layer, pixel_class, damage)
+            constants = _constants(samples_per_axis, layer, pixel_class, damage, sun)
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)
         return included(shader_path(match[1]).read_text(encoding="utf-8"))

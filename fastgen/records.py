@@ -8,14 +8,19 @@ these bounds, and a `Range` must also be ordered.
 import dataclasses
 import difflib
 import math
+import numbers
+import reprlib
+import sys
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from fastgen.errors import ConfigError
 
 T = TypeVar("T")
+
+_short = reprlib.repr
 
 
 class Range(NamedTuple):
@@ -30,13 +35,26 @@ def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[
     return {"lo": lo, "hi": hi, "unit": unit}
 
 
-def nearest(word: str, choices: typing.Iterable[str]) -> str:
+def nearest(word: Any, choices: typing.Iterable[str]) -> str:
     """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
     names = sorted(choices)
-    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     if close:
         return f" (did you mean {close[0]}?)"
     return f" (choose from {', '.join(names)})"
+
+
+def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
+    """`value` if it is a whole number within these limits, of whatever type.
+
+    Raises ConfigError that calls it `name` if not.
+    """
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    if is_number and least <= value <= most and value == int(value):
+        return int(value)
+    too_large = is_number and value > most
+    wanted = f"{least} to {most}" if too_large or most < 2**63 - 1 else f"{least} or more"
+    raise ConfigError(f"{name}: {_short(value)} is not a whole number of {wanted}")
 
 
 def to_plain(value: Any) -> Any:
@@ -58,7 +76,9 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
     Raises ConfigError naming the field, the value and what would be right.
     """
     if not isinstance(data, Mapping):
-        raise ConfigError(f"{path or cls.__name__}: expected a mapping of fields, got {data!r}")
+        raise ConfigError(
+            f"{path or cls.__name__}: expected a mapping of fields, got {_short(data)}"
+        )
     hints = typing.get_type_hints(cls)
     fields = {f.name: f for f in dataclasses.fields(typing.cast(Any, cls))}
     values: dict[str, Any] = {}
@@ -69,7 +89,7 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
         old = getattr(base, key) if base is not None else None
         values[key] = _convert(hints[key], item, where, fields[key].metadata, old)
     if base is not None:
-        return typing.cast(T, dataclasses.replace(typing.cast(Any, base), **values))
+        return _made(lambda: dataclasses.replace(typing.cast(Any, base), **values), path)
     missing = [
         name
         for name, field in fields.items()
@@ -79,7 +99,15 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
     ]
     if missing:
         raise ConfigError(f"{path or cls.__name__}: missing {', '.join(missing)}")
-    return cls(**values)
+    return _made(lambda: cls(**values), path)
+
+
+def _made(make: Callable[[], Any], path: str) -> Any:
+    """What `make` gives; what its __post_init__ refuses, it names by its own fields alone."""
+    try:
+        return make()
+    except ConfigError as error:
+        raise ConfigError(f"{path}.{error}" if path else str(error)) from None
 
 
 def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> Any:
@@ -101,7 +129,8 @@ def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any
 def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
     pair = [value, value] if isinstance(value, (int, float)) else value
     if not isinstance(pair, (list, tuple)) or len(pair) != 2:
-        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {value!r}")
+        got = f"{_short(value)}{_as_number(value)}"
+        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
     lo, hi = (_scalar(float, item, path, meta) for item in pair)
     if lo > hi:
         raise ConfigError(f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
@@ -110,7 +139,7 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
 
 def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
     if not isinstance(value, (list, tuple)):
-        raise ConfigError(f"{path}: expected a list, got {value!r}")
+        raise ConfigError(f"{path}: expected a list, got {_short(value)}")
     args = typing.get_args(hint)
     if len(args) == 2 and args[1] is Ellipsis:
         args = (args[0],) * len(value)
@@ -124,7 +153,7 @@ def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[A
 
 def _mapping(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ConfigError(f"{path}: expected a mapping, got {value!r}")
+        raise ConfigError(f"{path}: expected a mapping, got {_short(value)}")
     item_hint = typing.get_args(hint)[1]
     old = old or {}
     # what is given is the whole mapping; an item with a namesake inherits what it leaves out
@@ -138,14 +167,24 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
     if hint is bool or hint is str:
         if not isinstance(value, hint):
             kind = "true or false" if hint is bool else "text"
-            raise ConfigError(f"{path}: expected {kind}, got {value!r}")
+            raise ConfigError(f"{path}: expected {kind}, got {_short(value)}")
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ConfigError(f"{path}: expected a number, got {value!r}")
-    if hint is int and value != int(value):
-        raise ConfigError(f"{path}: expected a whole number, got {value!r}")
+        raise ConfigError(f"{path}: expected a number, got {_short(value)}{_as_number(value)}")
     lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
-    if not lo <= value <= hi or not math.isfinite(value):
+    # an int may be too large for a float, and infinity lies within bounds that have no end
+    if not max(lo, -sys.float_info.max) <= value <= min(hi, sys.float_info.max):
         unit = f" {meta['unit']}" if meta.get("unit") else ""
-        raise ConfigError(f"{path}: {value!r} is out of range; give {lo:g} to {hi:g}{unit}")
+        wanted = f"{lo:g} to {hi:g}{unit}" if math.isfinite(hi - lo) else "a finite number"
+        raise ConfigError(f"{path}: {_short(value)} is out of range; give {wanted}")
+    if hint is int and value != int(value):
+        raise ConfigError(f"{path}: expected a whole number, got {_short(value)}")
     return hint(value)
+
+
+def _as_number(value: Any) -> str:
+    """A hint for text that reads as a number: YAML 1.1 takes 1e-2 for text, and quotes make it."""
+    try:
+        return f" (a text; write {float(value):g} without quotes)" if isinstance(value, str) else ""
+    except ValueError:
+        return ""

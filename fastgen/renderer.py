@@ -20,7 +20,8 @@ from fastgen.camera import NEAR_M, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
-from fastgen.environment import EnvironmentLight, dfg_table
+from fastgen.divided_mesh import as_drawn
+from fastgen.environment import EnvironmentLight, dfg_table, to_map_frame
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
@@ -41,8 +42,12 @@ from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.spreader import build_spreader, tier_bounds_mm
+from fastgen.sun_shadow import ShadowMap, shadow_map
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
+
+_BOW_STEPS = 17
+"""Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
 
 
 class _Releasable(Protocol):
@@ -122,6 +127,8 @@ class Renderer:
         self._lights: _Kept[GpuLight] = _Kept(24)
         self._scenes: _Kept[_SceneDecals] = _Kept(2)
         self._probe = SkyProbe(self._ctx)
+        self._shadows: _Kept[ShadowMap] = _Kept(4)
+        self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
         self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
         self._view_block = self._ctx.buffer(reserve=VIEW_BLOCK.size)
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
@@ -155,19 +162,29 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh, spreader = self._mesh(scene.container), self._spreader(scene)
-        mesh.set_openness(self._probe.openness(mesh.mesh, _shading_spreader(scene)))
+        mesh = self._mesh(scene.container)
+        spreader = self._spreader(scene, camera.lens is not None)
+        usual = _shading_spreader(scene)
+        mesh.set_openness(self._probe.openness(mesh.mesh, usual))
+        if spreader is not None and usual is not None:
+            held = build_container(scene.container.kind)
+            shape = usual if camera.lens is None else spreader.mesh  # with vertices of its own
+            spreader.set_openness(self._probe.openness_of_spreader(shape, held))
         light = self.preload(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
-        exposure = self.exposure(scene, camera, size)
-        self._view_block.write(VIEW_BLOCK.pack(_view_values(scene, view, targets, exposure)))
+        shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
+        values = {
+            **_view_values(scene, view, targets, self.exposure(scene, camera, size)),
+            **_sun_values(scene, self._light_of(scene.environment.name), shadow, view),
+        }
+        self._view_block.write(VIEW_BLOCK.pack(values))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
 
         if damage != "sound":
-            values = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
-            self._damage_block.write(DAMAGE_BLOCK.pack(values))
+            shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
+            self._damage_block.write(DAMAGE_BLOCK.pack(shapes))
             self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
 
         holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
@@ -194,6 +211,8 @@ class Renderer:
         }
         if targets.rest is not None:
             textures["rest_points"] = targets.rest
+        if shadow is not None:
+            textures["sun_shadow"] = shadow.depth
         for name, texture in textures.items():
             texture.use(UNITS[name])
         self._bind_surface(scene, mesh, spreader)
@@ -202,8 +221,20 @@ class Renderer:
         if spreader is not None:
             frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
-        shading.draw(targets, bands([_region(view, box) for box in boxes]), damage, near)
+        regions = bands([_region(view, box) for box in boxes])
+        curved = view.distortion is not None
+        shading.draw(targets, regions, damage, near, sun=shadow is not None, bent=curved)
         return targets
+
+    def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
+        """What the sun of a scene leaves in the shade, None without a sun."""
+        toward = _to_sun(scene, self._light_of(scene.environment.name))
+        if toward is None:
+            return None
+        return self._shadows.get(
+            (container, spreader, *toward),
+            lambda: shadow_map(self._ctx, self._occluder, container, spreader, toward),
+        )
 
     def preload(self, environment: str) -> GpuLight:
         """The light of an environment, made if need be."""
@@ -225,7 +256,7 @@ class Renderer:
 
     def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
         """The spreader's material as textures, None where the scene has none."""
-        spreader = self._spreader(scene)
+        spreader = self._spreader(scene, False)
         if spreader is None:
             return None
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
@@ -265,9 +296,11 @@ class Renderer:
         return self._mesh(container).mesh
 
     def spreader_mesh(self, scene: Scene) -> Mesh | None:
-        """The spreader's mesh as it is drawn, None where the scene has none."""
-        spreader = self._spreader(scene)
-        return spreader.mesh if spreader else None
+        """The spreader's mesh as it is built, None where the scene has none."""
+        spreader = scene.spreader
+        if not spreader.present:
+            return None
+        return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
 
     def _mesh(self, container: Container) -> GpuMesh:
         def make() -> GpuMesh:
@@ -276,11 +309,12 @@ class Renderer:
 
         return self._meshes.get(container, make)
 
-    def _spreader(self, scene: Scene) -> GpuMesh | None:
-        spreader = scene.spreader
-        if not spreader.present:
+    def _spreader(self, scene: Scene, bent: bool) -> GpuMesh | None:
+        """bent: whether a lens bends it."""
+        built = self.spreader_mesh(scene)
+        if built is None:
             return None
-        mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
+        mesh = as_drawn(built, bent)
         return self._spreaders.get(
             mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
         )
@@ -294,10 +328,10 @@ class Renderer:
     def release(self) -> None:
         """Free every GL object that this renderer made."""
         caches: list[Any] = [self._shading, self._targets, self._meshes, self._spreaders]
-        for kept in (*caches, self._charts, self._lights, self._scenes):
+        for kept in (*caches, self._charts, self._lights, self._scenes, self._shadows):
             kept.release()
         blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
-        for item in (*blocks, *self._geometry.values(), self._probe):
+        for item in (*blocks, *self._geometry.values(), self._probe, self._occluder):
             item.release()
         for texture in (self._art, self._tiles, self._noise, self._dfg):
             texture.release()
@@ -339,6 +373,9 @@ def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
 
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
+    if view.distortion:  # what lies between two corners may bow out farther than both
+        a, b = corners_mm[:, None, None], corners_mm[:, None]
+        corners_mm = (a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)).reshape(-1, 3)
     pixels, depth = view.project(corners_mm)
     if depth.min() <= NEAR_M:
         return None
@@ -373,4 +410,34 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
+        **view.lens_values(targets.scale),
+    }
+
+
+def _to_sun(scene: Scene, light: EnvironmentLight) -> np.ndarray | None:
+    """Unit vector [3] toward the sun in the container's frame, None without one."""
+    if light.sun is None:
+        return None
+    return to_map_frame(light.sun.direction, -scene.environment.yaw_deg)
+
+
+def _sun_values(
+    scene: Scene, light: EnvironmentLight, shadow: ShadowMap | None, view: View
+) -> dict[str, ArrayLike]:
+    """Members of VIEW_BLOCK about the sun, zeros without one."""
+    toward = _to_sun(scene, light)
+    if light.sun is None or shadow is None or toward is None:
+        zero = np.zeros(3)
+        no_map = np.zeros((4, 4))
+        return {
+            "ray_to_shadow": no_map,
+            "sun_direction": zero,
+            "sun_radius": 0.0,
+            "sun_light": zero,
+        }
+    return {
+        "ray_to_shadow": shadow.from_ray(view.position_m),
+        "sun_direction": toward,
+        "sun_radius": light.sun.radius,
+        "sun_light": light.sun.light,
     }

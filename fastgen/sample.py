@@ -34,7 +34,8 @@ Keypoint = tuple[float, float, int]
 class Object:
     """One labelled thing in one image. Pixel coordinates as in camera.py.
 
-    id: its value in the id target. instance: 1, 2, ... within its class and scene.
+    id: its value in the id target; of a damage, which that does not show, its value in the damage
+    target, which no other object has for its id. instance: 1, 2, ... within its class and scene.
     bbox: tight box of its visible pixels, None where nothing is visible. amodal_bbox: exact bounds
     of the whole thing beyond the near plane, neither occluded nor cut by the image border, in float
     pixels; None where nothing of it is. area: visible pixels. visible_fraction: visible pixels over

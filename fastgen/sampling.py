@@ -5,17 +5,17 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
-from fastgen.container import KINDS, WallProfiles, build_container
+from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
 from fastgen.markings import sample_decals
-from fastgen.mesh import Mesh
+from fastgen.mesh import SHEET_FACES, Mesh
 from fastgen.records import Range
 from fastgen.scene import (
     Ageing,
@@ -32,6 +32,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
+from fastgen.sensor.sampling import sample_lens, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -44,11 +45,11 @@ def stream(seed: int, index: int, name: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
-def sample_scene(config: Config, seed: int, index: int, environments: Sequence[str]) -> Scene:
+def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
     """The scene number `index` of the dataset that `config` and `seed` describe.
 
-    environments: names of the HDRIs at hand; config.environment.names chooses among them.
-    Raises ConfigError when it names one that is not there.
+    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
+    among them, all alike. Raises ConfigError when it names one that is not there.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -58,7 +59,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
     weights = np.array(list(kinds.values()))
     kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
     scale = float(streams("corrugation").choice(config.container.depth_scale))
-    container = Container(kind, _scaled(config.container.profiles, scale))
+    container = Container(kind, config.container.profiles.deepened(scale))
     mesh = build_container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
@@ -69,7 +70,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         surface=surface,
         environment=_environment(config, streams, environments),
         cameras=tuple(
-            _camera(name, rig, kind, streams(f"camera.{name}"))
+            _with_sensor(_camera(name, rig, kind, streams), config, streams)
             for name, rig in config.cameras.items()
         ),
         decals=sample_decals(
@@ -82,6 +83,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Sequence[s
         ),
         damages=damages,
         spreader=_spreader(config.spreader, streams),
+        weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
     )
 
 
@@ -94,20 +96,12 @@ def split_of(config: Config, seed: int, index: int) -> str:
 
 def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
     """Width and height in mm of the unfolded sheet of each face that carries decals."""
-    faces = ("front", "back", "door", "no_door", "roof")
-    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in faces}
+    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
     return {face: (rect[2], rect[3]) for face, rect in rects.items()}
 
 
 def _between(rng: np.random.Generator, values: Range) -> float:
     return float(rng.uniform(values.lo, values.hi))
-
-
-def _scaled(profiles: WallProfiles, scale: float) -> WallProfiles:
-    def deeper(wave):  # type: ignore[no-untyped-def]
-        return replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
-
-    return WallProfiles(deeper(profiles.side), deeper(profiles.end), deeper(profiles.roof))
 
 
 def _surface(config: Config, streams: Streams) -> Surface:
@@ -152,14 +146,18 @@ def _surface(config: Config, streams: Streams) -> Surface:
     )
 
 
-def _environment(config: Config, streams: Streams, environments: Sequence[str]) -> EnvironmentView:
-    wanted = config.environment.names or tuple(environments)
+def _environment(
+    config: Config, streams: Streams, environments: Mapping[str, float]
+) -> EnvironmentView:
+    wanted = config.environment.names
     for name in wanted:
         if name not in environments:
             raise ConfigError(
                 f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
             )
-    name = str(streams("environment").choice(sorted(wanted)))
+    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
+    share = np.array(list(weights.values())) / sum(weights.values())
+    name = str(streams("environment").choice(list(weights), p=share))
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
 
 
@@ -176,8 +174,9 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     )
 
 
-def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -> Camera:
+def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
     """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    rng = streams(f"camera.{name}")
     length, width, height = KINDS[kind].size_mm
     outward, middle = {
         "front": ((0, -1, 0), (0, -width / 2, height / 2)),
@@ -205,7 +204,16 @@ def _camera(name: str, rig: CameraConfig, kind: str, rng: np.random.Generator) -
         roll_deg=round(_between(rng, rig.roll_deg), 3),
         sensor_width_mm=rig.sensor_width_mm,
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
+        lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
+
+
+def _with_sensor(camera: Camera, config: Config, streams: Streams) -> Camera:
+    distance_mm = float(np.linalg.norm(np.subtract(camera.position_mm, camera.target_mm)))
+    sensor = sample_sensor(
+        config.sensor, distance_mm, lambda part: streams(f"sensor.{camera.name}.{part}")
+    )
+    return replace(camera, sensor=sensor)
 
 
 def _rounded(point: np.ndarray) -> Vec3:

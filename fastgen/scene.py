@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
 from fastgen.records import from_plain, to_plain
+from fastgen.sensor.parts import Lens, Sensor, Weather
 
 Color = tuple[float, float, float]
 Vec2 = tuple[float, float]
@@ -173,9 +174,10 @@ class EnvironmentView:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera. The sensor's width spans the image's width, whatever its aspect ratio.
+    """A camera. The sensor's width spans the image's width, whatever its aspect ratio.
 
     exposure_ev: deviation from the metered exposure, in stops. roll_deg turns the image clockwise.
+    lens: how it distorts, None for a pinhole. sensor: what it does to the image, None for nothing.
     """
 
     name: str
@@ -185,6 +187,8 @@ class Camera:
     roll_deg: float = 0.0
     sensor_width_mm: float = 36.0
     exposure_ev: float = 0.0
+    lens: Lens | None = None
+    sensor: Sensor | None = None
 
 
 @dataclass(frozen=True)
@@ -200,6 +204,7 @@ class Scene:
     decals: tuple[Decal, ...] = ()
     damages: tuple[Damage, ...] = ()
     spreader: Spreader = field(default_factory=Spreader)
+    weather: Weather = field(default_factory=Weather)
 
     def __hash__(self) -> int:
         """By what names a scene alone: hashing a hundred decals would cost more than it finds."""
@@ -224,7 +229,7 @@ class Scene:
         """
         try:
             data = json.loads(text)
-        except ValueError as error:
+        except (ValueError, TypeError) as error:
             raise ConfigError(f"scene: is no JSON ({error})") from None
         if isinstance(data, dict) and "scene" in data:  # a scene file of a dataset
             data = data["scene"]

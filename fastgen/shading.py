@@ -26,6 +26,7 @@ UNITS = {
     "rest_points": 13,
     "sheet_depths": 14,
     "openness_points": 15,
+    "sun_shadow": 16,
 }
 
 
@@ -49,8 +50,8 @@ class Shading:
         self._samples_per_axis = samples_per_axis
         self._layer = layer
         self._programs: list[moderngl.Program] = []
-        self._arrays: dict[tuple[str, str, str], moderngl.VertexArray] = {}
-        self._listed: dict[str, moderngl.ComputeShader] = {}
+        self._arrays: dict[tuple[str, str, str, bool], moderngl.VertexArray] = {}
+        self._listed: dict[tuple[str, bool], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -58,12 +59,15 @@ class Shading:
         regions: Sequence[Region | None],
         damage: str,
         near_damage: Sequence[Region | None],
+        sun: bool = False,
+        bent: bool = False,
     ) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
-        None where that is not known.
+        None where that is not known. sun: whether there is one, with its shadow map bound.
+        bent: whether a lens bends straight lines.
         """
         image = targets.image
         image.use()
@@ -82,23 +86,28 @@ class Shading:
             targets.lists.begin(name)
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
-        self._run("shade", "plain", "sound", regions)
-        self._draw_sky()
+        self._run("shade", "plain", "sound", regions, sun)
+        self._draw_sky(bent)
         self._ctx.scissor = None
         self._ctx.memory_barrier()
         targets.bind_images()
         for name in listed:
-            self._dispatch(name, targets.lists)
+            self._dispatch(name, targets.lists, sun)
         self._ctx.memory_barrier()
         image.depth_mask = True
         self._ctx.depth_func = "<"
 
     def _run(
-        self, stage: str, pixel_class: str, damage: str, regions: Sequence[Region | None]
+        self,
+        stage: str,
+        pixel_class: str,
+        damage: str,
+        regions: Sequence[Region | None],
+        sun: bool = False,
     ) -> None:
         """Draw `stage`.frag over the pixels of a class in `regions`; the classifier gives all of
         them theirs."""
-        key = (stage, pixel_class, damage)
+        key = (stage, pixel_class, damage, sun)
         if key not in self._arrays:
             depth = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
             self._link(key, "fullscreen.vert", f"{stage}.frag", depth)
@@ -106,12 +115,12 @@ class Shading:
             self._ctx.scissor = region
             self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
 
-    def _draw_sky(self) -> None:
+    def _draw_sky(self, bent: bool) -> None:
         """Shade all pixels that are still of the first class."""
-        if self._layer != "all":
+        if bent or self._layer != "all":
             self._run("shade", "sky", "sound", [None])
             return
-        key = ("sky", "sky", "sound")
+        key = ("sky", "sky", "sound", False)
         if key not in self._arrays:
             # clipping may round depths: they lie between the first two classes
             self._link(key, "sky.vert", "sky.frag", CLASS_DEPTH_STEP / 2)
@@ -120,28 +129,30 @@ class Shading:
         self._arrays[key].render(moderngl.TRIANGLES, vertices=_OCTAHEDRON)
 
     def _link(
-        self, key: tuple[str, str, str], vertex: str, fragment: str, class_depth: float
+        self, key: tuple[str, str, str, bool], vertex: str, fragment: str, class_depth: float
     ) -> None:
         program = link(self._ctx, vertex, fragment, UNITS, **self._variant(*key[1:]))
         program["class_depth"] = class_depth
         self._programs.append(program)
         self._arrays[key] = self._ctx.vertex_array(program, [])
 
-    def _dispatch(self, pixel_class: str, lists: PixelLists) -> None:
+    def _dispatch(self, pixel_class: str, lists: PixelLists, sun: bool) -> None:
         """Shade the listed pixels of a class."""
-        if pixel_class not in self._listed:
+        key = (pixel_class, sun)
+        if key not in self._listed:
             damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
-            self._listed[pixel_class] = link_compute(
-                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage)
+            self._listed[key] = link_compute(
+                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage, sun)
             )
-        lists.dispatch(pixel_class, self._listed[pixel_class])
+        lists.dispatch(pixel_class, self._listed[key])
 
-    def _variant(self, pixel_class: str, damage: str) -> dict[str, Any]:
+    def _variant(self, pixel_class: str, damage: str, sun: bool) -> dict[str, Any]:
         return {
             "samples_per_axis": self._samples_per_axis,
             "layer": self._layer,
             "pixel_class": pixel_class,
             "damage": damage,
+            "sun": sun,
         }
 
     def release(self) -> None:

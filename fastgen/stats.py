@@ -1,103 +1,123 @@
-"""What a dataset holds: the paper's Tables 1 to 3 and the sizes of its Fig. 8, from the files."""
+"""What a dataset holds: the paper's Tables 1 to 3 and the sizes of its Fig. 8.
+
+Counted from the records in the shards' manifests, which the label files are made of, so that it
+works for every format and place.
+"""
 
 import json
 from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
+from fastgen.formats import Record
 from fastgen.sampling import SPLITS
+from fastgen.shards import manifest_path
+from fastgen.storage import storage_of
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_FIRST_MARKER = DETECTION_CLASSES.index("text") + 1
 
 
-def report(out: Path) -> str:
-    """Tables as text. Raises OutputError when `out` is no finished dataset."""
-    if not (out / "dataset.json").is_file():
-        raise OutputError(f"{out}: no dataset.json; give a folder that `fastgen generate` made")
+@dataclass
+class _Counts:
+    """Of one split. damages and markers: labels by class; the sizes are shares of the image."""
+
+    images: int = 0
+    damaged: int = 0
+    damages: Counter[str] = field(default_factory=Counter)
+    markers: Counter[str] = field(default_factory=Counter)
+    damage_sizes: list[tuple[float, float]] = field(default_factory=list)
+    marker_sizes: list[tuple[float, float]] = field(default_factory=list)
+
+    def add(self, record: Record) -> None:
+        """Count one image."""
+        image_width, image_height = record["size"]
+        damages, markers = record["facts"]["damage"], record["facts"]["imdg"]
+        self.images += 1
+        self.damaged += any(item["category_id"] > 1 for item in damages)
+        for item in damages:
+            self.damages[SEGMENTATION_CLASSES[item["category_id"] - 1]] += 1
+            if item["category_id"] > 1:
+                _, _, width, height = item["bbox"]
+                self.damage_sizes.append((width / image_width, height / image_height))
+        for item in markers:
+            number = item["category_id"] - 1
+            if not item["iscrowd"]:  # ignored: no label file of this task has it
+                self.markers[DETECTION_CLASSES[number]] += 1
+                if number >= _FIRST_MARKER:
+                    _, _, width, height = item["bbox"]
+                    self.marker_sizes.append((width / image_width, height / image_height))
+
+
+def report(out: str | Path) -> str:
+    """Tables as text, of the dataset in a folder or at an address.
+
+    Raises OutputError when `out` is no finished dataset.
+    """
+    counts = {split: _Counts() for split in SPLITS}
     try:
-        damage = {split: _coco(out, split) for split in SPLITS}
-    except (OSError, ValueError) as error:
-        raise OutputError(f"{out}: not finished or damaged ({error}); run generate again") from None
-    markers = {split: _boxes(out, split) for split in SPLITS}
-    images = sum(len(damage[split]["images"]) for split in SPLITS)
-    boxes = [box for split in SPLITS for box in markers[split]]
-    visible = Counter(DETECTION_CLASSES[int(box[0])] for box in boxes)
-    per_image = (sum(visible.values()) - visible["container"] - visible["text"]) / max(images, 1)
+        for record in _records(out):
+            counts[record["split"]].add(record)
+    except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError, IndexError):
+        raise OutputError(f"{out}: is damaged; run fastgen verify {out}") from None
+    images = sum(each.images for each in counts.values())
+    visible = sum((each.markers for each in counts.values()), Counter())
+    per_image = (visible.total() - visible["container"] - visible["text"]) / max(images, 1)
+    tables = (
+        ("damage", SEGMENTATION_CLASSES, [each.damages for each in counts.values()]),
+        ("marker", DETECTION_CLASSES, [each.markers for each in counts.values()]),
+    )
+    sound = [each.images - each.damaged for each in counts.values()]
     parts = [
         "Table 1: images without and with visible damage",
-        _table(SPLITS, {"No damage": _undamaged(damage, 0), "Damaged": _undamaged(damage, 1)}),
-        "Table 2: instances in the damage task",
-        _table(SPLITS, {name: _instances(damage, name) for name in SEGMENTATION_CLASSES}),
-        "Table 3: instances in the marker task",
-        _table(SPLITS, {name: _labels(markers, name) for name in DETECTION_CLASSES}),
+        _table({"No damage": sound, "Damaged": [each.damaged for each in counts.values()]}),
+    ]
+    for number, (task, classes, found) in enumerate(tables, start=2):
+        parts.append(f"Table {number}: instances in the {task} task")
+        parts.append(_table({name: [each[name] for each in found] for name in classes}))
+    damage_sizes = [size for each in counts.values() for size in each.damage_sizes]
+    marker_sizes = [size for each in counts.values() for size in each.marker_sizes]
+    parts += [
         f"Per image: {per_image:.2f} markers, {visible['text'] / max(images, 1):.2f} texts",
         "Fig. 8: box width and height as shares of the image, at quantiles "
         + ", ".join(f"{q:g}" for q in _QUANTILES),
-        _sizes("damage", _damage_sizes(damage)),
-        _sizes("markers", np.array([box[3:] for box in boxes if box[0] >= 2]).reshape(-1, 2)),
+        _sizes("damage", damage_sizes),
+        _sizes("markers", marker_sizes),
     ]
     return "\n\n".join(parts)
 
 
-def _coco(out: Path, split: str) -> dict[str, Any]:
-    data: dict[str, Any] = json.loads((out / f"damage/coco_{split}.json").read_text("utf-8"))
-    return data
+def _records(out: str | Path) -> Iterator[Record]:
+    """One of each image, shard by shard."""
+    storage = storage_of(out)
+    try:
+        manifest = json.loads(storage.read("dataset.json"))
+    except FileNotFoundError:
+        raise OutputError(
+            f"{out}: no dataset.json; give a folder that `fastgen generate` made"
+        ) from None
+    if "shards" not in manifest:
+        raise OutputError(f"{out}: the dataset is not finished; run generate again")
+    for number in manifest["shards"]:
+        yield from json.loads(storage.read(manifest_path(int(number))))["records"]
 
 
-def _boxes(out: Path, split: str) -> list[list[float]]:
-    lines = []
-    for path in sorted((out / "imdg/labels" / split).glob("*.txt")):
-        lines += path.read_text(encoding="utf-8").splitlines()
-    return [[float(v) for v in line.split()] for line in lines]
-
-
-def _undamaged(damage: dict[str, Any], wanted: int) -> list[int]:
-    counts = []
-    for data in damage.values():
-        hit = {item["image_id"] for item in data["annotations"] if item["category_id"] > 1}
-        counts.append(len(hit) if wanted else len(data["images"]) - len(hit))
-    return counts
-
-
-def _instances(damage: dict[str, Any], name: str) -> list[int]:
-    number = SEGMENTATION_CLASSES.index(name) + 1
-    return [
-        sum(item["category_id"] == number for item in data["annotations"])
-        for data in damage.values()
-    ]
-
-
-def _labels(markers: dict[str, list[list[float]]], name: str) -> list[int]:
-    number = DETECTION_CLASSES.index(name)
-    return [sum(int(box[0]) == number for box in boxes) for boxes in markers.values()]
-
-
-def _damage_sizes(damage: dict[str, Any]) -> np.ndarray:
-    shares = []
-    for data in damage.values():
-        sizes = {image["id"]: (image["width"], image["height"]) for image in data["images"]}
-        for item in data["annotations"]:
-            if item["category_id"] <= len(DAMAGE_CLASSES) + 1 and item["category_id"] > 1:
-                width, height = sizes[item["image_id"]]
-                shares.append((item["bbox"][2] / width, item["bbox"][3] / height))
-    return np.array(shares).reshape(-1, 2)
-
-
-def _table(columns: tuple[str, ...], rows: dict[str, list[int]]) -> str:
-    head = f"{'':14}" + "".join(f"{name:>9}" for name in columns)
+def _table(rows: dict[str, list[int]]) -> str:
+    head = f"{'':14}" + "".join(f"{name:>9}" for name in SPLITS)
     body = [f"{name:14}" + "".join(f"{v:9d}" for v in values) for name, values in rows.items()]
     return "\n".join([head, *body])
 
 
-def _sizes(name: str, shares: np.ndarray) -> str:
-    if not len(shares):
+def _sizes(name: str, shares: list[tuple[float, float]]) -> str:
+    if not shares:
         return f"{name:10} none"
     lines = []
-    for axis, values in (("width", shares[:, 0]), ("height", shares[:, 1])):
+    for axis, values in zip(("width", "height"), np.array(shares).T, strict=True):
         at = np.quantile(values, _QUANTILES)
         lines.append(f"{name:10} {axis:8}" + "".join(f"{v:8.4f}" for v in at))
     return "\n".join(lines)

@@ -10,13 +10,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-from fastgen.errors import OutputError
+from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Files, Same
 
 ASIDE = ".aside"
 """Prefix of folders where files wait until all of their shard are on the disk."""
 
 LOCK = ".lock"
+
+_BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
+"""Protocols of fsspec's object stores."""
 
 
 class Storage(Protocol):
@@ -36,6 +39,10 @@ class Storage(Protocol):
 
     def read(self, path: str) -> bytes:
         """Content of a file. Raises FileNotFoundError."""
+        ...
+
+    def remove(self, path: str) -> None:
+        """Be without a file, whether it was there or not."""
         ...
 
     def sizes(self) -> Mapping[str, int]:
@@ -92,15 +99,23 @@ class Folder:
     def make_folders(self, paths: Iterable[str]) -> None:
         """Have these folders even where nothing is in them."""
         for path in paths:
-            (self.root / path).mkdir(parents=True, exist_ok=True)
+            with _told(self.root / path, "written"):
+                (self.root / path).mkdir(parents=True, exist_ok=True)
 
     def read(self, path: str) -> bytes:
         """Content of a file. Raises FileNotFoundError."""
-        return (self.root / path).read_bytes()
+        with _told(self.root / path, "read"):
+            return (self.root / path).read_bytes()
+
+    def remove(self, path: str) -> None:
+        """Be without a file, whether it was there or not."""
+        with _told(self.root / path, "removed"):
+            (self.root / path).unlink(missing_ok=True)
 
     def sizes(self) -> dict[str, int]:
         """Every file with its size in bytes."""
-        return dict(self._walk(self.root, ""))
+        with _told(self.root, "listed"):
+            return dict(self._walk(self.root, ""))
 
     def _walk(self, folder: Path, prefix: str) -> Iterator[tuple[str, int]]:
         for entry in os.scandir(folder):
@@ -119,7 +134,9 @@ class Folder:
         holds it.
         """
         path = self.root / LOCK
-        with path.open("w") as stream:
+        with _told(path, "written"):
+            stream = path.open("w")
+        with stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 # whoever held it before may have removed the file that we opened
@@ -157,8 +174,20 @@ class Remote:
         self.root = address
         try:
             self._system, self._base = fsspec.core.url_to_fs(address)
-        except (ImportError, ValueError) as error:
-            raise OutputError(f"{address}: {error}") from None
+        except Exception as error:  # each store has errors of its own
+            raise OutputError(f"{address}: {_words(error)}") from None
+
+    @property
+    def lives_here(self) -> bool:
+        """Whether it is this process's memory, which no other process sees."""
+        return "memory" in self._system.protocol  # a name or several
+
+    @property
+    def _has_buckets(self) -> bool:
+        """Whether a path begins with a bucket: needs no folders, and asked for one, a mistyped
+        bucket would be made."""
+        protocol = self._system.protocol
+        return not _BUCKETS.isdisjoint({protocol} if isinstance(protocol, str) else protocol)
 
     def commit(self, files: Files, name: str) -> None:
         """Put one file after the other."""
@@ -169,28 +198,34 @@ class Remote:
 
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
         """Put one file; it appears when all of it has arrived."""
-        try:
-            self._system.makedirs(self._path(path).rsplit("/", 1)[0], exist_ok=True)
+        with self._told(path, "written"):
+            if not self._has_buckets:
+                self._system.makedirs(self._path(path).rsplit("/", 1)[0], exist_ok=True)
             with self._system.open(self._path(path), "wb") as stream:
                 for piece in pieces:
                     stream.write(piece)
-        except OSError as error:
-            raise OutputError(f"{self.root}/{path}: cannot be written ({error})") from None
 
     def make_folders(self, paths: Iterable[str]) -> None:
         """Nothing: an address has no folders, only names with slashes."""
 
     def read(self, path: str) -> bytes:
         """Content of a file. Raises FileNotFoundError."""
-        data: bytes = self._system.cat_file(self._path(path))
+        with self._told(path, "read"):
+            data: bytes = self._system.cat_file(self._path(path))
         return data
+
+    def remove(self, path: str) -> None:
+        """Be without a file, whether it was there or not."""
+        with self._told(path, "removed"), contextlib.suppress(FileNotFoundError):
+            self._system.rm_file(self._path(path))
 
     def sizes(self) -> dict[str, int]:
         """Every file with its size in bytes."""
-        self._system.invalidate_cache()
-        if not self._system.exists(self._base):
-            return {}
-        found: dict[str, dict[str, Any]] = self._system.find(self._base, detail=True)
+        with self._told("", "listed"):
+            self._system.invalidate_cache()
+            if not self._system.exists(self._base):
+                return {}
+            found: dict[str, dict[str, Any]] = self._system.find(self._base, detail=True)
         skip = len(self._base.rstrip("/")) + 1
         return {path[skip:]: int(entry["size"]) for path, entry in found.items()}
 
@@ -202,11 +237,35 @@ class Remote:
     def _path(self, path: str) -> str:
         return f"{self._base.rstrip('/')}/{path}"
 
+    def _told(self, path: str, deed: str) -> contextlib.AbstractContextManager[None]:
+        # each store has errors of its own
+        return _told(f"{self.root}/{path}" if path else self.root, deed, Exception)
+
 
 def storage_of(out: str | Path) -> Folder | Remote:
     """The storage at a path or an address with '://'."""
     text = str(out)
     return Remote(text) if "://" in text else Folder(Path(text))
+
+
+@contextlib.contextmanager
+def _told(place: Path | str, deed: str, errors: type[Exception] = OSError) -> Iterator[None]:
+    """Failures become OutputErrors that name the place; a file to be read may be missing."""
+    try:
+        yield
+    except FastgenError:
+        raise
+    except errors as error:
+        if deed == "read" and isinstance(error, FileNotFoundError | NotADirectoryError):
+            raise FileNotFoundError(str(place)) from None
+        raise OutputError(f"{place}: cannot be {deed} ({_words(error)})") from None
+
+
+def _words(error: Exception) -> str:
+    """What an error says of itself, without the place."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return str(error) or type(error).__name__
 
 
 def _link(source: Path, target: Path) -> None:

@@ -62,6 +62,7 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
         "scratch_coverage": surface.scratches.coverage,
         "wear_strength": surface.wear.strength,
         "wear_tile_mm": surface.wear.scale_mm * _TILE_OF_SCALE,
+        "wetness": scene.weather.wetness,
         "background_size": float(background_size),
     }
 

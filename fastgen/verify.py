@@ -1,6 +1,7 @@
 """`fastgen verify`: every file of a dataset present, unchanged, and consistent with its labels."""
 
 import json
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -22,11 +23,26 @@ from fastgen.storage import Folder, Remote, storage_of
 Place = Folder | Remote
 
 
+@dataclass(frozen=True)
+class Findings:
+    """faults: a line each that names a file. broken: paths of files that are not as they were
+    written, or missing. manifest: what dataset.json says, {} where it cannot be trusted."""
+
+    faults: list[str]
+    broken: set[str] = field(default_factory=set)
+    manifest: dict[str, Any] = field(default_factory=dict)
+
+
 def verify(out: str) -> list[str]:
     """Faults found in the dataset at `out`, each a line that names a file; empty when all is well.
 
     Raises OutputError when `out` is no dataset.
     """
+    return examine(out).faults
+
+
+def examine(out: str) -> Findings:
+    """As `verify`, with what a repair needs to know."""
     storage = storage_of(out)
     try:
         text = storage.read(MANIFEST)
@@ -35,9 +51,10 @@ def verify(out: str) -> list[str]:
     except (OSError, ValueError, KeyError, TypeError):
         raise OutputError(f"{out}: no readable {MANIFEST}; give a dataset's folder") from None
     if "digest" not in manifest:
-        return [f"{MANIFEST}: the dataset is not finished; run generate again"]
+        return Findings([f"{MANIFEST}: the dataset is not finished; run generate again"])
     if not _is_sealed(text):
-        return [f"{MANIFEST}: was changed after it was written"]
+        again = "run generate again with the same settings"
+        return Findings([f"{MANIFEST}: was changed after it was written; {again}"])
     faults = [
         f"scene {each['scene']} is missing: it failed ({each['error']})"
         for each in manifest["failed"]
@@ -45,12 +62,14 @@ def verify(out: str) -> list[str]:
     present = dict(storage.sizes())
     present.pop(MANIFEST, None)
     shards = []
+    broken: set[str] = set()
     for number, hashed in manifest["shards"].items():
         path = manifest_path(int(number))
         data = _intact(storage, present, path, None, hashed, faults)
-        if data is not None:
+        if data is None:
+            broken.add(path)
+        else:
             shards.append(json.loads(data))
-    broken: set[str] = set()
     listed = [manifest["files"], *(shard["files"] for shard in shards)]
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
         if _intact(storage, present, path, size, hashed, faults) is None:
@@ -60,7 +79,7 @@ def verify(out: str) -> list[str]:
     if manifest["format"] == "seafront":
         records = [record for shard in shards for record in shard["records"]]
         faults += _consistency(storage, records, broken)
-    return faults
+    return Findings(faults, broken, manifest)
 
 
 def _is_sealed(text: bytes) -> bool:

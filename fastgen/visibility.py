@@ -22,7 +22,7 @@ rounding, before something is said to hide it."""
 @dataclass(frozen=True, eq=False)
 class Shot:
     """One image and all that explains it. mesh: the scene's container at rest; spreader: its
-    spreader, None where it has none."""
+    spreader as built, None where it has none."""
 
     frame: Frame
     scene: Scene

@@ -3,6 +3,7 @@
 Each has a pipe of its own: a queue's lock dies with the process that holds it.
 """
 
+import contextlib
 import multiprocessing
 import signal
 import time
@@ -40,7 +41,9 @@ class _Worker:
     def give(self, task: Any) -> None:
         self.task, self.place = task, None
         self.heard = time.monotonic()
-        self.pipe.send(task)
+        # one that has died meanwhile is found out when it is listened to
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+            self.pipe.send(task)
 
     def stop(self) -> None:
         self.process.kill()

@@ -10,6 +10,7 @@
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
+#include "wet.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "material.glsl"

@@ -2,6 +2,7 @@
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
+#include "lens.glsl"
 #if DAMAGED
 #include "damage.glsl"
 #endif
@@ -35,7 +36,7 @@ void main() {
         position_mm = in_position_mm;
     }
 #endif
-    gl_Position = world_to_clip * vec4(position_mm * MM, 1.0);
+    gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // seen in a mirror, the sheets' backs pass for fronts: face culling keeps the insides
     gl_ViewportIndex = int(in_inner);

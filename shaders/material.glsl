@@ -69,7 +69,8 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif
-    s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS),
-                          trait.x * (1.0 - rusty));
+    float metallic = trait.x * (1.0 - rusty);
+    wet(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
+    s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS), metallic);
     return s;
 }

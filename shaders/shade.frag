@@ -14,7 +14,7 @@ void main() {
 #else
     Shaded s = single_surface(pixel);
 #endif
-    out_color = vec4(srgb_encode(s.color), 1.0);
+    out_color = vec4(developed(s.color), 1.0);
     out_labels = s.id | (s.damage << 16);
     out_depth = s.depth;
 }

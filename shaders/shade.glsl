@@ -2,14 +2,19 @@
 
 #include "octahedral.glsl"
 #include "keys_around.glsl"
+#include "lens.glsl"
 #include "tone.glsl"
 #include "ibl.glsl"
+#if SUN
+#include "sun.glsl"
+#endif
 #include "layers.glsl"
 #include "ageing.glsl"
 #include "dirt.glsl"
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
+#include "wet.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "material.glsl"
@@ -25,13 +30,14 @@ uniform sampler2D sheet_depths;
 uniform sampler2D openness_points;
 
 struct Shaded {
-    vec3 color;   // displayed, linear
+    vec3 color;   // exposed radiance; of a single layer, what is displayed
     uint id;
     uint damage;
     float depth;
 };
 
 vec3 view_ray(vec2 pixel) {
+    pixel = straightened(pixel);
     return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
 }
 
@@ -41,9 +47,17 @@ Openness openness_at(ivec2 sample_at) {
     return Openness(normalize(stored.xyz * 255.0 - 128.0), stored.w);
 }
 
+// to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
+vec3 developed(vec3 color) {
+#if LAYER == LAYER_ALL
+    color = neutral_tone(color);
+#endif
+    return srgb_encode(color);
+}
+
 vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 #if LAYER == LAYER_ALL
-    return neutral_tone(exposure * lit(s.material, normal, view, sky));
+    return exposure * lit(s.material, normal, view, sky);
 #elif LAYER == LAYER_NORMALS
     return srgb_decode(normal * 0.5 + 0.5);
 #elif LAYER == LAYER_REFLECTION
@@ -55,7 +69,7 @@ vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 
 Shaded sky(vec3 ray) {
 #if LAYER == LAYER_ALL
-    vec3 color = neutral_tone(exposure * background(ray));
+    vec3 color = exposure * background(ray);
 #else
     vec3 color = vec3(1.0);
 #endif
@@ -106,7 +120,14 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    return layer_color(p.surface, normal, view, sky);
+    vec3 color = layer_color(p.surface, normal, view, sky);
+#if SUN && LAYER == LAYER_ALL
+    float depth = texelFetch(sheet_depths, sample_at, 0).r;
+    vec2 place = vec2(sample_at - SAMPLES_PER_AXIS / 2) / float(SAMPLES_PER_AXIS) + 0.5;
+    float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
+    color += exposure * share * sunlit(p.surface.material, normal, view);
+#endif
+    return color;
 }
 
 // a pixel all of whose samples see the same surface
@@ -129,7 +150,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     if (inner_key != 0u && hole_at(rest_mm) < 0) {
         vec3 seen = inside(-key_normal(inner_key), rest_mm);
 #if LAYER == LAYER_ALL
-        seen = neutral_tone(exposure * seen);
+        seen *= exposure;
 #endif
         s = Shaded(seen, CONTAINER_ID, 0u, depth);
     }

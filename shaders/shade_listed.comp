@@ -76,7 +76,7 @@ void main() {
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
 #endif
-    imageStore(color_image, pixel, vec4(srgb_encode(color), 1.0));
+    imageStore(color_image, pixel, vec4(developed(color), 1.0));
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
     imageStore(depth_image, pixel, vec4(s.depth));
 }

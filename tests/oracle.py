@@ -163,7 +163,7 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
         number = mesh.chart_index(decal.face)
         x0, y0 = mesh.charts[number].rect_mm[:2]
         ids[outside & (chart == number) & inside(decal, hits.atlas_mm - (x0, y0))] = following
-        following += 1
+        following = 600 if following == 199 else following + 1  # damages have 200 to 599
     return ids
 
 

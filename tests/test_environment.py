@@ -2,6 +2,7 @@
 
 import json
 import threading
+from collections import Counter
 from pathlib import Path
 
 import cv2
@@ -9,10 +10,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from fastgen import environment
+from fastgen import Config, environment
 from fastgen.environment import (
     EnvironmentLight,
     bundled_hdris,
+    bundled_weights,
     find_hdris,
     irradiance_at,
     load_environment,
@@ -21,6 +23,7 @@ from fastgen.environment import (
     prefilter_environment,
 )
 from fastgen.errors import AssetError
+from fastgen.sampling import sample_scene
 from tests.sky_samples import patchwork, texel_grid
 
 
@@ -258,7 +261,31 @@ def test_bundled_environments_are_whole_free_and_varied():
         radiance = load_radiance(path)
         assert radiance.shape[1] == 2 * radiance.shape[0]
         assert 0 < radiance.mean() < radiance.max() <= 65504
-        assert index[name]["licence"] == "CC0-1.0"
+        ours = name.startswith("port_")
+        assert index[name]["licence"] == ("Apache-2.0" if ours else "CC0-1.0")
         assert f"| {path.name} |" in sources
     kinds = {kind for entry in index.values() for kind in entry["kind"]}
-    assert {"day", "night", "dusk", "overcast", "urban", "industrial"} <= kinds
+    assert {"day", "night", "dusk", "overcast", "urban", "industrial", "port"} <= kinds
+
+
+def test_ports_are_drawn_oftener_than_other_places_and_interiors_never():
+    folder = next(iter(bundled_hdris().values())).parent
+    index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
+    weights = bundled_weights()
+    assert list(weights) == list(bundled_hdris())
+    for name, weight in weights.items():
+        kind = set(index[name]["kind"])
+        assert (weight == 0) == ("interior" in kind)
+        assert (weight > 1) == ("port" in kind)
+
+
+def test_scenes_draw_by_weight_and_what_is_named_alike():
+    def drawn(config, weights):
+        scenes = [sample_scene(config, 5, i, weights) for i in range(12)]
+        return Counter(scene.environment.name for scene in scenes)
+
+    assert drawn(Config.preset(), {"quay": 1.0, "hall": 0.0}) == {"quay": 12}
+    often = drawn(Config.preset(), {"rare": 0.01, "often": 0.99})
+    assert often["often"] > 9
+    named = Config.from_values({"environment": {"names": ["hall"]}})
+    assert drawn(named, {"quay": 1.0, "hall": 0.0}) == {"hall": 12}

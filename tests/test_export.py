@@ -323,7 +323,7 @@ def test_baking_leaves_the_next_frame_as_it_was(generator, torn):
     [
         (["-o", "box.obj"], "box.obj: give a file name that ends in .glb"),
         (["-o", "box.glb", "--camera", "Cx"], "camera: 'Cx' is unknown"),
-        (["-o", "box.glb", "--texel-mm", "0"], "texel_mm: 0 is not a size"),
+        (["-o", "box.glb", "--texel-mm", "0"], "texel_mm: 0.0 is not a size"),
         (["-o", "box.glb", "--texel-mm", "nan"], "texel_mm: nan is not a size"),
         (["-o", "box.glb", "--texel-mm", "0.5"], "or more for this container"),
         (["-o", "none/box.glb"], "no folder none"),

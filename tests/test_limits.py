@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
+from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
 from fastgen.programs import SPREADER_ID
@@ -50,13 +51,20 @@ def check(sample):
 
 
 def test_300_markers_each_have_their_label():
-    with Generator(seed=4, size=(1600, 500)) as generator:
-        scene = replace(bare(generator, kind="45HC"), decals=markers(300, 60, 200, MARKER_CLASSES))
+    values = {"probability": 1, "kinds": ["axis"], "count": [3, 3]}
+    config = Config.from_values({"damage": values, "container": {"kinds": {"45HC": 1}}})
+    with Generator(config, seed=4, size=(1600, 500)) as generator:
+        scene = replace(
+            bare(generator),
+            decals=markers(300, 60, 200, MARKER_CLASSES),
+            damages=generator.scene(0).damages,
+        )
         camera = Camera("all", (0, -9000, 1400), (0, 0, 1300), 20.0)
         sample = generator.render(scene=scene, camera=camera)
     labelled = [item for item in sample.objects if item.class_name in MARKER_CLASSES]
     assert len(labelled) == 300
-    assert len({item.id for item in labelled}) == 300
+    assert sum(item.class_name == "axis" for item in sample.objects) == 3
+    assert len({item.id for item in sample.objects}) == len(sample.objects)
     assert all(item.area for item in labelled)
     check(sample)
 

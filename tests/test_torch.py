@@ -271,6 +271,20 @@ def test_a_curriculum_sets_the_chance_of_damage_by_epoch():
     data.close()
 
 
+def test_a_curriculum_sets_what_is_too_little_to_train_on_by_epoch():
+    data = ContainerDataset(
+        "imdg",
+        size=SMALL,
+        length=4,
+        fixed=True,
+        curriculum=lambda epoch: {"labels": {"min_visible_px": 10**6 if epoch else 1}},
+    )
+    counts = [[len(data.item(p, epoch)[1]["labels"]) for p in range(4)] for epoch in (0, 1)]
+    assert min(counts[0]) > 0
+    assert counts[1] == [0, 0, 0, 0]
+    data.close()
+
+
 @pytest.fixture(scope="module")
 def renders():
     """Images [3, H, W] of the first six positions, by Generator in this process."""
@@ -326,7 +340,7 @@ def test_pinned_batches_keep_their_form(renders):
     ("arguments", "words"),
     [
         ({"task": "damge"}, r"task: 'damge' is unknown \(did you mean damage\?\)"),
-        ({"length": 0}, "length: 0 is out of range"),
+        ({"length": 0}, "length: 0 is not a whole number of 1 to"),
         ({"cameras": ["A", "D"]}, "cameras: 'D' is none of the imdg task's"),
         ({"task": "door", "cameras": ["A"]}, "cameras: 'A' is none of the door task's"),
         ({"cameras": []}, "cameras: name at least one"),
@@ -335,7 +349,10 @@ def test_pinned_batches_keep_their_form(renders):
         ({"task": "door", "form": "yolo"}, "form: 'yolo' holds boxes"),
         ({"size": (10, 10)}, "size: 10x10 is out of range"),
         ({"curriculum": lambda epoch: 3}, "curriculum: epoch 0 gives 3"),
-        ({"curriculum": lambda epoch: {"damge": {}}}, "damge: unknown key"),
+        ({"curriculum": lambda epoch: {"damge": {}}}, "curriculum: epoch 0: damge: unknown key"),
+        ({"config": {}}, "config: dict is no Config"),
+        ({"cameras": "A"}, r"cameras: 'A' is no list; give \['A'\]"),
+        ({"length": "9"}, "length: '9' is not a whole number"),
         (
             {"curriculum": lambda epoch: {"damage": {"mask_threshold_mm": 9.0}}},
             "curriculum: epoch 0 changes damage.mask_threshold_mm",

@@ -10,6 +10,7 @@ import simplejpeg
 import webdataset
 from moto.server import ThreadedMotoServer
 from PIL import Image
+from s3fs import S3FileSystem
 
 from fastgen.cli import main
 from fastgen.storage import storage_of
@@ -83,7 +84,9 @@ def bucket(monkeypatch):
     ):
         monkeypatch.setenv(name, value)
     boto3.client("s3", endpoint_url=address).create_bucket(Bucket="port")
+    S3FileSystem.clear_instance_cache()  # it remembers the address of an earlier server
     yield "s3://port/made"
+    S3FileSystem.clear_instance_cache()
     server.stop()
 
 
@@ -102,4 +105,43 @@ def test_a_dataset_in_an_s3_store_equals_one_on_disk_and_resumes(bucket, out, ca
     assert main(["generate", bucket, *arguments]) == 0
     assert store.read(lost) == (out / lost).read_bytes()
     assert main(["generate", bucket, *arguments[:2], "--seed", "4", *ARGUMENTS[4:]]) == 2
-    assert "was made with another" in capsys.readouterr().err
+    assert "was made with other settings (formats was [" in capsys.readouterr().err
+
+
+def test_a_bucket_that_is_not_there_is_named_and_not_made(bucket, capsys):
+    assert main(["generate", "s3://prot/made", *ARGUMENTS]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: s3://prot/made")
+    assert "bucket does not exist" in error
+    assert error.count("\n") == 1
+    assert main(["verify", "s3://prot/made"]) == 2
+    assert [b["Name"] for b in boto3.client("s3").list_buckets()["Buckets"]] == ["port"]
+
+
+def test_a_store_without_credentials_gives_one_line(bucket, monkeypatch, capsys, tmp_path):
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "none"))
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "none"))
+    for command in (["generate", bucket, *ARGUMENTS], ["verify", bucket], ["stats", bucket]):
+        assert main(command) == 2
+        error = capsys.readouterr().err
+        assert error.startswith(f"fastgen: {bucket}/dataset.json: cannot be read")
+        assert error.count("\n") == 1
+
+
+def test_the_memory_of_one_process_is_refused(capsys):
+    assert main(["generate", "memory://made", *ARGUMENTS]) == 2
+    assert "memory://made: is the memory of this process" in capsys.readouterr().err
+
+
+def test_stats_of_tar_files_are_those_of_a_folder(out, tmp_path, capsys):
+    plain = tmp_path / "plain"
+    at = ARGUMENTS.index("--format")
+    assert main(["generate", str(plain), *ARGUMENTS[:at]]) == 0
+    capsys.readouterr()
+    assert main(["stats", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert main(["stats", str(plain)]) == 0
+    assert capsys.readouterr().out == printed

@@ -139,10 +139,14 @@ def _scene_file(item: Item) -> bytes:
 
 def view_values(view: View) -> dict[str, Any]:
     """Camera in OpenCV's convention (x right, y down, z forward), but for pixel coordinates: here
-    the first pixel's centre is (0.5, 0.5). rotation and translation_mm take world to camera."""
+    the first pixel's centre is (0.5, 0.5). rotation and translation_mm take world to camera.
+    distortion: OpenCV's coefficients, of cv2.fisheye where distortion_model is fisheye, none for a
+    pinhole."""
+    lens = view.distortion.lens if view.distortion else None
     return {
         "intrinsics": view.intrinsics.tolist(),
-        "distortion": [],
+        "distortion_model": lens.model if lens else "pinhole",
+        "distortion": list(lens.coefficients) if lens else [],
         "rotation": view.rotation.tolist(),
         "translation_mm": view.translation_mm.tolist(),
     }

@@ -13,13 +13,16 @@ import numpy as np
 
 from fastgen.container import KINDS, WallProfiles, build_container
 from fastgen.encode import png
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
 from fastgen.programs import CONTAINER_ID
 from fastgen.sampling import SPLITS
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
 """obj_id of each kind of container."""
+
+
+_LENS_KEYS = ("distortion_model", "distortion")
 
 
 class _Bop(Format):
@@ -37,6 +40,8 @@ class _Bop(Format):
         intrinsics = sample.view.intrinsics.copy()
         intrinsics[:2, 2] -= 0.5
         camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}
+        if sample.view.distortion:  # beyond the format: its tools take images for undistorted
+            camera |= {key: view_values(sample.view)[key] for key in _LENS_KEYS}
         if thing.bbox is None or thing.amodal_bbox is None:
             return files, {"id": item.number, "camera": camera, "gt": [], "info": []}
         visible = np.asarray(sample.damage > 0, np.uint8) * np.uint8(255)

@@ -31,6 +31,8 @@ class _Container(Format):
             "rotation": pose["rotation"],
             "translation_mm": pose["translation_mm"],
             "intrinsics": pose["intrinsics"],
+            "distortion_model": pose["distortion_model"],
+            "distortion": pose["distortion"],
         }
         return {}, [found]
 

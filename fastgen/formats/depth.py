@@ -11,7 +11,7 @@ from fastgen.formats import Files, Format, Item
 
 
 def depth_mm(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Metres float32 [H, W] to whole millimetres; 0 where void, 65535 from there on."""
+    """Metres float32 [H, W] to whole millimetres; 0 where void, 65535 that far away and farther."""
     mm = np.where(np.isfinite(depth_m), depth_m * 1e3, 0.0)
     return np.asarray(np.rint(np.minimum(mm, 65535)), np.uint16)
 

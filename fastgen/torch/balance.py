@@ -16,6 +16,7 @@ from fastgen.errors import ConfigError
 from fastgen.formats.door import DOOR_CLASSES, door_class
 from fastgen.generator import Generator
 from fastgen.labels import outlines_mm
+from fastgen.records import whole
 from fastgen.scene import Camera, Scene
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import class_names
@@ -40,9 +41,8 @@ def class_counts(
     names = class_names(task)
     if not names:
         raise ConfigError(f"task: {task} has no classes to count")
-    if scenes < 1:
-        raise ConfigError(f"scenes: {scenes} is out of range; give 1 or more")
-    config = config or Config.preset()
+    scenes = whole("scenes", scenes, 1)
+    config = Config.checked(config)
     chosen = chosen_cameras(task, config, cameras)
     generator = Generator(config, seed, size)
     counts = np.zeros(len(names), np.int64)

@@ -9,6 +9,7 @@ from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
 from fastgen.config import Config
 from fastgen.errors import ConfigError
+from fastgen.records import whole
 from fastgen.sample import Sample
 from fastgen.sampling import sample_scene
 from fastgen.scene import Scene
@@ -19,7 +20,6 @@ from fastgen.torch.plan import (
     config_of,
     positions,
     shard,
-    whole,
 )
 from fastgen.torch.rendering import LocalGenerator
 from fastgen.torch.targets import Collate, Item, check_form, collate_of, item_of
@@ -69,11 +69,12 @@ class ContainerDataset(Dataset[Item]):
         quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
-        if length != int(length) or not 1 <= length <= MAX_LENGTH:
-            raise ConfigError(f"length: {length!r} is out of range; give 1 to {MAX_LENGTH}")
-        self.config = config or Config.preset()
+        length = whole("length", length, 1, MAX_LENGTH)
+        self.config = Config.checked(config)
+        if not (transforms is None or callable(transforms)):
+            raise ConfigError(f"transforms: {transforms!r} is no function of image and target")
         self.task, self.form, self.as_float = task, form, as_float
-        self.seed, self.length = seed, int(length)
+        self.seed, self.length = seed, length
         self.transforms, self.curriculum = transforms, curriculum
         self.cameras = chosen_cameras(task, self.config, cameras)
         check_form(task, form)
@@ -134,7 +135,8 @@ class ContainerDataset(Dataset[Item]):
             config = self.config_at(epoch)
             scene = sample_scene(config, self.seed, index, generator.environments)
             last = self._scene = ((epoch, index), scene)
-        return generator.render(scene=last[1], camera=camera)
+        labels = self.config_at(epoch).labels
+        return generator.render(scene=last[1], camera=camera, labels=labels)
 
     def item(self, position: int, epoch: int | None = None) -> Item:
         """Image and target at a position, 0 or more, transforms applied; see targets.item_of."""

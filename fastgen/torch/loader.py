@@ -1,14 +1,15 @@
 """Loader: a DataLoader that shares positions among ranks and resumes at the very next sample."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
 
 from fastgen.errors import ConfigError
+from fastgen.records import whole
 from fastgen.sampling import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
-from fastgen.torch.plan import shard, whole
+from fastgen.torch.plan import shard
 from fastgen.torch.targets import Collate
 
 
@@ -121,6 +122,8 @@ class Loader:
 
         Raises ConfigError where it is of a loader that makes other samples, naming what differs.
         """
+        if not isinstance(state, Mapping) or not isinstance(state.get("made", {}), Mapping):
+            raise ConfigError(f"state: {state!r} is not what state_dict returned")
         ours = self.state_dict()
         for key in ours:
             if key not in state:

@@ -9,7 +9,7 @@ import torch
 from fastgen.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import DOOR_CLASSES
-from fastgen.records import nearest
+from fastgen.records import nearest, whole
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
 
@@ -78,6 +78,8 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     """
     class_names(task)
     rig = config.cameras
+    if isinstance(cameras, str):
+        raise ConfigError(f"cameras: {cameras!r} is no list; give [{cameras!r}]")
     usable = [name for name in rig if task != "door" or rig[name].face in DOOR_CLASSES]
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
@@ -96,23 +98,21 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
     """
     if curriculum is None:
         return base
+    if not callable(curriculum):
+        raise ConfigError(f"curriculum: {curriculum!r} is no function of the epoch")
     made = curriculum(epoch)
-    if isinstance(made, Mapping):
-        made = Config.from_values(made, base)
-    if not isinstance(made, Config):
+    if not isinstance(made, Config | Mapping):
         raise ConfigError(f"curriculum: epoch {epoch} gives {made!r}, not a Config or a mapping")
+    try:
+        values = made.to_plain() if isinstance(made, Config) else made
+        made = Config.from_values(values, base)
+    except ConfigError as error:
+        raise ConfigError(f"curriculum: epoch {epoch}: {error}") from None
     if made.damage.mask_threshold_mm != base.damage.mask_threshold_mm:
         raise ConfigError(f"curriculum: epoch {epoch} changes damage.mask_threshold_mm; leave it")
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")
     return made
-
-
-def whole(name: str, value: int, least: int) -> int:
-    """`value` if it is a whole number of `least` or more. Raises ConfigError naming it if not."""
-    if value != int(value) or value < least:
-        raise ConfigError(f"{name}: {value!r} is not a whole number of {least} or more")
-    return int(value)
 
 
 def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
@@ -126,7 +126,8 @@ def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
         return 0, 1
     if rank is None or world_size is None:
         raise ConfigError("rank, world_size: give both or neither")
-    if not 0 <= rank < world_size:
+    rank, world_size = whole("rank", rank), whole("world_size", world_size, 1)
+    if rank >= world_size:
         raise ConfigError(f"rank: {rank} is out of range; world_size {world_size} has 0 and up")
     return rank, world_size
 

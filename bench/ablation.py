@@ -1,0 +1,186 @@
+"""What is each modelled element worth, and what does it cost?
+
+    python bench/ablation.py [--cases 16] [--only WORD] [--repeats 5]
+
+Takes one element at a time out of the scenes of bench/references (ablation_elements.py says how)
+and draws them again. Printed are the FLIP that this changes over the pixels of container and
+spreader at 640x640, mean over the cases and worst case; the share of those pixels that change
+visibly, by more than VISIBLE; by how much the image without it is farther from Cycles' reference at
+320x320 (negative: nearer); and the processor time of a draw that is saved, a mean with its standard
+error. Elements that a case does not have count as no change. Leaves its
+table in docs/accuracy.md and bench/results/ablation.json; with --only, neither.
+"""
+
+import argparse
+import os
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+from ablation_elements import ELEMENTS, Absence, Element
+from image_error import displayed, flip
+from numpy.typing import NDArray
+from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from results import machine, parse_size, save, write_section
+
+from fastgen import Config, Generator
+from fastgen.sample import Frame
+from fastgen.scene import Scene
+
+QUALITY = "balanced"
+VISIBLE = 0.1
+MARGIN_PX = 32
+"""Around the objects, beyond what FLIP's filters carry over to them from the border."""
+
+
+Array = NDArray[np.floating]
+
+
+class Drawer:
+    """Draws scenes with or without an element; a context manager over a generator of its own."""
+
+    def __init__(self, absence: Absence) -> None:
+        self._absence = absence
+        self._generator = Generator(Config.preset(), SEED, SIZE, quality=QUALITY)
+
+    def __enter__(self) -> "Drawer":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._generator.close()
+
+    def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
+        """The case's view of the scene."""
+        with self._absence.gone():
+            renderer = self._generator._open()
+            return renderer.render(self._absence.scene(scene), scene.camera(case.camera), size)
+
+    def seconds(self, case: Case, scene: Scene, size: tuple[int, int]) -> float:
+        """Processor time of a draw that is warm."""
+        with self._absence.gone():
+            renderer = self._generator._open()
+            less, camera = self._absence.scene(scene), scene.camera(case.camera)
+            renderer._ctx.finish()
+            began = time.process_time()
+            renderer.draw(less, camera, size)
+            renderer._ctx.finish()
+            return time.process_time() - began
+
+    def exposure(self, case: Case, scene: Scene) -> float:
+        """Of the case's camera."""
+        return self._generator.exposure(scene, scene.camera(case.camera))
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """A case with everything in it. image: sRGB in 0..1 at the size asked for; there: its pixels of
+    objects; around: the window of it that holds them; error: mean FLIP to Cycles' image."""
+
+    case: Case
+    reference: Reference
+    exposure: float
+    image: Array
+    there: NDArray[np.bool_]
+    around: tuple[slice, slice]
+    error: float
+
+    @staticmethod
+    def of(case: Case, full: Drawer, size: tuple[int, int]) -> "Whole":
+        """Drawn by `full`."""
+        reference = load(case.number)
+        frame = full.frame(case, reference.scene, size)
+        there = frame.ids > 0
+        around = tuple(
+            slice(max(places.min() - MARGIN_PX, 0), places.max() + MARGIN_PX)
+            for places in np.nonzero(there)
+        )
+        exposure = full.exposure(case, reference.scene)
+        error = error_to(reference, exposure, full.frame(case, reference.scene, SIZE))
+        image = frame.image / 255.0
+        return Whole(case, reference, exposure, image, there, (around[0], around[1]), error)
+
+
+def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
+    """Mean FLIP to Cycles' image over the pixels of objects."""
+    expected = displayed(reference.radiance[FILTERS[QUALITY]], exposure)
+    return float(flip(expected, frame.image / 255.0)[reference.inside].mean())
+
+
+def without(
+    element: Element, wholes: list[Whole], full: Drawer, size: tuple[int, int], repeats: int
+) -> dict[str, Any]:
+    """The row of an element."""
+    absence = Absence(element)
+    changes, visible, farther, saved = [], [], [], []
+    with Drawer(absence) as less:
+        for whole in wholes:
+            case, scene = whole.case, whole.reference.scene
+            part = less.frame(case, scene, size).image / 255.0
+            error = flip(whole.image[whole.around], part[whole.around])
+            change = error[whole.there[whole.around]]
+            changes.append(float(change.mean()))
+            visible.append(float((change > VISIBLE).mean()))
+            small = less.frame(case, scene, SIZE)
+            farther.append(error_to(whole.reference, whole.exposure, small) - whole.error)
+            pairs = [
+                [drawer.seconds(case, scene, size) for drawer in (full, less)]
+                for _ in range(repeats)
+            ]
+            saved.append(float(np.median(np.subtract(*np.transpose(pairs)))) * 1e3)
+    absence.check()
+    return {
+        "group": element.group,
+        "flip": float(np.mean(changes)),
+        "worst": max(changes),
+        "visible": float(np.mean(visible)),
+        "farther": float(np.mean(farther)),
+        "saved_ms": float(np.mean(saved)),
+        "saved_error_ms": float(np.std(saved, ddof=1) / len(saved) ** 0.5) if saved[1:] else 0.0,
+    }
+
+
+def main() -> None:
+    """Print the table as it grows."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cases", type=int, default=16)
+    parser.add_argument("--size", default="640x640")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--only", default="", help="elements whose group or name holds this")
+    options = parser.parse_args()
+    size = parse_size(options.size)
+    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    about = machine()
+    lines = [
+        f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}, no GPU.",
+        "",
+        "| without | FLIP of objects, mean (worst case) | visible change | farther from Cycles "
+        "| core-ms saved |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    rows: dict[str, Any] = {}
+    with Drawer(Absence(Element("", "nothing"))) as full:
+        wholes = [Whole.of(case, full, size) for case in chosen]
+        for element in ELEMENTS:
+            if options.only not in f"{element.group} {element.name}":
+                continue
+            row = rows[element.name] = without(element, wholes, full, size, options.repeats)
+            lines.append(
+                f"| {element.name} | {row['flip']:.4f} ({row['worst']:.4f}) | {row['visible']:.2%} "
+                f"| {row['farther']:+.4f} | {row['saved_ms']:.1f} ± {row['saved_error_ms']:.1f} |"
+            )
+            print(lines[-1], file=sys.stderr, flush=True)
+    if options.only:
+        return
+    write_section("ablation", lines)
+    figures = {"machine": about, "size": options.size, "cases": len(chosen), "elements": rows}
+    save("ablation", figures)
+
+
+if __name__ == "__main__":
+    main()

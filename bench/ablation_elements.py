@@ -1,0 +1,230 @@
+"""What can be taken out of an image, and how: by the scene, by shader text, or by mesh parts."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from fastgen import openness, programs, renderer
+from fastgen.mesh import FACE_AXES, Mesh
+from fastgen.scene import Scene, Spreader
+
+MeshEdit = Callable[[Mesh], Mesh]
+
+
+@dataclass(frozen=True)
+class Element:
+    """One thing that is modelled. Its absence is a scene without it, other shader text (each old
+    piece must be found in some shader), or other meshes of the container or the spreader; the shade
+    of what is gone from a mesh stays."""
+
+    group: str
+    name: str
+    scene: Callable[[Scene], Scene] | None = None
+    text: tuple[tuple[str, str], ...] = ()
+    container: MeshEdit | None = None
+    spreader: MeshEdit | None = None
+    open_sky: bool = False
+
+
+class Absence:
+    """Takes an element out of all that is drawn while the context `gone` is entered."""
+
+    def __init__(self, element: Element) -> None:
+        self.element = element
+        self._found: set[str] = set()
+
+    def scene(self, scene: Scene) -> Scene:
+        """The scene without the element."""
+        return self.element.scene(scene) if self.element.scene else scene
+
+    @contextmanager
+    def gone(self) -> Iterator[None]:
+        """Renderers that are made and used in here do without the element."""
+        with ExitStack() as stack:
+            for owner, name, value in self._replacements():
+                stack.enter_context(mock.patch.object(owner, name, value))
+            yield
+
+    def check(self) -> None:
+        """Ends the program where shader text that was to change was never met."""
+        for old, _ in self.element.text:
+            if old not in self._found:
+                raise SystemExit(f"{self.element.name}: no shader holds {old!r} any more")
+
+    def _replacements(self) -> Iterator[tuple[Any, str, Any]]:
+        element = self.element
+        if element.text:
+            yield programs, "expand", self._edited(programs.expand)
+        if element.container:
+            yield renderer, "build_container", _built(renderer.build_container, element.container)
+        if element.spreader:
+            yield renderer, "build_spreader", _built(renderer.build_spreader, element.spreader)
+        yield openness.SkyProbe, "openness", _probe(element.open_sky)
+
+    def _edited(self, expand: Callable[..., str]) -> Callable[..., str]:
+        def edited(*args: Any, **kwargs: Any) -> str:
+            text = expand(*args, **kwargs)
+            for old, new in self.element.text:
+                if old in text:
+                    self._found.add(old)
+                    text = text.replace(old, new)
+            return text
+
+        return edited
+
+
+_SOURCES: dict[Mesh, Mesh] = {}
+"""Edited meshes and what they were made of."""
+
+
+@lru_cache(maxsize=512)
+def _edited_mesh(mesh: Mesh, edit: MeshEdit) -> Mesh:
+    edited = edit(mesh)
+    _SOURCES[edited] = mesh
+    return edited
+
+
+def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
+    return lambda *args: _edited_mesh(build(*args), edit)
+
+
+@lru_cache(maxsize=64)
+def _all_open(mesh: Mesh) -> bytes:
+    return openness.encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
+
+
+def _probe(open_sky: bool) -> Callable[..., bytes]:
+    """In place of SkyProbe.openness: that of the unedited meshes, or no occlusion at all."""
+    measured = openness.SkyProbe.openness
+
+    def found(self: openness.SkyProbe, container: Mesh, spreader: Mesh | None) -> bytes:
+        if open_sky:
+            return _all_open(container)
+        source = _SOURCES.get(container, container)
+        return measured(self, source, _SOURCES.get(spreader, spreader) if spreader else None)
+
+    return found
+
+
+def without_charts(*words: str) -> MeshEdit:
+    """Leaves out the triangles of charts whose name holds one of `words`."""
+
+    def edit(mesh: Mesh) -> Mesh:
+        dropped = np.array([any(word in chart.name for word in words) for chart in mesh.charts])
+        keep = ~dropped[mesh.chart[mesh.triangles[:, 0]]]
+        groups, parts, start = {}, [], 0
+        for name, part in mesh.groups.items():
+            parts.append(mesh.triangles[part][keep[part]])
+            groups[name] = slice(start, start + len(parts[-1]))
+            start += len(parts[-1])
+        return replace(mesh, triangles=np.concatenate(parts), groups=groups)
+
+    return edit
+
+
+def filled_pockets(mesh: Mesh) -> Mesh:
+    """The castings' apertures closed flush with their faces."""
+    positions = mesh.positions_mm.copy()
+    for number, chart in enumerate(mesh.charts):
+        if chart.name.endswith(".pocket"):
+            out = np.array(FACE_AXES[chart.face].out, np.float32)
+            mine = mesh.chart == number
+            depth = positions[mine] @ out
+            positions[mine] += (depth.max() - depth)[:, None] * out
+    charts = tuple(
+        replace(chart, material="casting") if chart.name.endswith(".pocket") else chart
+        for chart in mesh.charts
+    )
+    return replace(mesh, positions_mm=positions, charts=charts)
+
+
+def _without_decals(*kinds: str) -> Callable[[Scene], Scene]:
+    return lambda scene: replace(
+        scene, decals=tuple(decal for decal in scene.decals if decal.kind not in kinds)
+    )
+
+
+def _fresh_print(scene: Scene) -> Scene:
+    return replace(scene, decals=tuple(replace(decal, wear=0.0) for decal in scene.decals))
+
+
+def _layer(name: str) -> tuple[tuple[str, str], ...]:
+    return ((f"#define SHOWN_{name} 1", f"#define SHOWN_{name} 0"),)
+
+
+ELEMENTS = (
+    Element("surface", "tone of the paint", text=_layer("TONE")),
+    Element("surface", "ageing toward corners", text=_layer("AGEING")),
+    Element("surface", "dirt along edges", text=_layer("DIRT")),
+    Element("surface", "rust", text=_layer("RUST")),
+    Element("surface", "scratches", text=_layer("SCRATCHES")),
+    Element("surface", "worn reflection", text=_layer("REFLECTION")),
+    Element("prints", "markers", _without_decals("marker")),
+    Element("prints", "texts", _without_decals("text")),
+    Element(
+        "prints", "stickers, emblems, stripes", _without_decals("sticker", "emblem", "stripes")
+    ),
+    Element("prints", "wear of prints", _fresh_print),
+    Element("shape", "damage", lambda scene: replace(scene, damages=())),
+    Element(
+        "shape",
+        "door gear: bars, cams, handles, hinges",
+        container=without_charts(
+            *(
+                f"door.{part}."
+                for part in ("bar", "cams", "keepers", "brackets", "handle", "hinges")
+            )
+        ),
+    ),
+    Element("shape", "door gaskets", container=without_charts("door.gasket")),
+    Element("shape", "castings' apertures", container=filled_pockets),
+    Element(
+        "shape", "underside: members, fork pockets", container=without_charts("member.", "fork.")
+    ),
+    Element("shape", "spreader", lambda scene: replace(scene, spreader=Spreader())),
+    Element("shape", "spreader: cables", spreader=without_charts("cables.")),
+    Element("shape", "spreader: headblock", spreader=without_charts("headblock.")),
+    Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),
+    Element("shape", "spreader: twist locks", spreader=without_charts(".locks.")),
+    Element("light", "occlusion of the sky", open_sky=True),
+    Element(
+        "light",
+        "bounces in occluded places",
+        text=(
+            (
+                "return clamp(((share * a + b) * share + c) * share, share, 1.0);",
+                "return vec3(share);",
+            ),
+        ),
+    ),
+    Element(
+        "light",
+        "occlusion of reflections",
+        text=(
+            (
+                "return smoothstep(rim - soft, rim, dot(mirror, sky.direction) + 1e-3);",
+                "return 1.0;",
+            ),
+        ),
+    ),
+    Element(
+        "light",
+        "energy of multiple scattering",
+        text=(("float gain = 1.0 / all - 1.0;", "float gain = 0.0;"),),
+    ),
+    Element(
+        "light",
+        "reflections altogether",
+        text=(
+            (
+                "return diffuse * around + specular * mirrored;",
+                "return m.albedo * (1.0 - m.metallic) * around;",
+            ),
+        ),
+    ),
+)

@@ -1,0 +1,74 @@
+"""What is known of Cycles' own errors and times, from bench/references/cycles.json."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from reference_set import FOLDER
+
+Curve = list[tuple[int, float, float]]
+"""(samples, error, processor seconds) in rising order of samples."""
+
+
+@dataclass(frozen=True)
+class Equal:
+    """At how many samples an error is reached, and the seconds that takes. 0 where it never is."""
+
+    samples: float
+    seconds: float
+    words: str
+
+
+@dataclass(frozen=True)
+class Figures:
+    """floor: by case and filter, the measures between two seeds. series: by case, way (spp or
+    denoised) and samples, the seconds and the measures against the reference's box. Measures are
+    FLIP, SSIM and PSNR of the whole image, then of objects."""
+
+    floor: dict[int, dict[str, list[float]]]
+    series: dict[int, dict[str, dict[str, dict[str, object]]]]
+
+    @staticmethod
+    def load(path: Path = FOLDER / "cycles.json") -> "Figures":
+        """All that was packed; nothing where the file is not there."""
+        if not path.exists():
+            return Figures({}, {})
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return Figures(*({int(n): v for n, v in data[k].items()} for k in ("floor", "series")))
+
+    def floor_rows(self, filter_name: str) -> list[tuple[float, ...]]:
+        """Measures of each case that was traced twice."""
+        return [tuple(by_filter[filter_name]) for by_filter in self.floor.values()]
+
+    def curve(self, numbers: Sequence[int], way: str, column: int) -> Curve:
+        """Means over cases of one measure by samples."""
+        of_case = [self.series[n][way] for n in numbers if way in self.series.get(n, {})]
+        if not of_case:
+            return []
+        return [
+            (
+                int(samples),
+                float(np.mean([case[samples]["measures"][column] for case in of_case])),
+                float(np.mean([case[samples]["seconds"] for case in of_case])),
+            )
+            for samples in of_case[0]
+        ]
+
+
+def equal_samples(curve: Curve, error: float) -> Equal:
+    """Where a falling curve meets `error`: straight lines between its points on both logarithms for
+    samples, and between the logarithm of samples and of seconds for the time."""
+    if not curve:
+        return Equal(0.0, 0.0, "no known number of")
+    samples, errors, seconds = (np.array(column, float) for column in zip(*curve, strict=True))
+    errors = np.minimum.accumulate(errors)
+    if error >= errors[0]:
+        return Equal(samples[0], seconds[0], f"fewer than {samples[0]:.0f}")
+    if error < errors[-1]:
+        return Equal(samples[-1], seconds[-1], f"more than {samples[-1]:.0f}")
+    place = np.interp(-np.log(error), -np.log(errors), np.log(samples))
+    needed = float(np.exp(np.interp(place, np.log(samples), np.log(seconds))))
+    count = float(np.exp(place))
+    return Equal(count, needed, f"{count:.0f}" if count >= 10 else f"{count:.1f}")

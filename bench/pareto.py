@@ -1,0 +1,241 @@
+"""What does accuracy cost? Images a second against the distance to the path tracer.
+
+    python bench/pareto.py [--cases 8] [--repeats 3]
+
+Sweeps what fastgen can leave out or do finer, each over the same cases of bench/references at
+320x320: FLIP over the pixels of objects against Cycles at 1,024 samples, and labelled images a
+second of one core, from processor time. On the same axes: Cycles at 1 to 256 samples with and
+without denoising (from bench/references/cycles.json: colour only, opening the scene left out), and
+pyrender, where `python bench/peers.py --install --only pyrender` was done. pyrender has no
+image-based light; its picture is scaled to the mean light of the reference's object pixels.
+Leaves its table in docs/accuracy.md, bench/results/pareto.json and docs/pareto.png.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import numpy as np
+import peers
+import trimesh
+from ablation_elements import ELEMENTS, Absence
+from cycles_figures import Figures
+from image_error import displayed, flip, srgb_decode, srgb_encode
+from pareto_chart import Point, draw, front
+from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from results import ROOT, machine, save, write_section
+
+from fastgen import Config, Generator, environment, renderer
+from fastgen.camera import view_of
+from fastgen.export import export_glb
+
+PYRENDER_TEXEL_MM = 6.0
+
+Patches = list[tuple[Any, str, Any]]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to render. absent: names of ablation_elements.ELEMENTS to do without; patches: what
+    else is replaced, a function as building it is to be left to those who draw it."""
+
+    name: str
+    quality: str = "balanced"
+    absent: tuple[str, ...] = ()
+    patches: Callable[[], Patches] = list
+
+    @contextmanager
+    def entered(self) -> Iterator[None]:
+        """Generators that are made and used in here render this way."""
+        named = {element.name: element for element in ELEMENTS}
+        with ExitStack() as stack:
+            for name in self.absent:
+                stack.enter_context(Absence(named[name]).gone())
+            for owner, attribute, value in self.patches():
+                stack.enter_context(mock.patch.object(owner, attribute, value))
+            yield
+
+
+def _coarse_mesh() -> Patches:
+    build = renderer.build_container
+    return [(renderer, "build_container", lambda kind, profiles: build(kind, profiles, 2000.0))]
+
+
+def _light_maps(scale: float) -> Callable[[], Patches]:
+    """Prefiltered maps of `scale` times the side, made anew instead of read from the cache."""
+
+    def load_anew(path: Path) -> environment.EnvironmentLight:
+        return environment.prefilter_environment(path.stem, environment.load_radiance(path))
+
+    def patches() -> Patches:
+        sizes = [
+            (environment, name, int(getattr(environment, name) * scale))
+            for name in ("SPECULAR_SIZE", "IRRADIANCE_SIZE")
+        ]
+        return [*sizes, (sys.modules["fastgen.generator"], "load_environment", load_anew)]
+
+    return patches
+
+
+LAYERS = tuple(e.name for e in ELEMENTS if e.group == "surface")
+OCCLUSION = "occlusion of the sky"
+
+VARIANTS = (
+    Variant("draft", "draft"),
+    Variant("balanced"),
+    Variant("high", "high"),
+    Variant("draft, no occlusion", "draft", (OCCLUSION,)),
+    Variant("balanced, no occlusion", absent=(OCCLUSION,)),
+    Variant("high, no occlusion", "high", (OCCLUSION,)),
+    Variant("balanced, no noise layers", absent=LAYERS),
+    Variant("balanced, no reflections", absent=("reflections altogether",)),
+    Variant("balanced, coarse mesh", patches=_coarse_mesh),
+    Variant("balanced, light maps of half the side", patches=_light_maps(0.5)),
+    Variant("balanced, light maps of twice the side", patches=_light_maps(2.0)),
+)
+
+
+def ours(variant: Variant, chosen: list[Case], repeats: int) -> Point:
+    """A variant's mean error and rate."""
+    errors, seconds = [], []
+    with (
+        variant.entered(),
+        Generator(Config.preset(), SEED, SIZE, quality=variant.quality) as generator,
+    ):
+        for case in chosen:
+            reference = load(case.number)
+            scene, camera = reference.scene, reference.scene.camera(case.camera)
+            image = generator.render(scene=scene, camera=camera).image / 255.0
+            radiance = reference.radiance[FILTERS[variant.quality]]
+            expected = displayed(radiance, generator.exposure(scene, camera))
+            errors.append(float(flip(expected, image)[reference.inside].mean()))
+            spent = []
+            for _ in range(repeats):
+                began = time.process_time()
+                generator.render(scene=scene, camera=camera)
+                spent.append(time.process_time() - began)
+            seconds.append(statistics.median(spent))
+    return Point("fastgen", variant.name, 1 / statistics.fmean(seconds), statistics.fmean(errors))
+
+
+def cycles(chosen: list[Case], figures: Figures) -> list[Point]:
+    """Cycles' points, over those of the cases that have a series."""
+    numbers = [case.number for case in chosen if case.number in figures.series]
+    names = {"spp": "Cycles", "denoised": "Cycles, denoised"}
+    return [
+        Point(names[way], str(samples), 1 / seconds, error)
+        for way in names
+        for samples, error, seconds in figures.curve(numbers, way, 3)
+    ]
+
+
+def write_pyrender_job(chosen: list[Case], repeats: int, folder: Path) -> None:
+    """The cases as peer_renderers/measure.py wants them; what is no container counts as markers."""
+    folder.mkdir()
+    scenes = []
+    with Generator(Config.preset(), SEED, SIZE) as generator:
+        for case in chosen:
+            scene = load(case.number).scene
+            camera = scene.camera(case.camera)
+            file = folder / f"{case.number}.glb"
+            export_glb(generator, scene, file, [camera], PYRENDER_TEXEL_MM)
+            whole = trimesh.Scene()
+            for name, part in trimesh.load_scene(file, process=False).geometry.items():
+                node = "marker_2" if name.startswith("spreader") else f"container {name}"
+                whole.add_geometry(part, node_name=node, geom_name=node)
+            file.write_bytes(whole.export(file_type="glb"))
+            view = view_of(camera, SIZE)
+            right, down, forward = view.rotation
+            pose = np.eye(4)
+            pose[:3, :3], pose[:3, 3] = np.stack([right, -down, -forward], axis=1), view.position_m
+            shot = {"camera": case.camera, "pose": pose.tolist(), "focal_px": view.focal_px}
+            shots = [{**shot, "exposure": generator.exposure(scene, camera), "markers": []}]
+            scenes.append(
+                {"index": case.number, "glb": file.name, "hdri": "", "yaw_deg": 0.0, "shots": shots}
+            )
+    job = {"seed": SEED, "size": SIZE, "repeats": repeats, "samples": 0, "scenes": scenes}
+    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+
+
+def as_bright(image: np.ndarray, reference: Reference, expected: np.ndarray) -> np.ndarray:
+    """sRGB `image` with the mean linear light of `expected` over object pixels."""
+    inside = reference.inside
+    light = srgb_decode(image)
+    gain = srgb_decode(expected)[inside].mean() / max(float(light[inside].mean()), 1e-6)
+    return np.asarray(srgb_encode(gain * light))
+
+
+def pyrender(chosen: list[Case], repeats: int) -> list[Point]:
+    """pyrender's point; none where it is not installed."""
+    (peer,) = (p for p in peers.PEERS if p.script == "with_pyrender.py")
+    if not peer.interpreter.exists():
+        print("pyrender: not installed, see --help")
+        return []
+    with tempfile.TemporaryDirectory() as place:
+        job, out = Path(place) / "job", Path(place) / "out"
+        write_pyrender_job(chosen, repeats, job)
+        result = peers.run(peer, job, out)
+        if "failed" in result:
+            print(f"pyrender: {result['failed']}")
+            return []
+        errors = []
+        with Generator(Config.preset(), SEED, SIZE) as generator:
+            for case in chosen:
+                reference = load(case.number)
+                exposure = generator.exposure(reference.scene, reference.scene.camera(case.camera))
+                expected = displayed(reference.radiance["box"], exposure)
+                with np.load(out / f"{case.number:06d}_{case.camera}.npz") as stored:
+                    image = as_bright(stored["image"] / 255.0, reference, expected)
+                errors.append(float(flip(expected, image)[reference.inside].mean()))
+    stages = ("colour", "labels")
+    cores = sum(statistics.median(lap[1] for lap in result["laps"][s]) for s in stages) / 1e3
+    return [Point("pyrender", "colour and ids", 1 / cores, statistics.fmean(errors))]
+
+
+def main() -> None:
+    """Print the points and draw the chart."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cases", type=int, default=8)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--only", default="", help="variants whose name holds this")
+    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "pareto.png")
+    options = parser.parse_args()
+    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    about = machine()
+    caption = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}"
+    points = [
+        ours(variant, chosen, options.repeats)
+        for variant in VARIANTS
+        if options.only in variant.name
+    ]
+    points += cycles(chosen, Figures.load()) + pyrender(chosen, options.repeats)
+    best = front(points)
+    lines = [
+        f"{caption}, no GPU.",
+        "",
+        "| renderer | setting | images/s of a core | FLIP of objects | on the front |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for point in points:
+        figures = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
+        lines.append(f"| {point.renderer} | {point.setting} | {figures} |")
+    write_section("pareto", lines)
+    save("pareto", {"machine": about, "points": [vars(point) for point in points]})
+    draw(points, caption, options.chart)
+
+
+if __name__ == "__main__":
+    main()

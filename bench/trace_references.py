@@ -1,0 +1,123 @@
+"""Path-traces what `bench/accuracy.py` compares with; run once, in the background.
+
+    python bench/trace_references.py --blender-python PYTHON [--cases 32] [--twice 8] [--series 8]
+
+PYTHON is a Python 3.11 with bpy==4.5.15. What is there already is not traced again, so a run that
+was stopped goes on where it was; as is, it takes 45 minutes of two cores. What Cycles writes goes
+to --raw; `bench/pack_references.py` makes bench/references from it. `--twice`: so many cases are
+traced a second time with another seed, to know Cycles' own noise. `--series`: of so many, images at
+1 to 256 samples follow, and denoised ones.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+os.environ.setdefault("LP_NUM_THREADS", "0")
+
+from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases
+
+from fastgen import Generator
+from fastgen.environment import bundled_hdris
+from fastgen.export import export_glb
+
+SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
+BACKGROUND_SAMPLES = 16
+"""Of each half pixel outside the rectangle around all objects: what is there is a smooth picture,
+and light never meets anything."""
+
+TEXEL_MM = 3.0
+"""A quarter of the closest camera's pixel: finer than what 320 pixels a side can show."""
+
+
+class Tracer:
+    """Renders cases with Cycles into a folder, each file once."""
+
+    def __init__(self, python: Path, folder: Path, threads: int) -> None:
+        self._python = python
+        self._folder = folder
+        self._threads = threads
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def reference(self, case: Case, seed: int) -> None:
+        """NN_seed.exr and NN_seed_whole.exr, and of the first seed NN_centers.exr."""
+        name = f"{case.number:02d}"
+        done = self._folder / f"{name}_{seed}.exr"
+        if done.exists():
+            return
+        part = self._folder / f"part_{name}_{seed}.exr"
+        more = ["--scale", SCALE, "--background", BACKGROUND_SAMPLES]
+        more += ["--whole", self._folder / f"{name}_{seed}_whole.exr"]
+        if seed == 1:
+            more += ["--centers", self._folder / f"{name}_centers.exr"]
+        self._run(case, part, seed, str(SAMPLES // SCALE**2), more)
+        part.replace(done)
+
+    def series(self, case: Case, way: str) -> None:
+        """NN_way_N.exr for each number N of samples, and their seconds in NN_way.json.
+
+        way: a key of SERIES.
+        """
+        name = f"{case.number:02d}_{way}"
+        seconds = self._folder / f"{name}.json"
+        if seconds.exists():
+            return
+        counts = ",".join(str(n) for n in SERIES[way])
+        more = ["--denoise"] if way == "denoised" else []
+        found = self._run(case, self._folder / f"{name}_{{samples}}.exr", 7, counts, more)
+        seconds.write_text(found, encoding="utf-8")
+
+    def _run(self, case: Case, out: Path, seed: int, samples: str, more: Sequence[object]) -> str:
+        """What the tracer says of its seconds."""
+        glb = self._exported(case)
+        tracer = Path(__file__).with_name("path_traced.py")
+        command = [self._python, tracer, glb, "--camera", case.camera]
+        command += ["--hdri", bundled_hdris()[case.light], "-o", out]
+        command += ["--samples", samples, "--seed", seed, "--threads", self._threads, *more]
+        done = subprocess.run(
+            [str(word) for word in command], check=True, stdout=subprocess.PIPE, text=True
+        )
+        (line,) = (line for line in done.stdout.splitlines() if line.startswith("seconds "))
+        print(f"{case.number:02d} {case.camera:2s} {case.light:8s} {out.name} {line}", flush=True)
+        return line.removeprefix("seconds ")
+
+    def _exported(self, case: Case) -> Path:
+        """The GLB file, beside it the scene that it was made from."""
+        glb = self._folder / f"{case.number:02d}.glb"
+        if not glb.exists():
+            scene = case.drawn()
+            aside = glb.with_suffix(".part")
+            with Generator(case.config, SEED, SIZE) as generator:
+                export_glb(generator, scene, aside, [scene.camera(case.camera)], TEXEL_MM)
+            text = json.dumps(json.loads(scene.to_json()))
+            glb.with_suffix(".json").write_text(text, encoding="utf-8")
+            aside.replace(glb)
+        return glb
+
+
+def main() -> None:
+    """Trace what is missing."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--blender-python", type=Path, required=True)
+    parser.add_argument("--cases", type=int, default=32)
+    parser.add_argument("--twice", type=int, default=8)
+    parser.add_argument("--series", type=int, default=8)
+    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--raw", type=Path, default=Path(__file__).parent / ".raw_references")
+    options = parser.parse_args()
+    os.nice(19)
+    tracer = Tracer(options.blender_python, options.raw, options.threads)
+    for case in cases()[: options.cases]:
+        tracer.reference(case, 1)
+    for case in cases()[: options.series]:
+        for way in SERIES:
+            tracer.series(case, way)
+    for case in cases()[: options.twice]:
+        tracer.reference(case, 2)
+
+
+if __name__ == "__main__":
+    main()

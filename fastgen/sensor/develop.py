@@ -1,0 +1,61 @@
+"""Frame -> the Frame that a real camera would have given: weather, optics, sensor, encoder.
+
+In the order of the real thing: fog and rain, defocus and motion, fall-off, exposure and white
+balance, noise, all in linear light; then the tone curve, the stamp and JPEG. The image changes,
+labels are those of what is there, at the middle of the exposure.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from fastgen.camera import View
+from fastgen.sample import Frame
+from fastgen.scene import Camera, Color
+from fastgen.sensor.blur import blur_radius_px, defocused, moved
+from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
+from fastgen.sensor.light import displayed, light_of
+from fastgen.sensor.parts import Sensor, Weather
+from fastgen.sensor.weather import foggy, rained
+
+
+def is_needed(camera: Camera, weather: Weather) -> bool:
+    """Whether `develop` changes anything."""
+    return camera.sensor is not None or bool(weather.visibility_mm or weather.rain)
+
+
+def develop(frame: Frame, view: View, camera: Camera, weather: Weather, airlight: Color) -> Frame:
+    """The frame as `camera` records it in `weather`.
+
+    airlight: mean light of the sky in the frame's exposure: that of fog, and of drops.
+    """
+    sensor = camera.sensor or Sensor()
+    light = light_of(frame.image)
+    sky = np.array(airlight, np.float32)
+    if weather.visibility_mm:
+        light = foggy(light, _ray_m(frame, view), weather.visibility_mm, sky)
+    if weather.rain:
+        light = rained(light, frame.depth, view, weather.rain, sky)
+    width, _ = view.size
+    if sensor.defocus:
+        light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
+    right, down = sensor.motion
+    light = moved(light, (right * width, down * width))
+    gains = np.array(sensor.gains, np.float32) * np.float32(2.0**sensor.exposure_error_ev)
+    if sensor.vignetting:
+        light = light * falloff(view.size, sensor.vignetting)
+    light = light * gains
+    if sensor.noise:
+        light = noisy(light, sensor.noise)
+    image = displayed(light)
+    if sensor.stamp:
+        image = stamped(image, sensor.stamp)
+    if sensor.jpeg_quality:
+        image = through_jpeg(image, sensor.jpeg_quality)
+    return replace(frame, image=image)
+
+
+def _ray_m(frame: Frame, view: View) -> np.ndarray:
+    """Distance along each pixel's ray, float32 [H, W]."""
+    _, rays = view.rays()
+    return np.asarray(frame.depth / (rays @ view.rotation[2]), np.float32)

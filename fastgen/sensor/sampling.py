@@ -1,0 +1,118 @@
+"""Draws what a camera and its weather do to an image; each part from a stream of its own."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from datetime import date, timedelta
+
+import numpy as np
+
+from fastgen.records import Range
+from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
+
+
+def sample_lens(config: LensConfig, rng: np.random.Generator) -> Lens:
+    """One lens of the kind that `config` describes; coefficients to a millionth."""
+    drawn = {name: _between(rng, getattr(config, name)) for name in sorted(config.names)}
+    return Lens(config.model, tuple(round(drawn[name], 6) for name in config.names))
+
+
+def extreme_lenses(config: LensConfig) -> Iterator[Lens]:
+    """The lenses at the ends of all ranges."""
+    ends = [sorted({*getattr(config, name)}) for name in config.names]
+    return (Lens(config.model, values) for values in itertools.product(*ends))
+
+
+def _between(rng: np.random.Generator, values: Range) -> float:
+    return float(rng.uniform(values.lo, values.hi))
+
+
+def sample_sensor(
+    config: SensorConfig, distance_mm: float, streams: Callable[[str], np.random.Generator]
+) -> Sensor | None:
+    """What a camera `distance_mm` before its target does to an image, None where it is nothing.
+
+    streams: gives the random stream of each part by its name.
+    """
+    sensor = Sensor(
+        defocus=_defocus(config, distance_mm, streams("defocus")),
+        motion=_motion(config, streams("motion")),
+        vignetting=_drawn(streams("vignetting"), config.vignetting),
+        exposure_error_ev=_drawn(streams("exposure"), config.exposure_error_ev),
+        gains=_gains(config.white_balance_ev, streams("white balance")),
+        noise=_noise(config, streams("noise")),
+        stamp=_stamp(config, streams("stamp")),
+        jpeg_quality=int(streams("jpeg").integers(*config.jpeg_quality, endpoint=True)),
+    )
+    return None if sensor == Sensor() else sensor
+
+
+def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
+    """The weather of a scene; streams: as for `sample_sensor`."""
+    fog, rain, wet = streams("fog"), streams("rain"), streams("wet")
+    foggy, rains = (
+        rng.random() < probability
+        for rng, probability in ((fog, config.fog_probability), (rain, config.rain_probability))
+    )
+    wets = wet.random() < config.wet_probability or rains
+    return Weather(
+        visibility_mm=round(_between(fog, config.visibility_mm)) if foggy else 0.0,
+        rain=Rain(
+            rate_mm_h=_drawn(rain, config.rate_mm_h),
+            shutter_s=_drawn(rain, config.shutter_s),
+            wind=_drawn(rain, config.wind),
+            seed=_seed(rain),
+        )
+        if rains
+        else None,
+        wetness=_drawn(wet, config.wetness) if wets else 0.0,
+    )
+
+
+def _defocus(config: SensorConfig, distance_mm: float, rng: np.random.Generator) -> Defocus | None:
+    if rng.random() >= config.defocus.probability:
+        return None
+    focus = _between(rng, config.defocus.focus) * distance_mm
+    return Defocus(round(focus), _drawn(rng, config.defocus.f_number))
+
+
+def _motion(config: SensorConfig, rng: np.random.Generator) -> tuple[float, float]:
+    if rng.random() >= config.motion.probability:
+        return 0.0, 0.0
+    extent, angle = _between(rng, config.motion.extent), rng.uniform(0, 2 * np.pi)
+    return round(float(extent * np.cos(angle)), 6), round(float(extent * np.sin(angle)), 6)
+
+
+def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
+    red, blue = (round(2.0 ** _between(rng, ev), 4) for _ in range(2))
+    return red, 1.0, blue
+
+
+def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
+    if rng.random() >= config.noise.probability:
+        return None
+    # so that halving the light is as likely at any level
+    low, high = np.log(config.noise.full_well_e)
+    full_well = round(float(np.exp(rng.uniform(low, high))))
+    return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))
+
+
+def _stamp(config: SensorConfig, rng: np.random.Generator) -> Stamp | None:
+    if rng.random() >= config.stamp.probability:
+        return None
+    first, last = config.stamp.years
+    day = date(int(rng.integers(first, last, endpoint=True)), 1, 1)
+    day += timedelta(days=int(rng.integers(365)))
+    seconds = int(rng.integers(86400))
+    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
+    shape = str(rng.choice(["%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d"]))
+    corner = str(rng.choice(config.stamp.corners))
+    return Stamp(f"{day.strftime(shape)} {clock}", corner, _drawn(rng, config.stamp.height))
+
+
+def _drawn(rng: np.random.Generator, values: Range) -> float:
+    return round(_between(rng, values), 4)
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**31))

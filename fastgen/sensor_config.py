@@ -1,0 +1,133 @@
+"""Ranges of what a real camera and its weather do to an image; everything is off by default."""
+
+from dataclasses import dataclass, field
+
+from fastgen.errors import ConfigError
+from fastgen.records import Range, bounds, nearest
+from fastgen.sensor.parts import LENS_MODELS
+
+_ZERO = Range(0.0, 0.0)
+_COEFFICIENT = bounds(-10.0, 10.0)
+_SHARE = bounds(0.0, 1.0)
+
+CORNERS = tuple(f"{level} {side}" for level in ("top", "bottom") for side in ("left", "right"))
+
+
+@dataclass(frozen=True)
+class LensConfig:
+    """A lens's distortion by OpenCV's coefficients, which differ a little between lenses of a kind.
+
+    model: brown_conrady takes k1, k2, k3, p1 and p2, fisheye (Kannala-Brandt) k1 to k4. See
+    sensor.parts.Lens.
+    """
+
+    model: str = "brown_conrady"
+    k1: Range = field(default=_ZERO, metadata=_COEFFICIENT)
+    k2: Range = field(default=_ZERO, metadata=_COEFFICIENT)
+    k3: Range = field(default=_ZERO, metadata=_COEFFICIENT)
+    k4: Range = field(default=_ZERO, metadata=_COEFFICIENT)
+    p1: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
+    p2: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
+
+    def check(self, path: str) -> None:
+        """Raise ConfigError, naming what stands at `path`, for what the model has not."""
+        if self.model not in LENS_MODELS:
+            hint = nearest(self.model, LENS_MODELS)
+            raise ConfigError(f"{path}.model: {self.model!r} is unknown{hint}")
+        foreign = ("p1", "p2") if self.model == "fisheye" else ("k4",)
+        for name in foreign:
+            if getattr(self, name) != _ZERO:
+                raise ConfigError(f"{path}.{name}: {self.model} has no {name}; leave it out")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The model's coefficients in OpenCV's order."""
+        fisheye = self.model == "fisheye"
+        return ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
+
+
+@dataclass(frozen=True)
+class NoiseConfig:
+    """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons."""
+
+    probability: float = field(default=0.0, metadata=_SHARE)
+    full_well_e: Range = field(default=Range(2500, 12000), metadata=bounds(50, 1e6, "electrons"))
+    read_noise_e: Range = field(default=Range(2, 12), metadata=bounds(0, 1e4, "electrons"))
+
+
+@dataclass(frozen=True)
+class StampConfig:
+    """Date and time burnt in. years: first and last; height: of capitals, share of the image's."""
+
+    probability: float = field(default=0.0, metadata=_SHARE)
+    years: tuple[int, int] = field(default=(2019, 2027), metadata=bounds(1970, 2100))
+    corners: tuple[str, ...] = ("top left", "top right", "bottom left", "bottom right")
+    height: Range = field(default=Range(0.018, 0.032), metadata=bounds(0.005, 0.2))
+
+
+@dataclass(frozen=True)
+class DefocusConfig:
+    """A focus that misses the container: focused at this share of the distance to the target."""
+
+    probability: float = field(default=0.0, metadata=_SHARE)
+    focus: Range = field(default=Range(0.25, 0.8), metadata=bounds(0.01, 100.0))
+    f_number: Range = field(default=Range(1.4, 4.0), metadata=bounds(0.5, 64.0))
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Camera and load move while the shutter is open. extent: share of the image's width."""
+
+    probability: float = field(default=0.0, metadata=_SHARE)
+    extent: Range = field(default=Range(0.001, 0.012), metadata=bounds(0.0, 0.2))
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """What cameras do to their images; applies to each camera of the rig.
+
+    vignetting: light lost in the corners. exposure_error_ev: beyond the rig's exposure_ev, after
+    the lens, clipping included. white_balance_ev: by which red and blue stray from green.
+    jpeg_quality: of the camera's own encoder, 0 for none.
+    """
+
+    defocus: DefocusConfig = field(default_factory=DefocusConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    vignetting: Range = field(default=_ZERO, metadata=bounds(0.0, 0.95))
+    exposure_error_ev: Range = field(default=_ZERO, metadata=bounds(-6.0, 6.0, "stops"))
+    white_balance_ev: Range = field(default=_ZERO, metadata=bounds(-2.0, 2.0, "stops"))
+    noise: NoiseConfig = field(default_factory=NoiseConfig)
+    stamp: StampConfig = field(default_factory=StampConfig)
+    jpeg_quality: tuple[int, int] = field(default=(0, 0), metadata=bounds(0, 100))
+
+    def __post_init__(self) -> None:
+        """Hold values to the choices that no single bound can express."""
+        for corner in self.stamp.corners:
+            if corner not in CORNERS:
+                raise ConfigError(f"stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}")
+        if not self.stamp.corners:
+            raise ConfigError("stamp.corners: the list is empty; give at least one")
+        for name, (low, high) in (
+            ("stamp.years", self.stamp.years),
+            ("jpeg_quality", self.jpeg_quality),
+        ):
+            if low > high:
+                raise ConfigError(f"{name}: the lowest value {low} is above {high}; swap")
+
+
+@dataclass(frozen=True)
+class WeatherConfig:
+    """How often there is fog or rain, and how wet what was rained on is.
+
+    visibility_mm: distance at which fog leaves 2 % of a contrast (Koschmieder); fog is below 1 km.
+    wetness: of paint while it rains, and in wet_probability of the scenes without rain.
+    """
+
+    fog_probability: float = field(default=0.0, metadata=_SHARE)
+    visibility_mm: Range = field(default=Range(2.5e4, 3e5), metadata=bounds(1000, 1e8, "mm"))
+    rain_probability: float = field(default=0.0, metadata=_SHARE)
+    rate_mm_h: Range = field(default=Range(2, 50), metadata=bounds(0.1, 300, "mm/h"))
+    shutter_s: Range = field(default=Range(0.0005, 0.004), metadata=bounds(1e-5, 0.1, "s"))
+    wind: Range = field(default=Range(-0.5, 0.5), metadata=bounds(-3.0, 3.0))
+    wet_probability: float = field(default=0.0, metadata=_SHARE)
+    wetness: Range = field(default=Range(0.3, 1.0), metadata=_SHARE)

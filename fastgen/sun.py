@@ -1,0 +1,66 @@
+"""The sun of an environment: a compact light, taken out of the maps so that it can cast shadows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import prefilter
+
+CAP_DEG = 3.0
+"""Radius about the brightest place that counts as the sun: its disc, blurred by texels and haze."""
+
+MIN_SHARE = 0.15
+"""Of the irradiance on a surface that faces it; what brings less casts no shadow worth its time."""
+
+_REC_709 = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, section 3.2
+
+
+@dataclass(frozen=True)
+class Sun:
+    """A light from one direction, in the frame of the environment's map.
+
+    direction: unit vector toward it. light: linear RGB, irradiance / pi on a surface that faces it,
+    the unit of EnvironmentLight.irradiance. radius: angular radius in radians of the even disc that
+    spreads as much.
+    """
+
+    direction: tuple[float, float, float]
+    light: tuple[float, float, float]
+    radius: float
+
+
+def split_sun(radiance: NDArray[np.float32]) -> tuple[Sun | None, NDArray[np.float32]]:
+    """The sun of equirectangular radiance [H, 2H, 3], and the radiance without it.
+
+    The sun is what exceeds the sky around it, channel by channel, near the brightest texel; both
+    parts together hold the light of the whole. Without a strong sun: None, and `radiance` itself.
+    """
+    height = radiance.shape[0]
+    directions = prefilter.equirect_directions(height)
+    weights = prefilter.row_solid_angle(height)[:, None]
+    luminance = radiance @ _REC_709
+    brightest = np.unravel_index(int(np.argmax(luminance)), luminance.shape)
+    toward = directions[brightest]
+    for _ in range(2):  # the second time around the centre of its light, not one texel
+        angle = np.arccos(np.clip(directions @ toward, -1.0, 1.0))
+        cap = angle < np.deg2rad(CAP_DEG)
+        around = (angle < np.deg2rad(2 * CAP_DEG)) & ~cap
+        sky = np.median(radiance[around], axis=0)
+        excess = np.where(cap[..., None], np.maximum(radiance - sky, 0.0), 0.0)
+        share = excess @ _REC_709 * weights
+        if not share.any():
+            return None, radiance
+        toward = (directions * share[..., None]).sum(axis=(0, 1))
+        toward /= np.linalg.norm(toward)
+    cosine = np.maximum(directions @ toward, 0.0)
+    if (share * cosine).sum() < MIN_SHARE * (luminance * weights * cosine).sum():
+        return None, radiance
+    squared_angle = np.arccos(np.clip(cosine, 0.0, 1.0)) ** 2
+    # an even disc of radius r has a mean square of r^2 / 2
+    radius = np.sqrt(2 * (share * squared_angle).sum() / share.sum())
+    light = (excess * (weights * cosine)[..., None]).sum(axis=(0, 1)) / np.pi
+    x, y, z = (float(v) for v in toward)
+    red, green, blue = (float(v) for v in light)
+    rest = (radiance - excess).astype(np.float32)
+    return Sun((x, y, z), (red, green, blue), float(radius)), rest

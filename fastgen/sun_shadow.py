@@ -1,0 +1,83 @@
+"""The shadow of a container and its spreader under a sun: one depth map from where it stands.
+
+As openness.py does, it keeps the faces turned away from the light, so that a lit surface is not its
+own occluder. Rest shapes: what a dent moves is less than what a penumbra blurs. Williams 1978,
+Casting Curved Shadows on Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
+"""
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.mesh import Mesh
+from fastgen.openness import Body, map_matrix, without_cables
+
+MAP_SIZE = (2048, 1024)
+"""Texels along and across: 7 mm for the longest container."""
+
+_BIAS_MM = 2.0
+
+Array = NDArray[np.float64]
+
+
+class ShadowMap:
+    """What a sun in one direction meets first. Owned by the renderer, which releases it."""
+
+    def __init__(self, ctx: moderngl.Context, bodies: list[Body], toward: Array) -> None:
+        low = np.min([body.positions_mm.min(axis=0) for body in bodies], axis=0)
+        high = np.max([body.positions_mm.max(axis=0) for body in bodies], axis=0)
+        self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
+        self.depth = ctx.depth_texture(MAP_SIZE)
+        self.depth.compare_func = "<="
+        self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.depth.repeat_x = self.depth.repeat_y = False
+        self._target = ctx.framebuffer([], self.depth)
+
+    def draw(self, ctx: moderngl.Context, program: moderngl.Program, bodies: list[Body]) -> None:
+        """Fill the map. program: of occluder.vert."""
+        self._target.use()
+        ctx.scissor = None
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.front_face, ctx.cull_face = "ccw", "front"
+        self._target.clear(depth=1.0)
+        program["to_map"] = tuple(self._to_map.T.ravel())
+        for body in bodies:
+            vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
+            indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
+            array = ctx.vertex_array(program, [(vertices, "3f", "in_position_mm")], indices)
+            array.render(moderngl.TRIANGLES)
+            for item in (array, vertices, indices):
+                item.release()
+        ctx.cull_face = "back"
+
+    def from_ray(self, eye_m: Array) -> Array:
+        """From a vector in metres, from the eye to a point, to (u, v, depth) in the map: [4, 4]."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = 0.5 * self._to_map[:3, :3] * 1000
+        matrix[:3, 3] = matrix[:3, :3] @ eye_m + 0.5 * self._to_map[:3, 3] + 0.5
+        matrix[2, 3] -= 0.5 * _BIAS_MM * np.linalg.norm(self._to_map[2, :3])
+        return matrix
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        for item in (self._target, self.depth):
+            item.release()
+
+
+def shadow_map(
+    ctx: moderngl.Context,
+    program: moderngl.Program,
+    container: Mesh,
+    spreader: Mesh | None,
+    toward: Array,
+) -> ShadowMap:
+    """The shadow of `container` and the `spreader` that holds it, less its cables.
+
+    toward: unit vector to the sun in the container's frame. program: of occluder.vert.
+    """
+    bodies = [Body(container.positions_mm, container.triangles)]
+    if spreader is not None:
+        bodies.append(without_cables(spreader))
+    made = ShadowMap(ctx, bodies, toward)
+    made.draw(ctx, program, bodies)
+    return made

@@ -1,0 +1,36 @@
+// vec4 bent(vec4 clip), vec2 straightened(vec2 pixel): a lens's distortion and the way back, see lens.py.
+
+vec2 tangential(vec2 p) {
+    float q = dot(p, p);
+    vec2 twice = 2.0 * lens_tangential * p.x * p.y;
+    return twice + lens_tangential.yx * (q + 2.0 * p * p);
+}
+
+vec4 bent(vec4 clip) {
+    if (lens_model == 0.0) return clip;
+    vec2 ideal = clip.xy / (lens_scale * clip.w);
+    float radius = max(length(ideal), 1e-6);
+    float t = lens_model == 2.0 ? atan(radius) : radius;
+    float inner = min(t, lens_end.x);
+    float q = inner * inner;
+    float curve = 1.0 + q * (lens_radial.x + q * (lens_radial.y + q * (lens_radial.z + q * lens_radial.w)));
+    float seen = inner * curve + lens_end.y * (t - inner);
+    vec2 moved = ideal * (seen / radius) + tangential(ideal * min(1.0, lens_end.x / radius));
+    return vec4(moved * lens_scale * clip.w, clip.zw);
+}
+
+// ideal over seen radius is the fit's reciprocal
+float stretched(vec2 seen) {
+    float q = dot(seen, seen);
+    vec4 high = lens_back[1], low = lens_back[0];
+    float ratio = ((high.w * q + high.z) * q + high.y) * q + high.x;
+    return 1.0 / ((((ratio * q + low.w) * q + low.z) * q + low.y) * q + low.x);
+}
+
+// of the tangential part one step is taken, which is enough for rays of light
+vec2 straightened(vec2 pixel) {
+    if (lens_model == 0.0) return pixel;
+    vec2 seen = (pixel - lens_center) / lens_focal;
+    seen -= tangential(seen * stretched(seen));
+    return lens_center + lens_focal * seen * stretched(seen);
+}

@@ -1,0 +1,167 @@
+"""The references, and what is concluded from them: cases, filters, files, equal samples, fronts."""
+
+import itertools
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
+
+import ablation_elements
+import cycles_figures
+import pareto_chart
+import reference_set
+
+from fastgen import programs
+from fastgen.container import build_container
+from fastgen.mesh import FACE_AXES
+from fastgen.resources import shader_path
+from fastgen.spreader import build_spreader
+
+
+@pytest.mark.parametrize("count", [8, 16, 24, 32])
+def test_prefix_of_the_cases_holds_every_light_camera_and_state_equally_often(count):
+    chosen = reference_set.cases()[:count]
+    for trait, kinds in (("light", 8), ("camera", 4), ("damaged", 2), ("rusty", 2)):
+        assert set(Counter(getattr(case, trait) for case in chosen).values()) == {count // kinds}
+
+
+def test_no_two_cases_join_the_same_light_and_camera():
+    pairs = {(case.light, case.camera) for case in reference_set.cases()}
+    assert len(pairs) == len(reference_set.cases()) == 32
+
+
+def test_case_draws_what_it_is_called():
+    for case in reference_set.cases()[:8]:
+        scene = case.drawn()
+        assert scene.environment.name == case.light
+        assert bool(scene.damages) == case.damaged
+        assert scene.surface.rust.coverage == (reference_set.RUSTY if case.rusty else 0.0)
+
+
+def test_filters_are_the_integrals_of_a_box_and_a_tent():
+    """Against sums over samples: 20 a half pixel, weighted by each filter's own formula."""
+    rng = np.random.default_rng(2)
+    halves = rng.random((16, 12, 3))
+    kernels = {
+        "box": lambda x: (abs(x) < 0.5) * 1.0,
+        "tent": lambda x: np.maximum(1 - abs(x), 0.0),
+    }
+    fine = 20  # samples a half pixel
+    rows, columns = (np.repeat(np.arange(n), fine) for n in (16, 12))
+    y, x = ((np.arange(n * fine) + 0.5) / fine / 2 for n in (16, 12))
+    found = reference_set.filtered(halves)
+    for name, kernel in kernels.items():
+        for i, j in itertools.product(range(1, 7), range(1, 5)):  # away from the border
+            down, across = kernel(y - i - 0.5), kernel(x - j - 0.5)
+            light = halves[rows][:, columns]
+            expected = np.einsum("y,x,yxc->c", down, across, light) / (down.sum() * across.sum())
+            assert np.allclose(found[name][i, j], expected, atol=1e-6)
+
+
+def test_reference_comes_back_from_its_files(tmp_path):
+    case = reference_set.cases()[0]
+    y, x = np.mgrid[:320, :320] / 320
+    smooth = np.stack([0.02 + x, 0.1 + y, 0.3 + 0.2 * x * y], axis=-1)
+    inside = (x - 0.5) ** 2 + y**2 < 0.2
+    depth_m = np.where(inside, 5 + x, np.inf)[::8, ::8]
+    written = reference_set.Reference(
+        case.drawn(),
+        0.25,
+        {"box": 4 * smooth, "tent": 4 * smooth[::-1]},
+        inside,
+        depth_m,
+        1 - y / 2,
+    )
+    reference_set.save(written, tmp_path, 0)
+    read = reference_set.load(0, tmp_path)
+    assert read.scene == written.scene
+    assert (read.inside == inside).all()
+    assert np.allclose(read.depth_m, depth_m, rtol=1e-6)
+    assert np.allclose(read.openness, written.openness, atol=0.02)
+    for name, radiance in written.radiance.items():
+        # compression is judged as it is seen, after exposure and encoding
+        shown, kept = ((0.25 * r).clip(0, 1) ** (1 / 2.2) for r in (radiance, read.radiance[name]))
+        assert np.abs(shown - kept).max() < 0.02
+
+
+@pytest.mark.parametrize("path", sorted(reference_set.FOLDER.glob("*.npz")), ids=lambda p: p.stem)
+def test_reference_that_is_kept_loads_and_shows_its_case(path):
+    case = reference_set.cases()[int(path.stem)]
+    reference = reference_set.load(case.number)
+    assert reference.scene.environment.name == case.light
+    assert 0.02 < reference.inside.mean() < 0.98
+    for image in reference.radiance.values():
+        assert np.isfinite(image).all()
+        assert image.shape == (*reference.inside.shape, 3)
+
+
+def test_equal_samples_of_noise_that_falls_with_the_root():
+    curve = [(n, 0.4 / n**0.5, 0.5 + 0.1 * n) for n in (1, 2, 4, 8, 16, 32, 64)]
+    found = cycles_figures.equal_samples(curve, 0.4 / 24**0.5)
+    assert found.samples == pytest.approx(24, rel=1e-3)
+    assert 0.5 + 0.1 * 16 < found.seconds < 0.5 + 0.1 * 32
+
+
+@pytest.mark.parametrize(("error", "words"), [(0.5, "fewer than 1"), (0.01, "more than 64")])
+def test_error_beyond_the_series_is_said_to_be_beyond_it(error, words):
+    curve = [(1, 0.4, 1.0), (64, 0.05, 7.0)]
+    assert cycles_figures.equal_samples(curve, error).words == words
+
+
+def test_front_holds_exactly_the_points_that_none_beats():
+    rng = np.random.default_rng(5)
+    points = [pareto_chart.Point("fastgen", str(i), *rng.random(2)) for i in range(60)]
+    unbeaten = {
+        p.setting
+        for p in points
+        if not any(q.rate > p.rate and q.error <= p.error for q in points)
+        and not any(q.rate >= p.rate and q.error < p.error for q in points)
+    }
+    assert {p.setting for p in pareto_chart.front(points)} == unbeaten
+
+
+def test_every_text_that_an_ablation_changes_stands_in_a_shader():
+    shaders = ("shade.frag", "shade_listed.comp")
+    text = "".join(
+        programs.expand(shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class)
+        for name in shaders
+        for pixel_class in ("plain", "mixed_decal")
+    )
+    for element in ablation_elements.ELEMENTS:
+        for old, _ in element.text:
+            assert old in text, element.name
+
+
+def test_mesh_without_charts_lacks_their_triangles_alone_and_keeps_its_groups():
+    mesh = build_container("20")
+    less = ablation_elements.without_charts("door.bar.")(mesh)
+    names = np.array([chart.name for chart in mesh.charts])
+    for name, part in mesh.groups.items():
+        triangles = mesh.triangles[part]
+        kept = [not names[mesh.chart[t[0]]].startswith("door.bar.") for t in triangles]
+        assert np.array_equal(less.triangles[less.groups[name]], triangles[kept])
+
+
+def test_filled_pockets_lie_in_the_plane_of_their_casting():
+    mesh = ablation_elements.filled_pockets(build_container("20"))
+    names = [chart.name for chart in mesh.charts]
+    for number, chart in enumerate(mesh.charts):
+        if chart.name.endswith(".pocket"):
+            out = np.array(FACE_AXES[chart.face].out)
+            plate = names.index(chart.name.removesuffix(".pocket"))
+            heights = [mesh.positions_mm[mesh.chart == n] @ out for n in (number, plate)]
+            assert np.allclose(heights[0], heights[1].max(), atol=1e-3)
+
+
+def test_spreader_parts_that_an_ablation_names_exist():
+    spreader, container = build_spreader("40HC"), build_container("20")
+    for element in ablation_elements.ELEMENTS:
+        for edit, mesh in ((element.spreader, spreader), (element.container, container)):
+            if edit is not None:
+                edited = edit(mesh)
+                same = np.array_equal(edited.positions_mm, mesh.positions_mm)
+                assert len(edited.triangles) < len(mesh.triangles) or not same, element.name

@@ -1,0 +1,125 @@
+"""Whatever a configuration holds: scenes that can be drawn, or one error that names the key."""
+
+import dataclasses
+import json
+import math
+import typing
+
+import pytest
+
+from fastgen.config import CameraConfig, Config
+from fastgen.damage import deform
+from fastgen.errors import ConfigError
+from fastgen.records import Range
+from fastgen.sampling import sample_scene
+
+NASTY = (
+    *(math.nan, math.inf, -math.inf, 1e300, 10**400, -1, 0, 0.5, None, True, "", "x", "#+1+2+3"),
+    *([], [[]], [None], ["a", "b"], [1, 2, 3], [2, 1], [math.nan, 1], [1, math.inf], [-1e9, 1e9]),
+    *({}, {"": 1}, {1: 2}, {"a": None}, {"a": {}}, {"front": math.nan}),
+)
+
+MUCH = {
+    "damage": {"probability": 1, "count": [4, 4]},
+    "markings": {"markers_per_face": [1, 3], "stickers_per_face": [0, 2]},
+}
+"""Values over the preset with which every scene draws from nearly every field."""
+
+
+def keys(value, path=()):
+    """Every key of nested mappings, those of inner nodes included."""
+    for key, item in value.items():
+        yield (*path, key)
+        if isinstance(item, dict):
+            yield from keys(item, (*path, key))
+
+
+def nested(path, value):
+    for key in reversed(path):
+        value = {key: value}
+    return value
+
+
+def sampled(config, count=2):
+    """Scenes of `config`, seen to hold finite numbers alone, before and after their damage."""
+    for index in range(count):
+        scene = sample_scene(config, 1, index, ("x",))
+        json.dumps(dataclasses.asdict(scene), allow_nan=False)
+        places = [damage.origin_mm for damage in scene.damages]
+        assert all(math.isfinite(v) for place in places for v in deform(scene.damages, place))
+
+
+@pytest.mark.parametrize("path", list(keys(Config.preset().to_plain())), ids=".".join)
+def test_any_value_is_drawn_from_or_refused_by_its_key(path):
+    base = Config.from_values(MUCH)
+    for value in NASTY:
+        try:
+            config = Config.from_values(nested(path, value), base)
+        except ConfigError as error:
+            message = str(error)
+            named = message.split(":")[0]
+            assert named.split("[")[0].startswith(path[0]), message
+            assert len(message) < 300
+            assert "\n" not in message
+            # a value may be at odds with another of its own group, which then is named
+            assert named.startswith((".".join(path), ".".join(path[:-1]))), message
+            continue
+        if path != ("environment", "names"):  # which there are is known at sampling alone
+            sampled(config)
+
+
+def limits(cls, path=()):
+    """Path, type and metadata of every bounded field under a dataclass."""
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        hint, here = hints[field.name], (*path, field.name)
+        if dataclasses.is_dataclass(hint):
+            yield from limits(hint, here)
+        elif field.metadata and hint is not dict:
+            yield here, hint, field.metadata
+
+
+BOUNDED = [
+    *limits(Config),
+    *limits(CameraConfig, ("cameras", "A")),
+]
+
+
+@pytest.mark.parametrize(
+    ("path", "hint", "meta"), BOUNDED, ids=[".".join(path) for path, _, _ in BOUNDED]
+)
+def test_the_limits_of_every_field_give_scenes(path, hint, meta):
+    base = Config.from_values(MUCH)
+    low, high = meta["lo"], meta["hi"]
+    for value in (low, high) if math.isfinite(high - low) else ():
+        if hint in (int, float, Range):
+            given = value
+        elif typing.get_origin(hint) is tuple:
+            given = [value, value]
+        else:
+            continue  # weights and probabilities by name
+        if path == ("container", "depth_scale"):
+            given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave
+        sampled(Config.from_values(nested(path, given), base), 1)
+
+
+def test_errors_about_names_name_the_file(tmp_path):
+    for text, words in (
+        (
+            "damage: {kinds: [dent]}",
+            r"damage.kinds\[0\]: unknown kind 'dent' \(did you mean dented",
+        ),
+        ("damage: {faces: [lid]}", r"damage.faces\[0\]: unknown face 'lid'"),
+        ("damage: {faces: []}", "damage.faces: the list is empty"),
+        ("markings: {fonts: [comic]}", "markings.fonts: unknown font 'comic'"),
+        ("markings: {brand: {lid: 1}}", "markings.brand: unknown face 'lid'"),
+        ("container: {depth_scale: [1, 3]}", r"container.depth_scale\[1\]: 3 times end: depth_mm"),
+        (
+            "container: {profiles: {side: {slope_mm: 1}}}",
+            "container.profiles.side.pitch_mm: 278 is",
+        ),
+    ):
+        path = tmp_path / "port.yaml"
+        path.write_text(text)
+        with pytest.raises(ConfigError, match=f"{path}: {words}"):
+            Config.load(path)

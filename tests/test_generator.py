@@ -1,0 +1,168 @@
+"""The public class: what it refuses, what it passes on through pickles and forks."""
+
+import math
+import multiprocessing
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.config import Config, LabelConfig
+from fastgen.errors import AssetError, ConfigError
+from fastgen.generator import Generator
+from fastgen.scene import Camera, Scene
+
+SIZE = (96, 64)
+RIG = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"config": {}}, "config: dict is no Config"),
+        ({"config": Config(labels=LabelConfig(min_visible_px=math.nan))}, "labels.min_visible_px"),
+        ({"config": Config(labels=None)}, "labels: expected a mapping"),
+        ({"seed": "x"}, "seed: 'x' is not a whole number of 0 or more"),
+        ({"seed": True}, "seed: True is not"),
+        ({"seed": 2**64}, "seed: 18446744073709551616 is not a whole number of 0 to"),
+        ({"size": 640}, r"size: 640 is no pair; give \(width, height\)"),
+        ({"size": ("a", 1)}, "size: ax1 is out of range"),
+        ({"size": (math.nan, 64)}, "size: nanx64 is out of range"),
+        ({"quality": 3}, "quality: 3 is unknown"),
+        ({"quality": []}, r"quality: \[\] is unknown"),
+        ({"backend": "elg"}, r"backend: 'elg' is unknown \(did you mean egl"),
+        ({"hdri_dir": 3}, "hdri_dir: 3 is no path"),
+        ({"device_index": -1}, "device_index: -1 is not"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, words):
+    with pytest.raises(ConfigError, match=words):
+        Generator(**arguments)
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(seed=3, size=SIZE) as made:
+        yield made
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({}, "give either index or scene"),
+        ({"index": 1.5}, "index: 1.5 is not a whole number"),
+        ({"index": "1"}, "index: '1' is not"),
+        ({"index": 0, "camera": 3}, "camera: 3 is neither a Camera nor the name of one"),
+        ({"index": 0, "camera": "D"}, "camera: 'D' is unknown"),
+        ({"index": 0, "layer": None}, "layer: None is unknown"),
+        (
+            {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 9, 0), 20)},
+            "camera.target_mm: .*stand",
+        ),
+        ({"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), 0)}, "camera.focal_mm: 0 is out"),
+        (
+            {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), "x")},
+            "camera: holds .* wrong ty",
+        ),
+        ({"scene": {}}, "scene: dict is no Scene"),
+    ],
+)
+def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
+    with pytest.raises(ConfigError, match=words):
+        generator.render(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("part", "changes", "words"),
+    [
+        ("decals", {"face": "lid"}, r"decals\[0\].face: 'lid' is unknown"),
+        ("decals", {"class_name": "C10"}, r"decals\[0\].class_name: 'C10' is unknown"),
+        ("decals", {"kind": "text", "font": "comic"}, r"decals\[0\].font: 'comic' is unknown"),
+        ("decals", {"kind": "marker", "art": "C1.9"}, r"decals\[0\].art: 'C1.9' is unknown"),
+        ("decals", {"size_mm": (0.0, 5.0)}, r"decals\[0\].size_mm: \(0.0, 5.0\) is out of range"),
+        ("decals", {"center_mm": (0.0, math.inf)}, r"decals\[0\].center_mm: .* is out of range"),
+        ("damages", {"kind": "dent"}, r"damages\[0\].kind: 'dent' is unknown"),
+        ("damages", {"shape": (1.0,)}, r"damages\[0\].shape: a concave has 0 numbers, not 1"),
+        ("damages", {"size_mm": (9.0, -1.0)}, r"damages\[0\].size_mm: .* is out of range"),
+        ("damages", {"along": (0.0, 0.0, 0.0)}, r"damages\[0\].along, across, inward: are not"),
+        ("container", {"kind": "30"}, "container.kind: '30' is unknown"),
+    ],
+)
+def test_scenes_changed_by_hand_are_refused_by_the_part_that_cannot_be(part, changes, words):
+    values = {"damage": {"probability": 1, "kinds": ["concave"]}}
+    with Generator(Config.from_values(values), size=SIZE) as generator:
+        scene = generator.scene(0)
+        held = getattr(scene, part)
+        one = replace(held[0] if isinstance(held, tuple) else held, **changes)
+        bad = replace(scene, **{part: (one,) if isinstance(held, tuple) else one})
+        with pytest.raises(ConfigError, match=f"scene.{words}"):
+            generator.render(scene=bad)
+
+
+def test_a_hundred_damages_of_a_kind_are_refused():
+    values = {"damage": {"probability": 1, "kinds": ["axis"], "count": [1, 1]}}
+    generator = Generator(Config.from_values(values), size=SIZE)
+    scene = generator.scene(0)
+    with pytest.raises(ConfigError, match="100 of kind axis; mask values tell 99 apart"):
+        generator.render(scene=replace(scene, damages=scene.damages * 100))
+
+
+def test_scene_files_with_numbers_that_are_none_are_refused(generator):
+    text = generator.scene(0).to_json().replace('"focal_mm": 14.5', '"focal_mm": NaN')
+    with pytest.raises(ConfigError, match=r"scene.cameras\[0\].focal_mm: nan is out of range"):
+        Scene.from_json(text)
+
+
+def test_the_first_camera_of_a_rig_is_the_default(generator):
+    assert generator.render(index=1).camera.name == "A"
+    with Generator(Config.from_values({"cameras": RIG}), size=SIZE) as gate:
+        assert gate.render(index=1).camera.name == "gate"
+
+
+def test_labels_rules_may_be_given_for_one_image(generator):
+    strict = LabelConfig(min_visible_px=10**6)
+    assert all(thing.ignored for thing in generator.render(index=1, labels=strict).objects)
+    assert not all(thing.ignored for thing in generator.render(index=1).objects)
+
+
+def test_hdris_of_one_name_are_refused(tmp_path):
+    for name in ("dusk.exr", "dusk.hdr"):
+        (tmp_path / name).write_bytes(b"")
+    with pytest.raises(AssetError, match=r"dusk.exr and dusk.hdr are both called 'dusk'"):
+        Generator(hdri_dir=tmp_path)
+
+
+def test_a_pickled_generator_renders_the_same(generator):
+    image = generator.render(index=2).image
+    with pickle.loads(pickle.dumps(generator)) as other:
+        np.testing.assert_array_equal(other.render(index=2).image, image)
+    np.testing.assert_array_equal(generator.render(index=2).image, image)
+
+
+def render_to(pipe, generator):
+    pipe.send(generator.render(index=2).image)
+    generator.close()
+
+
+def parent_and_child():
+    """An image rendered here, the same by the same generator in a fork, and again here."""
+    fork = multiprocessing.get_context("fork")
+    ours, theirs = fork.Pipe()
+    with Generator(seed=3, size=SIZE, backend="auto") as generator:
+        before = generator.render(index=2).image
+        child = fork.Process(target=render_to, args=(theirs, generator))
+        child.start()
+        there = ours.recv() if ours.poll(60) else None
+        child.kill()
+        child.join()
+        return before, there, generator.render(index=2).image
+
+
+def test_a_generator_that_rendered_goes_on_in_a_forked_child():
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        before, there, after = pool.submit(parent_and_child).result()
+    assert there is not None, "the child hangs or failed"
+    np.testing.assert_array_equal(there, before)
+    np.testing.assert_array_equal(after, before)

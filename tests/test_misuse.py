@@ -1,0 +1,178 @@
+"""The command line where people go wrong: odd folders, damaged files, pipes that close."""
+
+import json
+import shutil
+import subprocess
+import sys
+
+import pytest
+from pycocotools.coco import COCO
+
+from fastgen.classes import SEGMENTATION_CLASSES
+from fastgen.cli import main
+from tests.folders import content
+
+ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "dataset"
+    assert main(["generate", str(out), *ARGUMENTS, "--workers", "1"]) == 0
+    return out
+
+
+@pytest.fixture
+def copy(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "out")
+    return tmp_path / "out"
+
+
+def flip(path):
+    """Change one byte, and nothing that a listing of the folder shows."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.unlink()
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["images/*/*.jpg", "shards/000000.json", "damage/coco_train.json", "scenes/*/*.json"],
+)
+def test_repair_makes_again_what_resuming_cannot_see(dataset, copy, capsys, name):
+    flip(sorted(copy.glob(name))[0])
+    assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
+    if "coco" not in name and "shards" not in name:  # these are written anew by every run
+        capsys.readouterr()
+        assert main(["verify", str(copy)]) == 1
+        assert f"fastgen verify {copy} --repair" in capsys.readouterr().out
+    assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
+    assert content(copy) == content(dataset)
+
+
+def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys):
+    (copy / "images/notes.txt").write_text("mine")
+    assert main(["verify", str(copy), "--repair"]) == 1
+    assert "images/notes.txt: does not belong here" in capsys.readouterr().out
+    assert (copy / "images/notes.txt").read_text() == "mine"
+    path = copy / "dataset.json"
+    path.write_text(path.read_text().replace('"seed": 3', '"seed": 4'))
+    assert main(["verify", str(copy), "--repair"]) == 2
+    assert "dataset.json: was changed after it was written" in capsys.readouterr().err
+
+
+def test_strange_files_among_the_images_do_not_stop_a_run(copy):
+    for name in ("stray.jpg", "more_A.jpg", "Thumbs.db"):
+        (copy / "images/train" / name).write_bytes(b"no image")
+    next(copy.glob("images/*/000000_A.jpg")).unlink()
+    assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
+
+
+def test_a_damaged_image_of_the_contact_sheet_is_named(copy, capsys):
+    for path in copy.glob("images/*/*_A.jpg"):
+        path.write_bytes(bytes(path.stat().st_size))
+    assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 2
+    error = capsys.readouterr().err
+    assert "_A.jpg: it or its labels are damaged; run fastgen verify" in error
+
+
+def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
+    (tmp_path / "port.yaml").write_text("damage: {probability: 0.5}")
+    for more, words in (
+        (["--seed", "4"], "seed was 3, is now 4"),
+        (["--also", "ids"], "formats was ["),
+        (
+            ["--config", str(tmp_path / "port.yaml")],
+            "config.damage.probability was 0.4, is now 0.5",
+        ),
+    ):
+        assert main(["generate", f"{copy}/", *ARGUMENTS, *more]) == 2
+        error = capsys.readouterr().err
+        assert f"fastgen: {copy}: was made with other settings ({words}" in error
+
+
+def test_stats_equal_a_foreign_readers_count(dataset, capsys):
+    assert main(["stats", str(dataset)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    table = lines[lines.index("Table 2: instances in the damage task") :]
+    for number, name in enumerate(SEGMENTATION_CLASSES, start=1):
+        row = next(line for line in table if line.startswith(name))
+        held = [COCO(str(dataset / f"damage/coco_{s}.json")) for s in ("train", "val", "test")]
+        assert row.split()[1:] == [str(len(each.getAnnIds(catIds=number))) for each in held]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda p: (p / "dataset.json").unlink(), "no dataset.json"),
+        (lambda p: (p / "dataset.json").write_text("{}"), "the dataset is not finished"),
+        (lambda p: (p / "dataset.json").write_text("{"), "is damaged; run fastgen verify"),
+        (lambda p: (p / "shards/000000.json").unlink(), "is damaged; run fastgen verify"),
+        (lambda p: (p / "shards/000000.json").write_text("[]"), "is damaged; run fastgen verify"),
+    ],
+)
+def test_stats_of_half_a_dataset_say_what_to_do(copy, capsys, spoil, words):
+    spoil(copy)
+    assert main(["stats", str(copy)]) == 2
+    assert words in capsys.readouterr().err
+
+
+def lock_is_a_folder(path):
+    (path / ".lock").mkdir(parents=True)
+
+
+def images_are_a_file(path):
+    assert main(["generate", str(path), *ARGUMENTS, "--workers", "1"]) == 0
+    shutil.rmtree(path / "images")
+    (path / "images").write_text("")
+
+
+def manifest_is_a_folder(path):
+    (path / "dataset.json").mkdir(parents=True)
+
+
+@pytest.mark.parametrize("spoil", [lock_is_a_folder, images_are_a_file, manifest_is_a_folder])
+def test_what_cannot_be_written_is_named_in_one_line(tmp_path, capsys, spoil):
+    spoil(tmp_path / "out")
+    capsys.readouterr()
+    assert main(["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1"]) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert error.startswith(f"fastgen: {tmp_path / 'out'}")
+    assert "cannot be" in error
+
+
+@pytest.mark.parametrize("arguments", [["stats", "{}"], ["verify", "{}"], ["generate", "--help"]])
+def test_a_reader_that_goes_away_is_no_error(dataset, arguments):
+    filled = [each.format(dataset) for each in arguments]
+    command = [sys.executable, "-m", "fastgen", *filled]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait() in (0, 141)  # argparse ends with 0
+
+
+def test_show_takes_the_first_camera_of_a_rig(tmp_path):
+    rig = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
+    (tmp_path / "port.yaml").write_text(json.dumps({"cameras": rig}))
+    shown = ["--config", str(tmp_path / "port.yaml"), "--size", "64x64", "--index", "0"]
+    assert main(["show", *shown, "-o", str(tmp_path / "gate.png")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[]", r"Config: expected a mapping of fields, got []"),
+        ("surface: {rust_coverage: 1e-2}", "write 0.01"),
+        ("day: 2026-99-99", "not a YAML file"),
+        ("a: &a [*a]", "a: unknown key"),
+    ],
+)
+def test_odd_files_are_named(tmp_path, capsys, text, words):
+    path = tmp_path / "port.yaml"
+    path.write_text(text)
+    arguments = ["--config", str(path), "--index", "0", "-o", str(tmp_path / "x.png")]
+    assert main(["show", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"fastgen: {path}: ")
+    assert words in error

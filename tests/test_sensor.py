@@ -1,0 +1,239 @@
+"""Sensor and weather against optics, statistics and the laws they stand for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.camera import view_of
+from fastgen.config import Config
+from fastgen.errors import ConfigError
+from fastgen.generator import Generator
+from fastgen.scene import Camera, Scene
+from fastgen.sensor.blur import blur_radius_px, defocused, moved
+from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
+from fastgen.sensor.light import displayed, light_of
+from fastgen.sensor.parts import Defocus, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.sensor.weather import foggy, rained
+
+SIZE = (160, 120)
+
+
+def tone(c):
+    """Khronos PBR Neutral and sRGB of one colour, written after their specifications."""
+    x = min(c)
+    offset = x - 6.25 * x * x if x < 0.08 else 0.04
+    c = [v - offset for v in c]
+    peak = max(c)
+    if peak >= 0.76:
+        squeezed = 1 - 0.24**2 / (peak + 0.24 - 0.76)
+        c = [v * squeezed / peak for v in c]
+        g = 1 - 1 / (0.15 * (peak - squeezed) + 1)
+        c = [v * (1 - g) + squeezed * g for v in c]
+    return [255 * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055) for v in c]
+
+
+def test_light_is_shown_through_the_tone_curve_of_the_renderer():
+    light = np.random.default_rng(1).random((40, 30, 3)).astype(np.float32) ** 3 * 6
+    expected = [[tone(pixel) for pixel in row] for row in light.tolist()]
+    np.testing.assert_allclose(displayed(light), expected, atol=0.52)
+
+
+def test_an_image_survives_the_way_to_light_and_back():
+    # brighter colours of one channel alone lose more: eight bits hold too little of their others
+    light = np.random.default_rng(2).random((200, 200, 3)).astype(np.float32)
+    image = displayed(light)
+    apart = np.abs(displayed(light_of(image)).astype(int) - image)
+    assert np.quantile(apart, 0.99) <= 1
+    assert apart.max() <= 4
+    assert np.isfinite(light_of(np.full((2, 2, 3), 255, np.uint8))).all()
+
+
+def test_vignetting_follows_the_fourth_power_of_a_cosine():
+    share = falloff((301, 201), 0.6)[..., 0]
+    corner_tan2 = (1 - 0.6) ** -0.5 - 1
+    x, y = 260.5 - 150.5, 40.5 - 100.5
+    angle = np.arctan(np.sqrt(corner_tan2 * (x * x + y * y) / (150.5**2 + 100.5**2)))
+    assert share[40, 260] == pytest.approx(np.cos(angle) ** 4, rel=1e-4)
+    assert share[100, 150] == pytest.approx(1, abs=1e-4)
+    assert share[0, 0] == pytest.approx(0.4, abs=0.01)
+
+
+@pytest.mark.parametrize("level", [0.02, 0.2, 1.0])
+def test_noise_has_the_variance_of_counted_electrons(level):
+    noise = Noise(full_well_e=3000, read_noise_e=9, seed=4)
+    counted = noisy(np.full((400, 400, 3), level, np.float32), noise) * 3000
+    assert counted.mean() == pytest.approx(3000 * level, abs=0.5)
+    assert counted.var() == pytest.approx(3000 * level + 81, rel=0.02)
+
+
+def test_noise_is_that_of_its_seed():
+    light = np.full((30, 30, 3), 0.3, np.float32)
+    first = noisy(light, Noise(1000, 5, 7))
+    np.testing.assert_array_equal(first, noisy(light, Noise(1000, 5, 7)))
+    assert (first != noisy(light, Noise(1000, 5, 8))).mean() > 0.99
+
+
+def test_blur_is_as_wide_as_traced_marginal_rays():
+    camera = Camera("T", (0, 0, 0), (0, 1, 0), focal_mm=50.0)
+    defocus = Defocus(focus_mm=3000, f_number=2.0)
+    sensor_at = 1 / (1 / 50 - 1 / 3000)
+    for depth_mm in (1500.0, 3000.0, 9000.0):
+        image_at = 1 / (1 / 50 - 1 / depth_mm)
+        # the ray through the aperture's rim, 12.5 mm off the axis, on its way to image_at
+        on_sensor_mm = abs(12.5 * (1 - sensor_at / image_at))
+        radius = blur_radius_px(defocus, camera, 640, np.array([[depth_mm / 1e3]], np.float32))
+        assert radius[0, 0] == pytest.approx(on_sensor_mm / 36 * 640, rel=1e-4, abs=1e-3)
+    assert np.isfinite(blur_radius_px(defocus, camera, 640, np.array([[np.inf]], np.float32)))
+
+
+def test_a_point_out_of_focus_becomes_a_disc_of_its_light():
+    light = np.zeros((41, 41, 3), np.float32)
+    light[20, 20] = 1
+    spread = defocused(light, np.full((41, 41), 6.0, np.float32))[..., 0]
+    assert spread.sum() == pytest.approx(1, rel=1e-4)
+    assert spread[20, 20] == pytest.approx(1 / (np.pi * 36), rel=0.03)
+    away = np.hypot(*(np.mgrid[:41, :41] - 20))
+    assert spread[away > 7].max() < 1e-6
+    np.testing.assert_allclose(spread[away < 5], spread[20, 20], rtol=1e-3)
+
+
+def test_movement_spreads_a_point_evenly_about_where_it_is():
+    light = np.zeros((61, 61, 3), np.float32)
+    light[30, 30] = 1
+    spread = moved(light, (20.0, 8.0))[..., 0]
+    row, column = np.mgrid[:61, :61] - 30
+    assert spread.sum() == pytest.approx(1, rel=1e-4)
+    assert (spread * column).sum() == pytest.approx(0, abs=1e-3)
+    assert (spread * row).sum() == pytest.approx(0, abs=1e-3)
+    # a uniform line of length l has variance l^2 / 12; the pixels' own share is below 1/4
+    assert (spread * column**2).sum() == pytest.approx(20**2 / 12, abs=0.3)
+    assert (spread * row**2).sum() == pytest.approx(8**2 / 12, abs=0.3)
+    assert moved(light, (0.0, 0.0)) is light
+
+
+def test_fog_leaves_a_fiftieth_of_a_contrast_at_its_visibility():
+    air = np.array([0.5, 0.5, 0.6], np.float32)
+    light = np.array([[[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]]] * 2, np.float32)
+    away = np.array([[40.0, 40.0], [0.0, 0.0]], np.float32)
+    seen = foggy(light, away, 40e3, air)
+    np.testing.assert_allclose(seen[0, 0] - seen[0, 1], 0.02, rtol=1e-3)
+    np.testing.assert_allclose(seen[1], light[1])
+    behind = foggy(light, np.full((2, 2), np.inf, np.float32), 40e3, air)
+    np.testing.assert_allclose(behind, np.broadcast_to(air, behind.shape), atol=1e-6)
+
+
+def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
+    view = view_of(Camera("T", (0, -9000, 0), (0, 0, 0), 30.0), SIZE)
+    light = np.full((120, 160, 3), 0.1, np.float32)
+    depth = np.full((120, 160), np.inf, np.float32)
+    depth[:, :80] = 0.1  # nearer than any drop
+    rain = Rain(80, 0.002, 0.3, 11)
+    sky = np.ones(3, np.float32)
+    seen = rained(light, depth, view, rain, sky)
+    np.testing.assert_array_equal(seen, rained(light, depth, view, rain, sky))
+    np.testing.assert_array_equal(seen[:, :80], light[:, :80])
+    assert (seen[:, 80:] > 0.1001).any()
+    assert seen.max() <= 1.0
+    heavy = rained(light, depth, view, replace(rain, rate_mm_h=250), sky)
+    assert heavy.sum() > seen.sum()
+
+
+def test_stamps_stay_in_their_corner():
+    image = np.full((240, 320, 3), 90, np.uint8)
+    for corner in ("top left", "bottom right"):
+        changed = (stamped(image, Stamp("2024-02-29 12:00", corner, 0.04)) != image).any(axis=2)
+        rows, columns = np.nonzero(changed)
+        assert 100 < changed.sum() < 0.1 * changed.size
+        assert rows.max() < 40 if "top" in corner else rows.min() > 200
+        assert columns.min() < 20 if "left" in corner else columns.max() > 300
+
+
+def test_jpeg_loses_more_at_less_quality():
+    image = np.random.default_rng(0).integers(0, 255, (64, 64, 3)).astype(np.uint8)
+    coarse, fine = (
+        np.abs(through_jpeg(image, quality).astype(int) - image).mean() for quality in (20, 90)
+    )
+    assert coarse > fine > 0
+
+
+def test_by_default_cameras_are_perfect_and_the_sky_is_clear():
+    scene = Generator(seed=2).scene(5)
+    assert scene.weather == Weather()
+    assert all(camera.sensor is None and camera.lens is None for camera in scene.cameras)
+
+
+def test_the_crane_preset_changes_cameras_and_weather_alone_and_survives_json():
+    crane, plain = Generator(Config.preset("crane"), seed=4), Generator(seed=4)
+    kinds = set()
+    for index in range(12):
+        scene, other = crane.scene(index), plain.scene(index)
+        assert Scene.from_json(scene.to_json()) == scene
+        assert replace(scene, cameras=other.cameras, weather=Weather()) == other
+        for a, b in zip(scene.cameras, other.cameras, strict=True):
+            assert (a.position_mm, a.target_mm, a.roll_deg) == (
+                b.position_mm,
+                b.target_mm,
+                b.roll_deg,
+            )
+            assert a.sensor is not None
+            kinds |= {name for name in ("noise", "stamp", "defocus") if getattr(a.sensor, name)}
+    assert kinds == {"noise", "stamp", "defocus"}
+
+
+def test_labels_are_those_without_the_sensor_and_bytes_repeat():
+    sensor = Sensor(
+        defocus=Defocus(1500, 1.4),
+        motion=(0.01, 0.004),
+        vignetting=0.3,
+        exposure_error_ev=-0.5,
+        gains=(1.1, 1.0, 0.9),
+        noise=Noise(4000, 4, 3),
+        stamp=Stamp("2024-02-29 12:00", "top left", 0.05),
+        jpeg_quality=60,
+    )
+    weather = Weather(visibility_mm=80e3, rain=Rain(30, 0.002, 0.1, 5))
+    with Generator(seed=6, size=SIZE) as generator, Generator(seed=6, size=SIZE) as again:
+        scene = generator.scene(2)
+        camera = scene.camera("B")
+        clean = generator.render(scene=scene, camera=camera)
+        stormy = replace(scene, weather=weather)
+        real = generator.render(scene=stormy, camera=replace(camera, sensor=sensor))
+        repeated = again.render(scene=stormy, camera=replace(camera, sensor=sensor))
+    assert real.objects == clean.objects
+    for name in ("ids", "damage", "depth"):
+        np.testing.assert_array_equal(getattr(real, name), getattr(clean, name))
+    assert (real.image != clean.image).mean() > 0.9
+    np.testing.assert_array_equal(real.image, repeated.image)
+
+
+def test_water_darkens_what_is_porous():
+    config = Config.from_values({"surface": {"rust_coverage": 0.4}})
+    with Generator(config, seed=6, size=SIZE) as generator:
+        scene = generator.scene(1)
+        images = [
+            generator.render(scene=replace(scene, weather=Weather(wetness=wetness)), layer=layer)
+            for layer in ("rust", "reflection")
+            for wetness in (0.0, 1.0)
+        ]
+    (dry, wet), (rough, smooth) = (
+        [sample.image[sample.ids > 0].astype(int) for sample in images[i : i + 2]] for i in (0, 2)
+    )
+    assert (wet <= dry + 1).all()
+    assert wet.mean() < 0.97 * dry.mean()
+    assert smooth.mean() < 0.8 * rough.mean()
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"sensor": {"stamp": {"corners": ["top middle"]}}}, "sensor.stamp.corners: 'top middle'"),
+        ({"sensor": {"jpeg_quality": [90, 40]}}, "sensor.jpeg_quality: the lowest value 90"),
+        ({"sensor": {"vignetting": 1.0}}, "sensor.vignetting: 1.0 is out of range"),
+        ({"weather": {"fog_probability": 2}}, "weather.fog_probability: 2 is out of range"),
+        ({"sensor": {"noice": {}}}, r"sensor.noice: unknown key \(did you mean noise"),
+    ],
+)
+def test_bad_values_are_named(values, words):
+    with pytest.raises(ConfigError, match=words):
+        Config.from_values(values)
