@@ -42,7 +42,7 @@ from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.spreader import build_spreader, tier_bounds_mm
-from fastgen.sun_shadow import ShadowMap, sun_values
+from fastgen.sun_shadow import ShadowMap, shadow_map
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
 
@@ -174,9 +174,11 @@ class Renderer:
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
-        seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
-        sunny = sun_values(self._light_of(scene.environment.name).sun, shadow, view.position_m)
-        self._view_block.write(VIEW_BLOCK.pack({**seen, **sunny}))
+        values = {
+            **_view_values(scene, view, targets, self.exposure(scene, camera, size)),
+            **_sun_values(scene, self._light_of(scene.environment.name), shadow, view),
+        }
+        self._view_block.write(VIEW_BLOCK.pack(values))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
 
@@ -220,20 +222,18 @@ class Renderer:
             frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
         regions = bands([_region(view, box) for box in boxes])
-        shading.draw(
-            targets, regions, damage, near, sun=shadow is not None, bent=camera.lens is not None
-        )
+        curved = view.distortion is not None
+        shading.draw(targets, regions, damage, near, sun=shadow is not None, bent=curved)
         return targets
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
-        sun = self._light_of(scene.environment.name).sun
-        if sun is None:
+        toward = _to_sun(scene, self._light_of(scene.environment.name))
+        if toward is None:
             return None
-        toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
         return self._shadows.get(
             (container, spreader, *toward),
-            lambda: ShadowMap(self._ctx, self._occluder, container, spreader, toward),
+            lambda: shadow_map(self._ctx, self._occluder, container, spreader, toward),
         )
 
     def preload(self, environment: str) -> GpuLight:
@@ -411,4 +411,33 @@ def _view_values(
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
         **view.lens_values(targets.scale),
+    }
+
+
+def _to_sun(scene: Scene, light: EnvironmentLight) -> np.ndarray | None:
+    """Unit vector [3] toward the sun in the container's frame, None without one."""
+    if light.sun is None:
+        return None
+    return to_map_frame(light.sun.direction, -scene.environment.yaw_deg)
+
+
+def _sun_values(
+    scene: Scene, light: EnvironmentLight, shadow: ShadowMap | None, view: View
+) -> dict[str, ArrayLike]:
+    """Members of VIEW_BLOCK about the sun, zeros without one."""
+    toward = _to_sun(scene, light)
+    if light.sun is None or shadow is None or toward is None:
+        zero = np.zeros(3)
+        no_map = np.zeros((4, 4))
+        return {
+            "ray_to_shadow": no_map,
+            "sun_direction": zero,
+            "sun_radius": 0.0,
+            "sun_light": zero,
+        }
+    return {
+        "ray_to_shadow": shadow.from_ray(view.position_m),
+        "sun_direction": toward,
+        "sun_radius": light.sun.radius,
+        "sun_light": light.sun.light,
     }
