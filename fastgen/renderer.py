@@ -27,7 +27,6 @@ from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
 from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.mesh import Mesh
-from fastgen.noise import noise_tiles
 from fastgen.openness import SkyProbe
 from fastgen.programs import (
     DAMAGE_BLOCK,
@@ -42,9 +41,10 @@ from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.spreader import build_spreader, tier_bounds_mm
-from fastgen.sun_shadow import ShadowMap, shadow_map
+from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
+from fastgen.textures import mipmapped_array, noise_texture
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
@@ -134,10 +134,10 @@ class Renderer:
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
-        self._art = _mipmapped_array(self._ctx, art)
+        self._art = mipmapped_array(self._ctx, art)
         texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
-        self._tiles = _mipmapped_array(self._ctx, texels)
-        self._noise = _noise_texture(self._ctx)
+        self._tiles = mipmapped_array(self._ctx, texels)
+        self._noise = noise_texture(self._ctx)
         table = dfg_table()
         self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         self._dfg.repeat_x = self._dfg.repeat_y = False
@@ -174,11 +174,9 @@ class Renderer:
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
-        values = {
-            **_view_values(scene, view, targets, self.exposure(scene, camera, size)),
-            **_sun_values(scene, self._light_of(scene.environment.name), shadow, view),
-        }
-        self._view_block.write(VIEW_BLOCK.pack(values))
+        seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
+        sunny = sun_values(self._light_of(scene.environment.name).sun, shadow, view.position_m)
+        self._view_block.write(VIEW_BLOCK.pack({**seen, **sunny}))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
 
@@ -222,18 +220,20 @@ class Renderer:
             frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
         regions = bands([_region(view, box) for box in boxes])
-        curved = view.distortion is not None
-        shading.draw(targets, regions, damage, near, sun=shadow is not None, bent=curved)
+        shading.draw(
+            targets, regions, damage, near, sun=shadow is not None, bent=camera.lens is not None
+        )
         return targets
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
-        toward = _to_sun(scene, self._light_of(scene.environment.name))
-        if toward is None:
+        sun = self._light_of(scene.environment.name).sun
+        if sun is None:
             return None
+        toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
         return self._shadows.get(
             (container, spreader, *toward),
-            lambda: shadow_map(self._ctx, self._occluder, container, spreader, toward),
+            lambda: ShadowMap(self._ctx, self._occluder, container, spreader, toward),
         )
 
     def preload(self, environment: str) -> GpuLight:
@@ -350,27 +350,6 @@ def _shading_spreader(scene: Scene) -> Mesh | None:
     return build_spreader(scene.container.kind, held.flippers_down) if held.present else None
 
 
-def _mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
-    """uint8 [K, H, W, C] as a mip-mapped texture array, clamped at the borders."""
-    count, height, width, channels = images.shape
-    data = np.ascontiguousarray(images).tobytes()
-    texture = ctx.texture_array((width, height, count), channels, data, alignment=1)
-    texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.repeat_x = texture.repeat_y = False
-    return texture
-
-
-def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
-    """The noise tiles, repeating; GL's box-filtered mip chain is the one they were measured on."""
-    base = noise_tiles().levels[0]
-    size = base.shape[1]
-    texture = ctx.texture_array((size, size, len(base)), 4, base.tobytes())
-    texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
-    return texture
-
-
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
     if view.distortion:  # what lies between two corners may bow out farther than both
@@ -411,33 +390,4 @@ def _view_values(
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
         **view.lens_values(targets.scale),
-    }
-
-
-def _to_sun(scene: Scene, light: EnvironmentLight) -> np.ndarray | None:
-    """Unit vector [3] toward the sun in the container's frame, None without one."""
-    if light.sun is None:
-        return None
-    return to_map_frame(light.sun.direction, -scene.environment.yaw_deg)
-
-
-def _sun_values(
-    scene: Scene, light: EnvironmentLight, shadow: ShadowMap | None, view: View
-) -> dict[str, ArrayLike]:
-    """Members of VIEW_BLOCK about the sun, zeros without one."""
-    toward = _to_sun(scene, light)
-    if light.sun is None or shadow is None or toward is None:
-        zero = np.zeros(3)
-        no_map = np.zeros((4, 4))
-        return {
-            "ray_to_shadow": no_map,
-            "sun_direction": zero,
-            "sun_radius": 0.0,
-            "sun_light": zero,
-        }
-    return {
-        "ray_to_shadow": shadow.from_ray(view.position_m),
-        "sun_direction": toward,
-        "sun_radius": light.sun.radius,
-        "sun_light": light.sun.light,
     }

@@ -67,7 +67,7 @@ class Shading:
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
         None where that is not known. sun: whether there is one, with its shadow map bound.
-        bent: whether a lens bends straight lines.
+        bent: whether a lens bends the view.
         """
         image = targets.image
         image.use()
