@@ -31,7 +31,8 @@ from results import RESULTS, ROOT, machine, parse_size, save
 from throughput import generate_command, whole_run
 
 from fastgen import Config, Generator
-from fastgen.environment import bundled_hdris, load_environment, load_radiance
+from fastgen.environment import load_environment
+from fastgen.hdri import bundled_hdris, load_radiance
 from fastgen.scene import Scene
 
 SIZES = ("320x320", "640x640", "1024x768", "1333x800", "1920x1080", "2560x1440")

@@ -23,9 +23,10 @@ from fastgen.camera import MM, View, view_of
 from fastgen.container import build_container
 from fastgen.damage import deform
 from fastgen.decal_tables import object_ids
-from fastgen.environment import bundled_hdris, load_environment, load_radiance
+from fastgen.environment import load_environment
 from fastgen.export import export_glb
 from fastgen.exposure import metered_exposure
+from fastgen.hdri import bundled_hdris, load_radiance
 from fastgen.mesh import Mesh
 from fastgen.resources import asset_path
 from fastgen.scene import Decal, Scene, Spreader

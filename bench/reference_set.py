@@ -15,7 +15,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen import Config, Generator
-from fastgen.environment import HALF_MAX
+from fastgen.hdri import HALF_MAX
 from fastgen.scene import Scene
 
 FOLDER = Path(__file__).parent / "references"

@@ -21,8 +21,8 @@ os.environ.setdefault("LP_NUM_THREADS", "0")
 from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases
 
 from fastgen import Generator
-from fastgen.environment import bundled_hdris
 from fastgen.export import export_glb
+from fastgen.hdri import bundled_hdris
 
 SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
 BACKGROUND_SAMPLES = 16

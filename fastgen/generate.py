@@ -17,11 +17,12 @@ from fastgen import workers
 from fastgen.config import Config, SplitConfig
 from fastgen.contact_sheet import contact_sheet
 from fastgen.encode import png
-from fastgen.environment import find_hdris, load_environment
+from fastgen.environment import load_environment
 from fastgen.errors import ConfigError, OutputError
 from fastgen.formats import SEAFRONT, Record, formats_of
 from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
+from fastgen.hdri import find_hdris
 from fastgen.progress import Progress
 from fastgen.records import nearest
 from fastgen.sampling import SPLITS

@@ -15,16 +15,10 @@ from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
-from fastgen.environment import (
-    EnvironmentLight,
-    bundled_hdris,
-    bundled_weights,
-    hdris_by_name,
-    irradiance_at,
-    load_environment,
-)
+from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.errors import ConfigError
 from fastgen.gl import BACKENDS, GLContext, open_context
+from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
 from fastgen.programs import LAYERS
 from fastgen.records import nearest, whole

@@ -27,7 +27,6 @@ from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
 from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.mesh import Mesh
-from fastgen.noise import noise_tiles
 from fastgen.openness import SkyProbe
 from fastgen.programs import (
     DAMAGE_BLOCK,
@@ -45,6 +44,7 @@ from fastgen.spreader import build_spreader, tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
+from fastgen.textures import mipmapped_array, noise_texture
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
@@ -134,10 +134,10 @@ class Renderer:
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
-        self._art = _mipmapped_array(self._ctx, art)
+        self._art = mipmapped_array(self._ctx, art)
         texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
-        self._tiles = _mipmapped_array(self._ctx, texels)
-        self._noise = _noise_texture(self._ctx)
+        self._tiles = mipmapped_array(self._ctx, texels)
+        self._noise = noise_texture(self._ctx)
         table = dfg_table()
         self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         self._dfg.repeat_x = self._dfg.repeat_y = False
@@ -348,27 +348,6 @@ def _shading_spreader(scene: Scene) -> Mesh | None:
     seen in the shade, and every other shape costs half a second once."""
     held = scene.spreader
     return build_spreader(scene.container.kind, held.flippers_down) if held.present else None
-
-
-def _mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
-    """uint8 [K, H, W, C] as a mip-mapped texture array, clamped at the borders."""
-    count, height, width, channels = images.shape
-    data = np.ascontiguousarray(images).tobytes()
-    texture = ctx.texture_array((width, height, count), channels, data, alignment=1)
-    texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.repeat_x = texture.repeat_y = False
-    return texture
-
-
-def _noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
-    """The noise tiles, repeating; GL's box-filtered mip chain is the one they were measured on."""
-    base = noise_tiles().levels[0]
-    size = base.shape[1]
-    texture = ctx.texture_array((size, size, len(base)), 4, base.tobytes())
-    texture.build_mipmaps()
-    texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
-    return texture
 
 
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:

@@ -13,16 +13,13 @@ import pytest
 from fastgen import Config, environment
 from fastgen.environment import (
     EnvironmentLight,
-    bundled_hdris,
-    bundled_weights,
-    find_hdris,
     irradiance_at,
     load_environment,
-    load_radiance,
     metered_luminance,
     prefilter_environment,
 )
 from fastgen.errors import AssetError
+from fastgen.hdri import bundled_hdris, bundled_weights, find_hdris, load_radiance
 from fastgen.sampling import sample_scene
 from tests.sky_samples import patchwork, texel_grid
 

@@ -63,13 +63,14 @@ def test_irradiance_equals_the_direct_cosine_sum(patches):
 def test_a_light_appears_in_the_direction_where_it_stands():
     toward = np.array([0.48, 0.6, 0.64])  # right of +y seen from +x, above the horizon
     light = prefilter_environment("lamp", one_light(toward, 1000.0))
-    for layer in (light.background, light.specular[0], light.specular[4]):
-        size = layer.shape[0]
-        row, column = np.unravel_index(layer[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2))
-        # the layout of the module docstring, spelt out for z > 0
-        x, y = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
-        found = np.array([x, y, 1 - abs(x) - abs(y)])
-        assert found @ toward / np.linalg.norm(found) > np.cos(np.deg2rad(3))
+    size = light.background.shape[0]
+    row, column = np.unravel_index(light.background[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2))
+    # the layout of the module docstring, spelt out for z > 0
+    x, y = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
+    found = np.array([x, y, 1 - abs(x) - abs(y)])
+    assert found @ toward / np.linalg.norm(found) > np.cos(np.deg2rad(3))
+    assert light.sun is not None
+    assert np.dot(light.sun.direction, toward) > np.cos(np.deg2rad(1))
 
 
 @pytest.mark.parametrize(
@@ -82,8 +83,10 @@ def test_energy_of_a_single_texel_survives_every_map(toward, tolerance):
     expected = (radiance[..., 0] * texel_grid(128)[1]).sum() / (4 * np.pi)
     light = prefilter_environment("lamp", radiance)
     directions = even_directions(200_000)
-    for layer in (light.background, *light.specular):
-        mean = sample_octahedral(layer, directions)[:, 0].mean()
+    # a sun of irradiance pi E has a mean radiance of pi E / (4 pi)
+    aside = light.sun.light[0] / 4 if light.sun is not None else 0.0
+    for layer, rest in ((light.background, 0.0), *((layer, aside) for layer in light.specular)):
+        mean = sample_octahedral(layer, directions)[:, 0].mean() + rest
         assert mean == pytest.approx(expected, rel=tolerance)
     assert light.mean_luminance == pytest.approx(expected, rel=0.01)
 
@@ -107,12 +110,13 @@ def test_a_million_fold_sun_neither_speckles_nor_overflows():
             assert (seen[1:] <= seen[:-1] * 1.01).all()
 
 
-def test_sun_beyond_half_range_keeps_its_energy_in_wide_lobes():
+def test_a_sun_beyond_half_range_keeps_its_energy():
     radiance = one_light(np.array([0.0, 0.6, 0.8]), 1e6)
     expected = (radiance[..., 0] * texel_grid(128)[1]).sum() / (4 * np.pi)
     light = prefilter_environment("sun", radiance)
+    assert light.sun is not None
     seen = sample_octahedral(light.specular[4], even_directions(50_000))[:, 0]
-    assert seen.mean() == pytest.approx(expected, rel=0.02)
+    assert seen.mean() + light.sun.light[0] / 4 == pytest.approx(expected, rel=0.02)
 
 
 def test_octahedral_mapping_is_its_own_inverse_and_follows_the_convention():

@@ -11,8 +11,8 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen import Generator
-from fastgen.environment import bundled_hdris
 from fastgen.export import export_glb
+from fastgen.hdri import bundled_hdris
 from fastgen.scene import Scene
 
 TEXEL_MM = 6.0

@@ -1,0 +1,185 @@
+"""HDRI files: which there are, and their radiance as arrays."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from fastgen.errors import AssetError
+from fastgen.resources import asset_path
+
+HALF_MAX = 65504.0
+"""Largest finite value of IEEE 754 binary16, in which a GPU holds the maps."""
+
+MIN_WIDTH, MAX_WIDTH = 256, 16384
+"""Widths of an HDRI that can be used, in texels."""
+
+PORT_WEIGHT = 2.5
+"""How much oftener than another place out of doors a bundled port comes where none is named."""
+
+_ASPECT_TOLERANCE = 0.02
+_MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a float32 sum
+
+
+def find_hdris(folder: str | Path) -> list[Path]:
+    """The .hdr and .exr files directly in a folder, sorted by name; any case of the extension.
+
+    Raises AssetError where the folder does not exist or holds none.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise AssetError(f"{folder}: no such folder; give one that holds .hdr or .exr files")
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in (".hdr", ".exr"))
+    if not found:
+        raise AssetError(f"{folder}: no .hdr or .exr file in this folder")
+    return found
+
+
+def hdris_by_name(folder: str | Path) -> dict[str, Path]:
+    """Name -> file of the HDRIs in a folder, as `find_hdris` finds them.
+
+    Raises AssetError where two files differ in their ending alone.
+    """
+    named: dict[str, Path] = {}
+    for path in find_hdris(folder):
+        if path.stem in named:
+            raise AssetError(
+                f"{folder}: {named[path.stem].name} and {path.name} are both called "
+                f"{path.stem!r} in scenes; rename one"
+            )
+        named[path.stem] = path
+    return named
+
+
+def bundled_hdris() -> dict[str, Path]:
+    """Name -> file of every environment that ships with fastgen, sorted by name.
+
+    Their sources and licences stand in assets/hdri/SOURCES.md.
+    """
+    return {name: asset_path("hdri", entry["file"]) for name, entry in _index().items()}
+
+
+def bundled_weights() -> dict[str, float]:
+    """Name -> weight in the draw of every environment that ships with fastgen, sorted by name.
+
+    Interiors weigh 0: they come where a configuration names them.
+    """
+    kinds = {name: entry["kind"] for name, entry in _index().items()}
+    return {
+        name: 0.0 if "interior" in kind else PORT_WEIGHT if "port" in kind else 1.0
+        for name, kind in kinds.items()
+    }
+
+
+def _index() -> dict[str, dict[str, Any]]:
+    index = json.loads(asset_path("hdri", "index.json").read_text(encoding="utf-8"))
+    return dict(sorted(index.items()))
+
+
+def load_radiance(path: str | Path) -> NDArray[np.float32]:
+    """Linear radiance float32 [H, W, 3] of an equirectangular .exr or .hdr file.
+
+    W is 256 to 16384 and H within 2 % of W/2. Alpha is dropped, grey becomes three equal channels,
+    negative values become 0, infinity HALF_MAX (it stands for a sun too bright for half floats),
+    and NaN the mean of its valid neighbours. Raises AssetError, naming the file, for anything else.
+    """
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (".exr", ".hdr"):
+        raise AssetError(f"{path}: an HDRI must be an .exr or .hdr file")
+    if not path.is_file():
+        raise AssetError(f"{path}: no such file")
+    radiance = _read_exr(path) if kind == ".exr" else _read_hdr(path)
+    return _sanitized(radiance)
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if not MIN_WIDTH <= width <= MAX_WIDTH:
+        raise AssetError(
+            f"{path}: {width} texels wide; an HDRI must be {MIN_WIDTH} to {MAX_WIDTH} wide"
+        )
+    if abs(2 * height - width) > _ASPECT_TOLERANCE * width:
+        raise AssetError(f"{path}: {width}x{height} texels; an HDRI must be twice as wide as high")
+
+
+def _read_exr(path: Path) -> NDArray[np.float32]:
+    try:
+        # the header first, so that a file of a wrong size is not decoded
+        header = OpenEXR.File(str(path), header_only=True).header()
+        low, high = header["dataWindow"]
+        width, height = (int(n) for n in high - low + 1)
+    except Exception as error:  # whatever the decoder raises, the file is at fault
+        raise AssetError(f"{path}: not a readable OpenEXR file ({error})") from None
+    _check_size(path, width, height)
+    try:
+        # asked first because the decoder prints to the terminal when a file ends too soon
+        if not OpenEXR.InputFile(str(path)).isComplete():
+            raise ValueError("it ends too soon")
+        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+        planes = {name: channel.pixels for name, channel in channels.items()}
+    except Exception as error:
+        raise AssetError(f"{path}: damaged OpenEXR file ({error})") from None
+    names = _color_channels(path, list(planes))
+    radiance = np.empty((height, width, 3), np.float32)
+    for c, name in enumerate(names):
+        if planes[name].shape != (height, width):
+            raise AssetError(f"{path}: channel {name} is subsampled; save it at full resolution")
+        radiance[..., c] = planes[name]
+    return radiance
+
+
+def _color_channels(path: Path, names: list[str]) -> tuple[str, str, str]:
+    for red in sorted((n for n in names if n.split(".")[-1].upper() in ("R", "RED")), key=len):
+        prefix = red.rpartition(".")[0]
+        by_last = {n.split(".")[-1][0].upper(): n for n in names if n.rpartition(".")[0] == prefix}
+        if {"R", "G", "B"} <= by_last.keys():
+            return by_last["R"], by_last["G"], by_last["B"]
+    if not {"RY", "BY"} & set(names):
+        for grey in ("Y", "L"):
+            if grey in names:
+                return grey, grey, grey
+    raise AssetError(f"{path}: holds channels {', '.join(names)}; an HDRI must hold R, G and B")
+
+
+def _read_hdr(path: Path) -> NDArray[np.float32]:
+    with path.open("rb") as file:
+        head = file.read(4096)
+    # Radiance's own resolution string (Reference Manual, picture format): rows from the top, then
+    # columns from the left; OpenCV reads no other order
+    size = re.search(rb"\n\n-Y +(\d+) +\+X +(\d+)\n", head)
+    if not head.startswith(b"#?") or not size:
+        raise AssetError(f"{path}: not a Radiance HDR picture with rows from the top (-Y, +X)")
+    height, width = int(size[1]), int(size[2])
+    _check_size(path, width, height)
+    log_level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        bgr = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    except cv2.error:
+        bgr = None
+    finally:
+        cv2.utils.logging.setLogLevel(log_level)
+    if bgr is None or bgr.shape != (height, width, 3) or bgr.dtype != np.float32:
+        raise AssetError(f"{path}: damaged Radiance HDR picture")
+    return np.ascontiguousarray(bgr[..., ::-1])
+
+
+def _sanitized(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The radiance, changed in place, without NaN, infinity and negative values."""
+    unknown = np.empty(radiance.shape[:2], bool)
+    for flags, values in zip(unknown, radiance, strict=True):  # by rows: small masks at 16k
+        flags[:] = np.isnan(values).any(axis=-1)
+        np.nan_to_num(values, copy=False, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+        np.clip(values, 0.0, _MAX_RADIANCE, out=values)
+    for row in np.flatnonzero(unknown.any(axis=1)):
+        around = slice(max(row - 1, 0), row + 2)
+        known = ~unknown[around]
+        total, count = (radiance[around] * known[..., None]).sum(0), known.sum(0)[:, None]
+        total, count = (a + np.roll(a, 1, axis=0) + np.roll(a, -1, axis=0) for a in (total, count))
+        radiance[row, unknown[row]] = (total / np.maximum(count, 1))[unknown[row]]
+    return radiance
