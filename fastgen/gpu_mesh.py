@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 
 from fastgen.mesh import Mesh
-from fastgen.openness import encoded
+from fastgen.openness import open_sky
 
 _SLACK_MM = 120.0
 """Frames stand back from the castings' plane (mesh.GROUP_SLACK_MM), and sheets may sag a little."""
@@ -55,7 +55,7 @@ class GpuMesh:
         vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart + first_chart
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
-        self._open_sky = encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
+        self._open_sky = open_sky(mesh.normals).tobytes()
         self._openness = ctx.buffer(self._open_sky)
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * 2 * len(mesh.groups))
         self._views = ctx.buffer(np.arange(2, dtype=np.uint32).tobytes())

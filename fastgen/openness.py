@@ -79,6 +79,12 @@ def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
     return positions + inset + _LIFT_MM * mesh.normals
 
 
+def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """As `encoded` of surfaces that see their whole hemisphere, uint8 [V, 4]."""
+    whole = np.full((len(normals), 1), 255.0)
+    return np.rint(np.concatenate([128 + 127 * normals, whole], axis=1)).astype(np.uint8)
+
+
 def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.uint8]:
     """Openness of surfaces with unit `normals` [V, 3] as the shader reads it, uint8 [V, 4].
 

@@ -8,7 +8,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import openness
 from fastgen.container import build_container
 from fastgen.gl import open_context
-from fastgen.openness import SkyProbe, encoded, probe_points, sky_directions
+from fastgen.openness import SkyProbe, encoded, open_sky, probe_points, sky_directions
 from fastgen.spreader import build_spreader
 
 
@@ -41,9 +41,10 @@ def rays_open(meshes, points, directions):
 def test_under_an_open_sky_a_surface_sees_all_of_it_about_its_normal():
     normals = np.random.default_rng(0).normal(size=(500, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    direction, share = decoded(encoded(normals, np.ones((1, 1), bool)).tobytes())
-    assert (share == 1).all()
-    np.testing.assert_allclose(direction, normals, atol=0.5 / 127 + 1e-9)
+    for values in (encoded(normals, np.ones((1, 1), bool)), open_sky(normals)):
+        direction, share = decoded(values.tobytes())
+        assert (share == 1).all()
+        np.testing.assert_allclose(direction, normals, atol=0.5 / 127 + 1e-9)
 
 
 def test_a_wall_beside_a_surface_takes_half_and_turns_the_light_away_from_it():
