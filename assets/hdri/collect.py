@@ -34,7 +34,7 @@ LICENCE = "CC0-1.0"
 # name here: (package, name there, kinds); left out: hotel room, flats, studios, shopping halls
 CHOSEN = {
     "city": (BPY, "city", ("overcast", "urban")),
-    "courtyard": (BPY, "courtyard", ("day", "urban")),
+    "courtyard": (BPY, "courtyard", ("day", "interior")),
     "forest": (BPY, "forest", ("day",)),
     "night": (BPY, "night", ("night",)),
     "sunrise": (BPY, "sunrise", ("dawn",)),
