@@ -84,6 +84,8 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
                 if kind == "images":
                     progress.add(value)
                 elif kind == "made by":
+                    if not made_by:  # whoever finishes a killed run may have nothing left to make
+                        storage.write(MANIFEST, [_unsealed({**settings, **value})])
                     made_by.update(value)
 
             try:
@@ -206,7 +208,7 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
             raise OutputError(
                 f"{job.out}: holds something else (no {MANIFEST}); give an empty or new place"
             ) from None
-        storage.write(MANIFEST, [json.dumps(settings, indent=1).encode()])
+        storage.write(MANIFEST, [_unsealed(settings)])
         return {}
     except ValueError:
         raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
@@ -323,9 +325,13 @@ class _Sums:
         return [self._size, self._hash.hexdigest()]
 
 
+def _unsealed(manifest: Mapping[str, Any]) -> bytes:
+    return json.dumps(manifest, indent=1).encode()
+
+
 def sealed(manifest: Mapping[str, Any]) -> bytes:
     """dataset.json with a hash of itself as its last line."""
-    text = json.dumps(manifest, indent=1)
+    text = _unsealed(manifest).decode()
     return f'{text[:-2]},\n "digest": "{digest(text.encode())}"\n}}'.encode()
 
 

@@ -54,12 +54,18 @@ class QuickMaker(Maker):
         return files, record
 
 
-def make(out, scenes, workers, hang_s=60.0):
-    """Run the job; what dataset.json says."""
+def make(out, scenes, workers, hang_s=60.0, then=lambda: None):
+    """Run the job; what dataset.json says. then: called between the last shard and the end."""
     config = Config.preset()
     job = Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
     assert SEAFRONT
-    return generate(job, workers, run_here(workers, hang_s, QuickMaker))
+    run = run_here(workers, hang_s, QuickMaker)
+
+    def runner(*arguments):
+        run(*arguments)
+        then()
+
+    return generate(job, workers, runner)
 
 
 if __name__ == "__main__":

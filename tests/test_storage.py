@@ -74,6 +74,16 @@ def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_p
     assert content(out) == content(whole)
 
 
+def test_stopped_after_the_last_shard_it_ends_in_the_same_bytes(whole, tmp_path):
+    def stop():
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make(tmp_path / "out", SCENES, 2, then=stop)
+    make(tmp_path / "out", SCENES, 2)
+    assert content(tmp_path / "out") == content(whole)
+
+
 def test_a_scene_that_kills_its_worker_is_given_up_and_no_other(whole, tmp_path, monkeypatch):
     monkeypatch.setenv("FAULT", "crash")
     made = make(tmp_path / "out", SCENES, 2)
