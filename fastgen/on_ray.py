@@ -5,6 +5,7 @@ that the scene which ended an actor is known after its death. Files go straight 
 job.out; Ray carries shard numbers and reports alone.
 """
 
+import json
 import logging
 import os
 import socket
@@ -132,6 +133,13 @@ class _Board:
         return news
 
 
+def _mark(job: Job) -> str:
+    """Of dataset.json, the same before and after the first worker says what it renders with."""
+    said = json.loads(storage_of(job.out).read(MANIFEST))
+    settings = {name: said[name] for name in said if name not in ("backend", "renderer")}
+    return digest(json.dumps(settings).encode())
+
+
 class _Actor:
     """Makes shards in a process of its own on some node; GL opens with the first shard.
 
@@ -149,8 +157,8 @@ class _Actor:
         if fastgen.__version__ != version:
             return [], self._here(f"has fastgen {fastgen.__version__}, the driver {version}")
         try:
-            seen = digest(storage_of(self._job.out).read(MANIFEST))
-        except (OSError, OutputError) as error:
+            seen = _mark(self._job)
+        except (OSError, OutputError, ValueError) as error:
             seen = str(error)
         if seen == claimed:
             return [], ""
@@ -220,7 +228,7 @@ class _Crew:
         self._count, self._hang_s = count, hang_s
         self._waiting = deque(tasks)
         self._strikes = Strikes(job)
-        self._claimed = digest(storage_of(job.out).read(MANIFEST))
+        self._claimed = _mark(job)
         self._members: dict[int, _Member] = {}
         self._hired = 0
         self._false_starts = 0
