@@ -14,6 +14,7 @@ from fastgen import Generator
 from fastgen.export import export_glb
 from fastgen.hdri import bundled_hdris
 from fastgen.scene import Scene
+from fastgen.sensor.light import displayed
 
 TEXEL_MM = 6.0
 """Of the exported textures: a pixel of the images shows 13 to 20 mm."""
@@ -34,20 +35,8 @@ class Traced:
 
 
 def display(radiance: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:
-    """Linear radiance [H, W, 3] as our images show it: Khronos PBR Neutral (shaders/tone.glsl),
-    then sRGB (IEC 61966-2-1)."""
-    color = radiance.astype(np.float64) * exposure
-    start, desaturation = 0.8 - 0.04, 0.15
-    low = color.min(axis=-1, keepdims=True)
-    color = color - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
-    peak = color.max(axis=-1, keepdims=True)
-    over = 1.0 - start
-    new_peak = 1.0 - over * over / (np.maximum(peak, start) + over - start)
-    bright = color * new_peak / np.maximum(peak, start)
-    share = 1.0 - 1.0 / (desaturation * (peak - new_peak) + 1.0)
-    color = np.clip(np.where(peak < start, color, bright + share * (new_peak - bright)), 0, 1)
-    curve = 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055
-    return np.asarray(np.where(color <= 0.0031308, 12.92 * color, curve) * 255 + 0.5, np.uint8)
+    """Linear radiance [H, W, 3] as our images show it."""
+    return displayed((radiance * exposure).astype(np.float32))
 
 
 def trace(
