@@ -96,11 +96,7 @@ def test_backends_find_the_same(gl):
     container = build_container("20")
     found = []
     for backend in ("egl", "osmesa"):
-        try:
-            context = open_context(backend)
-        except Exception as error:
-            pytest.skip(f"no {backend} here: {error}")
-        with context:
+        with open_context(backend) as context:
             probe = SkyProbe(context.ctx)
             found.append(probe.openness(container, None))
     assert found[0] == found[1]
