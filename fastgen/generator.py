@@ -4,7 +4,6 @@ import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -113,8 +112,6 @@ class Generator:
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
-        # kept on the CPU too, for metering; the least recently used fall out
-        self._light = lru_cache(maxsize=24)(self._load_light)
         # a scene's cameras are mostly rendered one after the other
         self._latest: tuple[tuple[Config, int, int], Scene] | None = None
         self._gl: GLContext | None = None
@@ -195,7 +192,7 @@ class Generator:
 
     def _airlight(self, scene: Scene, camera: Camera) -> Color:
         """Mean light from around in the camera's exposure, no more than its meter would admit."""
-        light = self._light(scene.environment.name)
+        light = self._open().ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
         mean = mean * self.exposure(scene, camera)
@@ -293,7 +290,7 @@ class Generator:
         if scene is None:
             assert index is not None
             scene = self.scene(index)
-        else:
+        elif self._latest is None or scene is not self._latest[1]:  # ours are sound
             check_scene(scene)
         if camera is None or isinstance(camera, str):
             return scene, find_camera(scene, camera)
@@ -306,7 +303,9 @@ class Generator:
             self._process = os.getpid()
             self._gl = open_context(self.backend, self._device_index)
             threshold_mm = self.config.damage.mask_threshold_mm
-            self._renderer = Renderer(self._gl, self._light, self._samples_per_axis, threshold_mm)
+            self._renderer = Renderer(
+                self._gl, self._load_light, self._samples_per_axis, threshold_mm
+            )
         else:
             assert self._gl is not None
             self._gl.make_current()  # another generator may have been at work in between

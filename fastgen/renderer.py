@@ -21,7 +21,7 @@ from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
 from fastgen.divided_mesh import as_drawn
-from fastgen.environment import EnvironmentLight, dfg_table, to_map_frame
+from fastgen.environment import Ambient, EnvironmentLight, dfg_table, to_map_frame
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
@@ -175,7 +175,7 @@ class Renderer:
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
-        sunny = sun_values(self._light_of(scene.environment.name).sun, shadow, view.position_m)
+        sunny = sun_values(light.ambient.sun, shadow, view.position_m)
         self._view_block.write(VIEW_BLOCK.pack({**seen, **sunny}))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
@@ -227,7 +227,7 @@ class Renderer:
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
-        sun = self._light_of(scene.environment.name).sun
+        sun = self.ambient(scene.environment.name).sun
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
@@ -238,8 +238,13 @@ class Renderer:
 
     def preload(self, environment: str) -> GpuLight:
         """The light of an environment, made if need be."""
-        data = self._light_of(environment)
-        return self._lights.get(environment, lambda: GpuLight(self._ctx, data))
+        return self._lights.get(
+            environment, lambda: GpuLight(self._gl, self._light_of(environment))
+        )
+
+    def ambient(self, environment: str) -> Ambient:
+        """The light of an environment as the CPU asks for it."""
+        return self.preload(environment).ambient
 
     def bake(self, scene: Scene, texel_mm: float) -> Atlas:
         """The material of the whole container of `scene` as textures, see bake.Atlas."""
@@ -266,7 +271,7 @@ class Renderer:
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        light = self._light_of(scene.environment.name)
+        light = self.ambient(scene.environment.name)
         paint = scene.surface.paint.albedo
         view = view_of(camera, size)
         return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
