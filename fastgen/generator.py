@@ -4,6 +4,7 @@ import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,8 +24,8 @@ from fastgen.programs import LAYERS
 from fastgen.records import nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
-from fastgen.sampling import sample_scene
-from fastgen.scene import Camera, Color, Scene
+from fastgen.sampling import one_container_each, possible_shapes, sample_scene
+from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
@@ -252,11 +253,22 @@ class Generator:
         return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
-        """Load every light that scenes draw, so that neither time nor memory grows later."""
-        renderer = self._open()
+        """Make every light and shape that scenes may have, so that neither time nor memory grows
+        later."""
+        scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
-        for name in self.config.environment.names or drawn:
-            renderer.preload(name)
+        names = self.config.environment.names or drawn
+        lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
+        shaped = (
+            replace(scene, container=container, spreader=spreader)
+            for container, spreader in possible_shapes(self.config)
+        )
+        lens = any(camera.lens is not None for camera in scene.cameras)
+        self._open().preload(chain(lit, shaped), lens)
+        for i, config in enumerate(one_container_each(self.config)):
+            scene = sample_scene(config, self.seed, i, self.environments)
+            for camera in scene.cameras:  # programs, targets, and what labels ask of meshes
+                self.render(scene=scene, camera=camera)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
