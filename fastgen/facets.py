@@ -126,8 +126,12 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
     # each corner gives itself where inside, then the crossing of the edge that it starts
     slots = np.stack([corners, cut], axis=2).reshape(count, 2 * most, channels)
     valid = np.stack([keep, crosses], axis=2).reshape(count, 2 * most)
-    order = np.argsort(~valid, axis=1, kind="stable")
-    used = valid.sum(axis=1)
+    # which slot comes first, second and so on; sorting takes ten times as long
+    place = np.cumsum(valid, axis=1)
+    used = place[:, -1]
+    order = np.zeros(valid.shape, np.int64)
+    row, slot = np.nonzero(valid)
+    order[row, place[row, slot] - 1] = slot
     left = used > 0
     slots, order, used = slots[left], order[left], used[left]
     width = max(int(used.max(initial=0)), 3)
