@@ -5,17 +5,12 @@ import os
 import struct
 import zlib
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
-
-try:  # the same bytes in a tenth of the time
-    from zlib_ng import zlib_ng as deflate
-except ImportError:
-    deflate: Any = zlib  # type: ignore[no-redef]
+from zlib_ng import zlib_ng
 
 JPEG_QUALITY = 92
 
@@ -59,7 +54,8 @@ def _mask_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     rows[:, 0] = _FILTER_UP
     rows[0, 1:] = values[0]
     np.subtract(values[1:], values[:-1], out=rows[1:, 1:])
-    packer = deflate.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 8, zlib.Z_RLE)
+    # zlib's own bytes in a tenth of the time
+    packer = zlib_ng.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 8, zlib.Z_RLE)
     packed = packer.compress(rows) + packer.flush()
     head = struct.pack(">IIBBBBB", width, height, depth, _GREY, 0, 0, 0)
     chunks = _chunk(b"IHDR", head), _chunk(b"IDAT", packed), _chunk(b"IEND", b"")
