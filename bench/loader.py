@@ -1,29 +1,35 @@
 """How much of a training step is spent waiting for data: rendered as it goes, or read as JPEG.
 
-    python bench/loader.py [--steps 30] [--batch 8] [--size 320x320] [--channels 8,16,32,64]
+    python bench/loader.py [--steps 40] [--batch 8] [--size 320x320]
 
-Trains a small convolutional net on one core, on the same images from both sources, and prints the
-share of a step that it waits for its batch, once the workers have warmed up.
+Trains convolutional nets of several sizes on one core, on the same images from both sources, and
+tells what share of a step they wait for their batch, once the workers have met most lights. Fills
+the table in docs/training.md and leaves bench/results/loader.json. Needs `.[torch,examples]`.
 """
 
 import argparse
-import os
-import platform
 import tempfile
 import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import simplejpeg
 import torch
+from results import ROOT, machine, parse_size, save, write_section
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
+from transformers import ResNetConfig, ResNetForImageClassification
 
 from fastgen.encode import jpeg, write
 from fastgen.torch import ContainerDataset, class_names, collate_yolo
 
-WARM_STEPS = 5
+WARM_STEPS = 40
+"""Until then workers open lights and link programs, which later steps do not."""
+
+WORKERS = (1, 2)
 
 
 class JpegDataset(Dataset[Any]):
@@ -41,7 +47,7 @@ class JpegDataset(Dataset[Any]):
         return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target
 
 
-def save(data: ContainerDataset, folder: Path) -> None:
+def save_items(data: ContainerDataset, folder: Path) -> None:
     """Write every item as a JPEG and its target beside it."""
     for position in range(len(data)):
         image, target = data[position]
@@ -49,19 +55,59 @@ def save(data: ContainerDataset, folder: Path) -> None:
         np.save(folder / f"{position}.npy", target.numpy())
 
 
-def net(channels: list[int]) -> nn.Module:
-    """Strided convolutions and a head that says which classes are in the image."""
+def convolutions() -> nn.Module:
+    """Four strided convolutions: next to no work, so that the source is the limit."""
+    channels = (8, 16, 32, 64)
     layers: list[nn.Module] = []
-    for before, after in zip([3, *channels], channels, strict=False):
+    for before, after in zip((3, *channels), channels, strict=False):
         layers += [nn.Conv2d(before, after, 3, stride=2, padding=1), nn.ReLU()]
     head = nn.Linear(channels[-1], len(class_names("imdg")))
     return nn.Sequential(*layers, nn.AdaptiveAvgPool2d(1), nn.Flatten(), head)
 
 
-def waiting(data: Dataset[Any], workers: int, batch: int, channels: list[int]) -> tuple[float, ...]:
-    """Share of the time spent waiting, step time in ms, and images a second."""
+class ResNet(nn.Module):
+    """A residual net with basic blocks, `width` times ResNet-18's channels."""
+
+    def __init__(self, width: float) -> None:
+        super().__init__()
+        sizes = [int(width * size) for size in (64, 128, 256, 512)]
+        config = ResNetConfig(
+            embedding_size=sizes[0],
+            hidden_sizes=sizes,
+            depths=[2, 2, 2, 2],
+            layer_type="basic",
+            num_labels=len(class_names("imdg")),
+        )
+        self.net = ResNetForImageClassification(config)
+
+    def forward(self, images: torch.Tensor) -> torch.Tensor:
+        """Logits [N, classes] of images [N, 3, H, W]."""
+        return self.net(pixel_values=images).logits
+
+
+NETS: dict[str, Callable[[], nn.Module]] = {
+    "4 convolutions": convolutions,
+    "ResNet-18, a quarter as wide": lambda: ResNet(0.25),
+    "ResNet-18, half as wide": lambda: ResNet(0.5),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What one run came to. waiting: share of the time; the rest are means of a step."""
+
+    net: str
+    source: str
+    workers: int
+    waiting: float
+    step_ms: float
+    images_per_s: float
+
+
+def run(net: str, source: str, data: Dataset[Any], workers: int, batch: int) -> Row:
+    """Train for as many steps as `data` holds; the first WARM_STEPS do not count."""
     torch.manual_seed(0)
-    model = net(channels)
+    model = NETS[net]()
     optimizer = torch.optim.SGD(model.parameters(), 0.01)
     loader = DataLoader(data, batch, num_workers=workers, collate_fn=collate_yolo)
     waits, steps = [], []
@@ -80,37 +126,48 @@ def waiting(data: Dataset[Any], workers: int, batch: int, channels: list[int]) -
         last = now
     total = sum(steps[WARM_STEPS:])
     count = len(steps) - WARM_STEPS
-    return sum(waits[WARM_STEPS:]) / total, total / count * 1e3, count * batch / total
+    waiting = sum(waits[WARM_STEPS:]) / total
+    return Row(net, source, workers, waiting, total / count * 1e3, count * batch / total)
+
+
+def table(rows: list[Row], options: argparse.Namespace) -> list[str]:
+    """The rows as Markdown."""
+    return [
+        f"{machine()}, no GPU; {options.size}, batch {options.batch}, {options.steps} steps.",
+        "",
+        "| net | images are | workers | waiting | ms a step | images/s |",
+        "| --- | --- | --- | --- | --- | --- |",
+        *(
+            f"| {r.net} | {r.source} | {r.workers} | {r.waiting:.0%} | {r.step_ms:.0f} "
+            f"| {r.images_per_s:.1f} |"
+            for r in rows
+        ),
+    ]
 
 
 def main() -> None:
-    """Print the table."""
+    """Measure, and fill the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--steps", type=int, default=30)
+    parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--size", default="320x320")
-    parser.add_argument("--channels", default="8,16,32,64")
     options = parser.parse_args()
-    width, height = (int(v) for v in options.size.split("x"))
-    channels = [int(v) for v in options.channels.split(",")]
     torch.set_num_threads(1)
     length = (options.steps + WARM_STEPS) * options.batch
-    rendered = ContainerDataset(
-        "imdg", seed=7, size=(width, height), length=length, form="yolo", fixed=True
-    )
-    print(
-        f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, {options.size}, batch "
-        f"{options.batch}, net {options.channels}, {options.steps} steps\n"
-    )
-    print(f"{'source':10}{'workers':>9}{'waiting':>9}{'ms a step':>11}{'images/s':>10}")
+    size = parse_size(options.size)
+    rendered = ContainerDataset("imdg", seed=7, size=size, length=length, form="yolo", fixed=True)
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
-        save(rendered, Path(folder))
+        save_items(rendered, Path(folder))
         rendered.close()
-        sources = {"rendered": rendered, "jpeg": JpegDataset(Path(folder), length)}
-        for name, data in sources.items():
-            for workers in (1, 2):
-                share, step_ms, rate = waiting(data, workers, options.batch, channels)
-                print(f"{name:10}{workers:9d}{share:9.1%}{step_ms:11.1f}{rate:10.1f}", flush=True)
+        sources = {"rendered": rendered, "read as JPEG": JpegDataset(Path(folder), length)}
+        for net in NETS:
+            for source, data in sources.items():
+                for workers in WORKERS:
+                    rows.append(run(net, source, data, workers, options.batch))
+                    print(rows[-1], flush=True)
+    save("loader", {"machine": machine(), "rows": [asdict(row) for row in rows]})
+    write_section("loader", table(rows, options), ROOT / "docs" / "training.md")
 
 
 if __name__ == "__main__":

@@ -16,6 +16,9 @@ _LICENSE = {
 }
 
 
+_GROUP_SHIFTS = 5 * np.arange(12)
+
+
 def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int]) -> dict[str, Any]:
     """Compressed run-length encoding of a mask: {'size': [H, W], 'counts': text}.
 
@@ -29,10 +32,11 @@ def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int])
     row, column = np.divmod(np.flatnonzero(padded[1:] != padded[:-1]), part.shape[1])
     edges = np.sort((x + column) * height + y + row)
     # a run that goes on in the next column ends and begins at one place
-    again = np.flatnonzero(edges[1:] == edges[:-1])
-    edges = np.delete(edges, np.concatenate([again, again + 1]))
-    edges = np.concatenate([[0], edges, [width * height]])
-    counts = np.diff(edges)
+    again = edges[1:] == edges[:-1]
+    once = np.ones(len(edges), bool)
+    once[1:][again] = once[:-1][again] = False
+    edges = np.concatenate([[0], edges[once], [width * height]])
+    counts = edges[1:] - edges[:-1]
     if len(edges) > 2 and edges[-1] == edges[-2]:
         counts = counts[:-1]
     return {"size": [height, width], "counts": _packed(counts)}
@@ -43,17 +47,15 @@ def _packed(counts: NDArray[np.int64]) -> str:
     groups of 5 bits, lowest first, 0x20 marking that more follow, offset by 48."""
     rest = counts.astype(np.int64)
     rest[3:] -= counts[1:-2]
-    columns, used = [], []
-    open_ = np.ones(len(rest), bool)
-    while open_.any():
-        group = rest & 0x1F
-        rest = rest >> 5
-        more = np.where(group & 0x10, rest != -1, rest != 0)
-        columns.append(group + np.where(more, 0x20, 0) + 48)
-        used.append(open_)
-        open_ = open_ & more
-    text = np.stack(columns, axis=1)[np.stack(used, axis=1)]
-    return text.astype(np.uint8).tobytes().decode("ascii")
+    # what is left at each group, the number itself first; none is longer than the longest's
+    most = int(np.abs(rest).max()).bit_length() // 5 + 1
+    left = rest[:, None] >> _GROUP_SHIFTS[: most + 1]
+    group = left[:, :-1] & 0x1F
+    # the sign bit of a last group is that of all that is left
+    more = left[:, 1:] != -(group >> 4)
+    used = np.ones(group.shape, bool)
+    np.logical_and.accumulate(more[:, :-1], axis=1, out=used[:, 1:])
+    return (group + 0x20 * more + 48)[used].astype(np.uint8).tobytes().decode("ascii")
 
 
 def annotation(

@@ -236,7 +236,9 @@ def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
     origin = corners[:, :1]
     flat = np.concatenate([corners - origin, np.ones_like(depth_m)[..., None]], axis=2)
     values = np.concatenate([rest_mm, np.ones_like(rest_mm[..., :1])], axis=2)
-    to_values = np.linalg.pinv(flat) @ (values / depth_m[..., None])
+    # clipping leaves corners that repeat; of three as drawn the inverse is the same for less
+    inverse = np.linalg.pinv if flat.shape[1] > 3 else np.linalg.inv
+    to_values = inverse(flat) @ (values / depth_m[..., None])
     pixel = np.stack([column, row], axis=1)
     at = np.concatenate([pixel + 0.5 - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
     found = np.einsum("pi,pij->pj", at, to_values[polygon])

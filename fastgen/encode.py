@@ -2,22 +2,27 @@
 
 import contextlib
 import os
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
 import numpy as np
 import simplejpeg
 from numpy.typing import NDArray
+from zlib_ng import zlib_ng
 
 JPEG_QUALITY = 92
 
 _PNG_FAST = [
     *(cv2.IMWRITE_PNG_COMPRESSION, 1),
-    # naming a level resets the strategy; run lengths of rows taken from the one above suit masks:
-    # 1.6 ms and 3 kB for 640x640, against 5.3 ms when libpng chooses filters
+    # naming a level resets the strategy
     *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
     *(cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP),
 ]
+
+_FILTER_UP = 2
+_GREY = 0
 
 
 def jpeg(image: NDArray[np.uint8]) -> bytes:
@@ -30,10 +35,35 @@ def jpeg(image: NDArray[np.uint8]) -> bytes:
 
 def png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     """uint8 [H, W, 3] sRGB, or uint8 or uint16 [H, W], as PNG."""
-    ordered = pixels[..., ::-1] if pixels.ndim == 3 else pixels
-    done, data = cv2.imencode(".png", np.ascontiguousarray(ordered), _PNG_FAST)
+    if pixels.ndim == 2:
+        return _mask_png(pixels)
+    done, data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., ::-1]), _PNG_FAST)
     assert done
     return data.tobytes()
+
+
+def _mask_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """Rows less the one above, then run lengths: masks are patches of one value.
+
+    W3C, Portable Network Graphics, second edition, sections 5 (chunks), 9 (filters) and 11.
+    """
+    height, width = pixels.shape
+    depth = 8 * pixels.itemsize
+    values = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder(">")).view(np.uint8)
+    rows = np.empty((height, 1 + values.shape[1]), np.uint8)
+    rows[:, 0] = _FILTER_UP
+    rows[0, 1:] = values[0]
+    np.subtract(values[1:], values[:-1], out=rows[1:, 1:])
+    # zlib's own bytes in a tenth of the time
+    packer = zlib_ng.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 8, zlib.Z_RLE)
+    packed = packer.compress(rows) + packer.flush()
+    head = struct.pack(">IIBBBBB", width, height, depth, _GREY, 0, 0, 0)
+    chunks = _chunk(b"IHDR", head), _chunk(b"IDAT", packed), _chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def write(path: Path, data: bytes | str) -> None:

@@ -7,18 +7,18 @@ from above: radiance(direction) = map(Rz(-yaw) direction).
 
 import functools
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen import cache, prefilter
+from fastgen import cache, prefilter, rgb9e5
 from fastgen.errors import AssetError
 from fastgen.hdri import HALF_MAX, load_radiance
 from fastgen.sun import Sun, split_sun
 
-PREFILTER_VERSION = 6
+PREFILTER_VERSION = 7
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -40,29 +40,44 @@ _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
 
 @dataclass(frozen=True, eq=False)
-class EnvironmentLight:
-    """Light of one HDRI, ready for a GPU. All maps are finite, within [0, HALF_MAX], and float32
-    but for the background.
+class Ambient:
+    """What of an environment's light the CPU asks for, apart from the large maps.
 
-    The octahedral maps have a border of one texel (prefilter.py says how uv meets it). Their values
-    are exactly representable as half floats. `specular` and `irradiance` lack what `sun` has.
+    Maps are finite, float32 and within [0, HALF_MAX]. `irradiance` lacks what `sun` has.
     """
 
     name: str
-    specular: NDArray[np.float32]
-    """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS."""
     irradiance: NDArray[np.float32]
     """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
-    background: NDArray[np.float16]
-    """[B, B, 3] radiance as it is; B is a power of two from 512 to 2048 near twice the width, for
-    as much as that is needed to look as sharp as the HDRI itself, and 4096 where that is wider than
-    4096: a finer one shows in no picture of a usual size, but takes 100 MB."""
     luminance: NDArray[np.float32]
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
     """Mean of the luminance over the whole sphere."""
     sun: Sun | None
     """The one strong compact light, None where there is none."""
+
+    @staticmethod
+    def of(light: "Ambient") -> "Ambient":
+        """Only this of a whole light."""
+        return Ambient(**{field.name: getattr(light, field.name) for field in fields(Ambient)})
+
+
+@dataclass(frozen=True, eq=False)
+class EnvironmentLight(Ambient):
+    """Light of one HDRI, ready for a GPU.
+
+    The octahedral maps have a border of one texel (prefilter.py says how uv meets it). The values
+    of `specular` and `irradiance` are exactly representable as half floats.
+    """
+
+    specular: NDArray[np.float32]
+    """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS;
+    without the sun, as `irradiance`."""
+    background: NDArray[np.uint32]
+    """[B, B] radiance as it is, as rgb9e5.py packs it; B is a power of two from 512 to 2048 near
+    twice the width, for as much as that is needed to look as sharp as the HDRI itself, and 4096
+    where that is wider than 4096: a finer one shows in no picture of a usual size, but takes
+    67 MB."""
 
 
 def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> EnvironmentLight:
@@ -98,7 +113,8 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     irradiance = prefilter.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
 
     cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), _half(background), cells, sun)
+    packed = rgb9e5.packed(background)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, sun)
 
 
 def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -109,7 +125,7 @@ def _light(
     name: str,
     specular: NDArray[np.float16],
     irradiance: NDArray[np.float16],
-    background: NDArray[np.float16],
+    background: NDArray[np.uint32],
     luminance: NDArray[np.float32],
     sun: Sun | None,
 ) -> EnvironmentLight:
@@ -160,7 +176,7 @@ def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
         name,
         specular.astype(np.float16),
         irradiance.astype(np.float16),
-        background.astype(np.float16),
+        background.astype(np.uint32),
         luminance.astype(np.float32),
         _unpacked_sun(sun.astype(np.float64)),
     )
@@ -187,9 +203,7 @@ def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
     return d @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
 
 
-def irradiance_at(
-    env: EnvironmentLight, normals: ArrayLike, yaw_deg: float = 0.0
-) -> NDArray[np.float32]:
+def irradiance_at(env: Ambient, normals: ArrayLike, yaw_deg: float = 0.0) -> NDArray[np.float32]:
     """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], sun included."""
     normals = to_map_frame(normals, yaw_deg)
     found = prefilter.sample_octahedral(env.irradiance, normals)
@@ -207,7 +221,7 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def metered_luminance(
-    env: EnvironmentLight, direction: ArrayLike, half_angle_deg: float, yaw_deg: float = 0.0
+    env: Ambient, direction: ArrayLike, half_angle_deg: float, yaw_deg: float = 0.0
 ) -> tuple[float, float]:
     """Log average and average of the luminance within a cone around a world direction [3].
 

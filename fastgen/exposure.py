@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastgen.camera import View
-from fastgen.environment import EnvironmentLight, irradiance_at, metered_luminance
+from fastgen.environment import Ambient, irradiance_at, metered_luminance
 from fastgen.scene import Camera, Color
 
 MIDDLE_GREY = 0.18
@@ -15,7 +15,7 @@ _REC_709 = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, section 3.2
 
 
 def metered_exposure(
-    light: EnvironmentLight, yaw_deg: float, view: View, camera: Camera, paint: Color
+    light: Ambient, yaw_deg: float, view: View, camera: Camera, paint: Color
 ) -> float:
     """Factor on radiance that puts the metered mean at a mid-tone, then exposure_ev stops off it.
 

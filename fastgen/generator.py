@@ -4,7 +4,7 @@ import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
@@ -24,8 +24,8 @@ from fastgen.programs import LAYERS
 from fastgen.records import nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
-from fastgen.sampling import sample_scene
-from fastgen.scene import Camera, Color, Scene
+from fastgen.sampling import one_container_each, possible_shapes, sample_scene
+from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
@@ -113,8 +113,6 @@ class Generator:
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
-        # kept on the CPU too, for metering; the least recently used fall out
-        self._light = lru_cache(maxsize=24)(self._load_light)
         # a scene's cameras are mostly rendered one after the other
         self._latest: tuple[tuple[Config, int, int], Scene] | None = None
         self._gl: GLContext | None = None
@@ -195,7 +193,7 @@ class Generator:
 
     def _airlight(self, scene: Scene, camera: Camera) -> Color:
         """Mean light from around in the camera's exposure, no more than its meter would admit."""
-        light = self._light(scene.environment.name)
+        light = self._open().ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
         mean = mean * self.exposure(scene, camera)
@@ -255,11 +253,22 @@ class Generator:
         return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
-        """Load every light that scenes draw, so that neither time nor memory grows later."""
-        renderer = self._open()
+        """Make every light and shape that scenes may have, so that neither time nor memory grows
+        later."""
+        scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
-        for name in self.config.environment.names or drawn:
-            renderer.preload(name)
+        names = self.config.environment.names or drawn
+        lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
+        shaped = (
+            replace(scene, container=container, spreader=spreader)
+            for container, spreader in possible_shapes(self.config)
+        )
+        lens = any(camera.lens is not None for camera in scene.cameras)
+        self._open().preload(chain(lit, shaped), lens)
+        for i, config in enumerate(one_container_each(self.config)):
+            scene = sample_scene(config, self.seed, i, self.environments)
+            for camera in scene.cameras:  # programs, targets, and what labels ask of meshes
+                self.render(scene=scene, camera=camera)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
@@ -293,7 +302,7 @@ class Generator:
         if scene is None:
             assert index is not None
             scene = self.scene(index)
-        else:
+        elif self._latest is None or scene is not self._latest[1]:  # ours are sound
             check_scene(scene)
         if camera is None or isinstance(camera, str):
             return scene, find_camera(scene, camera)
@@ -306,7 +315,9 @@ class Generator:
             self._process = os.getpid()
             self._gl = open_context(self.backend, self._device_index)
             threshold_mm = self.config.damage.mask_threshold_mm
-            self._renderer = Renderer(self._gl, self._light, self._samples_per_axis, threshold_mm)
+            self._renderer = Renderer(
+                self._gl, self._load_light, self._samples_per_axis, threshold_mm
+            )
         else:
             assert self._gl is not None
             self._gl.make_current()  # another generator may have been at work in between

@@ -1,18 +1,27 @@
 """An EnvironmentLight on the GPU: three octahedral maps."""
 
+import ctypes
+
 import moderngl
 import numpy as np
 
-from fastgen.environment import EnvironmentLight
+from fastgen.environment import Ambient, EnvironmentLight
+from fastgen.gl import GLContext
 
+_TEXTURE_2D = 0x0DE1
+_RGB = 0x1907
 _RGB9_E5 = 0x8C3D
-"""OpenGL 4.5 core specification, section 8.5.2: holds up to 65,408."""
+_UNSIGNED_INT_5_9_9_9_REV = 0x8C3E
+_INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 
 class GpuLight:
-    """Textures of one environment. Owned by the renderer, which releases it."""
+    """Textures of one environment, and what of it the CPU asks for. Owned by the renderer, which
+    releases it."""
 
-    def __init__(self, ctx: moderngl.Context, light: EnvironmentLight) -> None:
+    def __init__(self, gl: GLContext, light: EnvironmentLight) -> None:
+        ctx = gl.ctx
+        self.ambient = Ambient.of(light)
         self.background_size = light.background.shape[0]
         layers, size = light.specular.shape[:2]
         self.specular = ctx.texture_array(
@@ -20,11 +29,7 @@ class GpuLight:
         )
         size = light.irradiance.shape[0]
         self.irradiance = ctx.texture((size, size), 4, _half(light.irradiance), dtype="f2")
-        size = self.background_size
-        # the largest by far: nine bits a channel and a common exponent take half of half floats
-        self.background = ctx.texture(
-            (size, size), 3, light.background.tobytes(), dtype="f2", internal_format=_RGB9_E5
-        )
+        self.background = _packed_texture(gl, light.background)
         for texture in (self.specular, self.irradiance, self.background):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False
@@ -33,6 +38,20 @@ class GpuLight:
         """Free all GL objects."""
         for texture in (self.specular, self.irradiance, self.background):
             texture.release()
+
+
+def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
+    """RGB9_E5 texels, uint32 [N, N]: moderngl has no name for the type, and a driver that is given
+    another one takes 60 ms to convert it."""
+    size = texels.shape[0]
+    texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=_RGB9_E5)
+    texture.use()
+    upload = gl.function(
+        "glTexSubImage2D", None, _ENUM, _INT, *(_INT,) * 4, _ENUM, _ENUM, ctypes.c_void_p
+    )
+    address = np.ascontiguousarray(texels, np.uint32).ctypes.data
+    upload(_TEXTURE_2D, 0, 0, 0, size, size, _RGB, _UNSIGNED_INT_5_9_9_9_REV, address)
+    return texture
 
 
 def _half(radiance: np.ndarray) -> bytes:

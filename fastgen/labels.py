@@ -289,14 +289,21 @@ def _behind(
     mesh: Mesh, eye_mm: NDArray[np.float64], points: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Which of points [N, 3] the mesh hides from the eye, bool [N]; Moeller and Trumbore 1997."""
-    a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
+    a, b_a, c_a, normal = _spanned(mesh)
     ray, offset = points - eye_mm, eye_mm - a
     # their triple products, turned so that nothing is crossed for each ray anew
-    q = np.cross(offset, b - a)
-    scale = ray @ np.cross(c - a, b - a).T
+    q = np.cross(offset, b_a)
+    scale = ray @ normal.T
     scale[np.abs(scale) < 1e-9] = np.inf
-    u = ray @ np.cross(c - a, offset).T / scale
+    u = ray @ np.cross(c_a, offset).T / scale
     v = ray @ q.T / scale
-    along = (q * (c - a)).sum(axis=1) / scale
+    along = (q * c_a).sum(axis=1) / scale
     met = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0) & (along < 1)
     return np.asarray(met.any(axis=1), bool)
+
+
+@lru_cache(maxsize=16)
+def _spanned(mesh: Mesh) -> tuple[NDArray[np.float64], ...]:
+    """Of each triangle [T, 3]: its first corner, the edges to the others, and their product."""
+    a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
+    return a, b - a, c - a, np.cross(c - a, b - a)

@@ -247,7 +247,9 @@ class _Locator:
     def _weights(
         self, points: NDArray[np.float64], triangle: NDArray[np.int64]
     ) -> NDArray[np.float64]:
-        matrix = self.to_weights[triangle]
-        second_third = np.einsum("...ij,...j->...i", matrix[..., :2], points) + matrix[..., 2]
-        first = 1 - second_third.sum(axis=-1, keepdims=True)
-        return np.concatenate([first, second_third], axis=-1)
+        x, y = points[..., 0], points[..., 1]
+        second, third = (
+            row[triangle, 0] * x + row[triangle, 1] * y + row[triangle, 2]
+            for row in self.to_weights.transpose(1, 0, 2)
+        )
+        return np.stack([1 - (second + third), second, third], axis=-1)

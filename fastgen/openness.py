@@ -6,6 +6,7 @@ before it. Back faces rather than front ones: a lit surface is then no occluder 
 
 import hashlib
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import moderngl
@@ -20,7 +21,7 @@ from fastgen.spreader import CABLE_TIER, tier_of_vertices
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface."""
 
-_VERSION = 1
+_VERSION = 2
 """Part of the disk cache's key: count up whenever the openness changes."""
 
 _MAP_SIZE = (2048, 512)
@@ -40,6 +41,7 @@ _INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
 _CAPACITY = 128
+_BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]
 Directions = NDArray[np.bool_]
@@ -91,22 +93,30 @@ def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.ui
     The mean direction of the cosine-weighted open sky, as 128 + 127 d, and its share of the whole
     hemisphere as 255 s.
     """
-    directions = sky_directions()
-    n = np.asarray(normals, np.float64)
+    n = np.asarray(normals, np.float32)
+    found = np.empty((len(n), 4), np.uint8)
+    for first in range(0, len(n), _BLOCK):
+        part = slice(first, first + _BLOCK)
+        found[part] = _encoded_part(n[part], open_to[part])
+    return found
+
+
+def _encoded_part(n: NDArray[np.float32], open_to: Directions) -> Array:
+    directions = sky_directions().astype(np.float32)
     cosine = np.maximum(n @ directions.T, 0.0)
     whole = cosine.sum(axis=1, keepdims=True)
-    seen = cosine * open_to
-    share = seen.sum(axis=1, keepdims=True) / whole
+    hidden = np.where(open_to, np.float32(0), cosine)
+    share = 1 - hidden.sum(axis=1, keepdims=True) / whole
     # the integral over a whole hemisphere is 2/3 n; what the directions miss of it is made good
-    mean = 2 / 3 * n + (seen - cosine) @ directions / whole
+    mean = 2 / 3 * n - hidden @ directions / whole
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     mean = np.where(length > 1e-3, mean / np.maximum(length, 1e-3), n)
-    return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1)).astype(np.uint8)
+    return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1))
 
 
-def _encoded_bits(mesh: Mesh, open_to: NDArray[np.uint8]) -> bytes:
+def _encoded_bits(mesh: Mesh, open_to: NDArray[np.uint8]) -> NDArray[np.uint8]:
     directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
-    return encoded(mesh.normals, directions).tobytes()
+    return encoded(mesh.normals, directions)
 
 
 class SkyProbe:
@@ -123,30 +133,36 @@ class SkyProbe:
     def openness(self, container: Mesh, spreader: Mesh | None) -> bytes:
         """`encoded` openness of a container's vertices under the spreader that holds it."""
         key = (container, spreader)
-        if key not in self._found:
-            self._keep(key, self._measured(container, spreader))
-        self._found.move_to_end(key)
-        return self._found[key]
+        return self._found_or(key, lambda: self._of_container(container, spreader))
 
     def openness_of_spreader(self, spreader: Mesh, container: Mesh) -> bytes:
         """`encoded` openness of a spreader's vertices above the container that it holds."""
         key = (spreader, container)
+        return self._found_or(key, lambda: self._of_spreader(spreader, container))
+
+    def _found_or(
+        self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
+    ) -> bytes:
         if key not in self._found:
-            # its faces are long and run into one another: their ends stand for nothing
-            points = probe_points(spreader, np.inf)
-            own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
-            below = self._kept(
-                Body(container.positions_mm, container.triangles), points, _COARSE_SIZE
-            )
-            self._keep(key, _encoded_bits(spreader, own & below))
+            digest = hashlib.sha256(f"{_VERSION} {self._driver}".encode())
+            for mesh in key:
+                for array in (mesh.positions_mm, mesh.normals, mesh.triangles) if mesh else ():
+                    digest.update(array.tobytes())
+            shape = (len(key[0].normals), 4)
+            self._found[key] = _from_disk(digest.hexdigest(), shape, measure).tobytes()
+            if len(self._found) > _CAPACITY:
+                self._found.popitem(last=False)
+        self._found.move_to_end(key)
         return self._found[key]
 
-    def _keep(self, key: tuple[Mesh, Mesh | None], values: bytes) -> None:
-        self._found[key] = values
-        if len(self._found) > _CAPACITY:
-            self._found.popitem(last=False)
+    def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
+        # its faces are long and run into one another: their ends stand for nothing
+        points = probe_points(spreader, np.inf)
+        own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
+        below = self._kept(Body(container.positions_mm, container.triangles), points, _COARSE_SIZE)
+        return _encoded_bits(spreader, own & below)
 
-    def _measured(self, container: Mesh, spreader: Mesh | None) -> bytes:
+    def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
         if container not in self._own:
             body = Body(container.positions_mm, container.triangles)
@@ -164,13 +180,11 @@ class SkyProbe:
         digest = hashlib.sha256(about)
         for array in (body.positions_mm, body.triangles, points_mm):
             digest.update(np.ascontiguousarray(array).tobytes())
-        entry = cache.default_folder() / f"openness-{digest.hexdigest()[:32]}.npz"
-        bits = cache.read(entry).get("bits")
-        shape = (len(points_mm), -(-DIRECTIONS // 8))
-        if bits is None or bits.shape != shape or bits.dtype != np.uint8:
-            bits = np.packbits(self._open_to(body, points_mm, size), axis=1)
-            cache.write(entry, {"bits": bits}, compress=True)
-        return bits.astype(np.uint8)
+        return _from_disk(
+            digest.hexdigest(),
+            (len(points_mm), -(-DIRECTIONS // 8)),
+            lambda: np.packbits(self._open_to(body, points_mm, size), axis=1),
+        )
 
     def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         ctx = self._ctx
@@ -207,6 +221,19 @@ class SkyProbe:
     def release(self) -> None:
         """Free the program."""
         self._program.release()
+
+
+def _from_disk(
+    key: str, shape: tuple[int, int], make: Callable[[], NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
+    """The disk cache's array of `key`; where there is none of `shape`, what `make` gives."""
+    entry = cache.default_folder() / f"openness-{key[:32]}.npz"
+    stored = cache.read(entry).get("values")
+    if stored is not None and stored.shape == shape and stored.dtype == np.uint8:
+        return stored.astype(np.uint8)
+    made = make()
+    cache.write(entry, {"values": made}, compress=True)
+    return made
 
 
 def map_matrix(toward: Array, low: Array, high: Array) -> Array:

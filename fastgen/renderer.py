@@ -6,9 +6,8 @@ for each different surface among its samples and write colour, ids, damage and d
 centre. Ids are never filtered: a sample lies exactly on each pixel centre.
 """
 
-from collections import OrderedDict
-from collections.abc import Callable
-from typing import Any, Generic, Protocol, Self, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Any, Self
 
 import moderngl
 import numpy as np
@@ -17,17 +16,15 @@ from numpy.typing import ArrayLike
 from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
-from fastgen.container import build_container
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
-from fastgen.divided_mesh import as_drawn
-from fastgen.environment import EnvironmentLight, dfg_table, to_map_frame
+from fastgen.environment import Ambient, EnvironmentLight, dfg_table, to_map_frame
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
-from fastgen.gpu_mesh import GpuMesh, chart_table
+from fastgen.gpu_mesh import GpuMesh
+from fastgen.kept import Kept
 from fastgen.mesh import Mesh
-from fastgen.openness import SkyProbe
 from fastgen.programs import (
     DAMAGE_BLOCK,
     DAMAGE_VARIANTS,
@@ -40,7 +37,8 @@ from fastgen.programs import (
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.spreader import build_spreader, tier_bounds_mm
+from fastgen.shapes import Shapes, spreader_mesh
+from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
@@ -48,33 +46,6 @@ from fastgen.textures import mipmapped_array, noise_texture
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
-
-
-class _Releasable(Protocol):
-    def release(self) -> None: ...
-
-
-T = TypeVar("T", bound=_Releasable)
-
-
-class _Kept(Generic[T]):
-    """The most recently used GL objects by key; what falls out is released."""
-
-    def __init__(self, capacity: int) -> None:
-        self._capacity = capacity
-        self._items: OrderedDict[object, T] = OrderedDict()
-
-    def get(self, key: object, make: Callable[[], T]) -> T:
-        if key not in self._items:
-            self._items[key] = make()
-            if len(self._items) > self._capacity:
-                self._items.popitem(last=False)[1].release()
-        self._items.move_to_end(key)
-        return self._items[key]
-
-    def release(self) -> None:
-        while self._items:
-            self._items.popitem()[1].release()
 
 
 class _SceneDecals:
@@ -119,16 +90,13 @@ class Renderer:
             damage: link(self._ctx, "geometry.vert", "geometry.frag", {}, damage=damage)
             for damage in DAMAGE_VARIANTS
         }
-        self._shading: _Kept[Shading] = _Kept(len(LAYERS))
-        self._targets: _Kept[Targets] = _Kept(3)
-        self._meshes: _Kept[GpuMesh] = _Kept(16)
-        self._spreaders: _Kept[GpuMesh] = _Kept(64)
-        self._charts: _Kept[moderngl.Texture] = _Kept(64)
-        self._lights: _Kept[GpuLight] = _Kept(24)
-        self._scenes: _Kept[_SceneDecals] = _Kept(2)
-        self._probe = SkyProbe(self._ctx)
-        self._shadows: _Kept[ShadowMap] = _Kept(4)
+        self._shading: Kept[Shading] = Kept(len(LAYERS))
+        self._targets: Kept[Targets] = Kept(3)
+        self._shapes = Shapes(self._ctx, self._geometry)
+        self._lights: Kept[GpuLight] = Kept(24)
+        self._scenes: Kept[_SceneDecals] = Kept(2)
         self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
+        self._sun_shadow = ShadowMap(self._ctx, self._occluder)
         self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
         self._view_block = self._ctx.buffer(reserve=VIEW_BLOCK.size)
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
@@ -162,20 +130,13 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh = self._mesh(scene.container)
-        spreader = self._spreader(scene, camera.lens is not None)
-        usual = _shading_spreader(scene)
-        mesh.set_openness(self._probe.openness(mesh.mesh, usual))
-        if spreader is not None and usual is not None:
-            held = build_container(scene.container.kind)
-            shape = usual if camera.lens is None else spreader.mesh  # with vertices of its own
-            spreader.set_openness(self._probe.openness_of_spreader(shape, held))
-        light = self.preload(scene.environment.name)
+        mesh, spreader = self._shapes.of(scene, camera.lens is not None)
+        light = self._light(scene.environment.name)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
-        sunny = sun_values(self._light_of(scene.environment.name).sun, shadow, view.position_m)
+        sunny = sun_values(light.ambient.sun, shadow, view.position_m)
         self._view_block.write(VIEW_BLOCK.pack({**seen, **sunny}))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
         self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
@@ -227,23 +188,32 @@ class Renderer:
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
-        sun = self._light_of(scene.environment.name).sun
+        sun = self.ambient(scene.environment.name).sun
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        return self._shadows.get(
-            (container, spreader, *toward),
-            lambda: ShadowMap(self._ctx, self._occluder, container, spreader, toward),
+        self._sun_shadow.cast(container, spreader, toward)
+        return self._sun_shadow
+
+    def preload(self, scenes: Iterable[Scene], lens: bool) -> None:
+        """Make the light and the shapes of scenes, so that drawing them takes neither time nor
+        memory for that; lens: whether one bends what is drawn."""
+        for scene in scenes:
+            self._light(scene.environment.name)
+            self._shapes.chart_table(*self._shapes.of(scene, lens))
+
+    def _light(self, environment: str) -> GpuLight:
+        return self._lights.get(
+            environment, lambda: GpuLight(self._gl, self._light_of(environment))
         )
 
-    def preload(self, environment: str) -> GpuLight:
-        """The light of an environment, made if need be."""
-        data = self._light_of(environment)
-        return self._lights.get(environment, lambda: GpuLight(self._ctx, data))
+    def ambient(self, environment: str) -> Ambient:
+        """The light of an environment as the CPU asks for it."""
+        return self._light(environment).ambient
 
     def bake(self, scene: Scene, texel_mm: float) -> Atlas:
         """The material of the whole container of `scene` as textures, see bake.Atlas."""
-        mesh = self._mesh(scene.container)
+        mesh = self._shapes.container(scene.container)
         damage = variant(scene.damages)
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
@@ -256,17 +226,17 @@ class Renderer:
 
     def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
         """The spreader's material as textures, None where the scene has none."""
-        spreader = self._spreader(scene, False)
+        spreader = self._shapes.spreader(scene, False)
         if spreader is None:
             return None
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
         self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
-        self._bind_surface(scene, self._mesh(scene.container), spreader)
+        self._bind_surface(scene, self._shapes.container(scene.container), spreader)
         return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_CHART)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        light = self._light_of(scene.environment.name)
+        light = self.ambient(scene.environment.name)
         paint = scene.surface.paint.albedo
         view = view_of(camera, size)
         return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
@@ -283,7 +253,7 @@ class Renderer:
             "noise_tiles": self._noise,
             "art": self._art,
             "glyph_tiles": self._tiles,
-            "chart_table": self._chart_table(mesh, spreader),
+            "chart_table": self._shapes.chart_table(mesh, spreader),
             "decal_grid": decals.grid,
             "decal_table": decals.table,
             "glyph_table": decals.glyphs,
@@ -293,45 +263,19 @@ class Renderer:
 
     def mesh(self, container: Container) -> Mesh:
         """The rest mesh of a container, as it is drawn."""
-        return self._mesh(container).mesh
+        return self._shapes.container(container).mesh
 
     def spreader_mesh(self, scene: Scene) -> Mesh | None:
         """The spreader's mesh as it is built, None where the scene has none."""
-        spreader = scene.spreader
-        if not spreader.present:
-            return None
-        return build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
-
-    def _mesh(self, container: Container) -> GpuMesh:
-        def make() -> GpuMesh:
-            mesh = build_container(container.kind, container.profiles)
-            return GpuMesh(self._ctx, mesh, self._geometry)
-
-        return self._meshes.get(container, make)
-
-    def _spreader(self, scene: Scene, bent: bool) -> GpuMesh | None:
-        """bent: whether a lens bends it."""
-        built = self.spreader_mesh(scene)
-        if built is None:
-            return None
-        mesh = as_drawn(built, bent)
-        return self._spreaders.get(
-            mesh, lambda: GpuMesh(self._ctx, mesh, self._geometry, SPREADER_CHART)
-        )
-
-    def _chart_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
-        meshes = {0: container.mesh}
-        if spreader is not None:
-            meshes[SPREADER_CHART] = spreader.mesh
-        return self._charts.get(tuple(meshes.values()), lambda: chart_table(self._ctx, meshes))
+        return spreader_mesh(scene)
 
     def release(self) -> None:
         """Free every GL object that this renderer made."""
-        caches: list[Any] = [self._shading, self._targets, self._meshes, self._spreaders]
-        for kept in (*caches, self._charts, self._lights, self._scenes, self._shadows):
+        caches: list[Any] = [self._shading, self._targets, self._shapes, self._lights]
+        for kept in (*caches, self._scenes, self._sun_shadow):
             kept.release()
         blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
-        for item in (*blocks, *self._geometry.values(), self._probe, self._occluder):
+        for item in (*blocks, *self._geometry.values(), self._occluder):
             item.release()
         for texture in (self._art, self._tiles, self._noise, self._dfg):
             texture.release()
@@ -341,13 +285,6 @@ class Renderer:
 
     def __exit__(self, *_: object) -> None:
         self.release()
-
-
-def _shading_spreader(scene: Scene) -> Mesh | None:
-    """What hides the sky from the container. At its usual gap: a centimetre more or less cannot be
-    seen in the shade, and every other shape costs half a second once."""
-    held = scene.spreader
-    return build_spreader(scene.container.kind, held.flippers_down) if held.present else None
 
 
 def _region(view: View, corners_mm: np.ndarray) -> Region | None:

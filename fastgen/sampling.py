@@ -5,8 +5,9 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -161,17 +162,50 @@ def _environment(
     return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
 
 
+def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
+    """Every container with every spreader that scenes of `config` may hold it by, up to colours."""
+    c = config.spreader
+    lowered = [v for v, p in ((True, c.flippers_down), (False, 1 - c.flippers_down)) if p > 0]
+    low, high = c.gap_mm
+    gaps = {_whole_gap(c, gap) for gap in (*np.arange(low, high, 5).tolist(), high)}
+    spreaders = [
+        Spreader(True, linear_color(c.colors[0]), (front, back), gap)
+        for front, back in product(lowered, repeat=2)
+        for gap in sorted(gaps)
+    ]
+    bare = replace(spreaders[0], present=False)
+    held = spreaders * (c.probability > 0) + [bare] * (c.probability < 1)
+    for one in one_container_each(config):
+        (kind,), (scale,) = one.container.kinds, one.container.depth_scale
+        container = Container(kind, config.container.profiles.deepened(scale))
+        yield from ((container, spreader) for spreader in held)
+
+
+def one_container_each(config: Config) -> Iterator[Config]:
+    """For every container of `config` one that has only that, and damage for certain, if any."""
+    c, damage = config.container, config.damage
+    damage = replace(damage, probability=float(damage.probability > 0))
+    for kind, weight in c.kinds.items():
+        for scale in c.depth_scale * (weight > 0):
+            only = replace(c, kinds={kind: 1.0}, depth_scale=(scale,))
+            yield replace(config, container=only, damage=damage)
+
+
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     lowered = streams("spreader.flippers").random(2) < c.flippers_down
-    low, high = c.gap_mm
-    # few different gaps, so that few shapes are built
-    gap = 10.0 * round(_between(streams("spreader.gap"), c.gap_mm) / 10)
+    gap = _whole_gap(c, _between(streams("spreader.gap"), c.gap_mm))
     return Spreader(
         present=bool(streams("spreader").random() < c.probability),
         albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
         flippers_down=(bool(lowered[0]), bool(lowered[1])),
-        gap_mm=min(max(gap, low), high),
+        gap_mm=gap,
     )
+
+
+def _whole_gap(c: SpreaderConfig, gap_mm: float) -> float:
+    """Few different gaps, so that few shapes are built."""
+    low, high = c.gap_mm
+    return min(max(10.0 * round(gap_mm / 10), low), high)
 
 
 def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:

@@ -22,20 +22,31 @@ Array = NDArray[np.float64]
 
 
 class ShadowMap:
-    """What a sun meets first of `container` and the `spreader` that holds it, less its cables.
+    """What a sun meets first of a container and the spreader that holds it, less its cables.
 
-    Owned by the renderer, which releases it. program: of occluder.vert. toward: unit vector [3] to
-    the sun in the container's frame.
+    Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
+    made anew for each, freed ones would stay with the process in pieces.
     """
 
-    def __init__(
-        self,
-        ctx: moderngl.Context,
-        program: moderngl.Program,
-        container: Mesh,
-        spreader: Mesh | None,
-        toward: Array,
-    ) -> None:
+    def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
+        self._ctx = ctx
+        self._program = program
+        self._shown: tuple[object, ...] = ()
+        self.toward = np.zeros(3)
+        self._to_map = np.eye(4)
+        self.depth = ctx.depth_texture(MAP_SIZE)
+        self.depth.compare_func = "<="
+        self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.depth.repeat_x = self.depth.repeat_y = False
+        self._target = ctx.framebuffer([], self.depth)
+
+    def cast(self, container: Mesh, spreader: Mesh | None, toward: Array) -> None:
+        """Draw the map if it does not show this. toward: unit vector [3] to the sun in the
+        container's frame."""
+        shown = (container, spreader, *toward)
+        if shown == self._shown:
+            return
+        self._shown = shown
         bodies = [Body(container.positions_mm, container.triangles)]
         if spreader is not None:
             bodies.append(without_cables(spreader))
@@ -43,24 +54,20 @@ class ShadowMap:
         high = np.max([body.positions_mm.max(axis=0) for body in bodies], axis=0)
         self.toward = toward
         self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-        self.depth = ctx.depth_texture(MAP_SIZE)
-        self.depth.compare_func = "<="
-        self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self.depth.repeat_x = self.depth.repeat_y = False
-        self._target = ctx.framebuffer([], self.depth)
-        self._draw(ctx, program, bodies)
+        self._draw(bodies)
 
-    def _draw(self, ctx: moderngl.Context, program: moderngl.Program, bodies: list[Body]) -> None:
+    def _draw(self, bodies: list[Body]) -> None:
+        ctx = self._ctx
         self._target.use()
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face, ctx.cull_face = "ccw", "front"
         self._target.clear(depth=1.0)
-        program["to_map"] = tuple(self._to_map.T.ravel())
+        self._program["to_map"] = tuple(self._to_map.T.ravel())
         for body in bodies:
             vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
             indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
-            array = ctx.vertex_array(program, [(vertices, "3f", "in_position_mm")], indices)
+            array = ctx.vertex_array(self._program, [(vertices, "3f", "in_position_mm")], indices)
             array.render(moderngl.TRIANGLES)
             for item in (array, vertices, indices):
                 item.release()

@@ -33,7 +33,10 @@ bool in_hole(int i, vec3 p) {
 // which perforation has torn away rest point p, -1 for none
 int hole_at(vec3 p) {
     int found = -1;
-    for (int i = 0; i < hole_count; ++i) if (in_hole(i, p)) found = i;
+    int i = 0;
+    do {
+        if (in_hole(i, p) && i < hole_count) found = i;
+    } while (++i < hole_count);
     return found;
 }
 
@@ -144,7 +147,8 @@ struct Damaged {
 Damaged damage_at(vec3 p) {
     Damaged d = Damaged(mat3(1.0), 0.0, 0u);
     float most = damage_threshold_mm;
-    for (int i = 0; i < damage_count; ++i) {
+    int i = 0;   // there is one at least
+    do {
         Field f = damage_field(i, p);
         vec3 slope = f.slope.x * damage_along[i].xyz + f.slope.y * damage_across[i].xyz +
                      f.slope.z * damage_inward[i].xyz;
@@ -154,7 +158,7 @@ Damaged damage_at(vec3 p) {
             most = abs(f.amount);
             d.value = uint(damage_shape[3 * i + 2].w);
         }
-    }
+    } while (++i < damage_count);
     return d;
 }
 

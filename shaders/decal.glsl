@@ -40,14 +40,15 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
     // centre and layer of the two nearest glyphs: from afar, two share a footprint
     vec4 first = vec4(1e9, 1e9, 0.0, 1e9);
     vec4 second = first;
-    for (int i = 0; i < int(run.z); ++i) {
-        int g = int(run.y) + i;
+    int g = int(run.y);
+    int end = g + int(run.z);
+    do {
         vec4 glyph = texelFetch(glyph_table, ivec2(g & 255, g >> 8), 0);
         vec2 d = p - glyph.xy;
-        vec4 found = vec4(d, glyph.z, max(abs(d.x), abs(d.y)));
+        vec4 found = vec4(d, glyph.z, g < end ? max(abs(d.x), abs(d.y)) : 1e9);
         if (found.w < first.w) { second = first; first = found; }
         else if (found.w < second.w) second = found;
-    }
+    } while (++g < end);
     return min(glyph_ink(first.xy, first.z, cap_mm, footprint_mm) +
                glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
 }
@@ -87,11 +88,13 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
 DecalHit decals_at(uint chart, vec3 paint, vec2 sheet_mm, float footprint_mm, float grain) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
     uvec4 cell = cell_at(chart, sheet_mm);
-    for (int i = 0; i < 8; ++i) {
-        uint pair = cell[i >> 1];
-        uint decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;
-        if (decal == 0u) break;
-        add_decal(hit, decal, sheet_mm, footprint_mm, grain);
-    }
+    int i = 0;
+    uint decal = cell.x & 0xffffu;
+    do {
+        if (decal != 0u) add_decal(hit, decal, sheet_mm, footprint_mm, grain);
+        ++i;
+        uint pair = cell[(i & 7) >> 1];
+        decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;
+    } while (i < 8 && decal != 0u);
     return hit;
 }

@@ -33,7 +33,10 @@ void main() {
     Shaded s = sky(view_ray(center));
     vec3 color = sky_weight * s.color;
     float done = sky_weight;
-    for (int part = 0; part < MAX_PARTS && left != 0u; ++part) {
+    // a driver that runs all lanes until the last is done runs a loop's body once more to find that
+    // its condition fails ahead of it: conditions come last. Of several surfaces one is no sky.
+    int part = 0;
+    do {
         uint first_key = 0u;
         ivec2 offset = ivec2(0);
         for (int i = TENT_SAMPLES - 1; i >= 0; --i)
@@ -48,7 +51,8 @@ void main() {
         Part p = part_at(middle + offset, first_key, view);
         bool at_center = part == 0 && !sees_sky;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
-        for (int side = 0; side < MAX_SIDES && of_part != 0u; ++side) {
+        int side = 0;
+        do {
             uint key = 0u;
             ivec2 side_offset = offset;
             for (int i = TENT_SAMPLES - 1; i >= 0; --i)
@@ -69,8 +73,8 @@ void main() {
 #endif
             color += weight * lit_color;
             done += weight;
-        }
-    }
+        } while (++side < MAX_SIDES && of_part != 0u);
+    } while (++part < MAX_PARTS && left != 0u);
     color /= done;   // of a busy pixel, what was not come to counts like the rest
 #else
     Shaded s = single_surface(pixel);

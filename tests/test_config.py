@@ -11,7 +11,7 @@ from fastgen.config import CameraConfig, Config
 from fastgen.damage import deform
 from fastgen.errors import ConfigError
 from fastgen.records import Range
-from fastgen.sampling import sample_scene
+from fastgen.sampling import possible_shapes, sample_scene
 
 NASTY = (
     *(math.nan, math.inf, -math.inf, 1e300, 10**400, -1, 0, 0.5, None, True, "", "x", "#+1+2+3"),
@@ -123,3 +123,18 @@ def test_errors_about_names_name_the_file(tmp_path):
         path.write_text(text)
         with pytest.raises(ConfigError, match=f"{path}: {words}"):
             Config.load(path)
+
+
+def test_possible_shapes_are_just_what_scenes_draw():
+    config = Config.from_values(
+        {"spreader": {"gap_mm": [12, 34], "probability": 0.8}, "container": {"kinds": {"20": 1}}}
+    )
+    environments = {"park": 1.0}
+
+    def shape(container, spreader):
+        held = (spreader.flippers_down, spreader.gap_mm) if spreader.present else None
+        return container, held
+
+    possible = {shape(*pair) for pair in possible_shapes(config)}
+    scenes = [sample_scene(config, 5, index, environments) for index in range(800)]
+    assert {shape(scene.container, scene.spreader) for scene in scenes} == possible

@@ -166,3 +166,22 @@ def test_a_generator_that_rendered_goes_on_in_a_forked_child():
     assert there is not None, "the child hangs or failed"
     np.testing.assert_array_equal(there, before)
     np.testing.assert_array_equal(after, before)
+
+
+def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
+    config = Config.from_values(
+        {"container": {"kinds": {"20": 1}}, "environment": {"names": ["park", "venice"]}}
+    )
+    with Generator(config, seed=4, size=SIZE) as generator:
+        generator.preload()
+
+        def never(*_: object, **__: object) -> None:
+            raise AssertionError("made after all")
+
+        for made in ("GpuMesh", "chart_table", "encoded"):
+            monkeypatch.setattr(
+                f"fastgen.{'openness' if made == 'encoded' else 'shapes'}.{made}", never
+            )
+        monkeypatch.setattr("fastgen.renderer.GpuLight", never)
+        for index in range(30):
+            generator.render(index)

@@ -12,6 +12,7 @@ from fastgen.environment import (
     prefilter_environment,
 )
 from fastgen.prefilter import octahedral_decode, octahedral_encode, sample_octahedral, shrink
+from fastgen.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
 
 
@@ -23,8 +24,8 @@ def patches() -> tuple[np.ndarray, EnvironmentLight]:
 
 def test_constant_environment_stays_constant_everywhere():
     light = prefilter_environment("even", np.full((128, 256, 3), 0.7, np.float32))
-    for values in (light.specular, light.irradiance, light.background, light.luminance):
-        np.testing.assert_allclose(values, 0.7, rtol=1e-3)
+    for values in (light.specular, light.irradiance, unpacked(light.background), light.luminance):
+        np.testing.assert_allclose(values, 0.7, rtol=2e-3)
     assert light.mean_luminance == pytest.approx(0.7, rel=1e-5)
 
 
@@ -71,7 +72,9 @@ def test_a_light_appears_in_the_direction_where_it_stands():
     toward = np.array([0.48, 0.6, 0.64])  # right of +y seen from +x, above the horizon
     light = prefilter_environment("lamp", one_light(toward, 1000.0))
     size = light.background.shape[0]
-    row, column = np.unravel_index(light.background[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2))
+    row, column = np.unravel_index(
+        unpacked(light.background)[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2)
+    )
     # the layout of the module docstring, spelt out for z > 0
     x, y = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
     found = np.array([x, y, 1 - abs(x) - abs(y)])
@@ -92,7 +95,10 @@ def test_energy_of_a_single_texel_survives_every_map(toward, tolerance):
     directions = even_directions(200_000)
     # a sun of irradiance pi E has a mean radiance of pi E / (4 pi)
     aside = light.sun.light[0] / 4 if light.sun is not None else 0.0
-    for layer, rest in ((light.background, 0.0), *((layer, aside) for layer in light.specular)):
+    for layer, rest in (
+        (unpacked(light.background), 0.0),
+        *((layer, aside) for layer in light.specular),
+    ):
         mean = sample_octahedral(layer, directions)[:, 0].mean() + rest
         assert mean == pytest.approx(expected, rel=tolerance)
     assert light.mean_luminance == pytest.approx(expected, rel=0.01)
@@ -102,7 +108,7 @@ def test_a_million_fold_sun_neither_speckles_nor_overflows():
     sky = np.full((128, 256, 3), 0.5, np.float32)
     toward = np.array([0.6, -0.48, 0.64])
     light = prefilter_environment("sun", sky + one_light(toward, 1e6))
-    for values in (light.specular, light.irradiance, light.background):
+    for values in (light.specular, light.irradiance, unpacked(light.background)):
         assert np.isfinite(values).all()
         assert values.min() >= 0.499
         assert values.max() <= 65504
@@ -142,7 +148,7 @@ def test_lookup_is_continuous_over_every_seam(patches):
         c, s = round(np.cos(quarter * np.pi / 2)), round(np.sin(quarter * np.pi / 2))
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         left, right = ((below + np.array([0, e, 0])) @ turn.T for e in (1e-7, -1e-7))
-        for layer in (light.background, light.irradiance, *light.specular):
+        for layer in (unpacked(light.background), light.irradiance, *light.specular):
             gap = np.abs(sample_octahedral(layer, left) - sample_octahedral(layer, right))
             assert gap.max() < 1e-3 * layer.max()
 
@@ -164,7 +170,7 @@ def test_fine_checkerboard_does_not_alias_in_the_background():
     rows, columns = np.mgrid[0:512, 0:1024]
     board = np.repeat(((rows + columns) % 2).astype(np.float32)[..., None], 3, axis=2)
     light = prefilter_environment("board", board)
-    blurred = cv2.blur(light.background[1:-1, 1:-1].astype(np.float32), (16, 16))
+    blurred = cv2.blur(unpacked(light.background)[1:-1, 1:-1], (16, 16))
     assert np.abs(blurred - 0.5).max() < 0.06
 
 
@@ -172,7 +178,7 @@ def test_the_background_is_as_sharp_as_the_hdri():
     """Along the horizon an HDRI's smallest detail, stripes a texel wide, keeps its contrast."""
     stripes = np.zeros((256, 512, 3), np.float32)
     stripes[:, ::2] = 1.0
-    background = prefilter_environment("stripes", stripes).background
+    background = unpacked(prefilter_environment("stripes", stripes).background)
     middle = 2 * np.pi * (np.arange(512) + 0.5) / 512
     along = np.stack([-np.cos(middle), np.sin(middle), np.full(512, 1e-3)], axis=1)
     seen = sample_octahedral(background, along)[:, 0]

@@ -78,7 +78,8 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, toward):
     toward = np.array(toward) / np.linalg.norm(toward)
     container, spreader = build_container("20"), build_spreader("20")
     program = link(gl.ctx, "occluder.vert", "occluder.frag", {})
-    shadow = ShadowMap(gl.ctx, program, container, spreader, toward)
+    shadow = ShadowMap(gl.ctx, program)
+    shadow.cast(container, spreader, toward)
     depth = np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(MAP_SIZE[::-1])
 
     lit = np.flatnonzero(container.normals @ toward > 0.1)

@@ -42,9 +42,15 @@ def test_run_lengths_decode_in_pycocotools_to_the_same_mask():
         assert reference["counts"].decode() == made["counts"]
 
 
-def test_masks_survive_png_in_16_bit(tmp_path):
-    mask = np.random.default_rng(1).choice([0, 101, 501, 65535], (33, 21)).astype(np.uint16)
+@pytest.mark.parametrize("values", [[0, 101, 501, 65535], np.array([0, 7, 255], np.uint8)])
+@pytest.mark.parametrize("size", [(33, 21), (1, 1), (300, 2)])
+def test_masks_survive_png_in_their_depth(tmp_path, values, size):
+    mask = np.random.default_rng(1).choice(np.array(values), size)
+    mask = mask.astype(np.uint16 if mask.dtype != np.uint8 else np.uint8)
     encode.write(tmp_path / "mask.png", encode.png(mask))
+    read = cv2.imread(str(tmp_path / "mask.png"), cv2.IMREAD_UNCHANGED)
+    assert read.dtype == mask.dtype
+    np.testing.assert_array_equal(read, mask)
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "mask.png")), mask)
 
 

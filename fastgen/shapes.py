@@ -1,0 +1,87 @@
+"""Containers and spreaders on the GPU, with what they hide of the sky from each other."""
+
+from collections.abc import Mapping
+
+import moderngl
+
+from fastgen.container import build_container
+from fastgen.divided_mesh import as_drawn
+from fastgen.gpu_mesh import GpuMesh, chart_table
+from fastgen.kept import Kept
+from fastgen.mesh import Mesh
+from fastgen.openness import SkyProbe
+from fastgen.programs import SPREADER_CHART
+from fastgen.scene import Container, Scene
+from fastgen.spreader import build_spreader
+
+
+class Shapes:
+    """The meshes of scenes. Owned by the renderer, which releases them.
+
+    programs: the geometry program of each of programs.DAMAGE_VARIANTS.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Mapping[str, moderngl.Program]) -> None:
+        self._ctx = ctx
+        self._programs = programs
+        self._containers: Kept[GpuMesh] = Kept(16)
+        self._spreaders: Kept[GpuMesh] = Kept(64)
+        self._charts: Kept[moderngl.Texture] = Kept(128)
+        self._probe = SkyProbe(ctx)
+
+    def of(self, scene: Scene, bent: bool) -> tuple[GpuMesh, GpuMesh | None]:
+        """Container and spreader of a scene, ready to be drawn; bent: whether a lens bends them."""
+        mesh, spreader = self.container(scene.container), self.spreader(scene, bent)
+        usual = _shading_spreader(scene)
+        mesh.set_openness(self._probe.openness(mesh.mesh, usual))
+        if spreader is not None and usual is not None:
+            held = build_container(scene.container.kind)
+            shape = spreader.mesh if bent else usual  # with vertices of its own
+            spreader.set_openness(self._probe.openness_of_spreader(shape, held))
+        return mesh, spreader
+
+    def container(self, container: Container) -> GpuMesh:
+        """The mesh of a container at rest."""
+
+        def make() -> GpuMesh:
+            mesh = build_container(container.kind, container.profiles)
+            return GpuMesh(self._ctx, mesh, self._programs)
+
+        return self._containers.get(container, make)
+
+    def spreader(self, scene: Scene, bent: bool) -> GpuMesh | None:
+        """The spreader of a scene, None where it has none."""
+        built = spreader_mesh(scene)
+        if built is None:
+            return None
+        mesh = as_drawn(built, bent)
+        return self._spreaders.get(
+            mesh, lambda: GpuMesh(self._ctx, mesh, self._programs, SPREADER_CHART)
+        )
+
+    def chart_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
+        """The charts of both as the material layers read them."""
+        meshes = {0: container.mesh}
+        if spreader is not None:
+            meshes[SPREADER_CHART] = spreader.mesh
+        return self._charts.get(tuple(meshes.values()), lambda: chart_table(self._ctx, meshes))
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        for kept in (self._containers, self._spreaders, self._charts, self._probe):
+            kept.release()
+
+
+def spreader_mesh(scene: Scene) -> Mesh | None:
+    """A scene's spreader as it is built, None where it has none."""
+    held = scene.spreader
+    if not held.present:
+        return None
+    return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
+
+
+def _shading_spreader(scene: Scene) -> Mesh | None:
+    """What hides the sky from the container. At its usual gap: a centimetre more or less cannot be
+    seen in the shade, and every other shape costs half a second once."""
+    held = scene.spreader
+    return build_spreader(scene.container.kind, held.flippers_down) if held.present else None

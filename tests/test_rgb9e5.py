@@ -1,0 +1,60 @@
+"""Packed radiance against the driver's own packing, and against what nine bits promise."""
+
+import moderngl
+import numpy as np
+import pytest
+
+from fastgen.gl import open_context
+from fastgen.rgb9e5 import LARGEST, packed, unpacked
+
+_RGB9_E5 = 0x8C3D
+
+
+def colours() -> np.ndarray:
+    """[64, 64, 3] over all exponents, with black, single channels, and what rounds up."""
+    rng = np.random.default_rng(4)
+    values = 2.0 ** rng.uniform(-26, 15.99, (64, 64, 3))
+    values[:8] *= rng.random((8, 64, 3)) < 0.5
+    values[8, :, 0] = 2.0 ** np.arange(-24.0, 40.0).clip(-24, 15) * (1 - 2.0**-11)
+    values[8, :, 1:] = 0
+    values[9, 0] = LARGEST
+    return values.astype(np.float32)
+
+
+@pytest.mark.parametrize("backend", ["egl", "osmesa"])
+def test_the_driver_packs_alike(backend):
+    values = colours()
+    with open_context(backend) as gl:
+        texture = gl.ctx.texture(
+            (64, 64), 3, values.tobytes(), dtype="f4", internal_format=_RGB9_E5
+        )
+        target = gl.ctx.texture((64, 64), 4, dtype="f4")
+        frame = gl.ctx.framebuffer([target])
+        program = gl.ctx.program(
+            vertex_shader="""#version 330
+            void main() {
+                vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
+                gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0);
+            }""",
+            fragment_shader="""#version 330
+            uniform sampler2D texels;
+            out vec4 color;
+            void main() { color = texelFetch(texels, ivec2(gl_FragCoord.xy), 0); }""",
+        )
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        texture.use(0)
+        frame.use()
+        gl.ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
+        theirs = np.frombuffer(target.read(), np.float32).reshape(64, 64, 4)[..., :3]
+    np.testing.assert_array_equal(unpacked(packed(values)), theirs)
+
+
+def test_a_channel_is_off_by_half_a_step_of_the_largest():
+    values = colours()
+    error = np.abs(unpacked(packed(values)) - values)
+    largest = np.maximum(values.max(axis=-1, keepdims=True), 2.0**-15)
+    assert (error <= largest / 2**9).all()
+
+
+def test_what_is_too_bright_is_clamped():
+    assert unpacked(packed(np.array([1e6, 0.0, -1.0]))).tolist() == [LARGEST, 0.0, 0.0]
