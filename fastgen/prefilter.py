@@ -165,17 +165,24 @@ def sample_octahedral(
 def ggx_lobe(roughness: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
     """Weight of radiance at angle t from the mirror direction, for view and normal along it.
 
-    Karis 2013, Real Shading in Unreal Engine 4, pre-filtered environment map: half vectors spread
-    as the GGX distribution D with alpha = roughness^2, weighted by n.l. With v = n the half vector
-    lies at t/2, so the density of l is D(t/2) / 4, and cos^2(t/2) = (1 + cos t) / 2 turns D into
-    1 / ((1 - cos t) + alpha^2 (1 + cos t))^2 up to a factor that normalisation removes.
+    What a surface of GGX microfacets reflects is the integral of D G2 / (4 n.v) over incoming
+    directions, with alpha = roughness^2 (Walter et al. 2007, eq. 20). With v = n the half vector
+    lies at t/2 and G2 is the masking of the light alone, G1(t) = 2 / (1 + sqrt(1 + alpha^2 tan^2
+    t)) (Heitz 2014, eq. 72 and 99). cos^2(t/2) = (1 + cos t) / 2 turns D into 1 / ((1 - cos t) +
+    alpha^2 (1 + cos t))^2 up to a factor that normalisation removes. Karis 2013 has cos t for G1,
+    which is narrower.
     """
     alpha_squared = roughness**4
 
     def lobe(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
         spread = (1.0 + alpha_squared) - (1.0 - alpha_squared) * cosine
         np.square(spread, out=spread)
-        return np.divide(np.maximum(cosine, 0.0), spread, out=spread)
+        lit = np.maximum(cosine, 0.0)
+        # 2 / (1 + sqrt(1 + alpha^2 tan^2 t)), multiplied by cos t above and below
+        masked = np.sqrt(alpha_squared + (1.0 - alpha_squared) * lit * lit)
+        masked += lit
+        np.divide(lit, np.maximum(masked, 1e-12), out=lit)
+        return np.divide(lit, spread, out=spread)
 
     return lobe
 

@@ -59,11 +59,12 @@ vec3 with_bounces(float share, vec3 albedo) {
 }
 
 // Share of a lobe about `mirror` within the cone of open sky, which holds the share of the
-// hemisphere: its half-angle's cosine is sqrt(1 - share). All of it where nothing hides the sky.
+// hemisphere: its half-angle's cosine is sqrt(1 - share). Fitted to sampled GGX lobes over random
+// roughness, view and cones within the hemisphere: 0.07 off in the root mean square.
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
     float rim = sqrt(1.0 - sky.share);
-    float soft = 0.1 + 0.4 * roughness;
-    return smoothstep(rim - soft, rim, dot(mirror, sky.direction) + 1e-3);
+    return smoothstep(rim - 0.03 - 0.64 * roughness, rim - 0.13 + 1.4 * roughness,
+                      dot(mirror, sky.direction));
 }
 
 vec3 lit(Material m, vec3 normal, vec3 view, Openness sky) {
@@ -78,12 +79,14 @@ vec3 lit(Material m, vec3 normal, vec3 view, Openness sky) {
     vec3 specular = mix(vec3(dielectric), metal, m.metallic);
     vec3 diffuse = m.albedo * ((1.0 - dielectric) * (1.0 - m.metallic));
 
-    // rough lobes lean to the normal: Lagarde and de Rousiers 2014, section 4.9.3
+    // rough lobes lean to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
+    // from aslant; both fitted to the mean of directions of sampled GGX lobes
     vec3 mirror = reflect(-view, normal);
-    mirror = normalize(mix(mirror, normal, m.roughness * m.roughness));
+    mirror = normalize(mix(mirror, normal, m.roughness * m.roughness * m.roughness));
+    float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - n_dot_v));
     vec3 around = diffuse_radiance(sky.direction) * with_bounces(sky.share, m.albedo);
     // where the sky is hidden the mirror shows the paint that hides it
-    vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, m.roughness),
+    vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, width),
                         open_lobe(sky, mirror, m.roughness));
     return diffuse * around + specular * mirrored;
 }

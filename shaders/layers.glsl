@@ -8,8 +8,9 @@ struct NoiseSample {
 };
 
 // tile_mm: length of a tile on the sheet; footprint_mm: width of the pixel on the sheet
+// Half a level finer than the footprint, for bilinear lookups widen a texel by about that.
 NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
-    float lod = clamp(log2(footprint_mm * NOISE_SIZE / tile_mm), 0.0, NOISE_LEVELS - 1.0);
+    float lod = clamp(log2(footprint_mm * NOISE_SIZE / tile_mm) - 0.5, 0.0, NOISE_LEVELS - 1.0);
     int low = int(lod);
     int high = min(low + 1, int(NOISE_LEVELS) - 1);
     vec4 value = textureLod(noise_tiles, vec3(sheet_mm / tile_mm, layer), lod);

@@ -43,13 +43,20 @@ def test_specular_levels_equal_monte_carlo_of_the_ggx_lobe(patches):
                 np.cos(turn)[:, None] * side[0] + np.sin(turn)[:, None] * side[1]
             )
             reflected = 2 * (half @ normal)[:, None] * half - normal
-            weight = np.maximum(reflected @ normal, 0)
+            cosine = np.maximum(reflected @ normal, 1e-6)
+            # half vectors are drawn as D says, so what is left of the integrand is masking
+            weight = (reflected @ normal > 0) / (1 + smith_lambda(cosine, alpha))
             row = np.arccos(np.clip(reflected[:, 2], -1, 1)) / np.pi * height
             column = (0.5 - np.arctan2(reflected[:, 1], reflected[:, 0]) / (2 * np.pi)) * 2 * height
             seen = radiance[np.minimum(row.astype(int), height - 1), column.astype(int) % 256]
             expected = (seen * weight[:, None]).sum(0) / weight.sum()
             found = sample_octahedral(light.specular[level], normal[None])[0]
             np.testing.assert_allclose(found, expected, rtol=0.03, atol=0.01)
+
+
+def smith_lambda(cosine: np.ndarray, alpha: float) -> np.ndarray:
+    """Of Smith's masking 1 / (1 + lambda) for GGX: Heitz 2014, eq. 72."""
+    return (np.sqrt(1 + alpha**2 * (1 / cosine**2 - 1)) - 1) / 2
 
 
 def test_irradiance_equals_the_direct_cosine_sum(patches):
