@@ -118,7 +118,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
     extra = ",".join(sorted(set(known_formats()) - set(SEAFRONT)))
-    make.add_argument("--also", default="", metavar=extra, help="further files for each image")
+    make.add_argument(
+        "--also",
+        default="",
+        metavar=extra,
+        help="further files for each image; bop not with webdataset",
+    )
     make.add_argument("--shard", type=int, metavar="SCENES", help="scenes committed together")
     make.add_argument(
         "--split", metavar="NAME|a,b,c", help="train, val or test for all, or three fractions"
