@@ -220,7 +220,8 @@ ELEMENTS = (
         "occlusion of reflections",
         text=(
             (
-                "return smoothstep(rim - soft, rim, dot(mirror, sky.direction) + 1e-3);",
+                "return smoothstep(rim - 0.03 - 0.64 * roughness, rim - 0.13 + 1.4 * roughness,\n"
+                "                      dot(mirror, sky.direction));",
                 "return 1.0;",
             ),
         ),
