@@ -17,7 +17,7 @@ from fastgen import Config
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import build_container
 from fastgen.mesh import Mesh
-from fastgen.openness import SkyProbe, encoded
+from fastgen.openness import SkyProbe, open_sky
 from fastgen.sample import Object, Sample
 from fastgen.sampling import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
@@ -188,8 +188,8 @@ _SKY = (SHADE, EVERYTHING)
 def without(element: str) -> Iterator[None]:
     """While it lasts, renders lack what of `element` no scene decides."""
 
-    def unhidden(_: SkyProbe, container: Mesh, __: Mesh | None) -> bytes:
-        return encoded(container.normals, np.ones((1, 1), bool)).tobytes()
+    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> bytes:
+        return open_sky(container.normals).tobytes()
 
     with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
         yield
