@@ -220,8 +220,8 @@ ELEMENTS = (
         "occlusion of reflections",
         text=(
             (
-                "mirrored = mix(m.albedo * around, prefiltered(mirror, width),",
-                "mirrored = mix(prefiltered(mirror, width), prefiltered(mirror, width),",
+                "open_lobe(sky, mirror, m.roughness));",
+                "1.0);",
             ),
         ),
     ),

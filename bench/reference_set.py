@@ -15,7 +15,6 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen import Config, Generator
-from fastgen.hdri import HALF_MAX
 from fastgen.scene import Scene
 
 FOLDER = Path(__file__).parent / "references"
@@ -95,6 +94,9 @@ side. `draft` has none and is held to the box."""
 
 DEPTH_STEP = 8
 
+_BRIGHTEST = 1000.0
+"""Displayed as white; nearer the end of half floats compression could pass it."""
+
 _EXR = {
     "compression": OpenEXR.DWAB_COMPRESSION,
     "dwaCompressionLevel": 45.0,
@@ -127,7 +129,7 @@ def save(reference: Reference, folder: Path, number: int) -> None:
     for name, image in reference.radiance.items():
         for c, channel in enumerate("RGB"):
             exposed = image[..., c] * reference.exposure
-            planes[f"{name}.{channel}"] = np.minimum(exposed, HALF_MAX)
+            planes[f"{name}.{channel}"] = np.minimum(exposed, _BRIGHTEST)
     halves = {name: np.ascontiguousarray(p.astype(np.float16)) for name, p in planes.items()}
     folder.mkdir(parents=True, exist_ok=True)
     OpenEXR.File(dict(_EXR), halves).write(str(folder / f"{number:02d}.exr"))

@@ -6,7 +6,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from fastgen.mesh import Mesh
+from fastgen.mesh import FACE_AXES, FACES, Mesh
 from fastgen.openness import open_sky
 
 _SLACK_MM = 120.0
@@ -120,6 +120,10 @@ def chart_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.T
         columns = slice(first, first + len(mesh.charts))
         table[0, columns] = [chart.rect_mm for chart in mesh.charts]
         table[1, columns, 0] = [chart.material_index for chart in mesh.charts]
+        table[1, columns, 1:] = [
+            FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
+            for chart in mesh.charts
+        ]
     texture = ctx.texture((count, 2), 4, table.tobytes(), dtype="f4")
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return texture

@@ -1,6 +1,9 @@
 // Fragment stage of the geometry draw: which surface, where on its sheet, how far. Shading comes later.
 #version 430 core
 #include "blocks.glsl"
+#if HOLED
+#include "damage.glsl"
+#endif
 
 in vec2 atlas_mm;
 in vec4 openness;
@@ -10,6 +13,9 @@ layout(location = 0) out uint out_key;
 layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
 layout(location = 2) out float out_depth;  // m
 layout(location = 3) out vec4 out_openness;   // as openness.py encodes it
+#if HOLED
+flat in uint inner;
+#endif
 #if DAMAGED
 in vec3 rest_mm;
 
@@ -17,6 +23,10 @@ layout(location = 4) out vec4 out_rest;    // rest position in mm, -
 #endif
 
 void main() {
+#if HOLED
+    // in the outer view torn sheet marks the hole, in the inner one it is not there
+    if (inner == 1u && hole_at(rest_mm) >= 0) discard;
+#endif
     out_key = surface_key;
     out_sheet = atlas_mm;
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding

@@ -22,6 +22,9 @@ flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
 #endif
+#if HOLED
+flat out uint inner;
+#endif
 
 void main() {
     atlas_mm = in_atlas_mm;
@@ -39,6 +42,7 @@ void main() {
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // seen in a mirror, the sheets' backs pass for fronts: face culling keeps the insides
+    inner = in_inner;
     gl_ViewportIndex = int(in_inner);
     if (in_inner == 1u) gl_Position.x = -gl_Position.x;
 #endif

@@ -1,16 +1,19 @@
 // SurfacePoint surface_at(chart, sheet_mm, footprint_mm, scar): all layers at a point of the sheet.
 
-uniform sampler2D chart_table;   // row 0: x0, y0, width, height in mm; row 1: material, -, -, -
+uniform sampler2D chart_table;   // row 0: x0, y0, width, height in mm; row 1: material, and
+                                 // of panels and door gear their face's outward axis, else 0
 
 struct SurfacePoint {
     Material material;
     uint decal_id;
+    vec3 outward;   // as in the chart table
 };
 
 // footprint_mm: width of the pixel on the sheet; scar: how much damage has worked the steel, 0..1
 SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float scar) {
     vec4 rect = texelFetch(chart_table, ivec2(int(chart), 0), 0);
-    int kind = int(texelFetch(chart_table, ivec2(int(chart), 1), 0).x);
+    vec4 part = texelFetch(chart_table, ivec2(int(chart), 1), 0);
+    int kind = int(part.x);
     vec4 base = material_base[kind];   // albedo, roughness
     vec4 trait = material_trait[kind]; // metallic, proneness to rust, share of the paint layers, -
 
@@ -24,6 +27,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 
     SurfacePoint s;
     s.decal_id = 0u;
+    s.outward = part.yzw;
     vec3 albedo = base.rgb;
     float roughness = base.a;
 

@@ -128,6 +128,8 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
     vec2 place = vec2(sample_at - SAMPLES_PER_AXIS / 2) / float(SAMPLES_PER_AXIS) + 0.5;
     float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
+    // before a sun behind the wall stands the whole container, too close to a groove for the map
+    if (dot(p.surface.outward, sun_direction) < 0.0) share = 0.0;
     color += exposure * share * sunlit(p.surface.material, normal, view);
 #endif
     return color;
@@ -150,7 +152,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     vec3 rest_mm = texelFetch(rest_points, inner_at, 0).xyz;
     float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);
-    if (inner_key != 0u && hole_at(rest_mm) < 0) {
+    if (inner_key != 0u) {
         vec3 seen = inside(-key_normal(inner_key), rest_mm);
 #if LAYER == LAYER_ALL
         seen *= exposure;

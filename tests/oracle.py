@@ -82,7 +82,6 @@ def cast(
         wall = facing != inside
         opened = wall & ~inside & (torn >= 0)
         hole[active[opened]] = torn[opened]
-        leaves = wall & inside & (torn >= 0)
         ends = wall & (torn < 0)
         at = active[ends]
         seen[at] = triangle[ends]
@@ -90,7 +89,7 @@ def cast(
         atlas_corners = mesh.atlas_mm[mesh.triangles[triangle[ends]]].astype(np.float64)
         atlas[at] = _between(atlas_corners, b[ends], c[ends])
         depth[at] = view.to_view(start + distance[ends, None] * ray[ends])[:, 2]
-        active = active[~(ends | leaves)]
+        active = active[~ends]
     before = np.zeros(count, bool)
     if scene and scene.spreader.present:
         nearer = _spreader_depth(scene, view, start, rays)

@@ -100,6 +100,18 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert sample.image[through].mean() < 0.6 * around
 
 
+def test_a_hole_torn_through_rods_and_handles_shows_no_sky():
+    """The door's gear stands before its sheet, and all of it is torn away."""
+    values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
+    with Generator(Config.from_values({"damage": values}), 77, (256, 256)) as generator:
+        samples = [generator.render(index, "Cr") for index in range(12)]
+    holes = [sample.damage == 501 for sample in samples]
+    assert sum(int(hole.sum()) for hole in holes) > 1000
+    for sample, hole in zip(samples, holes, strict=True):
+        assert (sample.ids[hole] > 0).all()
+        assert np.isfinite(sample.depth[hole]).all()
+
+
 def test_opposite_holes_let_the_sky_through(generator):
     scene = close_up(scene_with(generator, "perforation"), "perforation")
     first = replace(scene.damages[0], size_mm=(300.0, 300.0), shape=(60.0, *[0.0] * 10))

@@ -1,19 +1,23 @@
 """The sun taken out of an environment, and its shadow, against integrals and rays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.container import build_container
+from fastgen import Generator
+from fastgen.container import KINDS, build_container
 from fastgen.environment import irradiance_at, load_environment, prefilter_environment
 from fastgen.gl import open_context
 from fastgen.openness import probe_points
 from fastgen.programs import link
+from fastgen.scene import Camera, EnvironmentView, Spreader
 from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.sun import split_sun
 from fastgen.sun_shadow import MAP_SIZE, ShadowMap
-from tests.sky_samples import even_directions, texel_grid
+from tests.sky_samples import even_directions, one_light, texel_grid
 from tests.test_environment import write_exr
 
 TOWARD = np.array([0.6, -0.64, 0.48])
@@ -113,3 +117,29 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, toward):
     assert 0.05 < free[0, clear].mean() < 0.95
     assert (found == free[0])[clear].mean() > 0.98
     shadow.release()
+
+
+def test_no_sunlight_leaks_through_a_wall(tmp_path):
+    """The grooves of a wall that is turned away lie centimetres behind what the map holds."""
+    toward = np.array([0.95, 0.25, 0.12])
+    sky = np.full((512, 1024, 3), 0.2, np.float32)
+    write_exr(tmp_path / "behind.exr", sky + one_light(toward, 3e5, 512))
+    with Generator(seed=1, size=(640, 640), hdri_dir=tmp_path) as generator:
+        scene = generator.scene(0)
+        assert load_environment(tmp_path / "behind.exr").sun is not None
+        scene = replace(
+            scene, environment=EnvironmentView("behind", 0.0), decals=(), damages=(),
+            container=replace(scene.container, kind="20"), spreader=Spreader(),
+        )  # fmt: skip
+        half_length, _, height = np.array(KINDS["20"].size_mm) / 2
+        width = KINDS["20"].size_mm[1]
+        camera = Camera("near", (0, -9000, height), (0, 0, height), 45.0)
+        sample = generator.render(scene=scene, camera=camera)
+    corners = np.array([[x, -width / 2, z] for x in (-0.9, 0.9) for z in (0.3, 1.7)])
+    corners *= (half_length, 1.0, height)
+    (left, top), (right, bottom) = np.array(
+        [f(sample.view.project(corners)[0], axis=0) for f in (np.min, np.max)]
+    ).astype(int)
+    wall = sample.image[top:bottom, left:right].astype(float).mean(axis=-1)
+    assert (sample.ids[top:bottom, left:right] == 1).all()
+    assert wall.max() < 2 * np.median(wall)

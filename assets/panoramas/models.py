@@ -11,8 +11,8 @@ _WAVE = ((0.0, 0.0), (0.072, 0.0), (0.14, 0.036), (0.21, 0.036))  # along, inwar
 _PITCH = 0.278
 
 
-def container(feet: int, lettered: bool, rng: np.random.Generator) -> bpy.types.Mesh:
-    """A box along x, its middle over the origin, doors at +x. lettered: a made-up name on it."""
+def container(feet: int, painted: bool, rng: np.random.Generator) -> bpy.types.Mesh:
+    """A box along x, its middle over the origin, doors at +x. painted: a line's livery on it."""
     shape, long = Shape(), LENGTHS[feet]
     half, side = long / 2, WIDTH / 2
     ribs = int((long - 0.5) / _PITCH)
@@ -43,17 +43,17 @@ def container(feet: int, lettered: bool, rng: np.random.Generator) -> bpy.types.
         )
     shape.box((half - 0.061, -0.01, 0.16), (half - 0.05, 0.01, HEIGHT - 0.12), "dark")
     for y in (0.35, 0.55, 0.7):  # identifier and masses on the right door
-        shape.box((half - 0.062, y, HEIGHT - 0.5), (half - 0.052, y + 0.12, HEIGHT - 0.4), "letter")
-    shape.box((half - 0.062, 0.3, 1.0), (half - 0.052, 0.8, 1.3), "letter")
-    if lettered:
-        _letters(shape, half, side, rng)
+        shape.box((half - 0.062, y, HEIGHT - 0.5), (half - 0.052, y + 0.12, HEIGHT - 0.4), "livery")
+    shape.box((half - 0.062, 0.3, 1.0), (half - 0.052, 0.8, 1.3), "livery")
+    if painted:
+        _livery(shape, half, side, rng)
     for face in (-1, 1):
         for i in range(7):
             x = face * (half - 1.6 + 0.13 * i)
             shape.box(
                 (x, face * (side - 0.032), HEIGHT - 0.48),
                 (x + 0.09, face * (side - 0.022), HEIGHT - 0.36),
-                "letter",
+                "livery",
             )
     return shape.mesh(f"container {feet}")
 
@@ -64,23 +64,24 @@ def _strip(shape: Shape, wall: list[tuple[float, float, float]], outward: bool) 
     shape.add(wall, [f[::-1] for f in faces] if outward else faces, "box")
 
 
-def _letters(shape: Shape, half: float, side: float, rng: np.random.Generator) -> None:
-    """Signs of upright and level bars, no script of this world."""
-    tall, count = 0.95, int(rng.integers(4, 7))
+def _livery(shape: Shape, half: float, side: float, rng: np.random.Generator) -> None:
+    """A stripe and a mark of squares on both sides, with nothing to read."""
+    low, tall = rng.choice((0.55, 1.0, 1.75)), rng.choice((0.16, 0.3, 0.45))
+    x, z = rng.uniform(-0.7, 0.4) * half, rng.uniform(0.8, 1.1)
+    squares = {
+        "block": [((0.0, 0.0), (1.0, 1.0))],
+        "two": [((0.0, 0.5), (0.6, 1.1)), ((0.7, 0.0), (1.3, 0.6))],
+        "frame": [
+            *(((0.0, v), (1.1, v + 0.2)) for v in (0.0, 0.9)),
+            *(((u, 0.2), (u + 0.2, 0.9)) for u in (0.0, 0.9)),
+        ],
+    }[str(rng.choice(("block", "two", "frame")))]
+    plates = [((x + u0, z + v0), (x + u1, z + v1)) for (u0, v0), (u1, v1) in squares]
+    if rng.random() < 0.6:
+        plates = [((0.3 - half, low), (half - 0.3, low + tall))]
     for face in (-1, 1):
-        for i in range(count):
-            x, low = -0.28 * half + (i - count / 2) * 1.1, 1.1
-            bars = [((0.0, 0.0), (0.2, tall))] if rng.random() < 0.8 else []
-            for level in rng.choice((0.0, 0.39, 0.77), 2, replace=False):
-                bars.append(((0.0, level), (0.78, level + 0.18)))
-            if rng.random() < 0.6:
-                bars.append(((0.58, 0.0), (0.78, tall)))
-            for k, ((u0, v0), (u1, v1)) in enumerate(bars):
-                shape.box(
-                    (x + u0, face * (side - 0.03), low + v0),
-                    (x + u1, face * (side - 0.018 + 0.002 * k), low + v1),
-                    "letter",
-                )
+        for (x0, z0), (x1, z1) in plates:
+            shape.box((x0, face * (side - 0.03), z0), (x1, face * (side - 0.018), z1), "livery")
 
 
 def quay_crane(boom_up: bool, trolley_y: float, hoist_z: float) -> bpy.types.Mesh:
