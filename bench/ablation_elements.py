@@ -97,18 +97,18 @@ def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
 
 @lru_cache(maxsize=64)
 def _all_open(mesh: Mesh) -> bytes:
-    return openness.encoded(mesh.normals, np.ones((1, 1), bool)).tobytes()
+    return openness.open_sky(mesh.normals).tobytes()
 
 
 def _probe(measured: Callable[..., bytes], open_sky: bool) -> Callable[..., bytes]:
     """In place of a method of SkyProbe that gives the first mesh's openness beside the second: what
     it finds for the unedited meshes, or no occlusion at all."""
 
-    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None) -> bytes:
+    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> bytes:
         if open_sky:
             return _all_open(mesh)
         return measured(
-            self, _SOURCES.get(mesh, mesh), _SOURCES.get(other, other) if other else None
+            self, _SOURCES.get(mesh, mesh), _SOURCES.get(other, other) if other else None, sky
         )
 
     return found
@@ -210,8 +210,8 @@ ELEMENTS = (
         "bounces in occluded places",
         text=(
             (
-                "return clamp(((share * a + b) * share + c) * share, share, 1.0);",
-                "return vec3(share);",
+                "return 0.75 * (clamp(((share * a + b) * share + c) * share, share, 1.0) - share);",
+                "return vec3(0.0);",
             ),
         ),
     ),
@@ -220,9 +220,8 @@ ELEMENTS = (
         "occlusion of reflections",
         text=(
             (
-                "return smoothstep(rim - 0.03 - 0.64 * roughness, rim - 0.13 + 1.4 * roughness,\n"
-                "                      dot(mirror, sky.direction));",
-                "return 1.0;",
+                "open_lobe(sky, mirror, m.roughness));",
+                "1.0);",
             ),
         ),
     ),

@@ -35,6 +35,7 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
+_SKY_TEXELS = 3  # along a cell of `Ambient.sky`: 5 degrees
 _DFG_POINTS = 4096
 _MAPS = ("specular", "irradiance", "background", "luminance", "sun")
 _SUN_WIDTH = 2048  # a texel is a third of the real sun
@@ -57,6 +58,8 @@ class Ambient:
     """Mean of the luminance over the whole sphere."""
     sun: Sun | None
     """The one strong compact light, None where there is none."""
+    sky: NDArray[np.float32]
+    """[42, 42] octahedral without a border, mean luminance of each cell, without the sun."""
 
     @staticmethod
     def of(light: "Ambient") -> "Ambient":
@@ -140,7 +143,15 @@ def _light(
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
         sun=sun,
+        sky=_sky_cells(specular[0].astype(np.float32) @ REC_709.astype(np.float32)),
     )
+
+
+def _sky_cells(luminance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over cells of an octahedral map [N, N] with a border."""
+    cells = (luminance.shape[0] - 2 * prefilter.BORDER) // _SKY_TEXELS
+    inner = luminance[prefilter.BORDER : -prefilter.BORDER, prefilter.BORDER : -prefilter.BORDER]
+    return inner.reshape(cells, _SKY_TEXELS, cells, _SKY_TEXELS).mean(axis=(1, 3))
 
 
 def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> EnvironmentLight:
@@ -236,6 +247,39 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     height = _LUMINANCE_WIDTH // 2
     weight = np.repeat(prefilter.row_solid_angle(height), _LUMINANCE_WIDTH)
     return prefilter.equirect_directions(height).reshape(-1, 3), weight
+
+
+def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
+    """Luminance [K] of `irradiance_at` without the sun: of what ibl.glsl's diffuse_radiance is."""
+    luminance = env.irradiance @ REC_709.astype(np.float32)
+    toward = to_map_frame(normals, yaw_deg)
+    return prefilter.sample_octahedral(luminance[..., None], toward)[:, 0]
+
+
+def sky_luminance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
+    """Mean luminance, without the sun, of what lies nearest to each of world directions [K, 3].
+
+    The directions are spread over the whole sphere; each holds several cells of `env.sky`.
+    """
+    cells, solid_angle = _sky_geometry(env.sky.shape[0])
+    toward = to_map_frame(directions, yaw_deg).astype(np.float32)
+    # by element: threads of a matrix library cost more than they save
+    x, y, z = cells.T[..., None] * toward.T[:, None]
+    nearest = (x + y + z).argmax(axis=1)
+    count = len(toward)
+    total = np.bincount(nearest, solid_angle * env.sky.ravel(), minlength=count)
+    return (total / np.bincount(nearest, solid_angle, minlength=count)).astype(np.float32)
+
+
+@functools.cache
+def _sky_geometry(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Directions [size^2, 3] and relative solid angles [size^2] of octahedral cells."""
+    step = (np.arange(size) + 0.5) / size
+    cells = prefilter.octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
+    # the octahedron's faces are equally far from its middle: a piece of one, at a distance r, fills
+    # an angle in proportion to r^-3; on it |x| + |y| + |z| = 1, so that r is 1 / (|x| + |y| + |z|)
+    solid_angle = np.abs(cells).sum(axis=1) ** 3
+    return cells.astype(np.float32), solid_angle.astype(np.float32)
 
 
 def metered_luminance(

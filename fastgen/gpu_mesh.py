@@ -71,7 +71,7 @@ class GpuMesh:
         }
 
     def set_openness(self, values: bytes) -> None:
-        """Let the next draws have `values`, of openness.encoded; until then all sky is open."""
+        """Let the next draws have `values`, of openness.SkyProbe; until then all sky is open."""
         if values is not self._open_sky:
             self._openness.write(values)
             self._open_sky = values

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import cache
+from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.mesh import Mesh
-from fastgen.programs import link
+from fastgen.programs import LIGHT_STEPS, link
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
 
 DIRECTIONS = 96
-"""Of the whole sphere, so that about half of them bear on a surface."""
+"""Of the whole sphere, so that about half of them bear on a surface; a multiple of 8."""
 
-_VERSION = 2
+_VERSION = 3
 """Part of the disk cache's key: count up whenever the openness changes."""
 
 _MAP_SIZE = (2048, 512)
@@ -41,6 +42,8 @@ _INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
 _CAPACITY = 128
+_LIT_CAPACITY = 8  # a scene asks for two, once a camera
+_DARK = 1e-20  # instead of no light at all, which has no ratios
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]
@@ -82,19 +85,21 @@ def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
 
 
 def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """As `encoded` of surfaces that see their whole hemisphere, uint8 [V, 4]."""
-    whole = np.full((len(normals), 1), 255.0)
+    """What the shader reads of surfaces that see their whole hemisphere, uint8 [V, 4]: as `encoded`
+    and `Openness.under` have it."""
+    whole = np.full((len(normals), 1), LIGHT_STEPS)
     return np.rint(np.concatenate([128 + 127 * normals, whole], axis=1)).astype(np.uint8)
 
 
 def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.uint8]:
-    """Openness of surfaces with unit `normals` [V, 3] as the shader reads it, uint8 [V, 4].
+    """The cone of open sky over surfaces with unit `normals` [V, 3], uint8 [V, 3]: 128 + 127 v.
 
-    The mean direction of the cosine-weighted open sky, as 128 + 127 d, and its share of the whole
-    hemisphere as 255 s.
+    v points to the mean of the cosine-weighted open sky. A cone that holds the share s of the
+    hemisphere's cosine-weighted solid angle has a half-angle with the cosine c = sqrt(1 - s); v is
+    1 - c / 2 long, so that no direction is too short to be told from eight bits.
     """
     n = np.asarray(normals, np.float32)
-    found = np.empty((len(n), 4), np.uint8)
+    found = np.empty((len(n), 3), np.uint8)
     for first in range(0, len(n), _BLOCK):
         part = slice(first, first + _BLOCK)
         found[part] = _encoded_part(n[part], open_to[part])
@@ -111,12 +116,83 @@ def _encoded_part(n: NDArray[np.float32], open_to: Directions) -> Array:
     mean = 2 / 3 * n - hidden @ directions / whole
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     mean = np.where(length > 1e-3, mean / np.maximum(length, 1e-3), n)
-    return np.rint(np.concatenate([128 + 127 * mean, 255 * share], axis=1))
+    rim = np.sqrt(np.clip(1 - share, 0, 1))
+    return np.rint(128 + 127 * (1 - rim / 2) * mean)
 
 
-def _encoded_bits(mesh: Mesh, open_to: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    directions = np.unpackbits(open_to, axis=1, count=DIRECTIONS).astype(bool)
-    return encoded(mesh.normals, directions)
+@dataclass(frozen=True)
+class Sky:
+    """An environment's light without its sun, turned by yaw_deg."""
+
+    light: Ambient
+    yaw_deg: float
+
+
+class Openness:
+    """What a mesh's V vertices see of the sky.
+
+    normals: unit [V, 3]; few of them differ. open_to: Directions packed along them, uint8
+    [V, DIRECTIONS / 8]. cone: uint8 [V, 3] as of `encoded`.
+    """
+
+    def __init__(
+        self,
+        normals: NDArray[np.float32],
+        open_to: NDArray[np.uint8],
+        cone: NDArray[np.uint8],
+    ) -> None:
+        self._normals, number = np.unique(normals, axis=0, return_inverse=True)
+        self._number = number.ravel().astype(np.int32)
+        # a column after the other is what `under` reads
+        self._open_to = np.ascontiguousarray(open_to.T)
+        self._cone = cone
+        packed = cone.astype(np.int32) @ np.array([1, 1 << 8, 1 << 16], np.int32)
+        _, first, which = np.unique(packed, return_index=True, return_inverse=True)
+        self._toward, self._which = _directions(cone[first]), which.astype(np.int32)
+
+    def under(self, sky: Sky) -> NDArray[np.uint8]:
+        """As the shader reads it under `sky`, uint8 [V, 4].
+
+        After the cone there is, as LIGHT_STEPS r, the ratio r of two irradiances' luminances: of
+        what reaches a vertex from where the sky is open, to that of a whole sky about the cone's
+        direction, which is what the shader looks up. The first is a part of the irradiance about
+        the normal: that of the open ones in sums over all directions. Of such sums over eight
+        directions at a time there are 256 for each normal: a byte of open_to finds its own.
+        """
+        toward = sky_directions()
+        luminance = np.maximum(sky_luminance(sky.light, toward, sky.yaw_deg), _DARK)
+        weight = np.maximum(self._normals @ toward.T.astype(np.float32), 0) * luminance
+        whole = self._irradiance(sky, _directions(open_sky(self._normals)[:, :3]))
+        weight *= (LIGHT_STEPS * whole / weight.sum(axis=1))[:, None]
+        sums = _sums_of_eight(weight.reshape(len(weight), -1, 8))
+        light = np.zeros(len(self._number), np.float32)
+        row = 256 * self._number
+        for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
+            light += np.take(table, row + bits)
+        light /= np.take(self._irradiance(sky, self._toward), self._which)
+        found = np.empty((len(light), 4), np.uint8)
+        found[:, :3] = self._cone
+        found[:, 3] = np.minimum(light + 0.5, 255)  # rounds
+        return found
+
+    @staticmethod
+    def _irradiance(sky: Sky, toward: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.maximum(sky_irradiance(sky.light, toward, sky.yaw_deg), _DARK)
+
+
+def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Unit vectors [K, 3] along the cones [K, 3] of `encoded`."""
+    toward = cone.astype(np.float32) - 128
+    return toward / np.linalg.norm(toward, axis=1, keepdims=True)
+
+
+def _sums_of_eight(weight: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sums [..., 256] of those of eight weights [..., 8] whose bits are set in each byte, in the
+    order of np.packbits: the first has the highest."""
+    sums = np.zeros((*weight.shape[:-1], 1), np.float32)
+    for bit in range(7, -1, -1):
+        sums = np.concatenate([sums, sums + weight[..., bit : bit + 1]], axis=-1)
+    return sums
 
 
 class SkyProbe:
@@ -128,28 +204,49 @@ class SkyProbe:
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
         self._own: OrderedDict[Mesh, NDArray[np.uint8]] = OrderedDict()
-        self._found: OrderedDict[tuple[Mesh, Mesh | None], bytes] = OrderedDict()
+        self._found: OrderedDict[tuple[Mesh, Mesh | None], Openness] = OrderedDict()
+        self._lit: OrderedDict[tuple[Openness, Sky], bytes] = OrderedDict()
 
-    def openness(self, container: Mesh, spreader: Mesh | None) -> bytes:
-        """`encoded` openness of a container's vertices under the spreader that holds it."""
+    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> bytes:
+        """`Openness.under` a sky of a container's vertices below the spreader that holds it."""
         key = (container, spreader)
-        return self._found_or(key, lambda: self._of_container(container, spreader))
+        return self._under(sky, key, lambda: self._of_container(container, spreader))
 
-    def openness_of_spreader(self, spreader: Mesh, container: Mesh) -> bytes:
-        """`encoded` openness of a spreader's vertices above the container that it holds."""
+    def openness_of_spreader(self, spreader: Mesh, container: Mesh, sky: Sky) -> bytes:
+        """As `openness`, of a spreader's vertices above the container that it holds."""
         key = (spreader, container)
-        return self._found_or(key, lambda: self._of_spreader(spreader, container))
+        return self._under(sky, key, lambda: self._of_spreader(spreader, container))
+
+    def _under(
+        self, sky: Sky, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
+    ) -> bytes:
+        openness = self._found_or(key, measure)
+        lit = (openness, sky)
+        if lit not in self._lit:
+            self._lit[lit] = openness.under(sky).tobytes()
+            if len(self._lit) > _LIT_CAPACITY:
+                self._lit.popitem(last=False)
+        self._lit.move_to_end(lit)
+        return self._lit[lit]
 
     def _found_or(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
-    ) -> bytes:
+    ) -> Openness:
         if key not in self._found:
             digest = hashlib.sha256(f"{_VERSION} {self._driver}".encode())
             for mesh in key:
                 for array in (mesh.positions_mm, mesh.normals, mesh.triangles) if mesh else ():
                     digest.update(array.tobytes())
-            shape = (len(key[0].normals), 4)
-            self._found[key] = _from_disk(digest.hexdigest(), shape, measure).tobytes()
+            normals = key[0].normals
+
+            def make() -> NDArray[np.uint8]:
+                bits = measure()
+                directions = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
+                return np.concatenate([encoded(normals, directions), bits], axis=1)
+
+            shape = (len(normals), 3 + DIRECTIONS // 8)
+            stored = _from_disk(digest.hexdigest(), shape, make)
+            self._found[key] = Openness(normals, stored[:, 3:], stored[:, :3].copy())
             if len(self._found) > _CAPACITY:
                 self._found.popitem(last=False)
         self._found.move_to_end(key)
@@ -160,7 +257,7 @@ class SkyProbe:
         points = probe_points(spreader, np.inf)
         own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
         below = self._kept(Body(container.positions_mm, container.triangles), points, _COARSE_SIZE)
-        return _encoded_bits(spreader, own & below)
+        return own & below
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
@@ -172,7 +269,7 @@ class SkyProbe:
         open_to = self._own[container]
         if spreader is not None:
             open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
-        return _encoded_bits(container, open_to)
+        return open_to
 
     def _kept(self, body: Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""
@@ -182,7 +279,7 @@ class SkyProbe:
             digest.update(np.ascontiguousarray(array).tobytes())
         return _from_disk(
             digest.hexdigest(),
-            (len(points_mm), -(-DIRECTIONS // 8)),
+            (len(points_mm), DIRECTIONS // 8),
             lambda: np.packbits(self._open_to(body, points_mm, size), axis=1),
         )
 

@@ -71,6 +71,10 @@ DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 REACH_MARGIN_MM = 40.0
 """Pixels are filtered with their neighbours: this far around a damage they are shaded with it."""
 
+LIGHT_STEPS = 127.0
+"""What of 255 stands for all the light of an open sky, see openness.py; what is open may face more
+of it than the surface does, hence up to twice as much."""
+
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 MAX_SAMPLES_PER_AXIS = 3
@@ -198,6 +202,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "MIN_ROUGHNESS": "0.045",
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
+        "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
         "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",
         "SPECULAR_LAYERS": f"{len(levels):.1f}",

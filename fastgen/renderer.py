@@ -130,8 +130,8 @@ class Renderer:
         targets = self._targets.get(
             (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
         )
-        mesh, spreader = self._shapes.of(scene, camera.lens is not None)
         light = self._light(scene.environment.name)
+        mesh, spreader = self._shapes.of(scene, camera.lens is not None, light.ambient)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
         self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
@@ -199,8 +199,8 @@ class Renderer:
         """Make the light and the shapes of scenes, so that drawing them takes neither time nor
         memory for that; lens: whether one bends what is drawn."""
         for scene in scenes:
-            self._light(scene.environment.name)
-            self._shapes.chart_table(*self._shapes.of(scene, lens))
+            light = self.ambient(scene.environment.name)
+            self._shapes.chart_table(*self._shapes.of(scene, lens, light))
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(

@@ -6,10 +6,11 @@ import moderngl
 
 from fastgen.container import build_container
 from fastgen.divided_mesh import as_drawn
+from fastgen.environment import Ambient
 from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.kept import Kept
 from fastgen.mesh import Mesh
-from fastgen.openness import SkyProbe
+from fastgen.openness import Sky, SkyProbe
 from fastgen.programs import SPREADER_CHART
 from fastgen.scene import Container, Scene
 from fastgen.spreader import build_spreader
@@ -29,15 +30,19 @@ class Shapes:
         self._charts: Kept[moderngl.Texture] = Kept(128)
         self._probe = SkyProbe(ctx)
 
-    def of(self, scene: Scene, bent: bool) -> tuple[GpuMesh, GpuMesh | None]:
-        """Container and spreader of a scene, ready to be drawn; bent: whether a lens bends them."""
+    def of(self, scene: Scene, bent: bool, light: Ambient) -> tuple[GpuMesh, GpuMesh | None]:
+        """Container and spreader of a scene, ready to be drawn; bent: whether a lens bends them.
+
+        light: of the scene's environment.
+        """
         mesh, spreader = self.container(scene.container), self.spreader(scene, bent)
         usual = _shading_spreader(scene)
-        mesh.set_openness(self._probe.openness(mesh.mesh, usual))
+        sky = Sky(light, scene.environment.yaw_deg)
+        mesh.set_openness(self._probe.openness(mesh.mesh, usual, sky))
         if spreader is not None and usual is not None:
             held = build_container(scene.container.kind)
             shape = spreader.mesh if bent else usual  # with vertices of its own
-            spreader.set_openness(self._probe.openness_of_spreader(shape, held))
+            spreader.set_openness(self._probe.openness_of_spreader(shape, held, sky))
         return mesh, spreader
 
     def container(self, container: Container) -> GpuMesh:

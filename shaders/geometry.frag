@@ -12,7 +12,7 @@ flat in uint surface_key;
 layout(location = 0) out uint out_key;
 layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
 layout(location = 2) out float out_depth;  // m
-layout(location = 3) out vec4 out_openness;   // Openness, packed
+layout(location = 3) out vec4 out_openness;   // as openness.py encodes it
 #if HOLED
 flat in uint inner;
 #endif

@@ -44,7 +44,10 @@ vec3 view_ray(vec2 pixel) {
 // as openness.py encodes it
 Openness openness_at(ivec2 sample_at) {
     vec4 stored = texelFetch(openness_points, sample_at, 0);
-    return Openness(normalize(stored.xyz * 255.0 - 128.0), stored.w);
+    vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
+    float size = length(cone);
+    float light = stored.w * (255.0 / LIGHT_STEPS);
+    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones

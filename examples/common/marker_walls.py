@@ -188,7 +188,7 @@ _SKY = (SHADE, EVERYTHING)
 def without(element: str) -> Iterator[None]:
     """While it lasts, renders lack what of `element` no scene decides."""
 
-    def unhidden(_: SkyProbe, container: Mesh, __: Mesh | None) -> bytes:
+    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> bytes:
         return open_sky(container.normals).tobytes()
 
     with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
