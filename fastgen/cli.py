@@ -69,13 +69,21 @@ def _stopped_by_sigterm() -> Iterator[None]:
         yield
         return
 
+    heard = False
+
     def stop(*_: object) -> None:
+        nonlocal heard
+        heard = True
         signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the second would disturb the clearing
-        raise _Terminated
+        raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, stop)
     try:
         yield
+    except KeyboardInterrupt:
+        if heard:  # told here, as compiled code in between lets no other exception through
+            raise _Terminated from None
+        raise
     finally:
         signal.signal(signal.SIGTERM, before)
 

@@ -8,7 +8,9 @@ job.out; Ray carries shard numbers and reports alone.
 import json
 import logging
 import os
+import signal
 import socket
+import threading
 import time
 from collections import deque
 from collections.abc import Callable
@@ -90,10 +92,14 @@ def _joined(address: str | None, count: int | None) -> bool:
         options |= {"include_dashboard": False, "object_store_memory": _STORE_BYTES}
     elif address != "auto":
         _probe(address)
+    at_sigterm = signal.getsignal(signal.SIGTERM)
     try:
         ray.init(logging_level=logging.WARNING, **options)
     except (ConnectionError, RuntimeError, ValueError) as error:
         raise OutputError(f"--ray {address or ''}: no Ray cluster joined: {error}") from None
+    finally:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, at_sigterm)  # Ray's own would end us in its way
     return True
 
 
