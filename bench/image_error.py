@@ -2,16 +2,16 @@
 
 from dataclasses import dataclass
 
-import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
 
 from fastgen.programs import SPREADER_ID
 from fastgen.sample import Sample
 
 STEP_M = 0.15
 OCCLUDED = 0.8  # ambient occlusion below this is a corner or the valley of a wave
+
+_NEEDS = "FLIP and SSIM need what pip install '.[accuracy]' brings"
 
 Array = NDArray[np.floating]
 Measures = tuple[float, float, float]
@@ -60,6 +60,10 @@ class Comparison:
     def of(reference: Array, test: Array) -> "Comparison":
         """Compare `test` with `reference`. Andersson et al. 2020, FLIP; at its default viewing
         distance, 67 pixels a degree."""
+        try:  # here, so that --help needs neither this nor FLIP
+            from skimage.metrics import structural_similarity
+        except ImportError:
+            raise SystemExit(_NEEDS) from None
         a, b = reference.astype(np.float32), test.astype(np.float32)
         _, similarity = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
         return Comparison(flip(a, b), similarity.mean(axis=2), ((a - b) ** 2).mean(axis=2))
@@ -76,6 +80,10 @@ class Comparison:
 
 def flip(reference: Array, test: Array) -> Array:
     """FLIP [H, W] alone, between sRGB images in 0..1."""
+    try:
+        import flip_evaluator
+    except ImportError:
+        raise SystemExit(_NEEDS) from None
     a, b = reference.astype(np.float32), test.astype(np.float32)
     found: Array = flip_evaluator.evaluate(a, b, "LDR", applyMagma=False)[0][..., 0]
     return found

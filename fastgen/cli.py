@@ -1,11 +1,13 @@
 """The `fastgen` command."""
 
 import argparse
+import contextlib
 import os
 import re
 import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -31,11 +33,15 @@ SHOWN_LAYERS = (*LAYERS, "ids", "damage")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns the exit code: 0 good, 1 faults found, 2 bad input."""
+    """Run the command; returns the exit code: 0 good, 1 faults found, 2 bad input.
+
+    Stopped by a signal, it is 128 and the signal's number: 130 after Ctrl-C, 143 after SIGTERM.
+    """
     try:
         try:
             options = _parser().parse_args(arguments)
-            code: int = options.run(options)
+            with _stopped_by_sigterm():
+                code: int = options.run(options)
         finally:
             sys.stdout.flush()
     except FastgenError as error:
@@ -46,10 +52,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 128 + signal.SIGPIPE
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
-        return 128 + signal.SIGINT
+        return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM came: docker and Slurm stop a run so."""
+
+
+@contextlib.contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """Within, SIGTERM does what Ctrl-C does, so that what was begun is cleared away."""
+    if threading.current_thread() is not threading.main_thread():  # which alone hears signals
+        yield
+        return
+
+    def stop(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the second would disturb the clearing
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _refused(words: str) -> int:
@@ -90,7 +118,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
     extra = ",".join(sorted(set(known_formats()) - set(SEAFRONT)))
-    make.add_argument("--also", default="", metavar=extra, help="further files for each image")
+    make.add_argument(
+        "--also",
+        default="",
+        metavar=extra,
+        help="further files for each image; bop not with webdataset",
+    )
     make.add_argument("--shard", type=int, metavar="SCENES", help="scenes committed together")
     make.add_argument(
         "--split", metavar="NAME|a,b,c", help="train, val or test for all, or three fractions"

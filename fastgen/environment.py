@@ -5,6 +5,7 @@ with Rec. 709 primaries. A yaw in degrees turns the environment about +z, counte
 from above: radiance(direction) = map(Rz(-yaw) direction).
 """
 
+import contextlib
 import functools
 import hashlib
 from dataclasses import dataclass, fields
@@ -33,6 +34,7 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
+_DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
 _SKY_TEXELS = 3  # along a cell of `Ambient.sky`: 5 degrees
 _DFG_POINTS = 4096
 _MAPS = ("specular", "irradiance", "background", "luminance", "sun")
@@ -158,7 +160,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
     cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen. The key is the content of the
     file, so a renamed file hits and a changed one misses. Cached or not, the result is the same to
     the bit. A broken entry is built again, and without a writable folder nothing is cached.
-    Raises AssetError, as `load_radiance` does.
+    Raises AssetError, as `load_radiance` does, and where it is too dark to be exposed.
     """
     path = Path(path)
     try:
@@ -172,6 +174,12 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
     if cached is None:
         cached = prefilter_environment(path.stem, load_radiance(path))
         _write_cache(cached, entry)
+        _remove_earlier(entry)
+    if cached.mean_luminance < _DARKEST:
+        raise AssetError(
+            f"{path}: is dark, with a mean luminance of {cached.mean_luminance:.2g}; an HDRI must "
+            f"have {_DARKEST:g} or more to be exposed"
+        )
     return cached
 
 
@@ -205,6 +213,16 @@ def _write_cache(light: EnvironmentLight, entry: Path) -> None:
     sun = np.array([*light.sun.direction, *light.sun.light, light.sun.radius] if light.sun else [])
     maps = (specular, irradiance, light.background, light.luminance, sun)
     cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
+
+
+def _remove_earlier(entry: Path) -> None:
+    """Remove what earlier versions of this module made of the same HDRI: 17 MB a light add up."""
+    key = entry.stem.rpartition("-")[0]
+    for other in entry.parent.glob(f"{key}-*.npz"):
+        version = other.stem.rpartition("-")[2]
+        if version.isdecimal() and int(version) < PREFILTER_VERSION:
+            with contextlib.suppress(OSError):
+                other.unlink()
 
 
 def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
 from fastgen.programs import LAYERS
-from fastgen.records import nearest, whole
+from fastgen.records import check_fields, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import one_container_each, possible_shapes, sample_scene
@@ -115,6 +115,7 @@ class Generator:
         )
         # a scene's cameras are mostly rendered one after the other
         self._latest: tuple[tuple[Config, int, int], Scene] | None = None
+        self._sound: Scene | None = None
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
@@ -167,6 +168,8 @@ class Generator:
         objects that are hard to see, in place of config.labels.
         Raises ConfigError for what cannot be drawn, by its name.
         """
+        if labels is not None:
+            check_fields(labels, LabelConfig, "labels")
         if layer not in LAYERS:
             raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
         scene, camera = self._chosen(index, camera, scene)
@@ -242,15 +245,15 @@ class Generator:
 
         Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
         """
-        return self._open().bake(check_scene(scene), texel_mm)
+        return self._open().bake(self._check(scene), texel_mm)
 
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
         """As `bake`, of the spreader; None where the scene has none."""
-        return self._open().bake_spreader(check_scene(scene), texel_mm)
+        return self._open().bake_spreader(self._check(scene), texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        return self._open().exposure(check_scene(scene), check_camera(camera), self.size)
+        return self._open().exposure(self._check(scene), check_camera(camera), self.size)
 
     def preload(self) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
@@ -302,11 +305,18 @@ class Generator:
         if scene is None:
             assert index is not None
             scene = self.scene(index)
-        elif self._latest is None or scene is not self._latest[1]:  # ours are sound
-            check_scene(scene)
+        else:
+            self._check(scene)
         if camera is None or isinstance(camera, str):
             return scene, find_camera(scene, camera)
         return scene, check_camera(camera)
+
+    def _check(self, scene: Scene) -> Scene:
+        """`check_scene`, once for all cameras of a scene, and never for what was made here."""
+        ours = self._latest is not None and scene is self._latest[1]
+        if not ours and scene is not self._sound:
+            self._sound = check_scene(scene)
+        return scene
 
     def _open(self) -> Renderer:
         if self._process != os.getpid():  # what was opened before a fork is the parent's

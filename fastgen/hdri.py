@@ -29,12 +29,14 @@ _MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a floa
 def find_hdris(folder: str | Path) -> list[Path]:
     """The .hdr and .exr files directly in a folder, sorted by name; any case of the extension.
 
+    Hidden files, such as those that macOS leaves beside others on foreign disks, do not count.
     Raises AssetError where the folder does not exist or holds none.
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise AssetError(f"{folder}: no such folder; give one that holds .hdr or .exr files")
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in (".hdr", ".exr"))
+    seen = (path for path in folder.iterdir() if not path.name.startswith("."))
+    found = sorted(path for path in seen if path.suffix.lower() in (".hdr", ".exr"))
     if not found:
         raise AssetError(f"{folder}: no .hdr or .exr file in this folder")
     return found

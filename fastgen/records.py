@@ -7,6 +7,7 @@ these bounds, and a `Range` must also be ordered.
 
 import dataclasses
 import difflib
+import functools
 import math
 import numbers
 import reprlib
@@ -180,6 +181,92 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
     if hint is int and value != int(value):
         raise ConfigError(f"{path}: expected a whole number, got {_short(value)}")
     return hint(value)
+
+
+def check_fields(value: Any, cls: type, path: str, most: float = math.inf) -> None:
+    """Hold an instance of dataclass `cls` that Python code made to its annotations and bounds.
+
+    Everything below it is looked at: types, lengths of tuples, finite numbers. most: how far from 0
+    numbers without bounds may lie. Raises ConfigError that names the field below `path`.
+    """
+    try:
+        _check_of(cls, most)(value)
+    except ConfigError as error:
+        raise ConfigError(f"{path}{error}") from None
+
+
+_Check = Callable[[Any], None]
+"""Raises ConfigError whose words begin with what stands behind the name of the value."""
+
+
+@functools.cache
+def _check_of(cls: type, most: float) -> _Check:
+    hints = typing.get_type_hints(cls)
+    parts = tuple(
+        (f.name, _check(hints[f.name], {"lo": -most, "hi": most, **f.metadata}, most))
+        for f in dataclasses.fields(typing.cast(Any, cls))
+    )
+
+    def check(value: Any) -> None:
+        if not isinstance(value, cls):
+            raise ConfigError(f": expected a {cls.__name__}, got {_short(value)}")
+        for name, part in parts:
+            try:
+                part(getattr(value, name))
+            except ConfigError as error:
+                raise ConfigError(f".{name}{error}") from None
+
+    return check
+
+
+def _check(hint: Any, meta: Mapping[str, Any], most: float) -> _Check:
+    origin, args = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        inner = _check(args[0], meta, most)
+        return lambda value: None if value is None else inner(value)
+    if dataclasses.is_dataclass(hint):
+        return _check_of(typing.cast(type, hint), most)
+    if origin is tuple:
+        return _check_tuple(args, meta, most)
+    if hint is bool or hint is str:
+        return functools.partial(_check_kind, hint)
+    kind = numbers.Integral if hint is int else numbers.Real
+    lo, hi = max(meta["lo"], -sys.float_info.max), min(meta["hi"], sys.float_info.max)
+
+    def check(value: Any) -> None:
+        exact = type(value)
+        if not (exact is hint or (isinstance(value, kind) and exact is not bool)):
+            what = "whole number" if hint is int else "number"
+            raise ConfigError(f": expected a {what}, got {_short(value)}")
+        if not lo <= value <= hi:
+            unit = f" {meta['unit']}" if meta.get("unit") else ""
+            raise ConfigError(f": {_short(value)} is out of range; give {lo:g} to {hi:g}{unit}")
+
+    return check
+
+
+def _check_tuple(args: tuple[Any, ...], meta: Mapping[str, Any], most: float) -> _Check:
+    any_length = args[-1] is Ellipsis
+    parts = [_check(arg, meta, most) for arg in args if arg is not Ellipsis]
+
+    def check(value: Any) -> None:
+        if not isinstance(value, tuple):
+            raise ConfigError(f": expected a tuple, got {_short(value)}")
+        if not any_length and len(value) != len(parts):
+            raise ConfigError(f": expected {len(parts)} values, got {len(value)}")
+        for i, item in enumerate(value):
+            try:
+                parts[0 if any_length else i](item)
+            except ConfigError as error:
+                raise ConfigError(f"[{i}]{error}") from None
+
+    return check
+
+
+def _check_kind(kind: type, value: Any) -> None:
+    if not isinstance(value, kind):
+        what = "True or False" if kind is bool else "text"
+        raise ConfigError(f": expected {what}, got {_short(value)}")
 
 
 def _as_number(value: Any) -> str:

@@ -12,12 +12,18 @@ from dataclasses import dataclass, field
 
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
-from fastgen.records import from_plain, to_plain
-from fastgen.sensor.parts import Lens, Sensor, Weather
+from fastgen.records import bounds, from_plain, to_plain
+from fastgen.sensor.parts import WHOLE, Lens, Sensor, Weather
+from fastgen.spreader import GAP_LIMITS_MM
 
 Color = tuple[float, float, float]
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
+
+_SHARE = bounds(0.0, 1.0)
+_REACH = bounds(0.0, 1e6, "mm")
+_SCALE = bounds(1.0, 1e6, "mm")
+_LENGTH = bounds(1e-3, 1e6, "mm")
 
 
 @dataclass(frozen=True)
@@ -25,43 +31,43 @@ class Paint:
     """Base coat. albedo: linear colour; roughness: GGX perceptual roughness of sound paint."""
 
     name: str
-    albedo: Color
-    roughness: float
-    tone_variation: float
+    albedo: Color = field(metadata=_SHARE)
+    roughness: float = field(metadata=_SHARE)
+    tone_variation: float = field(metadata=_SHARE)
 
 
 @dataclass(frozen=True)
 class Ageing:
     """Darkening toward the corners of each panel. strength 0..1; reach in mm from a corner."""
 
-    strength: float
-    reach_mm: float
+    strength: float = field(metadata=_SHARE)
+    reach_mm: float = field(metadata=_REACH)
 
 
 @dataclass(frozen=True)
 class Dirt:
     """Light grey deposit along edges. strength 0..1; reach in mm from an edge."""
 
-    strength: float
-    reach_mm: float
-    albedo: Color
+    strength: float = field(metadata=_SHARE)
+    reach_mm: float = field(metadata=_REACH)
+    albedo: Color = field(metadata=_SHARE)
 
 
 @dataclass(frozen=True)
 class Rust:
     """Ochre corrosion that breaks the paint. coverage: fraction of the sheet; scale in mm."""
 
-    coverage: float
-    scale_mm: float
-    albedo: Color
-    roughness: float
+    coverage: float = field(metadata=_SHARE)
+    scale_mm: float = field(metadata=_SCALE)
+    albedo: Color = field(metadata=_SHARE)
+    roughness: float = field(metadata=_SHARE)
 
 
 @dataclass(frozen=True)
 class Scratches:
     """Fine bright lines down to primer or steel. coverage: fraction of the sheet."""
 
-    coverage: float
+    coverage: float = field(metadata=_SHARE)
 
 
 @dataclass(frozen=True)
@@ -69,8 +75,8 @@ class Wear:
     """Worn reflection: how much noise spreads the roughness of exposed paint, 0..1. Scratches and
     dirt share the noise tile whose scale_mm stands here."""
 
-    strength: float
-    scale_mm: float
+    strength: float = field(metadata=_SHARE)
+    scale_mm: float = field(metadata=_SCALE)
 
 
 @dataclass(frozen=True)
@@ -102,15 +108,15 @@ class Decal:
     class_name: str
     face: str
     center_mm: Vec2
-    size_mm: Vec2
+    size_mm: Vec2 = field(metadata=_LENGTH)
     rotation_deg: float = 0.0
     art: str = ""
     lines: tuple[str, ...] = ()
     font: str = ""
     vertical: bool = False
     cap_mm: float = 0.0
-    albedo: Color = (0.8, 0.8, 0.8)
-    wear: float = 0.0
+    albedo: Color = field(default=(0.8, 0.8, 0.8), metadata=_SHARE)
+    wear: float = field(default=0.0, metadata=_SHARE)
 
     @property
     def text(self) -> str:
@@ -137,7 +143,7 @@ class Damage:
     along: Vec3
     across: Vec3
     inward: Vec3
-    size_mm: Vec2
+    size_mm: Vec2 = field(metadata=_LENGTH)
     depth_mm: float
     shape: tuple[float, ...] = ()
 
@@ -159,9 +165,9 @@ class Spreader:
     """
 
     present: bool = False
-    albedo: Color = (0.6, 0.35, 0.02)
+    albedo: Color = field(default=(0.6, 0.35, 0.02), metadata=_SHARE)
     flippers_down: tuple[bool, bool] = (True, True)
-    gap_mm: float = 15.0
+    gap_mm: float = field(default=15.0, metadata=bounds(*GAP_LIMITS_MM, "mm"))
 
 
 @dataclass(frozen=True)
@@ -183,10 +189,10 @@ class Camera:
     name: str
     position_mm: Vec3
     target_mm: Vec3
-    focal_mm: float
+    focal_mm: float = field(metadata=_LENGTH)
     roll_deg: float = 0.0
-    sensor_width_mm: float = 36.0
-    exposure_ev: float = 0.0
+    sensor_width_mm: float = field(default=36.0, metadata=_LENGTH)
+    exposure_ev: float = field(default=0.0, metadata=bounds(-30.0, 30.0, "stops"))
     lens: Lens | None = None
     sensor: Sensor | None = None
 
@@ -195,8 +201,8 @@ class Camera:
 class Scene:
     """One container with all that is on it, its light and its cameras."""
 
-    seed: int
-    index: int
+    seed: int = field(metadata=WHOLE)
+    index: int = field(metadata=WHOLE)
     container: Container
     surface: Surface
     environment: EnvironmentView

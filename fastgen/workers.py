@@ -5,11 +5,14 @@ Each has a pipe of its own: a queue's lock dies with the process that holds it.
 
 import contextlib
 import multiprocessing
+import os
 import signal
+import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -22,6 +25,7 @@ HANG_S = 300.0
 """A worker that has said nothing for so long hangs; the slowest step known takes a hundredth."""
 
 _POLL_S = 1.0
+_STOPS = {signal.SIGINT, signal.SIGTERM}
 
 
 class _Worker:
@@ -32,7 +36,14 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs, setup, arguments), daemon=True)
-        self.process.start()
+        # a signal may reach the whole group, and the parent decides: a worker that is not ready
+        # yet takes this mask over and stays quiet. The tracker's own start would lift the mask
+        resource_tracker.ensure_running()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
         self.task: Any = None
         self.place: Any = None
@@ -68,10 +79,11 @@ def run(
     an error that no repetition mends. No process outlives the call.
     """
     waiting = deque(tasks)
-    workers = [_Worker(setup, arguments) for _ in range(min(count, len(waiting)))]
+    workers: list[_Worker] = []
     try:
-        for worker in workers:
-            worker.give(waiting.popleft())
+        while waiting and len(workers) < count:
+            workers.append(_Worker(setup, arguments))
+            workers[-1].give(waiting.popleft())
         while busy := [worker for worker in workers if worker.task is not None]:
             wait([worker.pipe for worker in busy], timeout=_POLL_S)
             for worker in busy:
@@ -119,23 +131,45 @@ def in_words(error: Exception, place: str) -> str:
 
 
 def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
-    """One worker process: tasks from the pipe until the parent ends it."""
-    # Ctrl-C reaches the whole group; the parent decides
+    """One worker process: tasks from the pipe until the parent ends it, or is no more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     place = "start"
+
+    def send(kind: str, value: Any) -> None:
+        with _gone_with_parent():
+            pipe.send((kind, value))
 
     def report(kind: str, value: Any) -> None:
         nonlocal place
         if kind == "at":
             place = f"scene {value}"
-        pipe.send((kind, value))
+        send(kind, value)
 
     try:
         work = setup(*arguments, report)
         while True:
-            work(pipe.recv())
-            pipe.send(("done", None))
-    except EOFError:
-        pass  # the parent is gone
+            with _gone_with_parent():
+                task = pipe.recv()
+            work(task)
+            send("done", None)
     except Exception as error:
-        pipe.send(("failed", in_words(error, place)))
+        send("failed", in_words(error, place))
+
+
+@contextlib.contextmanager
+def _gone_with_parent() -> Iterator[None]:
+    """End this process where its pipe turns out to have no other end: nobody is left to tell."""
+    try:
+        yield
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        os._exit(1)
+
+
+def _end_with_parent() -> None:
+    """End this process where it stands once its parent has died, as a kill of both would."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

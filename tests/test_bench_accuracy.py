@@ -1,6 +1,7 @@
 """The references, and what is concluded from them: cases, filters, files, equal samples, fronts."""
 
 import itertools
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -167,3 +168,28 @@ def test_spreader_parts_that_an_ablation_names_exist():
                 edited = edit(mesh)
                 same = np.array_equal(edited.positions_mm, mesh.positions_mm)
                 assert len(edited.triangles) < len(mesh.triangles) or not same, element.name
+
+
+@pytest.mark.parametrize("name", ["accuracy", "pareto", "ablation"])
+def test_help_needs_no_error_measure(name):
+    """An import that is None fails as one of a package that is not installed."""
+    path = Path(ablation_elements.__file__).with_name(f"{name}.py")
+    code = (
+        "import runpy, sys; sys.modules['flip_evaluator'] = sys.modules['skimage'] = None;"
+        f"sys.path.insert(0, '{path.parent}'); sys.argv = ['{name}', '--help'];"
+        f"runpy.run_path('{path}', run_name='__main__')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "usage:" in done.stdout
+
+
+def test_without_an_error_measure_one_line_says_what_to_install():
+    folder = Path(ablation_elements.__file__).parent
+    code = (
+        f"import sys; sys.modules['flip_evaluator'] = None; sys.path.insert(0, '{folder}');"
+        "import numpy, image_error; image_error.flip(*[numpy.zeros((16, 16, 3))] * 2)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "pip install '.[accuracy]'" in done.stderr
+    assert "Traceback" not in done.stderr

@@ -235,8 +235,41 @@ def test_every_unusable_file_is_refused_by_name(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("value", [0.0, np.nan, -3.0, 1e-9])
+def test_an_hdri_without_light_is_refused_by_name_cached_or_not(tmp_path, value):
+    path = write_exr(tmp_path / "night.exr", np.full((128, 256, 3), value, np.float32))
+    for _ in range(2):
+        with pytest.raises(AssetError, match=r"night\.exr: is dark"):
+            load_environment(path, tmp_path / "cache")
+
+
+def test_a_faint_light_is_light(tmp_path):
+    image = np.zeros((128, 256, 3), np.float32)
+    image[64] = 0.01  # a glow along the horizon
+    assert load_environment(write_exr(tmp_path / "dusk.exr", image), tmp_path).mean_luminance > 0
+
+
+def test_entries_of_earlier_versions_are_removed(tmp_path, monkeypatch):
+    path, other = tmp_path / "a.exr", tmp_path / "b.exr"
+    for each, level in ((path, 0.5), (other, 0.7)):
+        write_exr(each, np.full((128, 256, 3), level, np.float32))
+    folder = tmp_path / "cache"
+    version = environment.PREFILTER_VERSION
+    for each, made in ((path, version + 1), (path, version - 1), (other, version - 2)):
+        monkeypatch.setattr(environment, "PREFILTER_VERSION", made)
+        load_environment(each, folder)
+    before = {entry.name for entry in folder.iterdir()}
+    assert len(before) == 3
+    monkeypatch.setattr(environment, "PREFILTER_VERSION", version)
+    load_environment(path, folder)
+    after = {entry.name for entry in folder.iterdir()}
+    (gone,), (new,) = before - after, after - before
+    assert gone.endswith(f"-{version - 1}.npz")
+    assert new == gone.replace(f"-{version - 1}.", f"-{version}.")
+
+
 def test_folder_listing_is_sorted_and_ignores_other_files(tmp_path):
-    for name in ("b.HDR", "a.exr", "c.Exr", "notes.txt", "d.png"):
+    for name in ("b.HDR", "a.exr", "c.Exr", "notes.txt", "d.png", "._a.exr", ".hidden.hdr"):
         (tmp_path / name).touch()
     assert [p.name for p in find_hdris(tmp_path)] == ["a.exr", "b.HDR", "c.Exr"]
 

@@ -1,9 +1,11 @@
 """The command line where people go wrong: odd folders, damaged files, pipes that close."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from pycocotools.coco import COCO
@@ -176,3 +178,12 @@ def test_odd_files_are_named(tmp_path, capsys, text, words):
     error = capsys.readouterr().err
     assert error.startswith(f"fastgen: {path}: ")
     assert words in error
+
+
+@pytest.mark.parametrize("command", ["generate", "show", "export", "stats", "verify"])
+def test_the_readme_knows_every_option(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    words = (Path(__file__).parent.parent / "README.md").read_text()
+    for option in set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}:
+        assert option in words, option

@@ -181,6 +181,17 @@ def test_the_crane_preset_changes_cameras_and_weather_alone_and_survives_json():
     assert kinds == {"noise", "stamp", "defocus"}
 
 
+def test_the_shortest_shutter_that_may_be_is_drawn_and_rendered():
+    weather = {"rain_probability": 1.0, "shutter_s": [1e-5, 1.2e-5]}
+    with Generator(Config.from_values({"weather": weather}), size=SIZE) as generator:
+        drawn = {generator.scene(index).weather.rain.shutter_s for index in range(5)}
+        assert len(drawn) == 5
+        assert min(drawn) >= 1e-5
+        assert max(drawn) <= 1.2e-5
+        # a drop that hardly moves covers a spot: it must be seen, not divided by
+        assert np.ptp(generator.render(index=0).image) > 0
+
+
 def test_labels_are_those_without_the_sensor_and_bytes_repeat():
     sensor = Sensor(
         defocus=Defocus(1500, 1.4),

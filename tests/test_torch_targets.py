@@ -168,3 +168,10 @@ def test_weights_even_the_classes_out():
     weights = class_weights("damage", scenes=60).double()
     shares = counts * weights
     np.testing.assert_allclose(shares, np.full(5, counts.sum() / 5), rtol=1e-5)
+
+
+def test_classes_that_never_come_are_named():
+    config = Config.from_values({"damage": {"kinds": ["dented"], "probability": 1.0}})
+    with pytest.warns(UserWarning, match="axis, concave, perforation did not come in 5 scenes"):
+        weights = class_weights("damage", config, scenes=5)
+    assert torch.isfinite(weights).all()

@@ -1,9 +1,11 @@
 """What a Scene says of its lenses, sensors and weather: plain frozen data."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fastgen.errors import ConfigError
-from fastgen.records import nearest
+from fastgen.records import bounds, nearest
+
+WHOLE = bounds(0, 2**63 - 1)
 
 LENS_MODELS = {"brown_conrady": 5, "fisheye": 4}
 """Coefficients of each lens model, in OpenCV's order."""
@@ -38,9 +40,9 @@ class Noise:
     """A sensor's noise, see sensor/noise.py. full_well_e: electrons that make white; read_noise_e:
     standard deviation without light, in electrons; seed: of this image's noise."""
 
-    full_well_e: float
-    read_noise_e: float
-    seed: int
+    full_well_e: float = field(metadata=bounds(1.0, 1e9, "electrons"))
+    read_noise_e: float = field(metadata=bounds(0.0, 1e6, "electrons"))
+    seed: int = field(metadata=WHOLE)
 
 
 @dataclass(frozen=True)
@@ -50,15 +52,15 @@ class Stamp:
 
     text: str
     corner: str
-    height: float
+    height: float = field(metadata=bounds(0.001, 1.0))
 
 
 @dataclass(frozen=True)
 class Defocus:
     """A thin lens focused at focus_mm along the optical axis, its aperture focal_mm / f_number."""
 
-    focus_mm: float
-    f_number: float
+    focus_mm: float = field(metadata=bounds(1.0, 1e9, "mm"))
+    f_number: float = field(metadata=bounds(0.1, 1e4))
 
 
 @dataclass(frozen=True)
@@ -71,13 +73,13 @@ class Sensor:
     """
 
     defocus: Defocus | None = None
-    motion: tuple[float, float] = (0.0, 0.0)
-    vignetting: float = 0.0
-    exposure_error_ev: float = 0.0
-    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    motion: tuple[float, float] = field(default=(0.0, 0.0), metadata=bounds(-1.0, 1.0))
+    vignetting: float = field(default=0.0, metadata=bounds(0.0, 0.95))
+    exposure_error_ev: float = field(default=0.0, metadata=bounds(-30.0, 30.0, "stops"))
+    gains: tuple[float, float, float] = field(default=(1.0, 1.0, 1.0), metadata=bounds(0.0, 1000.0))
     noise: Noise | None = None
     stamp: Stamp | None = None
-    jpeg_quality: int = 0
+    jpeg_quality: int = field(default=0, metadata=bounds(0, 100))
 
 
 @dataclass(frozen=True)
@@ -85,10 +87,10 @@ class Rain:
     """Falling drops. rate_mm_h: of water; shutter_s: for how long each draws its streak; wind: its
     speed across the image over that of the fall; seed: of where they are."""
 
-    rate_mm_h: float
-    shutter_s: float
-    wind: float
-    seed: int
+    rate_mm_h: float = field(metadata=bounds(0.001, 1000.0, "mm/h"))
+    shutter_s: float = field(metadata=bounds(1e-6, 1.0, "s"))
+    wind: float = field(metadata=bounds(-10.0, 10.0))
+    seed: int = field(metadata=WHOLE)
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,6 @@ class Weather:
     """Between container and camera, and on the container. visibility_mm: of fog, 0 without; wetness
     of painted surfaces 0..1."""
 
-    visibility_mm: float = 0.0
+    visibility_mm: float = field(default=0.0, metadata=bounds(0.0, 1e9, "mm"))
     rain: Rain | None = None
-    wetness: float = 0.0
+    wetness: float = field(default=0.0, metadata=bounds(0.0, 1.0))

@@ -59,7 +59,8 @@ def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Gen
         visibility_mm=round(_between(fog, config.visibility_mm)) if foggy else 0.0,
         rain=Rain(
             rate_mm_h=_drawn(rain, config.rate_mm_h),
-            shutter_s=_drawn(rain, config.shutter_s),
+            # to four digits, as four decimals would make 0 of the shortest
+            shutter_s=float(f"{_between(rain, config.shutter_s):.4g}"),
             wind=_drawn(rain, config.wind),
             seed=_seed(rain),
         )

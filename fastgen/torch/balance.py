@@ -1,5 +1,6 @@
 """How often each class comes, counted on scenes alone, without GL; and weights that even it out."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -73,10 +74,17 @@ def class_weights(
     """Weights for a loss, float32 [classes]: labels / (classes * labels of the class).
 
     Over what was counted they average to 1 a label; arguments as for `class_counts`. A class that
-    did not come weighs as if it had come once. A loss that has a background as class 0 needs that
-    weight put before them.
+    did not come weighs as if it had come once, and a warning names it. A loss that has a
+    background as class 0 needs that weight put before them.
     """
     counts = class_counts(task, config, seed, size, scenes, cameras)
+    absent = [name for name, count in zip(class_names(task), counts, strict=True) if not count]
+    if absent:
+        warnings.warn(
+            f"class_weights: {', '.join(absent)} did not come in {scenes} scenes and weigh as if "
+            "they had come once; count more scenes, or set these weights yourself",
+            stacklevel=2,
+        )
     return counts.sum() / (len(counts) * counts.clamp(min=1)).float()
 
 

@@ -1,5 +1,9 @@
 """ContainerDataset and ContainerStream: positions of an epoch, rendered when they are asked for."""
 
+import contextlib
+import hashlib
+import json
+import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -92,7 +96,8 @@ class ContainerDataset(Dataset[Item]):
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
         self._epoch_config: tuple[int, Config] = (0, config_of(curriculum, self.config, 0))
         self._scene: tuple[tuple[int, int], Scene] | None = None
-        self.description: dict[str, Any] = {
+        self._digests: dict[int, str] = {}
+        self._made: dict[str, Any] = {
             "task": task,
             "seed": seed,
             "size": list(size),
@@ -104,6 +109,30 @@ class ContainerDataset(Dataset[Item]):
             "quality": quality,
             "config": self.config.to_plain(),
         }
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What decides the samples, as plain values; of files and of the curriculum, SHA-256.
+
+        The curriculum stands here by what it gives for epochs 0 and 1 and the present one.
+        """
+        if "hdri_dir" not in self._made:  # reads every HDRI
+            generator = self._generator.get()
+            names = generator.environments
+            self._made["hdri_dir"] = {name: generator.environment_digest(name) for name in names}
+        epochs = sorted({0, 1, self.epoch})
+        return {**self._made, "curriculum": self.curriculum_digests(epochs)}
+
+    def curriculum_digests(self, epochs: Sequence[int]) -> dict[str, str]:
+        """Epoch, as text -> SHA-256 of its configuration; without epochs that there is none of."""
+        for epoch in epochs:
+            with contextlib.suppress(Exception):  # one that indexes a list may end after epoch 0
+                if epoch not in self._digests:
+                    config = config_of(self.curriculum, self.config, epoch)
+                    # checked, so that 12 and 12.0 read the same
+                    plain = json.dumps(Config.checked(config).to_plain(), sort_keys=True)
+                    self._digests[epoch] = hashlib.sha256(plain.encode()).hexdigest()
+        return {str(epoch): self._digests[epoch] for epoch in epochs if epoch in self._digests}
 
     @property
     def epoch(self) -> int:
@@ -146,7 +175,14 @@ class ContainerDataset(Dataset[Item]):
         image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
         labels = self.config_at(epoch).labels
         made = item_of(sample, self.task, self.form, labels, image_id, self.as_float)
-        return self.transforms(*made) if self.transforms else made
+        if self.transforms is None:
+            return made
+        changed = self.transforms(*made)
+        if not isinstance(changed, tuple | list) or len(changed) != 2:
+            what = type(changed).__name__
+            raise ConfigError(f"transforms: gave {what}; return the pair (image, target)")
+        image, target = changed
+        return image, target
 
     def config_at(self, epoch: int) -> Config:
         """The configuration of an epoch, by the curriculum if there is one."""
@@ -163,6 +199,10 @@ class ContainerDataset(Dataset[Item]):
         return self.length
 
     def __getitem__(self, position: int) -> Item:
+        try:
+            position = operator.index(position)
+        except TypeError:
+            raise TypeError(f"position {position!r} is no whole number") from None
         if not -self.length <= position < self.length:
             raise IndexError(f"position {position} is out of range; there are {self.length}")
         return self.item(position % self.length)
@@ -211,7 +251,7 @@ class ContainerStream(IterableDataset[Item]):
 
     def start_at(self, position: int) -> None:
         """Let passes begin at a position of the epoch, counted over all ranks."""
-        self._start.fill_(position)
+        self._start.fill_(whole("position", position))
 
     def __len__(self) -> int:
         """Items of this rank in an epoch. Raises TypeError where there is no end."""

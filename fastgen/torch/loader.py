@@ -124,15 +124,21 @@ class Loader:
         """
         if not isinstance(state, Mapping) or not isinstance(state.get("made", {}), Mapping):
             raise ConfigError(f"state: {state!r} is not what state_dict returned")
-        ours = self.state_dict()
-        for key in ours:
+        for key in ("epoch", "position", "made"):
             if key not in state:
                 raise ConfigError(f"state: has no {key!r}; give what state_dict returned")
-        for key, value in ours["made"].items():
-            if state["made"].get(key) != value:
+        epoch = whole("state.epoch", state["epoch"])
+        most = 2**62 if self._length is None else self._length
+        made, ours = state["made"], self.state_dict()["made"]
+        taught = made.get("curriculum")
+        if isinstance(taught, Mapping) and all(str(each).isdecimal() for each in taught):
+            ours["curriculum"] = self._items.curriculum_digests([int(each) for each in taught])
+        for key, value in ours.items():
+            if made.get(key) != value:
                 raise ConfigError(f"state: was taken with another {key}; make the loader alike")
-        self._items.set_epoch(state["epoch"])
-        self._start = self._position = state["position"]
+        position = whole("state.position", state["position"], 0, most)
+        self._items.set_epoch(epoch)
+        self._start = self._position = position
 
     def __len__(self) -> int:
         """Batches of this rank in a whole epoch. Raises TypeError where there is no end."""

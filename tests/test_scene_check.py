@@ -1,0 +1,156 @@
+"""Scenes changed by hand: whatever field is spoilt is named, and what was drawn passes."""
+
+import dataclasses
+import math
+from dataclasses import replace
+
+import pytest
+
+from fastgen import Config, Generator
+from fastgen.camera import view_of
+from fastgen.errors import ConfigError
+from fastgen.scene import Camera, Scene
+from fastgen.scene_check import check_camera, check_scene
+from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+
+SIZE = (64, 64)
+
+
+@pytest.fixture(scope="module")
+def full():
+    """A scene that has some of everything that a scene can have."""
+    damage = {"probability": 1, "count": [8, 8]}
+    scene = Generator(Config.from_values({"damage": damage}), seed=2, size=SIZE).scene(3)
+    assert {damage.kind for damage in scene.damages} >= {"dented", "perforation"}
+    sensor = Sensor(
+        defocus=Defocus(1500, 1.4), noise=Noise(4000, 4, 3), stamp=Stamp("now", "top left", 0.05)
+    )
+    camera = replace(scene.cameras[0], lens=Lens("fisheye", (-0.02, 0.0, 0.0, 0.0)), sensor=sensor)
+    weather = Weather(80e3, Rain(30, 0.002, 0.1, 5), 0.5)
+    return replace(scene, cameras=(camera,), weather=weather)
+
+
+def leaves(part, path=()):
+    """Path of each number, text and truth below a part; of long tuples the first and last item."""
+    if dataclasses.is_dataclass(part):
+        for field in dataclasses.fields(part):
+            yield from leaves(getattr(part, field.name), (*path, field.name))
+    elif isinstance(part, tuple):
+        for i in sorted({0, len(part) - 1} if part else set()):
+            yield from leaves(part[i], (*path, i))
+    elif part is not None:
+        yield path
+
+
+def spoilt(part, path, value):
+    """The part with a value in place of what is at a path, whatever a constructor thinks of it."""
+    if not path:
+        return value
+    if isinstance(part, tuple):
+        changed = spoilt(part[path[0]], path[1:], value)
+        return (*part[: path[0]], changed, *part[path[0] + 1 :])
+    copy = object.__new__(type(part))
+    copy.__dict__.update(part.__dict__)
+    copy.__dict__[path[0]] = spoilt(getattr(part, path[0]), path[1:], value)
+    return copy
+
+
+def held(part, path):
+    for step in path:
+        part = part[step] if isinstance(step, int) else getattr(part, step)
+    return part
+
+
+def name(path):
+    return "scene" + "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in path)
+
+
+def test_what_is_drawn_passes():
+    extreme = {
+        "surface": {"rust_coverage": 1.0, "dirt_reach_mm": 1e6, "wear_scale_mm": 1e5},
+        "sensor": {"defocus": {"probability": 1, "focus": 100.0}, "vignetting": 0.95},
+        "weather": {"rain_probability": 1, "shutter_s": 1e-5, "rate_mm_h": 300},
+        "spreader": {"probability": 1, "gap_mm": 200},
+    }
+    for config in (Config.preset(), Config.preset("crane"), Config.from_values(extreme)):
+        generator = Generator(config, seed=5, size=SIZE)
+        for index in range(20):
+            scene = generator.scene(index)
+            assert check_scene(scene) is scene
+            assert check_scene(Scene.from_json(scene.to_json())) == scene
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e12, "x", None, True, [1.0], (1.0,)])
+def test_every_spoilt_leaf_is_named(full, value):
+    check_scene(full)
+    paths = list(leaves(full))
+    assert len(paths) > 100
+    for path in paths:
+        if type(value) is type(held(full, path)) and isinstance(value, str | bool):
+            continue
+        with pytest.raises(ConfigError) as caught:
+            check_scene(spoilt(full, path, value))
+        assert str(caught.value).startswith(f"{name(path)}: "), path
+
+
+def test_every_missing_or_foreign_part_is_named(full):
+    for field in dataclasses.fields(full):
+        for value in (None, "ABCD", list(full.decals), full.surface.paint, 1.5):
+            with pytest.raises(ConfigError, match=f"^scene.{field.name}"):
+                check_scene(spoilt(full, (field.name,), value))
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("surface", "paint", "albedo", 1), 1.2),
+        (("surface", "paint", "roughness"), -0.1),
+        (("surface", "rust", "scale_mm"), 0.0),
+        (("surface", "paint", "albedo"), (0.5, 0.5)),
+        (("decals", 0, "lines"), "ABCD"),
+        (("decals", 0, "wear"), 2.0),
+        (("damages", 0, "along"), (1.0, 0.0)),
+        (("cameras", 0, "sensor", "jpeg_quality"), 101),
+        (("cameras", 0, "sensor", "jpeg_quality"), 50.5),
+        (("cameras", 0, "sensor", "vignetting"), 1.0),
+        (("cameras", 0, "sensor", "stamp", "corner"), "middle"),
+        (("cameras", 0, "sensor", "defocus", "f_number"), 0),
+        (("cameras", 0, "exposure_ev"), 200.0),
+        (("weather", "wetness"), 1.5),
+        (("weather", "visibility_mm"), -1.0),
+        (("weather", "rain", "shutter_s"), 0.0),
+        (("spreader", "gap_mm"), -5.0),
+        (("index",), -1),
+        (("seed",), 2**64),
+    ],
+)
+def test_what_means_nothing_is_named(full, path, value):
+    with pytest.raises(ConfigError) as caught:
+        check_scene(spoilt(full, path, value))
+    assert str(caught.value).startswith(f"{name(path)}: ")
+
+
+def test_what_a_damages_formula_divides_by_is_above_zero(full):
+    for kind, places in (("dented", (0, 3, 5)), ("perforation", (0,))):
+        number = next(i for i, damage in enumerate(full.damages) if damage.kind == kind)
+        for i in places:
+            path = ("damages", number, "shape", i)
+            with pytest.raises(ConfigError, match="more than 0"):
+                check_scene(spoilt(full, path, 0.0))
+
+
+def test_a_camera_given_by_itself_is_held_to_the_same():
+    camera = Camera("c", (0, -9000, 1000), (0, 0, 1000), 20)
+    assert check_camera(camera) is camera
+    assert view_of(camera, SIZE).size == SIZE
+    with pytest.raises(ConfigError, match=r"^camera.lens.coefficients\[0\]: nan is out of range"):
+        check_camera(replace(camera, lens=Lens("fisheye", (math.nan, 0, 0, 0))))
+
+
+@pytest.mark.parametrize("labels", ["x", {}, 3])
+def test_rules_of_labels_are_a_label_config(labels):
+    with (
+        Generator(size=SIZE) as generator,
+        pytest.raises(ConfigError, match=r"^labels: expected a LabelConfig"),
+    ):
+        generator.render(index=0, labels=labels)

@@ -1,0 +1,87 @@
+"""Runs that are stopped from without: quietly, at once, and to be gone on with."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from fastgen.cli import main
+
+ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]
+STOPPED = "fastgen: stopped; run the same command again to go on"
+
+
+def begun(out, images="4000"):
+    """A run that has begun to write, in a session of its own."""
+    command = [
+        sys.executable,
+        "-m",
+        "fastgen",
+        "generate",
+        str(out),
+        *ARGUMENTS,
+        "--images",
+        images,
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while not (out / "dataset.json").exists():
+        assert process.poll() is None
+        time.sleep(0.02)
+    return process
+
+
+def wait_for(condition):
+    """Poll for minutes: the machine may be busy with other things."""
+    for _ in range(2400):
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError("it never came")
+
+
+def gone(processes):
+    """Whether all have ended; nobody may be there to bury a zombie."""
+    _, alive = psutil.wait_procs(processes, timeout=0)
+    return all(each.status() == psutil.STATUS_ZOMBIE for each in alive)
+
+
+@pytest.mark.parametrize("moment", ["workers start", "shards are made"])
+def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
+    out = tmp_path / "out"
+    process = begun(out)
+    if moment == "shards are made":
+        wait_for(lambda: list(out.glob("shards/*.json")))
+    family = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGTERM)  # to the parent alone, as docker sends it
+    error = process.communicate(timeout=300)[1]
+    assert process.returncode == 128 + signal.SIGTERM
+    assert "Traceback" not in error
+    assert error.splitlines()[-1] == STOPPED
+    assert not [p for p in out.iterdir() if p.name.startswith(".")]
+    wait_for(lambda: gone(family))
+
+
+def test_workers_whose_parent_was_killed_end_without_a_word(tmp_path):
+    out = tmp_path / "out"
+    process = begun(out)
+    wait_for(lambda: list(out.glob("shards/*.json")))
+    family = psutil.Process(process.pid).children(recursive=True)
+    assert len(family) >= 2
+    process.kill()
+    wait_for(lambda: gone(family))
+    # it is read to its end, which comes when the last that could write is gone
+    assert "Traceback" not in process.communicate(timeout=300)[1]
+
+
+def test_a_run_that_sigterm_stopped_goes_on(tmp_path):
+    out = tmp_path / "out"
+    process = begun(out, "40")
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=300)
+    before = signal.getsignal(signal.SIGTERM)
+    assert main(["generate", str(out), *ARGUMENTS, "--images", "40"]) == 0
+    assert signal.getsignal(signal.SIGTERM) == before
+    assert main(["verify", str(out)]) == 0
