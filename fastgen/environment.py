@@ -263,9 +263,11 @@ def sky_luminance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArra
     """
     cells, solid_angle = _sky_geometry(env.sky.shape[0])
     toward = to_map_frame(directions, yaw_deg).astype(np.float32)
-    # by element: threads of a matrix library cost more than they save
-    x, y, z = cells.T[..., None] * toward.T[:, None]
-    nearest = (x + y + z).argmax(axis=1)
+    # by column: threads of a matrix library cost more than they save
+    nearness = np.zeros((len(cells), len(toward)), np.float32)
+    for along, to in zip(cells.T, toward.T, strict=True):
+        nearness += np.outer(along, to)
+    nearest = nearness.argmax(axis=1)
     count = len(toward)
     total = np.bincount(nearest, solid_angle * env.sky.ravel(), minlength=count)
     return (total / np.bincount(nearest, solid_angle, minlength=count)).astype(np.float32)

@@ -1,4 +1,5 @@
-"""How open each vertex of a container or spreader lies to the sky, by depth maps from all around.
+"""How open each vertex of a container or spreader lies to the sky, by depth maps from all around,
+and how much of the light of a sky that lets in.
 
 A point is hidden from a direction where a back face (one turned away from that direction) stands
 before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
@@ -8,6 +9,7 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -142,13 +144,12 @@ class Openness:
         cone: NDArray[np.uint8],
     ) -> None:
         self._normals, number = np.unique(normals, axis=0, return_inverse=True)
-        self._number = number.ravel().astype(np.int32)
+        self._number = _narrow(number)
         # a column after the other is what `under` reads
         self._open_to = np.ascontiguousarray(open_to.T)
-        self._cone = cone
         packed = cone.astype(np.int32) @ np.array([1, 1 << 8, 1 << 16], np.int32)
         _, first, which = np.unique(packed, return_index=True, return_inverse=True)
-        self._toward, self._which = _directions(cone[first]), which.astype(np.int32)
+        self._cones, self._which = cone[first], _narrow(which)
 
     def under(self, sky: Sky) -> NDArray[np.uint8]:
         """As the shader reads it under `sky`, uint8 [V, 4].
@@ -166,18 +167,23 @@ class Openness:
         weight *= (LIGHT_STEPS * whole / weight.sum(axis=1))[:, None]
         sums = _sums_of_eight(weight.reshape(len(weight), -1, 8))
         light = np.zeros(len(self._number), np.float32)
-        row = 256 * self._number
+        row = 256 * self._number.astype(np.int32)
         for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
             light += np.take(table, row + bits)
-        light /= np.take(self._irradiance(sky, self._toward), self._which)
+        light /= np.take(self._irradiance(sky, _directions(self._cones)), self._which)
         found = np.empty((len(light), 4), np.uint8)
-        found[:, :3] = self._cone
+        found[:, :3] = self._cones[self._which]
         found[:, 3] = np.minimum(light + 0.5, 255)  # rounds
         return found
 
     @staticmethod
     def _irradiance(sky: Sky, toward: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.maximum(sky_irradiance(sky.light, toward, sky.yaw_deg), _DARK)
+
+
+def _narrow(index: NDArray[np.intp]) -> NDArray[np.unsignedinteger[Any]]:
+    """Indices [V] in as few bytes as hold them."""
+    return index.ravel().astype(np.min_scalar_type(int(index.max(initial=0))))
 
 
 def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -246,7 +252,7 @@ class SkyProbe:
 
             shape = (len(normals), 3 + DIRECTIONS // 8)
             stored = _from_disk(digest.hexdigest(), shape, make)
-            self._found[key] = Openness(normals, stored[:, 3:], stored[:, :3].copy())
+            self._found[key] = Openness(normals, stored[:, 3:], stored[:, :3])
             if len(self._found) > _CAPACITY:
                 self._found.popitem(last=False)
         self._found.move_to_end(key)
