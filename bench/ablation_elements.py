@@ -9,7 +9,7 @@ from unittest import mock
 
 import numpy as np
 
-from fastgen import openness, programs, renderer
+from fastgen import openness, programs, shapes
 from fastgen.mesh import FACE_AXES, Mesh
 from fastgen.scene import Scene, Spreader
 
@@ -61,9 +61,9 @@ class Absence:
         if element.text:
             yield programs, "expand", self._edited(programs.expand)
         if element.container:
-            yield renderer, "build_container", _built(renderer.build_container, element.container)
+            yield shapes, "build_container", _built(shapes.build_container, element.container)
         if element.spreader:
-            yield renderer, "build_spreader", _built(renderer.build_spreader, element.spreader)
+            yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
         probe = openness.SkyProbe
         yield probe, "openness", _probe(probe.openness, element.open_sky)
         yield probe, "openness_of_spreader", _probe(probe.openness_of_spreader, element.open_sky)

@@ -38,7 +38,7 @@ from pareto_chart import Point, draw, front
 from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
 from results import ROOT, machine, save, write_section
 
-from fastgen import Config, Generator, environment, renderer
+from fastgen import Config, Generator, environment, shapes
 from fastgen.camera import view_of
 from fastgen.export import export_glb
 
@@ -70,8 +70,8 @@ class Variant:
 
 
 def _coarse_mesh() -> Patches:
-    build = renderer.build_container
-    return [(renderer, "build_container", lambda *kind: build(*kind, max_edge_mm=2000.0))]
+    build = shapes.build_container
+    return [(shapes, "build_container", lambda *kind: build(*kind, max_edge_mm=2000.0))]
 
 
 def _light_maps(scale: float) -> Callable[[], Patches]:

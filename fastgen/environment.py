@@ -11,6 +11,7 @@ import hashlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -35,7 +36,7 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
-_SKY_TEXELS = 3  # along a cell of `Ambient.sky`: 5 degrees
+_SKY_CELLS = 42  # along a side of `Ambient.sky`: 5 degrees
 _DFG_POINTS = 4096
 _MAPS = ("specular", "irradiance", "background", "luminance", "sun")
 _SUN_WIDTH = 2048  # a texel is a third of the real sun
@@ -149,9 +150,9 @@ def _light(
 
 def _sky_cells(luminance: NDArray[np.float32]) -> NDArray[np.float32]:
     """Means over cells of an octahedral map [N, N] with a border."""
-    cells = (luminance.shape[0] - 2 * prefilter.BORDER) // _SKY_TEXELS
     inner = luminance[prefilter.BORDER : -prefilter.BORDER, prefilter.BORDER : -prefilter.BORDER]
-    return inner.reshape(cells, _SKY_TEXELS, cells, _SKY_TEXELS).mean(axis=(1, 3))
+    cells = cv2.resize(inner, (_SKY_CELLS, _SKY_CELLS), interpolation=cv2.INTER_AREA)
+    return np.asarray(cells, np.float32)
 
 
 def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> EnvironmentLight:
