@@ -38,7 +38,9 @@ def fill(
         material.shader = "defaultLit"
         texture = np.ascontiguousarray(source.baseColorTexture.convert("RGB"))
         material.albedo_img = o3d.geometry.Image(texture)
-        material.base_roughness, material.base_metallic = source.roughnessFactor, 0.0
+        # glTF leaves out a factor of 1
+        roughness = 1.0 if source.roughnessFactor is None else source.roughnessFactor
+        material.base_roughness, material.base_metallic = roughness, 0.0
         scene.add_geometry(name, mesh, material)
         flat = rendering.MaterialRecord()
         flat.shader = "defaultUnlit"
