@@ -3,7 +3,7 @@
 import numpy as np
 
 from fastgen.camera import View
-from fastgen.environment import Ambient, irradiance_at, metered_luminance
+from fastgen.environment import REC_709, Ambient, irradiance_at, metered_luminance
 from fastgen.scene import Camera, Color
 
 MIDDLE_GREY = 0.18
@@ -11,7 +11,6 @@ MIDDLE_GREY = 0.18
 
 _CENTER_WEIGHT = 0.65
 _MIN_LUMINANCE = 1e-6
-_REC_709 = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, section 3.2
 
 
 def metered_exposure(
@@ -26,8 +25,8 @@ def metered_exposure(
     forward = view.rotation[2]
     toward_camera = -forward * np.array([1.0, 1.0, 0.0])
     toward_camera /= max(float(np.linalg.norm(toward_camera)), 1e-6)
-    falling = float(irradiance_at(light, toward_camera[None], yaw_deg)[0] @ _REC_709)
-    reflectance = float(np.sqrt(MIDDLE_GREY * max(float(np.array(paint) @ _REC_709), 0.02)))
+    falling = float(irradiance_at(light, toward_camera[None], yaw_deg)[0] @ REC_709)
+    reflectance = float(np.sqrt(MIDDLE_GREY * max(float(np.array(paint) @ REC_709), 0.02)))
     behind, _ = metered_luminance(light, forward, view.half_angle_deg, yaw_deg)
     center = max(reflectance * falling, _MIN_LUMINANCE)
     behind = max(behind, _MIN_LUMINANCE)

@@ -1,4 +1,4 @@
-"""A cache of GL objects."""
+"""Caches of what was used last."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -9,24 +9,35 @@ class _Releasable(Protocol):
     def release(self) -> None: ...
 
 
-T = TypeVar("T", bound=_Releasable)
+T = TypeVar("T")
+R = TypeVar("R", bound=_Releasable)
 
 
-class Kept(Generic[T]):
-    """The most recently used GL objects by key; what falls out is released."""
+class Recent(Generic[T]):
+    """The most recently used values by key."""
 
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
         self._items: OrderedDict[object, T] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], T]) -> T:
-        """The object of `key`, made if need be."""
+        """The value of `key`, made if need be."""
         if key not in self._items:
             self._items[key] = make()
             if len(self._items) > self._capacity:
-                self._items.popitem(last=False)[1].release()
+                self._dropped(self._items.popitem(last=False)[1])
         self._items.move_to_end(key)
         return self._items[key]
+
+    def _dropped(self, value: T) -> None:
+        """Called with what falls out."""
+
+
+class Kept(Recent[R]):
+    """GL objects; what falls out is released."""
+
+    def _dropped(self, value: R) -> None:
+        value.release()
 
     def release(self) -> None:
         """Free them all."""

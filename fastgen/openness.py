@@ -6,7 +6,6 @@ before it. Back faces rather than front ones: a lit surface is then no occluder 
 """
 
 import hashlib
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from fastgen import cache
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
+from fastgen.kept import Recent
 from fastgen.mesh import Mesh
 from fastgen.programs import LIGHT_STEPS, link
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
@@ -209,9 +209,9 @@ class SkyProbe:
         # depth maps are the driver's, and so is what is found with them
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
-        self._own: OrderedDict[Mesh, NDArray[np.uint8]] = OrderedDict()
-        self._found: OrderedDict[tuple[Mesh, Mesh | None], Openness] = OrderedDict()
-        self._lit: OrderedDict[tuple[Openness, Sky], bytes] = OrderedDict()
+        self._own: Recent[NDArray[np.uint8]] = Recent(_CAPACITY)
+        self._found: Recent[Openness] = Recent(_CAPACITY)
+        self._lit: Recent[bytes] = Recent(_LIT_CAPACITY)
 
     def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> bytes:
         """`Openness.under` a sky of a container's vertices below the spreader that holds it."""
@@ -226,37 +226,26 @@ class SkyProbe:
     def _under(
         self, sky: Sky, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
     ) -> bytes:
-        openness = self._found_or(key, measure)
-        lit = (openness, sky)
-        if lit not in self._lit:
-            self._lit[lit] = openness.under(sky).tobytes()
-            if len(self._lit) > _LIT_CAPACITY:
-                self._lit.popitem(last=False)
-        self._lit.move_to_end(lit)
-        return self._lit[lit]
+        openness = self._found.get(key, lambda: self._stored(key, measure))
+        return self._lit.get((openness, sky), lambda: openness.under(sky).tobytes())
 
-    def _found_or(
+    def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
     ) -> Openness:
-        if key not in self._found:
-            digest = hashlib.sha256(f"{_VERSION} {self._driver}".encode())
-            for mesh in key:
-                for array in (mesh.positions_mm, mesh.normals, mesh.triangles) if mesh else ():
-                    digest.update(array.tobytes())
-            normals = key[0].normals
+        digest = hashlib.sha256(f"{_VERSION} {self._driver}".encode())
+        for mesh in key:
+            for array in (mesh.positions_mm, mesh.normals, mesh.triangles) if mesh else ():
+                digest.update(array.tobytes())
+        normals = key[0].normals
 
-            def make() -> NDArray[np.uint8]:
-                bits = measure()
-                directions = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
-                return np.concatenate([encoded(normals, directions), bits], axis=1)
+        def make() -> NDArray[np.uint8]:
+            bits = measure()
+            directions = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
+            return np.concatenate([encoded(normals, directions), bits], axis=1)
 
-            shape = (len(normals), 3 + DIRECTIONS // 8)
-            stored = _from_disk(digest.hexdigest(), shape, make)
-            self._found[key] = Openness(normals, stored[:, 3:], stored[:, :3])
-            if len(self._found) > _CAPACITY:
-                self._found.popitem(last=False)
-        self._found.move_to_end(key)
-        return self._found[key]
+        shape = (len(normals), 3 + DIRECTIONS // 8)
+        stored = _from_disk(digest.hexdigest(), shape, make)
+        return Openness(normals, stored[:, 3:], stored[:, :3])
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
         # its faces are long and run into one another: their ends stand for nothing
@@ -267,12 +256,8 @@ class SkyProbe:
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
-        if container not in self._own:
-            body = Body(container.positions_mm, container.triangles)
-            self._own[container] = self._kept(body, points, _MAP_SIZE)
-            if len(self._own) > _CAPACITY:
-                self._own.popitem(last=False)
-        open_to = self._own[container]
+        body = Body(container.positions_mm, container.triangles)
+        open_to = self._own.get(container, lambda: self._kept(body, points, _MAP_SIZE))
         if spreader is not None:
             open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
         return open_to

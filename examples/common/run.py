@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -59,12 +60,12 @@ class Run:
         return self.folder / "cache"
 
 
-class Learner(nn.Module):
+class Learner(nn.Module, ABC):
     """A model that knows its loss."""
 
+    @abstractmethod
     def loss(self, images: list[torch.Tensor], targets: list[Any]) -> torch.Tensor:
         """Loss of a batch, a scalar."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,135 @@
+"""What datasets and loaders refuse: bad arguments, and states that are not theirs."""
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen import Config
+from fastgen.errors import ConfigError
+from fastgen.torch import ContainerDataset, Loader, ShardSampler
+from tests.test_torch import SMALL, dataset, stream
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"task": "damge"}, r"task: 'damge' is unknown \(did you mean damage\?\)"),
+        ({"length": 0}, "length: 0 is not a whole number of 1 to"),
+        ({"cameras": ["A", "D"]}, "cameras: 'D' is none of the imdg task's"),
+        ({"task": "door", "cameras": ["A"]}, "cameras: 'A' is none of the door task's"),
+        ({"cameras": []}, "cameras: name at least one"),
+        ({"split": "trian"}, r"split: 'trian' is unknown \(did you mean train\?\)"),
+        ({"form": "coco"}, "form: 'coco' is unknown"),
+        ({"task": "door", "form": "yolo"}, "form: 'yolo' holds boxes"),
+        ({"size": (10, 10)}, "size: 10x10 is out of range"),
+        ({"curriculum": lambda epoch: 3}, "curriculum: epoch 0 gives 3"),
+        ({"curriculum": lambda epoch: {"damge": {}}}, "curriculum: epoch 0: damge: unknown key"),
+        ({"config": {}}, "config: dict is no Config"),
+        ({"cameras": "A"}, r"cameras: 'A' is no list; give \['A'\]"),
+        ({"length": "9"}, "length: '9' is not a whole number"),
+        (
+            {"curriculum": lambda epoch: {"damage": {"mask_threshold_mm": 9.0}}},
+            "curriculum: epoch 0 changes damage.mask_threshold_mm",
+        ),
+        (
+            {"split": "val", "config": Config.from_values({"split": {"val": 0.0}})},
+            "split: config.split gives val no scenes",
+        ),
+    ],
+)
+def test_bad_arguments_are_named(arguments, words):
+    with pytest.raises(ConfigError, match=words):
+        ContainerDataset(**{"task": "imdg", "size": SMALL, **arguments})
+
+
+def test_bad_ranks_states_and_batches_are_named():
+    for rank, world, words in ((2, 2, "rank: 2 is out of range"), (0, None, "give both")):
+        with pytest.raises(ConfigError, match=words):
+            ShardSampler(dataset(), rank, world)
+    with pytest.raises(ConfigError, match="batch_size: 0"):
+        Loader(dataset(), batch_size=0)
+    with pytest.raises(ConfigError, match="a stream has its own"):
+        Loader(stream(), shuffle=True)
+    with pytest.raises(ConfigError, match="epoch: -1"):
+        dataset().set_epoch(-1)
+    with pytest.raises(ConfigError, match="state: was taken with another length"):
+        Loader(dataset(24)).load_state_dict(Loader(dataset(23)).state_dict())
+    with pytest.raises(ConfigError, match="state: has no 'position'"):
+        Loader(dataset()).load_state_dict({"epoch": 1})
+    with pytest.raises(IndexError, match="position 23"):
+        dataset()[23]
+
+
+def picture(path, level):
+    radiance = np.full((128, 256, 3), level, np.float32)
+    assert cv2.imwrite(str(path), radiance)
+
+
+def test_a_state_fits_loaders_of_the_same_light_alone(tmp_path):
+    folders = [tmp_path / name for name in ("one", "moved", "other")]
+    for folder, level in zip(folders, (0.5, 0.5, 0.7), strict=True):
+        folder.mkdir()
+        picture(folder / "sky.hdr", level)
+    one, moved, other = (Loader(dataset(hdri_dir=folder)) for folder in folders)
+    state = json.loads(json.dumps(one.state_dict()))
+    moved.load_state_dict(state)  # another path, but the same bytes
+    for loader in (other, Loader(dataset())):
+        with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
+            loader.load_state_dict(state)
+
+
+def test_a_state_fits_loaders_whose_curriculum_teaches_the_same():
+    def rarer(epoch):
+        return {"damage": {"probability": 1.0 / (1 + epoch)}}
+
+    def taught(curriculum, epoch=0):
+        loader = Loader(dataset(curriculum=curriculum))
+        loader.set_epoch(epoch)
+        return loader
+
+    state = json.loads(json.dumps(taught(rarer, 5).state_dict()))
+    taught(lambda epoch: Config.from_values(rarer(epoch))).load_state_dict(state)
+    for other in (
+        None,
+        lambda epoch: rarer(epoch + 1),
+        lambda epoch: rarer(0 if epoch == 1 else epoch),
+        lambda epoch: rarer(min(epoch, 3)),
+        lambda epoch: [rarer(0), rarer(1)][epoch],  # has no epoch 5
+    ):
+        with pytest.raises(ConfigError, match="state: was taken with another curriculum"):
+            taught(other).load_state_dict(state)
+    short = taught(lambda epoch: [rarer(0)][epoch])
+    short.load_state_dict(short.state_dict())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"position": "x"}, "state.position: 'x' is not a whole number of 0"),
+        ({"position": -3}, "state.position: -3 is not a whole number of 0"),
+        ({"position": 300}, "state.position: 300 is not a whole number of 0 to 23"),
+        ({"epoch": None}, "state.epoch: None is not a whole number"),
+    ],
+)
+def test_a_state_of_no_place_is_refused_and_changes_nothing(change, words):
+    loader = Loader(dataset())
+    loader.set_epoch(2)
+    state = loader.state_dict()
+    with pytest.raises(ConfigError, match=words):
+        loader.load_state_dict({**state, "epoch": 7, **change})
+    assert loader.state_dict() == state
+
+
+@pytest.mark.parametrize("position", ["a", 1.5, None])
+def test_only_whole_numbers_are_positions(position):
+    with pytest.raises(TypeError, match="is no whole number"):
+        dataset()[position]
+
+
+def test_transforms_that_return_no_pair_are_named():
+    data = dataset(transforms=lambda image, target: None)
+    with pytest.raises(ConfigError, match="transforms: gave NoneType; return the pair"):
+        data[0]
+    data.close()
