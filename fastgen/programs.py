@@ -77,7 +77,6 @@ of it than the surface does, hence up to twice as much."""
 
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
-MAX_SAMPLES_PER_AXIS = 3
 
 GUTTER_STEPS = 17
 """Times that a part is laid on a baked atlas: itself, then shifted for two rings of texels."""
@@ -236,7 +235,6 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "HOLE_REACH": f"{fields.HOLE_REACH}",
         "PORTAL_CHART": f"{PORTAL_CHART}u",
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
-        "TAKEN": "0xffffffffu",
         "SUN": int(sun),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,

@@ -1,4 +1,7 @@
-"""Where a dataset lies: a folder, or any address that fsspec knows. Files arrive whole or not."""
+"""Where a dataset lies: a folder, or any address that fsspec knows. Files arrive whole or not.
+
+Paths within it are relative, with forward slashes.
+"""
 
 import contextlib
 import ctypes
@@ -6,9 +9,9 @@ import fcntl
 import os
 import shutil
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Files, Same
@@ -20,34 +23,6 @@ LOCK = ".lock"
 
 _BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
 """Protocols of fsspec's object stores."""
-
-
-class Storage(Protocol):
-    """What the rest asks of a place. Paths are relative, with forward slashes."""
-
-    def commit(self, files: Files, name: str) -> None:
-        """Put all files in place; each is there whole or not at all, whatever happens meanwhile."""
-        ...
-
-    def write(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Put one file in place, whole or not at all."""
-        ...
-
-    def make_folders(self, paths: Iterable[str]) -> None:
-        """Have these folders even where nothing is in them."""
-        ...
-
-    def read(self, path: str) -> bytes:
-        """Content of a file. Raises FileNotFoundError."""
-        ...
-
-    def remove(self, path: str) -> None:
-        """Be without a file, whether it was there or not."""
-        ...
-
-    def sizes(self) -> Mapping[str, int]:
-        """Every file by path with its size in bytes, those set aside left out."""
-        ...
 
 
 class Folder:

@@ -33,16 +33,11 @@ class Findings:
     manifest: dict[str, Any] = field(default_factory=dict)
 
 
-def verify(out: str) -> list[str]:
-    """Faults found in the dataset at `out`, each a line that names a file; empty when all is well.
+def examine(out: str) -> Findings:
+    """What is wrong with the dataset at `out`, and what a repair of it needs to know.
 
     Raises OutputError when `out` is no dataset.
     """
-    return examine(out).faults
-
-
-def examine(out: str) -> Findings:
-    """As `verify`, with what a repair needs to know."""
     storage = storage_of(out)
     try:
         text = storage.read(MANIFEST)

@@ -1,7 +1,7 @@
 """Sample -> image and target tensors for each task of the paper, and their collate functions.
 
-What is labelled at all is decided where the files are written: coco.instances, yolo.detections,
-text_crops and door_class.
+What is labelled at all is decided where the files are written: formats.damage.instances,
+yolo.detections, text_crops and door_class.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,8 +33,6 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "text": (),
     "door": DOOR_CLASSES,
 }
-
-TASKS = tuple(_NAMES)
 
 FORMS = ("detection", "yolo")
 
