@@ -21,7 +21,7 @@ from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
 from fastgen.programs import LAYERS
-from fastgen.records import check_fields, nearest, whole
+from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import one_container_each, possible_shapes, sample_scene
@@ -51,8 +51,7 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
         raise ConfigError("camera: the scene has none; give a Camera")
     if name is None:
         return scene.cameras[0]
-    if name not in names:
-        raise ConfigError(f"camera: {name!r} is unknown{nearest(name, names)}")
+    check_known("camera", name, names)
     return scene.camera(name)
 
 
@@ -90,12 +89,8 @@ class Generator:
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.size = _whole_size(size)
-        for name, value, known in (
-            ("quality", quality, tuple(QUALITY)),
-            ("backend", backend, BACKENDS),
-        ):
-            if value not in known:
-                raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, known)}")
+        check_known("quality", quality, tuple(QUALITY))
+        check_known("backend", backend, BACKENDS)
         self.backend = backend
         for name, rig in self.config.cameras.items():
             for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
@@ -170,8 +165,7 @@ class Generator:
         """
         if labels is not None:
             check_fields(labels, LabelConfig, "labels")
-        if layer not in LAYERS:
-            raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
+        check_known("layer", layer, LAYERS)
         scene, camera = self._chosen(index, camera, scene)
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
