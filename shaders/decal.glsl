@@ -1,6 +1,6 @@
 // DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
 
-uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decals.py
+uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decal_tables.py
 uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
 uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
 uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline; share of ink
