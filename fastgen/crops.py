@@ -10,8 +10,6 @@ from fastgen.sample import Object, Sample
 
 _CROP_MARGIN_PX = 3
 _LEGIBLE_FRACTION = 0.85
-_CORNER = 16
-"""labels.outlines_mm puts this many points on each side of an outline."""
 
 
 def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDArray[np.uint8]]]:
@@ -40,8 +38,7 @@ def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
     if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
         return False
     decal = decal_of(sample.scene, item.id)
-    outline = np.array(item.polygon).reshape(-1, 2)
-    corners = outline[[0, _CORNER, 2 * _CORNER, 3 * _CORNER]]
-    across = np.linalg.norm(corners[1] - corners[0]) / decal.size_mm[0]
-    up = np.linalg.norm(corners[3] - corners[0]) / decal.size_mm[1]
+    upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)
+    across = np.linalg.norm(lower_right - lower_left) / decal.size_mm[0]
+    up = np.linalg.norm(upper_left - lower_left) / decal.size_mm[1]
     return bool(min(across, up) * decal.cap_mm >= min_text_px)

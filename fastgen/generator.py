@@ -29,6 +29,7 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
+from fastgen.shapes import spreader_mesh
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -128,16 +129,12 @@ class Generator:
     @property
     def renderer_name(self) -> str:
         """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
-        self._open()
-        assert self._gl is not None
-        return self._gl.renderer
+        return self._context().renderer
 
     @property
     def used_backend(self) -> str:
         """Which backend 'auto' came to: egl or osmesa."""
-        self._open()
-        assert self._gl is not None
-        return self._gl.backend
+        return self._context().backend
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
@@ -173,7 +170,7 @@ class Generator:
         if layer == "all" and is_needed(camera, scene.weather):
             airlight = self._airlight(scene, camera)
             frame = develop(frame, view, camera, scene.weather, airlight)
-        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
+        mesh, spreader = renderer.mesh(scene.container), spreader_mesh(scene)
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
@@ -223,16 +220,13 @@ class Generator:
         scene, camera = self._chosen(index, camera, scene)
         renderer = self._open()
         if self._cuda is None:
-            assert self._gl is not None
-            self._cuda = CudaFrames(self._gl, self.size)
+            self._cuda = CudaFrames(self._context(), self.size)
         image, labels, depth = self._cuda.take(renderer.draw(scene, camera, self.size))
         return CudaFrame(image, labels, depth, scene, camera, view_of(camera, self.size))
 
     def cuda_reason(self) -> str:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
-        self._open()
-        assert self._gl is not None
-        return cuda_reason(self._gl)
+        return cuda_reason(self._context())
 
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
@@ -326,6 +320,11 @@ class Generator:
             assert self._gl is not None
             self._gl.make_current()  # another generator may have been at work in between
         return self._renderer
+
+    def _context(self) -> GLContext:
+        self._open()
+        assert self._gl is not None
+        return self._gl
 
     def _hdri(self, name: str) -> Path:
         if name not in self._hdris:

@@ -37,7 +37,7 @@ from fastgen.programs import (
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes, spreader_mesh
+from fastgen.shapes import Shapes
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
@@ -264,10 +264,6 @@ class Renderer:
     def mesh(self, container: Container) -> Mesh:
         """The rest mesh of a container, as it is drawn."""
         return self._shapes.container(container).mesh
-
-    def spreader_mesh(self, scene: Scene) -> Mesh | None:
-        """The spreader's mesh as it is built, None where the scene has none."""
-        return spreader_mesh(scene)
 
     def release(self) -> None:
         """Free every GL object that this renderer made."""

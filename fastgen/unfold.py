@@ -154,20 +154,13 @@ def polygon(points_mm: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
 
 def beside(patches: Sequence[Patch]) -> Patch:
     """Patches on one sheet, upright and side by side."""
-    x, first = 0.0, 0
-    parts, triangles = [], []
+    x = 0.0
+    parts = []
     for patch in patches:
         placed = (patch.turned() if patch.size_mm[0] > patch.size_mm[1] else patch).at(x, 0.0)
         parts.append(placed)
-        triangles.append(placed.triangles + first)
         x += float(placed.size_mm[0]) + _SPACE_MM
-        first += len(placed.positions_mm)
-    return Patch(
-        np.concatenate([p.positions_mm for p in parts]),
-        np.concatenate([p.normals for p in parts]),
-        np.concatenate([p.sheet_mm for p in parts]),
-        np.concatenate(triangles),
-    )
+    return joined(parts)
 
 
 def joined(patches: Sequence[Patch]) -> Patch:

@@ -15,6 +15,7 @@ from fastgen.container import build_container
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.scene import Decal, Scene, Spreader
+from fastgen.shapes import spreader_mesh
 from fastgen.spreader import build_spreader, tier_bounds_mm
 from tests import oracle
 from tests.mesh_probe import ISO_668, first_hits, winding_normals
@@ -217,7 +218,7 @@ def test_paint_of_the_spreader_is_the_scenes(generator):
 def test_the_renderer_gives_the_mesh_that_it_draws(generator):
     scene = generator.scene(1)
     generator.render(scene=scene, camera="B")
-    mesh = generator._open().spreader_mesh(scene)
+    mesh = spreader_mesh(scene)
     pixels, depth = view_of(scene.camera("B"), SIZE).project(mesh.positions_mm)
     assert (depth > 0).all()
     sample = generator.render(scene=scene, camera="B")
@@ -228,7 +229,7 @@ def test_the_renderer_gives_the_mesh_that_it_draws(generator):
     assert max(low[1], 0) - 1 <= y0
     assert y1 <= high[1] + 1
     none = replace(scene, spreader=Spreader(present=False))
-    assert generator._open().spreader_mesh(none) is None
+    assert spreader_mesh(none) is None
     assert not (generator.render(scene=none, camera="B").ids == oracle.SPREADER).any()
 
 
