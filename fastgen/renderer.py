@@ -192,7 +192,7 @@ class Renderer:
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        self._sun_shadow.cast(container, spreader, toward)
+        self._sun_shadow.cast(container, spreader, toward, scene.damages)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:
