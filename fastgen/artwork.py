@@ -142,11 +142,14 @@ def glyph_coverage(tiles: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
     Mip levels of it keep the ink that those of distances lose where strokes are thin.
     """
-    side = GLYPH_TILE_SIZE * _INK_SAMPLES
-    fine = np.stack([cv2.resize(t, (side, side), interpolation=cv2.INTER_LINEAR) for t in tiles])
-    shape = (len(tiles), GLYPH_TILE_SIZE, _INK_SAMPLES, GLYPH_TILE_SIZE, _INK_SAMPLES)
-    share = (fine >= 128).reshape(shape).mean(axis=(2, 4))
-    return np.asarray(np.rint(share * 255), np.uint8)
+    return np.stack([_ink(tile) for tile in tiles])
+
+
+def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    side = GLYPH_TILE_SIZE
+    fine = cv2.resize(distances, (side * _INK_SAMPLES,) * 2, interpolation=cv2.INTER_LINEAR)
+    _, ink = cv2.threshold(fine, 127, 255, cv2.THRESH_BINARY)
+    return np.asarray(cv2.resize(ink, (side, side), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 @lru_cache(maxsize=1)
