@@ -42,7 +42,7 @@ from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
-from fastgen.textures import mipmapped_array, noise_texture
+from fastgen.textures import art_texture, mipmapped_array, noise_texture
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
@@ -102,7 +102,7 @@ class Renderer:
         self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
-        self._art = mipmapped_array(self._ctx, art)
+        self._art = art_texture(gl, art)
         texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
         self._tiles = mipmapped_array(self._ctx, texels)
         self._noise = noise_texture(self._ctx)
@@ -192,7 +192,7 @@ class Renderer:
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        self._sun_shadow.cast(container, spreader, toward)
+        self._sun_shadow.cast(container, spreader, toward, scene.damages)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:

@@ -34,18 +34,19 @@ class Folder:
     def commit(self, files: Files, name: str) -> None:
         """Write aside, flush, rename. name: distinguishes this commit from others under way."""
         aside = self.root / f"{ASIDE}-{name}-{uuid.uuid4().hex}"
+        places = {path: aside / str(number) for number, path in enumerate(files)}
         try:
+            aside.mkdir()
             for path, content in files.items():
-                target = aside / path
-                target.parent.mkdir(parents=True, exist_ok=True)
                 if isinstance(content, Same):
-                    _link(aside / content.path, target)
+                    _link(places[content.path], places[path])
                 else:
-                    target.write_bytes(content)
+                    places[path].write_bytes(content)
             _flush(aside)
-            for path in files:
-                (self.root / path).parent.mkdir(parents=True, exist_ok=True)
-                _move(aside / path, self.root / path)
+            for folder in {(self.root / path).parent for path in files}:
+                folder.mkdir(parents=True, exist_ok=True)
+            for path, place in places.items():
+                _move(place, self.root / path)
         except FileNotFoundError as error:
             raise OutputError(f"{self.root}: vanished while it was written ({error})") from None
         except OSError as error:
