@@ -35,7 +35,7 @@ from ablation_elements import ELEMENTS, Absence
 from cycles_figures import Figures
 from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
-from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator, environment, shapes
@@ -214,7 +214,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="variants whose name holds this")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "pareto.png")
     options = parser.parse_args()
-    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    chosen = traced(options.cases)
     about = machine()
     caption = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}"
     points = [
