@@ -52,7 +52,7 @@ def write_jobs(
             visible = set(np.unique(sample.ids).tolist())
             exposure = generator.exposure(scene, scene.camera(name))
             seen = sorted(visible & markers.keys())
-            shots.append(_shot(name, sample.view, exposure, seen))
+            shots.append(shot(name, sample.view, exposure, seen))
             keep = [0, 1, *markers]
             # texts are part of the container here, as they are no objects of the peers
             ids = np.where(np.isin(sample.ids, keep), sample.ids, 1).astype(np.uint16)
@@ -85,7 +85,8 @@ def _markers(scene: Scene) -> dict[int, Decal]:
     return {number: decal for number, decal in numbered if decal.kind == "marker"}
 
 
-def _shot(name: str, view: View, exposure: float, markers: list[int]) -> dict[str, Any]:
+def shot(name: str, view: View, exposure: float, markers: list[int]) -> dict[str, Any]:
+    """A view as peer_renderers/measure.py wants it."""
     pose = np.eye(4)
     right, down, forward = view.rotation
     pose[:3, :3] = np.stack([right, -down, -forward], axis=1)

@@ -15,7 +15,7 @@ import fastgen
 from fastgen import doctor, stats
 from fastgen.config import Config
 from fastgen.encode import jpeg, png, write
-from fastgen.errors import ConfigError, FastgenError, OutputError
+from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb
 from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
@@ -259,10 +259,7 @@ def _show(options: argparse.Namespace) -> int:
         image = label_colors(sample.ids if layer == "ids" else sample.damage)
     if options.overlay:
         image = overlay(sample, image)
-    try:
-        write(options.file, encode(image))
-    except OSError as error:
-        raise OutputError(f"{options.file}: cannot be written ({error.strerror})") from None
+    write(options.file, encode(image))
     return 0
 
 

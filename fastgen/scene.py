@@ -10,6 +10,8 @@ measured along the unfolded sheet.
 import json
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
 from fastgen.records import UNIT, bounds, from_plain, to_plain
@@ -17,6 +19,10 @@ from fastgen.sensor.parts import WHOLE, Lens, Sensor, Weather
 from fastgen.spreader import GAP_LIMITS_MM
 
 Color = tuple[float, float, float]
+
+REC_709 = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of a linear colour is its product with this; ITU-R BT.709-6, section 3.2."""
+
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 
