@@ -17,7 +17,7 @@ from fastgen.damage_config import DamageConfig
 from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
-from fastgen.records import UNIT, Range, bounds, check_known, from_plain, nearest, to_plain
+from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
 from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
@@ -222,8 +222,7 @@ class Config:
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
         """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
-        if name not in tuple(PRESETS):
-            raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
+        check_known("preset", name, tuple(PRESETS))
         return from_plain(Config, PRESETS[name], base=Config())
 
     @staticmethod

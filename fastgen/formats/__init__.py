@@ -19,9 +19,8 @@ from fastgen.camera import View
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.config import LabelConfig
 from fastgen.encode import jpeg
-from fastgen.errors import ConfigError
 from fastgen.programs import CONTAINER_ID
-from fastgen.records import nearest
+from fastgen.records import check_known
 from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene
 
@@ -115,8 +114,7 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     """Formats by name. Raises ConfigError for an unknown one."""
     known = known_formats()
     for name in names:
-        if name not in known:
-            raise ConfigError(f"also: {name!r} is no format{nearest(name, known)}")
+        check_known("also", name, known)
     return [known[name] for name in names]
 
 
