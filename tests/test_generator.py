@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fastgen.camera import view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
@@ -189,3 +190,26 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         monkeypatch.setattr("fastgen.renderer.GpuLight", never)
         for index in range(30):
             generator.render(index)
+
+
+def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see():
+    rig = {"focal_mm": 20, "distance_mm": 9000, "roll_deg": 0}
+    plumb = {"azimuth_deg": 0, "elevation_deg": 0, "target_shift_mm": 0}
+    cameras = {
+        "top": {"face": "roof", **rig},
+        "plumb": {"face": "roof", **rig, **plumb},
+        "pit": {"face": "underside", **rig},
+    }
+    with Generator(Config.from_values({"cameras": cameras}), seed=1, size=SIZE) as generator:
+        for index in range(3):
+            scene = generator.scene(index)
+            for camera in scene.cameras:
+                across, down, _ = view_of(camera, SIZE).rotation @ [1.0, 0.0, 0.0]
+                assert across > 0.9
+                assert abs(down) < 0.01
+            plumb = scene.camera("plumb")
+            x, y, z = plumb.position_mm
+            beside = replace(plumb, position_mm=(x + 30, y - 20, z))
+            exposures = [generator.exposure(scene, camera) for camera in (plumb, beside)]
+            assert exposures[0] == pytest.approx(exposures[1], rel=0.02)
+            assert generator.render(scene=scene, camera="plumb").image.mean() > 25
