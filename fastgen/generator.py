@@ -275,13 +275,13 @@ class Generator:
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
-        if self._process == os.getpid():
+        if self._process == os.getpid() and self._gl is not None:
+            self._gl.make_current()  # else what has the same names in another is freed
             if self._cuda is not None:
                 self._cuda.release()
             if self._renderer is not None:
                 self._renderer.release()
-            if self._gl is not None:
-                self._gl.release()
+            self._gl.release()
         self._cuda, self._renderer, self._gl = None, None, None
 
     def __enter__(self) -> Self:

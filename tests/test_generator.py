@@ -192,6 +192,18 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
             generator.render(index)
 
 
+def test_closing_one_generator_leaves_another_as_it_is():
+    with Generator(seed=2, size=SIZE) as kept:
+        before = kept.render(index=0)
+        with Generator(seed=1, size=SIZE) as other:
+            other.render(index=0)
+            kept.render(index=0)  # so that the other is not current when it goes
+        after = kept.render(index=0)
+        np.testing.assert_array_equal(after.image, before.image)
+        np.testing.assert_array_equal(after.ids, before.ids)
+        assert after.objects == before.objects
+
+
 def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see():
     rig = {"focal_mm": 20, "distance_mm": 9000, "roll_deg": 0}
     plumb = {"azimuth_deg": 0, "elevation_deg": 0, "target_shift_mm": 0}
