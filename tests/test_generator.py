@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+import psutil
 import pytest
 
 from fastgen.camera import view_of
@@ -202,6 +203,20 @@ def test_closing_one_generator_leaves_another_as_it_is():
         np.testing.assert_array_equal(after.image, before.image)
         np.testing.assert_array_equal(after.ids, before.ids)
         assert after.objects == before.objects
+
+
+def test_generators_dropped_unclosed_do_not_pile_up():
+    def resident_mib():
+        return psutil.Process().memory_info().rss / 2**20
+
+    with Generator(seed=2, size=SIZE, quality="draft") as kept:
+        before = kept.render(index=0)
+        Generator(seed=1, size=SIZE, quality="draft").render(index=0)
+        start = resident_mib()
+        for _ in range(6):
+            Generator(seed=1, size=SIZE, quality="draft").render(index=0)
+        assert resident_mib() - start < 250  # each holds 130
+        np.testing.assert_array_equal(kept.render(index=0).image, before.image)
 
 
 def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see():
