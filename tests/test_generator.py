@@ -193,6 +193,14 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
             generator.render(index)
 
 
+def test_a_sample_prints_in_one_line(generator):
+    sample = generator.render(index=3, camera="Cr")
+    words = repr(sample)
+    assert "index 3" in words
+    assert "'Cr'" in words
+    assert len(words) < 120
+
+
 def test_closing_one_generator_leaves_another_as_it_is():
     with Generator(seed=2, size=SIZE) as kept:
         before = kept.render(index=0)
