@@ -57,8 +57,6 @@ VARIANTS = (
     Variant("port_blue_hour", ("dusk", "night", "port", "waterside"), 8, (-20, 16, 7.0),
             (-6.0, 60), Clouds(0.25, 3.0, 0.3, 5.0, 9.0, 15), sky_level=0.045, haze_km=10.0,
             lamps=0.7, cranes=((40.0, False), (-80.0, False)), ship_m=90.0),
-    Variant("port_rain", ("overcast", "port"), 9, (-40, 112, 9.5), (55, -60),
-            Clouds(0.99, 0.6, 1.0, 8.0, 8.0, 17), wet=1.0, haze_km=1.3),
     Variant("port_afternoon", ("day", "port", "waterside"), 10, (4, 30, 6.5), (38, -75),
             Clouds(0.46, 1.2, 1.1, 9.0, 5.0, 21), haze_km=11.0, ship_m=175.0,
             cranes=((-46.0, False), (56.0, True), (120.0, False))),
@@ -350,8 +348,8 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     options.add_argument("names", nargs="*", help="default: all that are missing in --out")
     options.add_argument("--out", type=Path, default=HDRI)
-    options.add_argument("--width", type=int, default=3072)
-    options.add_argument("--samples", type=int, default=24)
+    options.add_argument("--width", type=int, default=4096)
+    options.add_argument("--samples", type=int, default=6)
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
     for v in VARIANTS:

@@ -26,7 +26,7 @@ import numpy as np
 from ablation_elements import ELEMENTS, Absence, Element
 from image_error import displayed, flip
 from numpy.typing import NDArray
-from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import machine, parse_size, save, write_section
 
 from fastgen import Config, Generator
@@ -162,7 +162,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="elements whose group or name holds this")
     options = parser.parse_args()
     size = parse_size(options.size)
-    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    chosen = traced(options.cases)
     about = machine()
     lines = [
         f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}, no GPU.",

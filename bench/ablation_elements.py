@@ -169,9 +169,7 @@ ELEMENTS = (
     Element("surface", "worn reflection", text=_layer("REFLECTION")),
     Element("prints", "markers", _without_decals("marker")),
     Element("prints", "texts", _without_decals("text")),
-    Element(
-        "prints", "stickers, emblems, stripes", _without_decals("sticker", "emblem", "stripes")
-    ),
+    Element("prints", "stickers, emblems, stripes", _without_decals("sticker", "emblem")),
     Element("prints", "wear of prints", _fresh_print),
     Element("shape", "damage", lambda scene: replace(scene, damages=())),
     Element(

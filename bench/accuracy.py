@@ -32,7 +32,7 @@ from cycles_figures import Figures, equal_samples
 from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
-from reference_set import DEPTH_STEP, FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from reference_set import DEPTH_STEP, FILTERS, SEED, SIZE, Case, Reference, cases, load, traced
 from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator
@@ -217,7 +217,7 @@ def main() -> None:
         subprocess.run(command, check=True)
         packer = str(Path(__file__).with_name("pack_references.py"))
         subprocess.run([sys.executable, packer], check=True)
-    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    chosen = traced(options.cases)
     if len(chosen) < options.cases:
         print(f"{options.cases - len(chosen)} references are missing: give --blender-python")
     if not chosen:

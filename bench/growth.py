@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +26,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import cv2
 import matplotlib.pyplot as plt
 import numpy as np
-from markers import with_markers
 from matplotlib.axes import Axes
 from results import RESULTS, ROOT, machine, parse_size, save
 from throughput import generate_command, whole_run
 
 from fastgen import Config, Generator
+from fastgen.classes import MARKER_CLASSES
 from fastgen.environment import load_environment
 from fastgen.hdri import bundled_hdris, load_radiance
-from fastgen.scene import Scene
+from fastgen.scene import Decal, Scene
 
 SIZES = ("320x320", "640x640", "1024x768", "1333x800", "1920x1080", "2560x1440")
 MARKERS = (1, 4, 16, 32, 64)
@@ -42,6 +43,8 @@ HDRI_WIDTHS = (512, 1024, 2048, 4096, 8192)
 SCENES = 3
 LENGTH_STEP = 100
 _POLL_S = 0.5
+_COLUMNS, _STEP_MM, _SIZE_MM = 8, 240.0, 200.0
+"""Of markers on the door."""
 
 Table = dict[str, list[float]]
 """Columns of equal length by name."""
@@ -71,6 +74,17 @@ def pixels(rounds: int) -> Table:
             table["ms"].append(frame_ms(generator, views, rounds))
         table["pixels"].append(width * height)
     return table
+
+
+def with_markers(scene: Scene, count: int) -> Scene:
+    """`scene` with `count` markers in rows on its door, and nothing else on it."""
+    decals = []
+    for i in range(count):
+        row, column = divmod(i, _COLUMNS)
+        name = MARKER_CLASSES[i % len(MARKER_CLASSES)]
+        center = (250 + column * _STEP_MM, 250 + row * _STEP_MM)
+        decals.append(Decal("marker", name, "door", center, (_SIZE_MM, _SIZE_MM), art=name))
+    return replace(scene, decals=tuple(decals), damages=())
 
 
 def markers(rounds: int) -> Table:

@@ -1,6 +1,8 @@
 """Error measures between images, and the way from radiance to what is displayed."""
 
+import importlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +12,6 @@ from fastgen.sample import Sample
 
 STEP_M = 0.15
 OCCLUDED = 0.8  # ambient occlusion below this is a corner or the valley of a wave
-
-_NEEDS = "FLIP and SSIM need what pip install '.[accuracy]' brings"
 
 Array = NDArray[np.floating]
 Measures = tuple[float, float, float]
@@ -60,12 +60,11 @@ class Comparison:
     def of(reference: Array, test: Array) -> "Comparison":
         """Compare `test` with `reference`. Andersson et al. 2020, FLIP; at its default viewing
         distance, 67 pixels a degree."""
-        try:  # here, so that --help needs neither this nor FLIP
-            from skimage.metrics import structural_similarity
-        except ImportError:
-            raise SystemExit(_NEEDS) from None
+        metrics = _imported("skimage.metrics")
         a, b = reference.astype(np.float32), test.astype(np.float32)
-        _, similarity = structural_similarity(a, b, channel_axis=2, data_range=1.0, full=True)
+        _, similarity = metrics.structural_similarity(
+            a, b, channel_axis=2, data_range=1.0, full=True
+        )
         return Comparison(flip(a, b), similarity.mean(axis=2), ((a - b) ** 2).mean(axis=2))
 
     def measures(self, where: NDArray[np.bool_]) -> Measures:
@@ -80,13 +79,18 @@ class Comparison:
 
 def flip(reference: Array, test: Array) -> Array:
     """FLIP [H, W] alone, between sRGB images in 0..1."""
-    try:
-        import flip_evaluator
-    except ImportError:
-        raise SystemExit(_NEEDS) from None
+    evaluator = _imported("flip_evaluator")
     a, b = reference.astype(np.float32), test.astype(np.float32)
-    found: Array = flip_evaluator.evaluate(a, b, "LDR", applyMagma=False)[0][..., 0]
+    found: Array = evaluator.evaluate(a, b, "LDR", applyMagma=False)[0][..., 0]
     return found
+
+
+def _imported(name: str) -> Any:
+    """A module of the extra `accuracy`, imported at its use, so that --help needs none of it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise SystemExit("FLIP and SSIM need what pip install '.[accuracy]' brings") from None
 
 
 def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:

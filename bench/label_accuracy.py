@@ -25,6 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import cv2
 import matplotlib.pyplot as plt
 import numpy as np
+from results import ROOT
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -217,7 +218,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=500)
     parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--chart", type=Path, default=Path("docs/label_accuracy.png"))
+    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "label_accuracy.png")
     options = parser.parse_args()
     exactness(options.scenes, options.size)
     against_the_paper(max(options.scenes // 10, 2), options.chart)

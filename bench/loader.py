@@ -33,7 +33,7 @@ WORKERS = (1, 2)
 
 
 class JpegDataset(Dataset[Any]):
-    """Images and YOLO targets that `save` wrote."""
+    """Images and YOLO targets that `save_items` wrote."""
 
     def __init__(self, folder: Path, length: int) -> None:
         self._folder, self._length = folder, length

@@ -35,7 +35,8 @@ from ablation_elements import ELEMENTS, Absence
 from cycles_figures import Figures
 from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
-from reference_set import FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
+from peer_jobs import shot
+from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import ROOT, machine, save, write_section
 
 from fastgen import Config, Generator, environment, shapes
@@ -158,12 +159,8 @@ def write_pyrender_job(chosen: list[Case], repeats: int, folder: Path) -> None:
                 node = "marker_2" if name.startswith("spreader") else f"container {name}"
                 whole.add_geometry(part, node_name=node, geom_name=node)
             file.write_bytes(whole.export(file_type="glb"))
-            view = view_of(camera, SIZE)
-            right, down, forward = view.rotation
-            pose = np.eye(4)
-            pose[:3, :3], pose[:3, 3] = np.stack([right, -down, -forward], axis=1), view.position_m
-            shot = {"camera": case.camera, "pose": pose.tolist(), "focal_px": view.focal_px}
-            shots = [{**shot, "exposure": generator.exposure(scene, camera), "markers": []}]
+            exposure = generator.exposure(scene, camera)
+            shots = [shot(case.camera, view_of(camera, SIZE), exposure, [])]
             scenes.append(
                 {"index": case.number, "glb": file.name, "hdri": "", "yaw_deg": 0.0, "shots": shots}
             )
@@ -214,7 +211,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="variants whose name holds this")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "pareto.png")
     options = parser.parse_args()
-    chosen = [c for c in cases()[: options.cases] if (FOLDER / f"{c.number:02d}.npz").exists()]
+    chosen = traced(options.cases)
     about = machine()
     caption = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}"
     points = [

@@ -19,6 +19,7 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
 import moderngl
+from results import parse_size
 
 from fastgen import Config, Generator
 from fastgen.gpu_mesh import GpuMesh
@@ -116,7 +117,7 @@ def main() -> None:
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--damage", type=float, help="share of scenes with damage")
     options = parser.parse_args()
-    width, height = (int(v) for v in options.size.split("x"))
+    width, height = parse_size(options.size)
     values = {} if options.damage is None else {"damage": {"probability": options.damage}}
     times, pixels = measure(
         Config.from_values(values), (width, height), options.scenes, options.repeats

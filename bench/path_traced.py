@@ -30,7 +30,7 @@ _MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # the narrowest filter that Cycles takes: a ray through the pixel centre
 
 
-def extras(path: Path) -> dict[str, Any]:
+def read_tree(path: Path) -> dict[str, Any]:
     """The JSON part of a GLB file (glTF 2.0, section 4.4)."""
     with path.open("rb") as file:
         file.seek(12)
@@ -44,7 +44,7 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     """Make the GLB file the current scene, seen by `camera` and lit by `hdri` (equirectangular)."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(path))
-    tree = extras(path)
+    tree = read_tree(path)
     node = next(n for n in tree["nodes"] if n["name"] == camera and "camera" in n)
     scene = bpy.context.scene
     scene.camera = bpy.data.objects[camera]

@@ -1,10 +1,9 @@
 """Scenes of fastgen as job folders that any renderer can be given: GLB, HDR light, cameras.
 
-The container is what `fastgen export` writes. Where that has no texture yet, a tinted one of
-TEXTURE_SIDE texels stands in, so that peers sample a texture as large as a baked one would be.
-Every marker is a mesh of its own that follows the corrugation 3 mm before the sheet, with its
-artwork as texture, because peers can only tell apart what is an object. Texts, rust, dirt and
-scratches are left out: what peers draw is simpler than what fastgen draws.
+The container is what `fastgen export` writes, its layers and prints baked into textures ahead.
+Every marker is a mesh of its own besides, which follows the corrugation 3 mm before the sheet with
+its artwork as texture, because peers can only tell apart what is an object. There are no damages
+and no spreader.
 """
 
 import json
@@ -19,19 +18,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fastgen import Generator
-from fastgen.camera import MM, View, view_of
+from fastgen.camera import MM, View
 from fastgen.container import build_container
 from fastgen.damage import deform
 from fastgen.decal_tables import object_ids
-from fastgen.environment import load_environment
 from fastgen.export import export_glb
-from fastgen.exposure import metered_exposure
 from fastgen.hdri import bundled_hdris, load_radiance
 from fastgen.mesh import Mesh
 from fastgen.resources import asset_path
 from fastgen.scene import Decal, Scene, Spreader
 
-TEXTURE_SIDE = 2048
 _LIFT_MM = 3.0
 _CELLS = 24
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
@@ -54,7 +50,9 @@ def write_jobs(
         for name in cameras:
             sample = generator.render(scene=scene, camera=name)
             visible = set(np.unique(sample.ids).tolist())
-            shots.append(_shot(scene, name, sample.view, sorted(visible & markers.keys())))
+            exposure = generator.exposure(scene, scene.camera(name))
+            seen = sorted(visible & markers.keys())
+            shots.append(shot(name, sample.view, exposure, seen))
             keep = [0, 1, *markers]
             # texts are part of the container here, as they are no objects of the peers
             ids = np.where(np.isin(sample.ids, keep), sample.ids, 1).astype(np.uint16)
@@ -87,20 +85,12 @@ def _markers(scene: Scene) -> dict[int, Decal]:
     return {number: decal for number, decal in numbered if decal.kind == "marker"}
 
 
-def _shot(scene: Scene, name: str, view: View, markers: list[int]) -> dict[str, Any]:
-    camera = scene.camera(name)
+def shot(name: str, view: View, exposure: float, markers: list[int]) -> dict[str, Any]:
+    """A view as peer_renderers/measure.py wants it."""
     pose = np.eye(4)
     right, down, forward = view.rotation
     pose[:3, :3] = np.stack([right, -down, -forward], axis=1)
     pose[:3, 3] = view.position_m
-    light = load_environment(bundled_hdris()[scene.environment.name])
-    exposure = metered_exposure(
-        light,
-        scene.environment.yaw_deg,
-        view_of(camera, view.size),
-        camera,
-        scene.surface.paint.albedo,
-    )
     return {
         "camera": name,
         "pose": pose.tolist(),
@@ -119,26 +109,12 @@ def _write_glb(generator: Generator, scene: Scene, markers: dict[int, Decal], pa
     mesh = build_container(scene.container.kind, scene.container.profiles)
     export_glb(generator, scene, path, cameras=())
     (container,) = trimesh.load_scene(path, process=False).geometry.values()
-    material = container.visual.material
-    if material.baseColorTexture is None:
-        material.baseColorTexture = _tinted(scene)
-        material.baseColorFactor = [1.0, 1.0, 1.0, 1.0]
     whole = trimesh.Scene()
     whole.add_geometry(container, node_name="container", geom_name="container")
     for number, decal in markers.items():
         name = f"marker_{number}"
         whole.add_geometry(_marker_mesh(scene, mesh, decal), node_name=name, geom_name=name)
     path.write_bytes(whole.export(file_type="glb"))
-
-
-def _tinted(scene: Scene) -> Image.Image:
-    """The paint with smooth variations, sRGB, TEXTURE_SIDE texels a side."""
-    rng = np.random.default_rng(scene.index)
-    coarse = rng.uniform(0.8, 1.0, (64, 64, 1)).astype(np.float32)
-    tint = cv2.resize(coarse, (TEXTURE_SIDE, TEXTURE_SIDE), interpolation=cv2.INTER_CUBIC)
-    linear = np.clip(tint[..., None] * np.array(scene.surface.paint.albedo), 0, 1)
-    encoded = np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return Image.fromarray(np.rint(encoded * 255).astype(np.uint8))
 
 
 def _marker_mesh(scene: Scene, mesh: Mesh, decal: Decal) -> trimesh.Trimesh:

@@ -70,6 +70,11 @@ def cases() -> list[Case]:
     return found
 
 
+def traced(count: int) -> list[Case]:
+    """Those of the first `count` cases whose reference is at hand."""
+    return [case for case in cases()[:count] if (FOLDER / f"{case.number:02d}.npz").exists()]
+
+
 @dataclass(frozen=True, eq=False)
 class Reference:
     """What Cycles makes of a case.

@@ -13,10 +13,10 @@ from typing import Any
 import cv2
 import numpy as np
 from common import charts, drawing
-from common.data import Feed, Kept, in_order, rendered
+from common.data import Kept, in_order, rendered
 from common.detection_metrics import Found, Scores, hits, operating_point, score
 from common.detector import Detector
-from common.run import Plan, Run, Table, conclude, parameters, start, train
+from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, train
 
 from fastgen import Config
 from fastgen.classes import SEGMENTATION_CLASSES
@@ -136,10 +136,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Train, test, and write what was found."""
     run = start("damage", __doc__ or "", PLANS, argv)
     plan = run.plan
-    data = training_data(run)
-    feed = Feed(
-        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
-    )
+    feed = feed_of(training_data(run), run)
     shape = {"width": 96, "blocks": 3} if run.full else {"width": 32, "blocks": 1}
     model = Detector(len(SEGMENTATION_CLASSES), masks=True, **shape)
     losses = train(model, feed, run)

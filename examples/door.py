@@ -11,8 +11,8 @@ from typing import Any
 
 import torch
 from common import charts
-from common.data import Feed, Kept, in_order, rendered
-from common.run import Learner, Plan, Run, Table, conclude, parameters, start, train
+from common.data import Kept, in_order, rendered
+from common.run import Learner, Plan, Run, Table, conclude, feed_of, parameters, start, train
 from torch.nn import functional
 from transformers import ResNetConfig, ResNetForImageClassification
 
@@ -97,10 +97,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Train, test both experiments, and write what was found."""
     run = start("door", __doc__ or "", PLANS, argv)
     plan = run.plan
-    data = training_data(run)
-    feed = Feed(
-        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
-    )
+    feed = feed_of(training_data(run), run)
     model = Classifier(run.full)
     losses = train(model, feed, run)
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 from common import charts, drawing
-from common.data import Feed, Kept, in_order, rendered
+from common.data import Kept, in_order, rendered
 from common.detection_metrics import OperatingPoint, Scores, confusion, operating_point, score
 from common.detector import Detector
 from common.rtdetr import RtDetr
-from common.run import Plan, Run, Table, conclude, parameters, start, train
+from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, train
 
 from fastgen import Config
 from fastgen.classes import DETECTION_CLASSES
@@ -93,10 +93,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Train, test, and write what was found."""
     run = start("imdg", __doc__ or "", PLANS, argv)
     plan = run.plan
-    data = training_data(run)
-    feed = Feed(
-        data if plan.workers else rendered(data, run.cache), plan.batch, run.seed, plan.workers
-    )
+    feed = feed_of(training_data(run), run)
     classes = len(DETECTION_CLASSES)
     model = RtDetr(classes, small=run.mode == "smoke") if run.full else Detector(classes)
     losses = train(model, feed, run)

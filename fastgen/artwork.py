@@ -76,6 +76,41 @@ def art_images() -> tuple[NDArray[np.uint8], Mapping[str, int]]:
     return images, MappingProxyType({name: i for i, name in enumerate(paths)})
 
 
+def smaller(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+    """An image [N, N, 4] of `art_images` at half its side, a quarter, and so on to one texel.
+
+    A texel is the mean of light that it covers, each part by its alpha: what is transparent has no
+    colour to give.
+    """
+    rgba: np.ndarray = cv2.LUT(image, _LIGHT_AND_ALPHA)
+    for channel in range(3):
+        rgba[..., channel] *= rgba[..., 3]
+    found = []
+    while len(rgba) > 1:
+        rgba = cv2.resize(rgba, (len(rgba) // 2,) * 2, interpolation=cv2.INTER_AREA)
+        light = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
+        half = np.empty(rgba.shape, np.uint8)
+        half[..., :3] = _CODE[(light * (len(_CODE) - 1) + 0.5).astype(np.uint16)]
+        half[..., 3] = rgba[..., 3] * 255 + 0.5
+        found.append(half)
+    return found
+
+
+def _srgb_light() -> NDArray[np.float32]:
+    """Linear light of each 8-bit sRGB value; IEC 61966-2-1."""
+    code = np.arange(256) / 255
+    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(
+        np.float32
+    )
+
+
+_LIGHT = _srgb_light()
+_LIGHT_AND_ALPHA = np.stack([_LIGHT, _LIGHT, _LIGHT, np.arange(256) / 255], axis=1)[None]
+_LIGHT_AND_ALPHA = _LIGHT_AND_ALPHA.astype(np.float32)
+_CODE = np.searchsorted((_LIGHT[1:] + _LIGHT[:-1]) / 2, np.linspace(0, 1, 2**16)).astype(np.uint8)
+"""The 8-bit sRGB value of light, by its 16-bit value."""
+
+
 @lru_cache(maxsize=1)
 def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
     """Signed-distance tiles, uint8 [G, 64, 64], row 0 at the top, and the fonts by name.
@@ -107,11 +142,14 @@ def glyph_coverage(tiles: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
     Mip levels of it keep the ink that those of distances lose where strokes are thin.
     """
-    side = GLYPH_TILE_SIZE * _INK_SAMPLES
-    fine = np.stack([cv2.resize(t, (side, side), interpolation=cv2.INTER_LINEAR) for t in tiles])
-    shape = (len(tiles), GLYPH_TILE_SIZE, _INK_SAMPLES, GLYPH_TILE_SIZE, _INK_SAMPLES)
-    share = (fine >= 128).reshape(shape).mean(axis=(2, 4))
-    return np.asarray(np.rint(share * 255), np.uint8)
+    return np.stack([_ink(tile) for tile in tiles])
+
+
+def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    side = GLYPH_TILE_SIZE
+    fine = cv2.resize(distances, (side * _INK_SAMPLES,) * 2, interpolation=cv2.INTER_LINEAR)
+    _, ink = cv2.threshold(fine, 127, 255, cv2.THRESH_BINARY)
+    return np.asarray(cv2.resize(ink, (side, side), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 @lru_cache(maxsize=1)

@@ -20,5 +20,3 @@ SOUND_CONTAINER = 101
 
 DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance, which are their ids as well."""
-
-OBJECT_CLASSES = ("container", "spreader", "text", *MARKER_CLASSES, *DAMAGE_CLASSES)

@@ -15,7 +15,7 @@ import fastgen
 from fastgen import doctor, stats
 from fastgen.config import Config
 from fastgen.encode import jpeg, png, write
-from fastgen.errors import ConfigError, FastgenError, OutputError
+from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb
 from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
@@ -24,7 +24,7 @@ from fastgen.gl import BACKENDS
 from fastgen.on_ray import run_on_ray
 from fastgen.overlay import label_colors, overlay
 from fastgen.programs import LAYERS
-from fastgen.records import nearest
+from fastgen.records import check_known
 from fastgen.repair import repair
 from fastgen.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.verify import examine
@@ -240,8 +240,7 @@ def _workers(options: argparse.Namespace) -> int:
 
 def _show(options: argparse.Namespace) -> int:
     layer = options.layer
-    if layer not in SHOWN_LAYERS:
-        raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, SHOWN_LAYERS)}")
+    check_known("layer", layer, SHOWN_LAYERS)
     encode = {".png": png, ".jpg": jpeg, ".jpeg": jpeg}.get(options.file.suffix.lower())
     if encode is None:
         raise ConfigError(f"{options.file}: give a file name that ends in .png or .jpg")
@@ -260,10 +259,7 @@ def _show(options: argparse.Namespace) -> int:
         image = label_colors(sample.ids if layer == "ids" else sample.damage)
     if options.overlay:
         image = overlay(sample, image)
-    try:
-        write(options.file, encode(image))
-    except OSError as error:
-        raise OutputError(f"{options.file}: cannot be written ({error.strerror})") from None
+    write(options.file, encode(image))
     return 0
 
 

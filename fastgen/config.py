@@ -17,11 +17,10 @@ from fastgen.damage_config import DamageConfig
 from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
-from fastgen.records import Range, bounds, from_plain, nearest, to_plain
+from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
 from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
-UNIT = bounds(0.0, 1.0)
 REACH = bounds(1.0, 1e6, "mm")
 """What falls off over a reach is divided by it."""
 
@@ -67,6 +66,15 @@ class SurfaceConfig:
     wear_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
     wear_scale_mm: Range = field(default=Range(700, 2500), metadata=bounds(50, 1e5, "mm"))
 
+    def __post_init__(self) -> None:
+        """Refuse what are no colors."""
+        for name, color in self.colors.items():
+            linear_color(color, f"colors.{name}")
+        if not self.colors:
+            raise ConfigError("colors: the list is empty; give at least one color")
+        _check_colors("rust_colors", self.rust_colors)
+        linear_color(self.dirt_color, "dirt_color")
+
 
 @dataclass(frozen=True)
 class ContainerConfig:
@@ -82,8 +90,7 @@ class ContainerConfig:
     def __post_init__(self) -> None:
         """Hold weights and depths to what can be drawn and built."""
         for kind in self.kinds:
-            if kind not in KINDS:
-                raise ConfigError(f"kinds.{kind}: unknown kind{nearest(kind, KINDS)}")
+            check_known("kinds", kind, KINDS)
         if sum(self.kinds.values()) <= 0:
             raise ConfigError("kinds: all weights are 0; give at least one above 0")
         if not self.depth_scale:
@@ -116,6 +123,10 @@ class CameraConfig:
     sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
     exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
     lens: LensConfig | None = None
+
+    def __post_init__(self) -> None:
+        """Hold the face to those that exist."""
+        check_known("face", self.face, FACES)
 
 
 def _seafront_rig() -> dict[str, CameraConfig]:
@@ -162,6 +173,10 @@ class SpreaderConfig:
     flippers_down: float = field(default=0.6, metadata=UNIT)
     gap_mm: Range = field(default=Range(10, 30), metadata=bounds(*GAP_LIMITS_MM, "mm"))
 
+    def __post_init__(self) -> None:
+        """Refuse what are no colors."""
+        _check_colors("colors", self.colors)
+
 
 @dataclass(frozen=True)
 class LabelConfig:
@@ -198,37 +213,18 @@ class Config:
         """Hold values to the choices that no single bound can express."""
         if not self.cameras:
             raise ConfigError("cameras: the rig is empty; describe at least one camera")
-        for name, camera in self.cameras.items():
+        for name in self.cameras:
             if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
                 raise ConfigError(
                     f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
                 )
-            if camera.face not in FACES:
-                hint = nearest(camera.face, FACES)
-                raise ConfigError(f"cameras.{name}.face: unknown face {camera.face!r}{hint}")
-            if camera.lens:
-                camera.lens.check(f"cameras.{name}.lens")
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")
-        for name, color in self.surface.colors.items():
-            linear_color(color, f"surface.colors.{name}")
-        if not self.surface.colors:
-            raise ConfigError("surface.colors: the list is empty; give at least one color")
-        if not self.surface.rust_colors:
-            raise ConfigError("surface.rust_colors: the list is empty; give at least one color")
-        for i, color in enumerate(self.surface.rust_colors):
-            linear_color(color, f"surface.rust_colors[{i}]")
-        linear_color(self.surface.dirt_color, "surface.dirt_color")
-        if not self.spreader.colors:
-            raise ConfigError("spreader.colors: the list is empty; give at least one color")
-        for i, color in enumerate(self.spreader.colors):
-            linear_color(color, f"spreader.colors[{i}]")
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
         """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
-        if name not in tuple(PRESETS):
-            raise ConfigError(f"preset {name!r} is unknown{nearest(name, PRESETS)}")
+        check_known("preset", name, tuple(PRESETS))
         return from_plain(Config, PRESETS[name], base=Config())
 
     @staticmethod
@@ -322,3 +318,10 @@ def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
     encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
     r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
     return r, g, b
+
+
+def _check_colors(name: str, colors: tuple[str, ...]) -> None:
+    if not colors:
+        raise ConfigError(f"{name}: the list is empty; give at least one color")
+    for i, color in enumerate(colors):
+        linear_color(color, f"{name}[{i}]")

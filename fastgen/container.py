@@ -29,6 +29,7 @@ from fastgen.door import leaves
 from fastgen.door_gear import gear
 from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
+from fastgen.records import check_known
 from fastgen.unfold import assemble
 
 __all__ = ["KINDS", "ContainerKind", "WallProfiles", "Wave", "build_container"]
@@ -46,8 +47,7 @@ def build_container(kind: str, profiles: WallProfiles = _USUAL, max_edge_mm: flo
     same object. Raises ConfigError for an unknown kind, an edge length out of range, or a wave
     that does not fit its wall.
     """
-    if kind not in KINDS:
-        raise ConfigError(f"container kind {kind!r} is unknown; choose one of {', '.join(KINDS)}")
+    check_known("container kind", kind, KINDS)
     low, high = _EDGE_LIMITS_MM
     if not low <= max_edge_mm <= high:
         raise ConfigError(f"max_edge_mm: {max_edge_mm:g} is outside {low:g} to {high:g} mm")

@@ -106,6 +106,8 @@ OVERLAP_MM = 5.0
 """Parts run this far into one another, so that no ray slips between them."""
 
 FLOOR_MM = 145.0
+BASE_RAIL_TOP_MM = 162.0
+FRONT_SILL_TOP_MM = 120.0
 RING_BOTTOM_MM = 11.0
 """Lower edge z of rails and sills; ISO 668 keeps the base 12.5 mm (+5, -1.5) off the ground."""
 

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastgen.container_layout import (
+    BASE_RAIL_TOP_MM,
     CASTING_MM,
     DOOR_RING_MM,
     FLOOR_MM,
+    FRONT_SILL_TOP_MM,
     OVERLAP_MM,
     RING_BOTTOM_MM,
     RING_TOP_MM,
@@ -31,7 +33,6 @@ DOOR_HEADER_MM = DOOR_SILL_MM = 120.0
 DOOR_FACE_MM = 50.0
 """Inset of the door header's and sill's faces; the locking bars pass in front of them."""
 
-_BASE_RAIL_TOP_MM = 162.0
 _MEMBER_SPACING_MM = 300.0
 
 
@@ -115,7 +116,7 @@ def _bottom_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
     for side, y_sign in (("front", -1), ("back", 1)):
         outer = y_sign * (half_width - layout.frame_recess_mm)
         inner = y_sign * (half_width - layout.side_inner_mm)
-        levels = breaks(RING_BOTTOM_MM, _BASE_RAIL_TOP_MM, np.inf, (*FORK_Z_MM, high - OVERLAP_MM))
+        levels = breaks(RING_BOTTOM_MM, BASE_RAIL_TOP_MM, np.inf, (*FORK_Z_MM, high - OVERLAP_MM))
         outline = [(outer, z) for z in levels[::-1]] + [(inner, z) for z in levels]
         # outline runs down outside and up inside: counter-clockwise from +x for the front side
         points = np.array(outline if y_sign < 0 else outline[::-1])
@@ -144,7 +145,7 @@ def _front_beams(layout: Layout, wall: Panel) -> list[Sheet]:
     header = [(outer, bottom), (outer, top), (inner, top), (inner, bottom), (outer, bottom)]
     sill_inner_top = FLOOR_MM + OVERLAP_MM
     sill = [(inner, sill_inner_top), (inner, RING_BOTTOM_MM), (outer, RING_BOTTOM_MM),
-            (outer, 120.0), (inner, 120.0)]  # fmt: skip
+            (outer, FRONT_SILL_TOP_MM), (inner, FRONT_SILL_TOP_MM)]  # fmt: skip
     return [
         _beam("header.no_door", "no_door", header, stations),
         _beam("sill.no_door", "no_door", sill, stations),
@@ -170,10 +171,15 @@ def _door_beams(layout: Layout) -> list[Sheet]:
     ]
 
 
+def _profile(section: list[tuple[float, float]]) -> Array:
+    """A section (x, z) as points in space, to be swept along y."""
+    return np.array([(x, 0.0, z) for x, z in section])
+
+
 def _beam(name: str, face: str, section: list[tuple[float, float]], stations: Array) -> Sheet:
     """A beam along y; its section (x, z) runs clockwise as seen from -y."""
-    profile = np.array([(x, 0.0, z) for x, z in section])
-    return Sheet(name, face, "paint_frame", "frame", sweep(profile, stations, (0, 1, 0)))
+    patch = sweep(_profile(section), stations, (0, 1, 0))
+    return Sheet(name, face, "paint_frame", "frame", patch)
 
 
 def _fork_centers(layout: Layout) -> tuple[float, ...]:
@@ -205,7 +211,7 @@ def base(layout: Layout) -> list[Sheet]:
             Sheet(f"fork.{i}", "underside", "underside", "frame", _fork_lining(center, outer))
         )
         low, high = center - FORK_WIDTH_MM / 2 - 4, center + FORK_WIDTH_MM / 2 + 4
-        shell = _channel([(high, FLOOR_MM + 2), (high, 13.0), (low, 13.0), (low, FLOOR_MM + 2)])
+        shell = _profile([(high, FLOOR_MM + 2), (high, 13.0), (low, 13.0), (low, FLOOR_MM + 2)])
         sheets.append(
             Sheet(
                 f"fork.{i}.shell",
@@ -218,15 +224,11 @@ def base(layout: Layout) -> list[Sheet]:
     return sheets
 
 
-def _channel(section: list[tuple[float, float]]) -> Array:
-    return np.array([(x, 0.0, z) for x, z in section])
-
-
 def _member(x: float, rows: Array) -> Patch:
     """A C channel across: web, lower flange and the web's other side; the rest is in the floor."""
     top, flange, lip = FLOOR_MM + 2, x + 45.0, 18.0
     section = [(x + 5, top), (x + 5, lip), (flange, lip), (flange, 12.5), (x, 12.5), (x, top)]
-    return sweep(_channel(section), rows, (0, 1, 0))
+    return sweep(_profile(section), rows, (0, 1, 0))
 
 
 def _fork_lining(center: float, outer: float) -> Patch:
@@ -235,4 +237,4 @@ def _fork_lining(center: float, outer: float) -> Patch:
     bottom, top = FORK_Z_MM
     section = [(low, bottom), (high, bottom), (high, top), (low, top), (low, bottom)]
     rows = breaks(-outer, outer, 600.0)
-    return sweep(_channel(section), rows, (0, 1, 0))
+    return sweep(_profile(section), rows, (0, 1, 0))

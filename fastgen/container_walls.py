@@ -4,7 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastgen.container_layout import CASTING_MM, OVERLAP_MM, Array, Layout, Wave
+from fastgen.container_layout import (
+    BASE_RAIL_TOP_MM,
+    CASTING_MM,
+    FRONT_SILL_TOP_MM,
+    OVERLAP_MM,
+    Array,
+    Layout,
+    Wave,
+)
 from fastgen.errors import ConfigError
 from fastgen.mesh import FACE_AXES
 from fastgen.unfold import Sheet, breaks, sweep
@@ -49,8 +57,8 @@ def panels(layout: Layout) -> dict[str, Panel]:
     behind_header = layout.end_inner_mm - OVERLAP_MM
     under_rail = layout.rail_bottom_mm + OVERLAP_MM
     past_casting = (half_length - long, half_width - wide, layout.top - high)
-    side_rows = (162.0 - OVERLAP_MM, under_rail)
-    end_rows = (120.0 - OVERLAP_MM, under_rail)
+    side_rows = (BASE_RAIL_TOP_MM - OVERLAP_MM, under_rail)
+    end_rows = (FRONT_SILL_TOP_MM - OVERLAP_MM, under_rail)
     roof_y = half_width - layout.side_inner_mm + OVERLAP_MM
     profiles = layout.profiles
     x_notches = (-past_casting[0], past_casting[0])

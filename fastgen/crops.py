@@ -21,9 +21,6 @@ _LEGIBLE_LETTER = 0.5
 _LETTER_POINTS = 7
 """Along each side of a letter's box."""
 
-_CORNER = 16
-"""labels.outlines_mm puts this many points on each side of an outline."""
-
 
 def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDArray[np.uint8]]]:
     """Each legible text of an image, and its pixels [h, w, 3] with a small margin, as a view.
@@ -52,10 +49,9 @@ def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
     if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
         return False
     decal = decal_of(sample.scene, item.id)
-    outline = np.array(item.polygon).reshape(-1, 2)
-    corners = outline[[0, _CORNER, 2 * _CORNER, 3 * _CORNER]]
-    across = np.linalg.norm(corners[1] - corners[0]) / decal.size_mm[0]
-    up = np.linalg.norm(corners[3] - corners[0]) / decal.size_mm[1]
+    upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)
+    across = np.linalg.norm(lower_right - lower_left) / decal.size_mm[0]
+    up = np.linalg.norm(upper_left - lower_left) / decal.size_mm[1]
     large = min(across, up) * decal.cap_mm >= min_text_px
     return bool(
         large and (not item.occluded or _least_letter(sample, item, decal) >= _LEGIBLE_LETTER)

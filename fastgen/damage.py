@@ -2,8 +2,8 @@
 
 A damage moves a rest point p (mm, container frame) by amount(p) along its `inward` direction. The
 shader evaluates the same fields (shaders/damage.glsl); this module is its slow, obvious twin and
-the one that tests and the exporter use. Local coordinates of p: u along the damage, v across it,
-w inward from its origin. seafront.txt section 3.3.2 describes the four kinds.
+the one that labels, tests and the exporter use. Local coordinates of p: u along the damage, v
+across it, w inward from its origin. seafront.txt section 3.3.2 describes the four kinds.
 """
 
 import numpy as np

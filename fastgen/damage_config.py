@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
-from fastgen.records import Range, bounds, nearest
+from fastgen.records import UNIT, Range, bounds, check_known, check_order
 
-UNIT = bounds(0.0, 1.0)
 MM = bounds(0.0, 20000.0, "mm")
 EXTENT = bounds(5.0, 20000.0, "mm")
 """Fields are scaled by their extents, which must not vanish."""
@@ -67,7 +66,7 @@ class DamageConfig:
 
     probability: float = field(default=0.4, metadata=UNIT)
     count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, MAX_INSTANCES))
-    kinds: tuple[str, ...] = ("axis", "concave", "dented", "perforation")
+    kinds: tuple[str, ...] = DAMAGE_CLASSES
     faces: tuple[str, ...] = ("front", "back", "door", "no_door")
     mask_threshold_mm: float = field(default=5.0, metadata=bounds(0.1, 1000.0, "mm"))
     axis: AxisConfig = field(default_factory=AxisConfig)
@@ -78,17 +77,9 @@ class DamageConfig:
     def __post_init__(self) -> None:
         """Hold names to those that exist and the counts to their order."""
         for i, kind in enumerate(self.kinds):
-            if kind not in DAMAGE_CLASSES:
-                raise ConfigError(
-                    f"kinds[{i}]: unknown kind {kind!r}{nearest(kind, DAMAGE_CLASSES)}"
-                )
+            check_known(f"kinds[{i}]", kind, DAMAGE_CLASSES)
         for i, face in enumerate(self.faces):
-            if face not in SHEET_FACES:
-                raise ConfigError(f"faces[{i}]: unknown face {face!r}{nearest(face, SHEET_FACES)}")
+            check_known(f"faces[{i}]", face, SHEET_FACES)
         if not self.faces and set(self.kinds) - {"axis"}:
             raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
-        low, high = self.count
-        if low > high:
-            raise ConfigError(
-                f"count: the lowest value {low} is above the highest {high}; swap them"
-            )
+        check_order("count", self.count)

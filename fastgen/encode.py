@@ -12,6 +12,8 @@ import simplejpeg
 from numpy.typing import NDArray
 from zlib_ng import zlib_ng
 
+from fastgen.errors import OutputError
+
 JPEG_QUALITY = 92
 
 _PNG_FAST = [
@@ -67,12 +69,15 @@ def _chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write(path: Path, data: bytes | str) -> None:
-    """Put `data` at `path`, written aside and renamed into place."""
+    """Put `data` at `path`, written aside and renamed into place.
+
+    Raises OutputError where that fails.
+    """
     aside = path.with_name(f".{path.name}.part")
     try:
         aside.write_bytes(data.encode() if isinstance(data, str) else data)
         os.replace(aside, path)
-    except OSError:
+    except OSError as error:
         with contextlib.suppress(OSError):
             aside.unlink(missing_ok=True)
-        raise
+        raise OutputError(f"{path}: cannot be written ({error.strerror})") from None

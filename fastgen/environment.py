@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen import cache, prefilter, rgb9e5
 from fastgen.errors import AssetError
 from fastgen.hdri import HALF_MAX, load_radiance
+from fastgen.scene import REC_709
 from fastgen.sun import Sun, split_sun
 
 PREFILTER_VERSION = 7
@@ -30,7 +31,6 @@ SPECULAR_SIZE = 128
 IRRADIANCE_SIZE = 34
 """Texels along a side, border included, as for SPECULAR_SIZE."""
 
-REC_709 = np.array([0.2126, 0.7152, 0.0722])
 """Luminance of linear red, green and blue: ITU-R BT.709-6, section 3.2."""
 
 _LUMINANCE_WIDTH = 32

@@ -91,10 +91,7 @@ def export_glb(
             "scene": to_plain(scene),
         }
     )
-    try:
-        write(path, data)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror})") from None
+    write(path, data)
 
 
 def _baked_material(glb: Glb, name: str, atlas: Atlas, prefix: str = "") -> int:

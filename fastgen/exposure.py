@@ -3,8 +3,8 @@
 import numpy as np
 
 from fastgen.camera import View
-from fastgen.environment import REC_709, Ambient, irradiance_at, metered_luminance
-from fastgen.scene import Camera, Color
+from fastgen.environment import Ambient, irradiance_at, metered_luminance
+from fastgen.scene import REC_709, Camera, Color
 
 MIDDLE_GREY = 0.18
 """Reflectance that a meter renders as a mid-tone (ISO 2720:1974 calibrates near 0.18)."""

@@ -24,7 +24,7 @@ from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
 from fastgen.programs import LAYERS
-from fastgen.records import check_fields, nearest, whole
+from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
 from fastgen.sampling import one_container_each, possible_shapes, sample_scene
@@ -32,6 +32,7 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
+from fastgen.shapes import spreader_mesh
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -54,8 +55,7 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
         raise ConfigError("camera: the scene has none; give a Camera")
     if name is None:
         return scene.cameras[0]
-    if name not in names:
-        raise ConfigError(f"camera: {name!r} is unknown{nearest(name, names)}")
+    check_known("camera", name, names)
     return scene.camera(name)
 
 
@@ -100,12 +100,8 @@ class Generator:
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.size = _whole_size(size)
-        for name, value, known in (
-            ("quality", quality, tuple(QUALITY)),
-            ("backend", backend, BACKENDS),
-        ):
-            if value not in known:
-                raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, known)}")
+        check_known("quality", quality, tuple(QUALITY))
+        check_known("backend", backend, BACKENDS)
         self.backend = backend
         for name, rig in self.config.cameras.items():
             for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
@@ -143,16 +139,12 @@ class Generator:
     @property
     def renderer_name(self) -> str:
         """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
-        self._open()
-        assert self._gl is not None
-        return self._gl.renderer
+        return self._context().renderer
 
     @property
     def used_backend(self) -> str:
         """Which backend 'auto' came to: egl or osmesa."""
-        self._open()
-        assert self._gl is not None
-        return self._gl.backend
+        return self._context().backend
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
@@ -180,8 +172,7 @@ class Generator:
         """
         if labels is not None:
             check_fields(labels, LabelConfig, "labels")
-        if layer not in LAYERS:
-            raise ConfigError(f"layer: {layer!r} is unknown{nearest(layer, LAYERS)}")
+        check_known("layer", layer, LAYERS)
         scene, camera = self._chosen(index, camera, scene)
         renderer = self._open()
         frame = renderer.render(scene, camera, self.size, layer)
@@ -189,7 +180,7 @@ class Generator:
         if layer == "all" and is_needed(camera, scene.weather):
             airlight = self._airlight(scene, camera)
             frame = develop(frame, view, camera, scene.weather, airlight)
-        mesh, spreader = renderer.mesh(scene.container), renderer.spreader_mesh(scene)
+        mesh, spreader = renderer.mesh(scene.container), spreader_mesh(scene)
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
@@ -239,16 +230,13 @@ class Generator:
         scene, camera = self._chosen(index, camera, scene)
         renderer = self._open()
         if self._cuda is None:
-            assert self._gl is not None
-            self._cuda = CudaFrames(self._gl, self.size)
+            self._cuda = CudaFrames(self._context(), self.size)
         image, labels, depth = self._cuda.take(renderer.draw(scene, camera, self.size))
         return CudaFrame(image, labels, depth, scene, camera, view_of(camera, self.size))
 
     def cuda_reason(self) -> str:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
-        self._open()
-        assert self._gl is not None
-        return cuda_reason(self._gl)
+        return cuda_reason(self._context())
 
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
@@ -347,6 +335,11 @@ class Generator:
             assert self._gl is not None
             self._gl.make_current()  # another generator may have been at work in between
         return self._renderer
+
+    def _context(self) -> GLContext:
+        self._open()
+        assert self._gl is not None
+        return self._gl
 
 
 def _hdri(hdris: Mapping[str, Path], name: str) -> Path:

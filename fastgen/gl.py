@@ -13,6 +13,7 @@ import moderngl
 
 from fastgen import gl_forks
 from fastgen.errors import ConfigError, ContextError
+from fastgen.records import check_known
 
 BACKENDS = ("auto", "egl", "osmesa")
 
@@ -141,8 +142,7 @@ def open_context(
     Raises ContextError naming the packages to install when nothing works, ConfigError for an
     unknown backend or a value out of range.
     """
-    if backend not in BACKENDS:
-        raise ConfigError(f"backend: {backend!r} is unknown; choose from {', '.join(BACKENDS)}")
+    check_known("backend", backend, BACKENDS)
     if threads is not None:
         if threads < 0:
             raise ConfigError(f"threads: {threads} is no count; give 0 or more")

@@ -7,6 +7,7 @@ import numpy as np
 
 from fastgen.environment import Ambient, EnvironmentLight
 from fastgen.gl import GLContext
+from fastgen.hdri import HALF_MAX
 
 _TEXTURE_2D = 0x0DE1
 _RGB = 0x1907
@@ -57,5 +58,5 @@ def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
 def _half(radiance: np.ndarray) -> bytes:
     """Radiance [..., 3] as RGBA half floats, clamped to what they hold."""
     rgba = np.ones((*radiance.shape[:-1], 4), np.float16)
-    rgba[..., :3] = np.clip(radiance, 0, 65504)
+    rgba[..., :3] = np.clip(radiance, 0, HALF_MAX)
     return rgba.tobytes()

@@ -81,7 +81,7 @@ def _decals(shot: Shot) -> list[Object]:
                 text=decal.text,
                 polygon=tuple(outline.ravel().tolist()),
                 # from the outline's corners in the order in which the eye finds them
-                quad=tuple(outline[[48, 32, 16, 0]].ravel().tolist()) if outline.size else (),
+                quad=tuple(outline[::_EDGE_POINTS][::-1].ravel().tolist()) if outline.size else (),
                 reading=("vertical" if decal.vertical else "horizontal") if decal.text else "",
                 **visibility(shot, alone[row], frame.ids, object_id, area),
             )

@@ -13,7 +13,7 @@ from fastgen.identifier import Identifier, sample_identifier
 from fastgen.lettering import layout
 from fastgen.markings_config import MarkingsConfig
 from fastgen.records import Range
-from fastgen.scene import Color, Decal, Vec2
+from fastgen.scene import REC_709, Color, Decal, Vec2
 from fastgen.weights import parts, weight_lines
 
 Streams = Callable[[str], np.random.Generator]
@@ -31,7 +31,6 @@ _COLORED: tuple[Color, ...] = ((0.7, 0.45, 0.02), (0.45, 0.02, 0.02), (0.02, 0.0
 _YELLOW: Color = (0.72, 0.47, 0.01)
 
 _HIGH_CUBE_SIGNS = ("height_sign", "height_triangle")
-_REC_709 = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass
@@ -121,7 +120,7 @@ def _style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) ->
     names = config.fonts or tuple(sorted(fonts))
     rng = streams("lettering")
     font = fonts[str(rng.choice(names))]
-    light = float(np.array(paint) @ _REC_709) < 0.22
+    light = float(np.array(paint) @ REC_709) < 0.22
     albedo = _LIGHT if light else _DARK
     if rng.random() < config.colored_lettering:
         albedo = _COLORED[int(rng.integers(len(_COLORED)))] if not light else _YELLOW

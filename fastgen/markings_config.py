@@ -3,11 +3,9 @@
 from dataclasses import dataclass, field
 
 from fastgen.artwork import glyph_tiles
-from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
-from fastgen.records import Range, bounds, nearest
+from fastgen.records import UNIT, Range, bounds, check_known, check_order
 
-UNIT = bounds(0.0, 1.0)
 MM = bounds(0.0, 20000.0, "mm")
 
 
@@ -51,16 +49,10 @@ class MarkingsConfig:
         """Hold names to those that exist, and each pair of counts to its order."""
         for name in ("marker_faces", "brand", "main_text"):
             for face in getattr(self, name):
-                if face not in SHEET_FACES:
-                    raise ConfigError(f"{name}: unknown face {face!r}{nearest(face, SHEET_FACES)}")
+                check_known(name, face, SHEET_FACES)
         if self.fonts:
-            _, known = glyph_tiles()
+            _, shipped = glyph_tiles()
             for font in self.fonts:
-                if font not in known:
-                    raise ConfigError(f"fonts: unknown font {font!r}{nearest(font, known)}")
+                check_known("fonts", font, shipped)
         for name in ("markers_per_face", "stickers_per_face"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ConfigError(
-                    f"{name}: the lowest value {low} is above the highest {high}; swap them"
-                )
+            check_order(name, getattr(self, name))

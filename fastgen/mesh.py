@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import ConvexHull
 
+from fastgen.distinct import distinct_rows
 from fastgen.errors import ConfigError
 
 FACES = ("front", "back", "door", "no_door", "roof", "underside")
@@ -153,7 +154,8 @@ class Mesh:
     @cached_property
     def points_mm(self) -> NDArray[np.float64]:
         """Positions [P, 3] of all vertices, those that coincide only once."""
-        return np.unique(self.positions_mm, axis=0).astype(np.float64)
+        first, _ = distinct_rows(self.positions_mm)
+        return self.positions_mm[first].astype(np.float64)
 
     @cached_property
     def hull(self) -> NDArray[np.int64]:

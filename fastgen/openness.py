@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import cache
+from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
@@ -143,8 +144,8 @@ class Openness:
         open_to: NDArray[np.uint8],
         cone: NDArray[np.uint8],
     ) -> None:
-        self._normals, number = np.unique(normals, axis=0, return_inverse=True)
-        self._number = _narrow(number)
+        first, number = distinct_rows(normals)
+        self._normals, self._number = normals[first], _narrow(number)
         # a column after the other is what `under` reads
         self._open_to = np.ascontiguousarray(open_to.T)
         packed = cone.astype(np.int32) @ np.array([1, 1 << 8, 1 << 16], np.int32)

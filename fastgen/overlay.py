@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.classes import DAMAGE_VALUES
 from fastgen.sample import Sample
 
 Image = NDArray[np.uint8]
@@ -42,7 +43,7 @@ def label_colors(labels: NDArray[np.uint16]) -> Image:
 def overlay(sample: Sample, image: Image | None = None) -> Image:
     """The sample's image, or `image`, with damage tinted and all visible objects boxed."""
     drawn = (sample.image if image is None else image).copy()
-    damaged = sample.damage > 200
+    damaged = sample.damage >= DAMAGE_VALUES.start
     if damaged.any():
         tint = label_colors(sample.damage)[damaged]
         drawn[damaged] = (0.55 * drawn[damaged] + 0.45 * tint).astype(np.uint8)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastgen import damage as fields
 from fastgen import environment
-from fastgen.artwork import ART_SIZE
+from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
 from fastgen.classes import DAMAGE_CLASSES, SOUND_CONTAINER
 from fastgen.lettering import TILE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
@@ -77,7 +77,6 @@ of it than the surface does, hence up to twice as much."""
 
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
-MAX_SAMPLES_PER_AXIS = 3
 
 GUTTER_STEPS = 17
 """Times that a part is laid on a baked atlas: itself, then shifted for two rings of texels."""
@@ -211,7 +210,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "NOISE_LEVELS": f"{_NOISE_LEVELS:.1f}",
         "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
         "ART_SIZE": f"{ART_SIZE:.1f}",
-        "GLYPH_TILE_SIZE": "64.0",
+        "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
         "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
         "GLYPH_RANGE_CAPS": "0.3",
         **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
@@ -236,7 +235,6 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "HOLE_REACH": f"{fields.HOLE_REACH}",
         "PORTAL_CHART": f"{PORTAL_CHART}u",
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
-        "TAKEN": "0xffffffffu",
         "SUN": int(sun),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,

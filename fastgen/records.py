@@ -14,7 +14,7 @@ import reprlib
 import sys
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from fastgen.errors import ConfigError
@@ -36,6 +36,10 @@ def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[
     return {"lo": lo, "hi": hi, "unit": unit}
 
 
+UNIT = bounds(0.0, 1.0)
+"""Bounds of shares, probabilities and colours."""
+
+
 def nearest(word: Any, choices: typing.Iterable[str]) -> str:
     """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
     names = sorted(choices)
@@ -43,6 +47,19 @@ def nearest(word: Any, choices: typing.Iterable[str]) -> str:
     if close:
         return f" (did you mean {close[0]}?)"
     return f" (choose from {', '.join(names)})"
+
+
+def check_known(name: str, value: Any, choices: Collection[str]) -> None:
+    """Raise ConfigError that calls it `name` where `value` is none of `choices`."""
+    if value not in choices:
+        raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, choices)}")
+
+
+def check_order(name: str, pair: tuple[float, float]) -> None:
+    """Raise ConfigError that calls it `name` where a lowest value is above its highest."""
+    lo, hi = pair
+    if lo > hi:
+        raise ConfigError(f"{name}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
 
 
 def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
@@ -133,8 +150,7 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
         got = f"{_short(value)}{_as_number(value)}"
         raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
     lo, hi = (_scalar(float, item, path, meta) for item in pair)
-    if lo > hi:
-        raise ConfigError(f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
+    check_order(path, (lo, hi))
     return Range(lo, hi)
 
 
@@ -172,15 +188,21 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
         return value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ConfigError(f"{path}: expected a number, got {_short(value)}{_as_number(value)}")
-    lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
-    # an int may be too large for a float, and infinity lies within bounds that have no end
-    if not max(lo, -sys.float_info.max) <= value <= min(hi, sys.float_info.max):
-        unit = f" {meta['unit']}" if meta.get("unit") else ""
-        wanted = f"{lo:g} to {hi:g}{unit}" if math.isfinite(hi - lo) else "a finite number"
+    lo, hi, wanted = _limits(meta)
+    if not lo <= value <= hi:
         raise ConfigError(f"{path}: {_short(value)} is out of range; give {wanted}")
     if hint is int and value != int(value):
         raise ConfigError(f"{path}: expected a whole number, got {_short(value)}")
     return hint(value)
+
+
+def _limits(meta: Mapping[str, Any]) -> tuple[float, float, str]:
+    """Lowest and highest number that a field may hold, and the two in words."""
+    lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
+    unit = f" {meta['unit']}" if meta.get("unit") else ""
+    wanted = f"{lo:g} to {hi:g}{unit}" if math.isfinite(hi - lo) else "a finite number"
+    # an int may be too large for a float, and infinity lies within bounds that have no end
+    return max(lo, -sys.float_info.max), min(hi, sys.float_info.max), wanted
 
 
 def check_fields(value: Any, cls: type, path: str, most: float = math.inf) -> None:
@@ -231,7 +253,7 @@ def _check(hint: Any, meta: Mapping[str, Any], most: float) -> _Check:
     if hint is bool or hint is str:
         return functools.partial(_check_kind, hint)
     kind = numbers.Integral if hint is int else numbers.Real
-    lo, hi = max(meta["lo"], -sys.float_info.max), min(meta["hi"], sys.float_info.max)
+    lo, hi, wanted = _limits(meta)
 
     def check(value: Any) -> None:
         exact = type(value)
@@ -239,8 +261,7 @@ def _check(hint: Any, meta: Mapping[str, Any], most: float) -> _Check:
             what = "whole number" if hint is int else "number"
             raise ConfigError(f": expected a {what}, got {_short(value)}")
         if not lo <= value <= hi:
-            unit = f" {meta['unit']}" if meta.get("unit") else ""
-            raise ConfigError(f": {_short(value)} is out of range; give {lo:g} to {hi:g}{unit}")
+            raise ConfigError(f": {_short(value)} is out of range; give {wanted}")
 
     return check
 

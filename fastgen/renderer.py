@@ -6,7 +6,7 @@ for each different surface among its samples and write colour, ids, damage and d
 centre. Ids are never filtered: a sample lies exactly on each pixel centre.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
 
 import moderngl
@@ -37,12 +37,13 @@ from fastgen.programs import (
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes, spreader_mesh
+from fastgen.shapes import Shapes
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
-from fastgen.textures import mipmapped_array, noise_texture
+from fastgen.textures import art_texture, mipmapped_array, noise_texture
+from fastgen.uniforms import Block
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
@@ -97,12 +98,13 @@ class Renderer:
         self._scenes: Kept[_SceneDecals] = Kept(2)
         self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
         self._sun_shadow = ShadowMap(self._ctx, self._occluder)
-        self._scene_block = self._ctx.buffer(reserve=SCENE_BLOCK.size)
-        self._view_block = self._ctx.buffer(reserve=VIEW_BLOCK.size)
-        self._damage_block = self._ctx.buffer(reserve=DAMAGE_BLOCK.size)
+        self._blocks = {
+            block.name: self._ctx.buffer(reserve=block.size)
+            for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
+        }
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
-        self._art = mipmapped_array(self._ctx, art)
+        self._art = art_texture(gl, art)
         texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
         self._tiles = mipmapped_array(self._ctx, texels)
         self._noise = noise_texture(self._ctx)
@@ -133,18 +135,14 @@ class Renderer:
         light = self._light(scene.environment.name)
         mesh, spreader = self._shapes.of(scene, camera.lens is not None, light.ambient)
         shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
-        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, light.background_size)))
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
         sunny = sun_values(light.ambient.sun, shadow, view.position_m)
-        self._view_block.write(VIEW_BLOCK.pack({**seen, **sunny}))
-        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
-        self._view_block.bind_to_uniform_block(VIEW_BLOCK.binding)
-
+        self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
+        self._set(VIEW_BLOCK, {**seen, **sunny})
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
-            self._damage_block.write(DAMAGE_BLOCK.pack(shapes))
-            self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
+            self._set(DAMAGE_BLOCK, shapes)
 
         holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
         targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
@@ -192,7 +190,7 @@ class Renderer:
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        self._sun_shadow.cast(container, spreader, toward)
+        self._sun_shadow.cast(container, spreader, toward, scene.damages)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:
@@ -215,12 +213,10 @@ class Renderer:
         """The material of the whole container of `scene` as textures, see bake.Atlas."""
         mesh = self._shapes.container(scene.container)
         damage = variant(scene.damages)
-        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
-        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        self._set(SCENE_BLOCK, scene_values(scene, 0))
         if damage != "sound":
             values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
-            self._damage_block.write(DAMAGE_BLOCK.pack(values))
-            self._damage_block.bind_to_uniform_block(DAMAGE_BLOCK.binding)
+            self._set(DAMAGE_BLOCK, values)
         self._bind_surface(scene, mesh, None)
         return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
 
@@ -229,8 +225,7 @@ class Renderer:
         spreader = self._shapes.spreader(scene, False)
         if spreader is None:
             return None
-        self._scene_block.write(SCENE_BLOCK.pack(scene_values(scene, 0)))
-        self._scene_block.bind_to_uniform_block(SCENE_BLOCK.binding)
+        self._set(SCENE_BLOCK, scene_values(scene, 0))
         self._bind_surface(scene, self._shapes.container(scene.container), spreader)
         return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_CHART)
 
@@ -261,20 +256,22 @@ class Renderer:
         for name, texture in textures.items():
             texture.use(UNITS[name])
 
+    def _set(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
+        """Fill a uniform block for the draws to come."""
+        buffer = self._blocks[block.name]
+        buffer.write(block.pack(values))
+        buffer.bind_to_uniform_block(block.binding)
+
     def mesh(self, container: Container) -> Mesh:
         """The rest mesh of a container, as it is drawn."""
         return self._shapes.container(container).mesh
-
-    def spreader_mesh(self, scene: Scene) -> Mesh | None:
-        """The spreader's mesh as it is built, None where the scene has none."""
-        return spreader_mesh(scene)
 
     def release(self) -> None:
         """Free every GL object that this renderer made."""
         caches: list[Any] = [self._shading, self._targets, self._shapes, self._lights]
         for kept in (*caches, self._scenes, self._sun_shadow):
             kept.release()
-        blocks: list[Any] = [self._scene_block, self._view_block, self._damage_block]
+        blocks: list[Any] = [*self._blocks.values()]
         for item in (*blocks, *self._geometry.values(), self._occluder):
             item.release()
         for texture in (self._art, self._tiles, self._noise, self._dfg):

@@ -10,17 +10,22 @@ measured along the unfolded sheet.
 import json
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
-from fastgen.records import bounds, from_plain, to_plain
+from fastgen.records import UNIT, bounds, from_plain, to_plain
 from fastgen.sensor.parts import WHOLE, Lens, Sensor, Weather
 from fastgen.spreader import GAP_LIMITS_MM
 
 Color = tuple[float, float, float]
+
+REC_709 = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of a linear colour is its product with this; ITU-R BT.709-6, section 3.2."""
+
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 
-_SHARE = bounds(0.0, 1.0)
 _REACH = bounds(0.0, 1e6, "mm")
 _SCALE = bounds(1.0, 1e6, "mm")
 _LENGTH = bounds(1e-3, 1e6, "mm")
@@ -31,16 +36,16 @@ class Paint:
     """Base coat. albedo: linear colour; roughness: GGX perceptual roughness of sound paint."""
 
     name: str
-    albedo: Color = field(metadata=_SHARE)
-    roughness: float = field(metadata=_SHARE)
-    tone_variation: float = field(metadata=_SHARE)
+    albedo: Color = field(metadata=UNIT)
+    roughness: float = field(metadata=UNIT)
+    tone_variation: float = field(metadata=UNIT)
 
 
 @dataclass(frozen=True)
 class Ageing:
     """Darkening toward the corners of each panel. strength 0..1; reach in mm from a corner."""
 
-    strength: float = field(metadata=_SHARE)
+    strength: float = field(metadata=UNIT)
     reach_mm: float = field(metadata=_REACH)
 
 
@@ -48,26 +53,26 @@ class Ageing:
 class Dirt:
     """Light grey deposit along edges. strength 0..1; reach in mm from an edge."""
 
-    strength: float = field(metadata=_SHARE)
+    strength: float = field(metadata=UNIT)
     reach_mm: float = field(metadata=_REACH)
-    albedo: Color = field(metadata=_SHARE)
+    albedo: Color = field(metadata=UNIT)
 
 
 @dataclass(frozen=True)
 class Rust:
     """Ochre corrosion that breaks the paint. coverage: fraction of the sheet; scale in mm."""
 
-    coverage: float = field(metadata=_SHARE)
+    coverage: float = field(metadata=UNIT)
     scale_mm: float = field(metadata=_SCALE)
-    albedo: Color = field(metadata=_SHARE)
-    roughness: float = field(metadata=_SHARE)
+    albedo: Color = field(metadata=UNIT)
+    roughness: float = field(metadata=UNIT)
 
 
 @dataclass(frozen=True)
 class Scratches:
     """Fine bright lines down to primer or steel. coverage: fraction of the sheet."""
 
-    coverage: float = field(metadata=_SHARE)
+    coverage: float = field(metadata=UNIT)
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class Wear:
     """Worn reflection: how much noise spreads the roughness of exposed paint, 0..1. Scratches and
     dirt share the noise tile whose scale_mm stands here."""
 
-    strength: float = field(metadata=_SHARE)
+    strength: float = field(metadata=UNIT)
     scale_mm: float = field(metadata=_SCALE)
 
 
@@ -115,8 +120,8 @@ class Decal:
     font: str = ""
     vertical: bool = False
     cap_mm: float = 0.0
-    albedo: Color = field(default=(0.8, 0.8, 0.8), metadata=_SHARE)
-    wear: float = field(default=0.0, metadata=_SHARE)
+    albedo: Color = field(default=(0.8, 0.8, 0.8), metadata=UNIT)
+    wear: float = field(default=0.0, metadata=UNIT)
 
     @property
     def text(self) -> str:
@@ -165,7 +170,7 @@ class Spreader:
     """
 
     present: bool = False
-    albedo: Color = field(default=(0.6, 0.35, 0.02), metadata=_SHARE)
+    albedo: Color = field(default=(0.6, 0.35, 0.02), metadata=UNIT)
     flippers_down: tuple[bool, bool] = (True, True)
     gap_mm: float = field(default=15.0, metadata=bounds(*GAP_LIMITS_MM, "mm"))
 

@@ -2,7 +2,6 @@
 
 import math
 from collections import Counter
-from collections.abc import Collection
 from typing import Any
 
 from fastgen.artwork import art_images, glyph_tiles
@@ -13,7 +12,7 @@ from fastgen.damage_config import MAX_INSTANCES
 from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
 from fastgen.programs import DECAL_KINDS, MAX_DAMAGES
-from fastgen.records import check_fields, nearest
+from fastgen.records import check_fields, check_known
 from fastgen.scene import Camera, Damage, Decal, Scene
 from fastgen.sensor_config import CORNERS
 
@@ -49,7 +48,7 @@ def check_scene(scene: Any) -> Scene:
         if count > most:
             raise ConfigError(f"scene.{name}: {count} are more than {most}")
     check_fields(scene, Scene, "scene", _FAR)
-    _one_of(scene.container.kind, KINDS, "scene.container.kind")
+    check_known("scene.container.kind", scene.container.kind, KINDS)
     for i, camera in enumerate(scene.cameras):
         _check_camera(camera, f"scene.cameras[{i}]")
     for i, decal in enumerate(scene.decals):
@@ -73,34 +72,29 @@ def check_camera(camera: Any) -> Camera:
     return camera
 
 
-def _one_of(name: str, known: Collection[str], path: str) -> None:
-    if name not in known:
-        raise ConfigError(f"{path}: {name!r} is unknown{nearest(name, known)}")
-
-
 def _check_camera(camera: Camera, path: str) -> None:
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is where the camera itself stands")
     if camera.sensor is not None and camera.sensor.stamp is not None:
-        _one_of(camera.sensor.stamp.corner, CORNERS, f"{path}.sensor.stamp.corner")
+        check_known(f"{path}.sensor.stamp.corner", camera.sensor.stamp.corner, CORNERS)
 
 
 def _check_decal(decal: Decal, path: str) -> None:
-    _one_of(decal.kind, _DECAL_KINDS, f"{path}.kind")
-    _one_of(decal.face, SHEET_FACES, f"{path}.face")
-    _one_of(decal.class_name, _LABELS, f"{path}.class_name")
+    check_known(f"{path}.kind", decal.kind, _DECAL_KINDS)
+    check_known(f"{path}.face", decal.face, SHEET_FACES)
+    check_known(f"{path}.class_name", decal.class_name, _LABELS)
     if decal.kind == "text":
-        _one_of(decal.font, glyph_tiles()[1], f"{path}.font")
+        check_known(f"{path}.font", decal.font, glyph_tiles()[1])
         if not decal.cap_mm > 0:
             raise ConfigError(f"{path}.cap_mm: {decal.cap_mm:g} is out of range; give more than 0")
         if not decal.text.strip():
             raise ConfigError(f"{path}.lines: nothing to write")
     elif decal.kind in _ART_KINDS and decal.art != "stripes":
-        _one_of(decal.art, art_images()[1], f"{path}.art")
+        check_known(f"{path}.art", decal.art, art_images()[1])
 
 
 def _check_damage(damage: Damage, path: str) -> None:
-    _one_of(damage.kind, DAMAGE_CLASSES, f"{path}.kind")
+    check_known(f"{path}.kind", damage.kind, DAMAGE_CLASSES)
     axes = (damage.along, damage.across, damage.inward)
     for i, one in enumerate(axes):
         for j, other in enumerate(axes[: i + 1]):

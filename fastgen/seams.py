@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fastgen.distinct import distinct_rows
+
 Array = NDArray[np.float64]
 
 _SAME_MM = 0.02
@@ -24,8 +26,7 @@ _ON_EDGE_MM = 0.05
 def merged(positions_mm: Array) -> tuple[Array, NDArray[np.int64]]:
     """Positions [V, 3] with those that coincide made equal, and int [V]: which point each is."""
     cells = np.floor((positions_mm + _SHIFT_MM) / _SAME_MM + 0.5).astype(np.int64)
-    _, first, point = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    point = point.ravel()
+    first, point = distinct_rows(cells)
     return positions_mm[first][point], point
 
 

@@ -3,12 +3,11 @@
 from dataclasses import dataclass, field
 
 from fastgen.errors import ConfigError
-from fastgen.records import Range, bounds, nearest
+from fastgen.records import UNIT, Range, bounds, check_known, check_order
 from fastgen.sensor.parts import LENS_MODELS
 
 _ZERO = Range(0.0, 0.0)
 _COEFFICIENT = bounds(-10.0, 10.0)
-_SHARE = bounds(0.0, 1.0)
 
 CORNERS = tuple(f"{level} {side}" for level in ("top", "bottom") for side in ("left", "right"))
 
@@ -29,15 +28,13 @@ class LensConfig:
     p1: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
     p2: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
 
-    def check(self, path: str) -> None:
-        """Raise ConfigError, naming what stands at `path`, for what the model has not."""
-        if self.model not in LENS_MODELS:
-            hint = nearest(self.model, LENS_MODELS)
-            raise ConfigError(f"{path}.model: {self.model!r} is unknown{hint}")
+    def __post_init__(self) -> None:
+        """Refuse coefficients that the model has not."""
+        check_known("model", self.model, LENS_MODELS)
         foreign = ("p1", "p2") if self.model == "fisheye" else ("k4",)
         for name in foreign:
             if getattr(self, name) != _ZERO:
-                raise ConfigError(f"{path}.{name}: {self.model} has no {name}; leave it out")
+                raise ConfigError(f"{name}: {self.model} has no {name}; leave it out")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -50,7 +47,7 @@ class LensConfig:
 class NoiseConfig:
     """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons."""
 
-    probability: float = field(default=0.0, metadata=_SHARE)
+    probability: float = field(default=0.0, metadata=UNIT)
     full_well_e: Range = field(default=Range(2500, 12000), metadata=bounds(50, 1e6, "electrons"))
     read_noise_e: Range = field(default=Range(2, 12), metadata=bounds(0, 1e4, "electrons"))
 
@@ -59,17 +56,25 @@ class NoiseConfig:
 class StampConfig:
     """Date and time burnt in. years: first and last; height: of capitals, share of the image's."""
 
-    probability: float = field(default=0.0, metadata=_SHARE)
+    probability: float = field(default=0.0, metadata=UNIT)
     years: tuple[int, int] = field(default=(2019, 2027), metadata=bounds(1970, 2100))
-    corners: tuple[str, ...] = ("top left", "top right", "bottom left", "bottom right")
+    corners: tuple[str, ...] = CORNERS
     height: Range = field(default=Range(0.018, 0.032), metadata=bounds(0.005, 0.2))
+
+    def __post_init__(self) -> None:
+        """Hold corners to those that exist, and the years to their order."""
+        for corner in self.corners:
+            check_known("corners", corner, CORNERS)
+        if not self.corners:
+            raise ConfigError("corners: the list is empty; give at least one")
+        check_order("years", self.years)
 
 
 @dataclass(frozen=True)
 class DefocusConfig:
     """A focus that misses the container: focused at this share of the distance to the target."""
 
-    probability: float = field(default=0.0, metadata=_SHARE)
+    probability: float = field(default=0.0, metadata=UNIT)
     focus: Range = field(default=Range(0.25, 0.8), metadata=bounds(0.01, 100.0))
     f_number: Range = field(default=Range(1.4, 4.0), metadata=bounds(0.5, 64.0))
 
@@ -78,7 +83,7 @@ class DefocusConfig:
 class MotionConfig:
     """Camera and load move while the shutter is open. extent: share of the image's width."""
 
-    probability: float = field(default=0.0, metadata=_SHARE)
+    probability: float = field(default=0.0, metadata=UNIT)
     extent: Range = field(default=Range(0.001, 0.012), metadata=bounds(0.0, 0.2))
 
 
@@ -101,18 +106,8 @@ class SensorConfig:
     jpeg_quality: tuple[int, int] = field(default=(0, 0), metadata=bounds(0, 100))
 
     def __post_init__(self) -> None:
-        """Hold values to the choices that no single bound can express."""
-        for corner in self.stamp.corners:
-            if corner not in CORNERS:
-                raise ConfigError(f"stamp.corners: {corner!r} is unknown{nearest(corner, CORNERS)}")
-        if not self.stamp.corners:
-            raise ConfigError("stamp.corners: the list is empty; give at least one")
-        for name, (low, high) in (
-            ("stamp.years", self.stamp.years),
-            ("jpeg_quality", self.jpeg_quality),
-        ):
-            if low > high:
-                raise ConfigError(f"{name}: the lowest value {low} is above {high}; swap")
+        """Hold the qualities to their order."""
+        check_order("jpeg_quality", self.jpeg_quality)
 
 
 @dataclass(frozen=True)
@@ -123,11 +118,11 @@ class WeatherConfig:
     wetness: of paint while it rains, and in wet_probability of the scenes without rain.
     """
 
-    fog_probability: float = field(default=0.0, metadata=_SHARE)
+    fog_probability: float = field(default=0.0, metadata=UNIT)
     visibility_mm: Range = field(default=Range(2.5e4, 3e5), metadata=bounds(1000, 1e8, "mm"))
-    rain_probability: float = field(default=0.0, metadata=_SHARE)
+    rain_probability: float = field(default=0.0, metadata=UNIT)
     rate_mm_h: Range = field(default=Range(2, 50), metadata=bounds(0.1, 300, "mm/h"))
     shutter_s: Range = field(default=Range(0.0005, 0.004), metadata=bounds(1e-5, 0.1, "s"))
     wind: Range = field(default=Range(-0.5, 0.5), metadata=bounds(-3.0, 3.0))
-    wet_probability: float = field(default=0.0, metadata=_SHARE)
-    wetness: Range = field(default=Range(0.3, 1.0), metadata=_SHARE)
+    wet_probability: float = field(default=0.0, metadata=UNIT)
+    wetness: Range = field(default=Range(0.3, 1.0), metadata=UNIT)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastgen.container_layout import KINDS
 from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
+from fastgen.records import check_known
 from fastgen.spreader_parts import TIERS, Hang, cables, ends, flippers, frame, headblock
 from fastgen.unfold import assemble
 
@@ -34,8 +35,7 @@ def build_spreader(
     the spreader's lower one. All triangles are in the group "frame". Calls with equal arguments
     return the same object. Raises ConfigError for an unknown kind or a gap out of range.
     """
-    if kind not in KINDS:
-        raise ConfigError(f"container kind {kind!r} is unknown; choose one of {', '.join(KINDS)}")
+    check_known("container kind", kind, KINDS)
     low, high = GAP_LIMITS_MM
     if not low <= gap_mm <= high:
         raise ConfigError(f"spreader gap_mm: {gap_mm:g} is outside {low:g} to {high:g} mm")

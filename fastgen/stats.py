@@ -15,6 +15,7 @@ import numpy as np
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
 from fastgen.formats import Record
+from fastgen.generate import MANIFEST
 from fastgen.sampling import SPLITS
 from fastgen.shards import manifest_path
 from fastgen.storage import storage_of
@@ -96,10 +97,10 @@ def _records(out: str | Path) -> Iterator[Record]:
     """One of each image, shard by shard."""
     storage = storage_of(out)
     try:
-        manifest = json.loads(storage.read("dataset.json"))
+        manifest = json.loads(storage.read(MANIFEST))
     except FileNotFoundError:
         raise OutputError(
-            f"{out}: no dataset.json; give a folder that `fastgen generate` made"
+            f"{out}: no {MANIFEST}; give a folder that `fastgen generate` made"
         ) from None
     if "shards" not in manifest:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")

@@ -1,4 +1,7 @@
-"""Where a dataset lies: a folder, or any address that fsspec knows. Files arrive whole or not."""
+"""Where a dataset lies: a folder, or any address that fsspec knows. Files arrive whole or not.
+
+Paths within it are relative, with forward slashes.
+"""
 
 import contextlib
 import ctypes
@@ -6,9 +9,9 @@ import fcntl
 import os
 import shutil
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Files, Same
@@ -22,34 +25,6 @@ _BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
 """Protocols of fsspec's object stores."""
 
 
-class Storage(Protocol):
-    """What the rest asks of a place. Paths are relative, with forward slashes."""
-
-    def commit(self, files: Files, name: str) -> None:
-        """Put all files in place; each is there whole or not at all, whatever happens meanwhile."""
-        ...
-
-    def write(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Put one file in place, whole or not at all."""
-        ...
-
-    def make_folders(self, paths: Iterable[str]) -> None:
-        """Have these folders even where nothing is in them."""
-        ...
-
-    def read(self, path: str) -> bytes:
-        """Content of a file. Raises FileNotFoundError."""
-        ...
-
-    def remove(self, path: str) -> None:
-        """Be without a file, whether it was there or not."""
-        ...
-
-    def sizes(self) -> Mapping[str, int]:
-        """Every file by path with its size in bytes, those set aside left out."""
-        ...
-
-
 class Folder:
     """A dataset in a folder of this machine."""
 
@@ -59,18 +34,19 @@ class Folder:
     def commit(self, files: Files, name: str) -> None:
         """Write aside, flush, rename. name: distinguishes this commit from others under way."""
         aside = self.root / f"{ASIDE}-{name}-{uuid.uuid4().hex}"
+        places = {path: aside / str(number) for number, path in enumerate(files)}
         try:
+            aside.mkdir()
             for path, content in files.items():
-                target = aside / path
-                target.parent.mkdir(parents=True, exist_ok=True)
                 if isinstance(content, Same):
-                    _link(aside / content.path, target)
+                    _link(places[content.path], places[path])
                 else:
-                    target.write_bytes(content)
+                    places[path].write_bytes(content)
             _flush(aside)
-            for path in files:
-                (self.root / path).parent.mkdir(parents=True, exist_ok=True)
-                _move(aside / path, self.root / path)
+            for folder in {(self.root / path).parent for path in files}:
+                folder.mkdir(parents=True, exist_ok=True)
+            for path, place in places.items():
+                _move(place, self.root / path)
         except FileNotFoundError as error:
             raise OutputError(f"{self.root}: vanished while it was written ({error})") from None
         except OSError as error:

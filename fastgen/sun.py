@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import prefilter
+from fastgen.scene import REC_709
 
 CAP_DEG = 3.0
 """Radius about the brightest place that counts as the sun: its disc, blurred by texels and haze."""
 
 MIN_SHARE = 0.15
 """Of the irradiance on a surface that faces it; what brings less casts no shadow worth its time."""
-
-_REC_709 = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, section 3.2
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ def split_sun(radiance: NDArray[np.float32]) -> tuple[Sun | None, NDArray[np.flo
     height = radiance.shape[0]
     directions = prefilter.equirect_directions(height)
     weights = prefilter.row_solid_angle(height)[:, None]
-    luminance = radiance @ _REC_709
+    luminance = radiance @ REC_709
     brightest = np.unravel_index(int(np.argmax(luminance)), luminance.shape)
     toward = directions[brightest]
     for _ in range(2):  # the second time around the centre of its light, not one texel
@@ -48,7 +47,7 @@ def split_sun(radiance: NDArray[np.float32]) -> tuple[Sun | None, NDArray[np.flo
         around = (angle < np.deg2rad(2 * CAP_DEG)) & ~cap
         sky = np.median(radiance[around], axis=0)
         excess = np.where(cap[..., None], np.maximum(radiance - sky, 0.0), 0.0)
-        share = excess @ _REC_709 * weights
+        share = excess @ REC_709 * weights
         if not share.any():
             return None, radiance
         toward = (directions * share[..., None]).sum(axis=(0, 1))

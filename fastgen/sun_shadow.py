@@ -1,16 +1,18 @@
 """The shadow of a container and its spreader under a sun: one depth map from where it stands.
 
 As openness.py does, it keeps the faces turned away from the light, so that a lit surface is not its
-own occluder. Rest shapes: what a dent moves is less than what a penumbra blurs. Williams 1978,
-Casting Curved Shadows on Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
+own occluder. Dents are bent in, holes are not cut out. Williams 1978, Casting Curved Shadows on
+Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 """
 
 import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
 from fastgen.openness import Body, map_matrix, without_cables
+from fastgen.scene import Damage
 from fastgen.sun import Sun
 
 MAP_SIZE = (2048, 1024)
@@ -40,14 +42,20 @@ class ShadowMap:
         self.depth.repeat_x = self.depth.repeat_y = False
         self._target = ctx.framebuffer([], self.depth)
 
-    def cast(self, container: Mesh, spreader: Mesh | None, toward: Array) -> None:
-        """Draw the map if it does not show this. toward: unit vector [3] to the sun in the
-        container's frame."""
-        shown = (container, spreader, *toward)
+    def cast(
+        self,
+        container: Mesh,
+        spreader: Mesh | None,
+        toward: Array,
+        damages: tuple[Damage, ...] = (),
+    ) -> None:
+        """Draw the map if it does not show this. container: at rest; damages: done to it. toward:
+        unit vector [3] to the sun in the container's frame."""
+        shown = (container, spreader, *toward, damages)
         if shown == self._shown:
             return
         self._shown = shown
-        bodies = [Body(container.positions_mm, container.triangles)]
+        bodies = [Body(_bent(container.positions_mm, damages), container.triangles)]
         if spreader is not None:
             bodies.append(without_cables(spreader))
         low = np.min([body.positions_mm.min(axis=0) for body in bodies], axis=0)
@@ -85,6 +93,17 @@ class ShadowMap:
         """Free all GL objects."""
         for item in (self._target, self.depth):
             item.release()
+
+
+def _bent(positions_mm: NDArray[np.float32], damages: tuple[Damage, ...]) -> NDArray[np.float32]:
+    """Rest positions [V, 3] as the damages move them."""
+    moved = positions_mm.copy()
+    for damage in damages:
+        box = corners_mm(damage)
+        near = ((positions_mm >= box.min(axis=0)) & (positions_mm <= box.max(axis=0))).all(axis=1)
+        rest = positions_mm[near].astype(np.float64)
+        moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
+    return moved
 
 
 def sun_values(sun: Sun | None, shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:

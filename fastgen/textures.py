@@ -1,9 +1,33 @@
 """Textures of a GL context made from arrays."""
 
+import ctypes
+
 import moderngl
 import numpy as np
 
+from fastgen.artwork import smaller
+from fastgen.gl import GLContext
 from fastgen.noise import noise_tiles
+
+_TEXTURE_2D_ARRAY, _RGBA, _RGBA8, _UNSIGNED_BYTE = 0x8C1A, 0x1908, 0x8058, 0x1401
+_INT, _ENUM = ctypes.c_int, ctypes.c_uint
+
+
+def art_texture(gl: GLContext, images: np.ndarray) -> moderngl.TextureArray:
+    """Artwork uint8 [K, N, N, 4] as a mip-mapped texture array, clamped at the borders. The driver
+    would average sRGB as if it were light, so the levels are `smaller`'s."""
+    count, side = images.shape[:2]
+    data = np.ascontiguousarray(images).tobytes()
+    texture = gl.ctx.texture_array((side, side, count), 4, data, alignment=1)
+    texture.use()
+    define = gl.function("glTexImage3D", None, _ENUM, *(_INT,) * 6, _ENUM, _ENUM, ctypes.c_void_p)
+    levels = zip(*map(smaller, images), strict=True)
+    for level, layers in enumerate(levels, start=1):
+        texels = np.stack(layers)
+        size = (len(texels[0]), len(texels[0]), count)
+        address = texels.ctypes.data
+        define(_TEXTURE_2D_ARRAY, level, _RGBA8, *size, 0, _RGBA, _UNSIGNED_BYTE, address)
+    return _clamped(texture)
 
 
 def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
@@ -12,6 +36,10 @@ def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.Textu
     data = np.ascontiguousarray(images).tobytes()
     texture = ctx.texture_array((width, height, count), channels, data, alignment=1)
     texture.build_mipmaps()
+    return _clamped(texture)
+
+
+def _clamped(texture: moderngl.TextureArray) -> moderngl.TextureArray:
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False
     return texture

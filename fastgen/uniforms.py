@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 _TYPES: dict[str, tuple[int, int, str]] = {
     "float": (1, 4, "f4"),
     "int": (1, 4, "i4"),
-    "uint": (1, 4, "u4"),
     "vec2": (2, 8, "f4"),
-    "ivec2": (2, 8, "i4"),
     "vec3": (3, 16, "f4"),
     "vec4": (4, 16, "f4"),
     "mat4": (16, 16, "f4"),
@@ -38,11 +36,11 @@ class Block:
             kind, name = member[0], member[1]
             length = member[2] if len(member) == 3 else 0
             components, align, _ = _TYPES[kind]
-            if length and align != 16:
-                raise AssertionError(f"{name}: arrays are of vec3, vec4 or mat4 only")
+            if length and kind not in ("vec4", "mat4"):
+                raise AssertionError(f"{name}: arrays are of vec4 or mat4 only")
             offset = -(-offset // align) * align
             self._offsets[name] = (offset, kind, length)
-            offset += max(components * 4, 16 if length else 0) * max(length, 1)
+            offset += components * 4 * max(length, 1)
         self._offsets[""] = (-(-offset // 16) * 16, "", 0)
 
     @property
@@ -75,12 +73,5 @@ class Block:
             rows = np.ascontiguousarray(array).reshape(-1, components)
             if len(rows) > max(length, 1):
                 raise AssertionError(f"{name}: {len(rows)} rows do not fit its {length}")
-            stride = 16 if length and components < 4 else components * 4
-            end = offset + stride * len(rows)
-            if end > self.size:  # a last member narrower than its stride
-                data[offset : offset + rows.nbytes] = rows.view(np.uint8).ravel()
-            else:
-                data[offset:end].reshape(len(rows), stride)[:, : components * 4] = rows.view(
-                    np.uint8
-                ).reshape(len(rows), -1)
+            data[offset : offset + rows.nbytes] = rows.view(np.uint8).ravel()
         return data.tobytes()

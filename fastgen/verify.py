@@ -10,7 +10,7 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from fastgen import coco
-from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record
 from fastgen.generate import MANIFEST
@@ -33,16 +33,11 @@ class Findings:
     manifest: dict[str, Any] = field(default_factory=dict)
 
 
-def verify(out: str) -> list[str]:
-    """Faults found in the dataset at `out`, each a line that names a file; empty when all is well.
+def examine(out: str) -> Findings:
+    """What is wrong with the dataset at `out`, and what a repair of it needs to know.
 
     Raises OutputError when `out` is no dataset.
     """
-    return examine(out).faults
-
-
-def examine(out: str) -> Findings:
-    """As `verify`, with what a repair needs to know."""
     storage = storage_of(out)
     try:
         text = storage.read(MANIFEST)
@@ -175,7 +170,7 @@ def _sample(data: dict[str, bytes], record: Record) -> list[tuple[str, str]]:
 def _same_masks(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
     """Category, area, box and run lengths of every annotation, derived again from the mask."""
     parts = [(1, mask > 0)] if mask.any() else []
-    parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= 200])]
+    parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
     seen = []
     for category, part in parts:
         rows, columns = np.nonzero(part)

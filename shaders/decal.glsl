@@ -1,6 +1,6 @@
 // DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
 
-uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decals.py
+uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decal_tables.py
 uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
 uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
 uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline; share of ink
@@ -74,7 +74,8 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
         float wave = abs(fract((p.x + p.y) / period_mm) - 0.5) * period_mm - 0.25 * period_mm;
         albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / footprint_mm, 0.0, 1.0));
     } else {
-        float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)), 0.0);
+        // half a level finer: trilinear lookups widen the footprint by as much
+        float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
         vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
         albedo = kind.x == DECAL_EMBLEM ? ink.rgb : srgb_decode(texel.rgb);
         if (kind.x != DECAL_MARKER) alpha *= texel.a;

@@ -1,4 +1,4 @@
-// vec2 octahedral(vec3 n): unit vector to [0, 1]^2, and pack_surface_key / unpack_normal on top of it.
+// Unit vectors to [0, 1]^2 and back, and the surface keys that hold a normal so.
 // Cigolle et al. 2014, A Survey of Efficient Representations for Independent Unit Vectors.
 
 vec2 octahedral(vec3 n) {

@@ -1,4 +1,4 @@
-// vec3 display_color(vec3 radiance): exposed linear radiance to sRGB-encoded 0..1.
+// Exposed linear radiance to what a screen shows, and sRGB encoding.
 
 // Khronos PBR Neutral tone mapper (Khronos Group 2024, specification section 2): the identity below
 // 0.8 less the Fresnel offset, then a shoulder that leans to white.

@@ -17,7 +17,6 @@ import numpy as np
 import simplejpeg
 
 from fastgen.config import Config
-from fastgen.formats import SEAFRONT
 from fastgen.generate import generate, run_here
 from fastgen.sampling import split_of
 from fastgen.shards import Job, Maker, stem_of
@@ -58,7 +57,6 @@ def make(out, scenes, workers, hang_s=60.0, then=lambda: None):
     """Run the job; what dataset.json says. then: called between the last shard and the end."""
     config = Config.preset()
     job = Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
-    assert SEAFRONT
     run = run_here(workers, hang_s, QuickMaker)
 
     def runner(*arguments):

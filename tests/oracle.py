@@ -190,3 +190,11 @@ def box_of(mask: np.ndarray) -> tuple[int, int, int, int] | None:
     if not rows.size:
         return None
     return int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1
+
+
+def near_edge(values: np.ndarray) -> np.ndarray:
+    """Pixels [H, W] within one pixel of a place where `values` [H, W] changes."""
+    padded = np.pad(values, 1, mode="edge")
+    height, width = values.shape
+    around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
+    return np.any([a != values for a in around], axis=0)

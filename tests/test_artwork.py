@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
 
-from fastgen.artwork import ART_SIZE, art_images, brands, glyph_tiles, stickers
+from fastgen.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
 from fastgen.classes import MARKER_CLASSES
+from fastgen.gl import open_context
 from fastgen.resources import asset_path
+from fastgen.textures import art_texture
 
 RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125, 26)
 YELLOW, WHITE, BLACK = (246, 201, 0), (255, 255, 255), (16, 16, 16)
@@ -105,3 +107,53 @@ def test_stickers_and_emblems_have_art():
     _, layers = art_images()
     assert all(name in layers for name in stickers())
     assert all(brand.emblem in layers for brand in brands())
+
+
+def mean_light(block):
+    """sRGB [3] and alpha of the mean light of texels [..., 4], by Python's floats."""
+    texels = block.reshape(-1, 4) / 255.0
+    light = [
+        [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in t[:3]] for t in texels
+    ]
+    alpha = texels[:, 3]
+    mean = (np.array(light) * alpha[:, None]).sum(axis=0) / max(alpha.sum(), 1e-9)
+    code = np.where(mean <= 0.0031308, 12.92 * mean, 1.055 * mean ** (1 / 2.4) - 0.055)
+    return np.append(255 * code, 255 * alpha.mean())
+
+
+def test_smaller_artwork_is_the_mean_of_its_light_and_not_of_its_codes():
+    rng = np.random.default_rng(3)
+    image = rng.integers(0, 256, (16, 16, 4), np.uint8)
+    image[:4, :4, :3], image[:4, :2, 3], image[:4, 2:4, 3] = 200, 255, 0
+    image[:4, 2:4, :3] = 0  # transparent, so its black does not count
+    levels = smaller(image)
+    assert [len(level) for level in levels] == [8, 4, 2, 1]
+    for step, level in zip((2, 4, 8, 16), levels, strict=True):
+        for y, x in np.ndindex(level.shape[:2]):
+            block = image[y * step : (y + 1) * step, x * step : (x + 1) * step]
+            assert np.abs(level[y, x] - mean_light(block)).max() <= 1.0
+    assert (levels[1][0, 0, :3] == 200).all()
+
+
+def test_the_gpu_samples_these_levels():
+    rng = np.random.default_rng(4)
+    images = rng.integers(0, 256, (3, 8, 8, 4), np.uint8)
+    code = """
+    #version 430
+    layout(local_size_x = 1) in;
+    layout(binding = 0) uniform sampler2DArray art;
+    layout(std430, binding = 0) buffer Found { vec4 found[]; };
+    void main() {
+        uint level = gl_WorkGroupID.x;
+        vec2 corner = vec2(0.5 / float(8 >> level));
+        found[level] = textureLod(art, vec3(corner, 2.0), float(level));
+    }
+    """
+    with open_context() as gl:
+        art_texture(gl, images).use(0)
+        found = gl.ctx.buffer(reserve=4 * 16)
+        found.bind_to_storage_buffer(0)
+        gl.ctx.compute_shader(code).run(4)
+        corners = np.frombuffer(found.read(), np.float32).reshape(4, 4) * 255
+    wanted = [images[2], *smaller(images[2])]
+    assert np.abs(corners - [level[0, 0] for level in wanted]).max() < 0.5

@@ -107,12 +107,12 @@ def test_errors_about_names_name_the_file(tmp_path):
     for text, words in (
         (
             "damage: {kinds: [dent]}",
-            r"damage.kinds\[0\]: unknown kind 'dent' \(did you mean dented",
+            r"damage.kinds\[0\]: 'dent' is unknown \(did you mean dented",
         ),
-        ("damage: {faces: [lid]}", r"damage.faces\[0\]: unknown face 'lid'"),
+        ("damage: {faces: [lid]}", r"damage.faces\[0\]: 'lid' is unknown"),
         ("damage: {faces: []}", "damage.faces: the list is empty"),
-        ("markings: {fonts: [comic]}", "markings.fonts: unknown font 'comic'"),
-        ("markings: {brand: {lid: 1}}", "markings.brand: unknown face 'lid'"),
+        ("markings: {fonts: [comic]}", "markings.fonts: 'comic' is unknown"),
+        ("markings: {brand: {lid: 1}}", "markings.brand: 'lid' is unknown"),
         ("container: {depth_scale: [1, 3]}", r"container.depth_scale\[1\]: 3 times end: depth_mm"),
         (
             "container: {profiles: {side: {slope_mm: 1}}}",

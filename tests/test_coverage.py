@@ -219,7 +219,7 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
     flags = set()
     for sample in views(generator):
         mesh = generator._renderer.mesh(sample.scene.container)
-        low, high = mesh.bounds_mm.__iter__()
+        low, high = mesh.bounds_mm
         moved = fields.deform(sample.scene.damages, mesh.positions_mm)
         body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
         eye = sample.view.position_m

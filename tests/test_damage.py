@@ -26,14 +26,6 @@ def generator():
         yield made
 
 
-def changes(labels):
-    """Pixels within one pixel of a place where `labels` changes."""
-    padded = np.pad(labels, 1, mode="edge")
-    height, width = labels.shape
-    around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
-    return np.any([a != labels for a in around], axis=0)
-
-
 @pytest.mark.parametrize("index", range(8))
 def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, index):
     scene = generator.scene(index)
@@ -45,10 +37,10 @@ def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, ind
         wrong = sample.damage != expected
         assert wrong.mean() < 1e-3
         # away from edges, only a centre right on a seam between two parts may fall between them
-        assert (wrong & ~changes(expected)).sum() <= 3
+        assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
         ids = oracle.object_ids(scene, mesh, hits)
-        assert ((sample.ids != ids) & ~changes(ids)).sum() <= 3
-        both = np.isfinite(sample.depth) & hits.hit & ~changes(expected)
+        assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
+        both = np.isfinite(sample.depth) & hits.hit & ~oracle.near_edge(expected)
         error_m = np.abs(sample.depth[both] - hits.depth_m[both])
         allowed_m = np.maximum(1e-3, 1e-3 * hits.depth_m[both])
         # centres on a crease between facets may fall on either

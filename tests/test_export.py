@@ -187,10 +187,6 @@ def test_the_exported_spreader_is_where_the_renderer_shows_it(generator, tmp_pat
 def test_the_exported_spreader_wears_the_renderers_paint(generator, tmp_path):
     scene = bare(generator.scene(0))
     scene = replace(scene, spreader=Spreader(present=True, albedo=(0.5, 0.1, 0.02)))
-    scene = replace(
-        scene,
-        surface=replace(scene.surface, paint=replace(scene.surface.paint, tone_variation=0.0)),
-    )
     export_glb(generator, scene, tmp_path / "held.glb", [], 16.0)
     skin = Exported(tmp_path / "held.glb").parts["spreader"].visual.material.baseColorTexture
     typical = np.median(np.asarray(skin.convert("RGB")).reshape(-1, 3), axis=0) / 255

@@ -13,8 +13,6 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
 
 from fastgen import shards
 from fastgen.cli import main
@@ -59,23 +57,9 @@ def test_every_file_of_the_layout_is_there(dataset):
     manifest = json.loads((dataset / "dataset.json").read_text())
     assert sum(s["images"] for s in manifest["counts"].values()) == 14
     assert manifest["seed"] == 3
-    assert "llvmpipe" in manifest["renderer"] or manifest["renderer"]
+    assert manifest["renderer"]
     sheet = cv2.imread(str(dataset / "contact_sheet.png"))
     assert sheet is not None
-
-
-def test_coco_ground_truth_scores_full_marks_against_itself(dataset):
-    for split in ("train", "val", "test"):
-        truth = COCO(str(dataset / f"damage/coco_{split}.json"))
-        if not truth.getAnnIds():
-            continue
-        found = [dict(a, score=1.0) for a in truth.dataset["annotations"]]
-        for kind in ("bbox", "segm"):
-            score = COCOeval(truth, truth.loadRes([dict(a) for a in found]), kind)
-            score.evaluate()
-            score.accumulate()
-            score.summarize()
-            assert score.stats[0] == pytest.approx(1.0)
 
 
 def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):

@@ -30,6 +30,7 @@ RIG = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
         ({"seed": True}, "seed: True is not"),
         ({"seed": 2**64}, "seed: 18446744073709551616 is not a whole number of 0 to"),
         ({"size": 640}, r"size: 640 is no pair; give \(width, height\)"),
+        ({"size": (32, 640)}, "size: 32x640 is out of range"),
         ({"size": ("a", 1)}, "size: ax1 is out of range"),
         ({"size": (math.nan, 64)}, "size: nanx64 is out of range"),
         ({"quality": 3}, "quality: 3 is unknown"),
@@ -58,6 +59,7 @@ def generator():
         ({"index": "1"}, "index: '1' is not"),
         ({"index": 0, "camera": 3}, "camera: 3 is neither a Camera nor the name of one"),
         ({"index": 0, "camera": "D"}, "camera: 'D' is unknown"),
+        ({"index": 0, "layer": "rusty"}, r"layer: 'rusty' is unknown \(did you mean rust"),
         ({"index": 0, "layer": None}, "layer: None is unknown"),
         (
             {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 9, 0), 20)},

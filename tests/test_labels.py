@@ -5,7 +5,6 @@ import pytest
 
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config import Config
-from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.labels import decal_of, visible_boxes
 from tests import oracle
@@ -70,7 +69,7 @@ def test_truncated_means_the_amodal_box_leaves_the_image(samples):
             leaves = x0 < 0 or y0 < 0 or x1 > 480 or y1 > 360
             assert item.truncated == leaves
             found[leaves] += 1
-    assert found[False]
+    assert all(found.values())
 
 
 def test_unoccluded_markers_are_nearly_fully_visible(samples):
@@ -90,17 +89,3 @@ def test_boxes_of_random_ids_equal_brute_force():
     for value in range(2, 10):
         assert boxes[value] == oracle.box_of(ids == value)
         assert areas[value] == (ids == value).sum()
-
-
-def test_bad_arguments_are_named():
-    with pytest.raises(ConfigError, match="size: 32x640"):
-        Generator(size=(32, 640))
-    with pytest.raises(ConfigError, match="seed: -1"):
-        Generator(seed=-1)
-    with Generator(size=(64, 64)) as generator:
-        with pytest.raises(ConfigError, match="camera: 'Cx' is unknown"):
-            generator.render(index=0, camera="Cx")
-        with pytest.raises(ConfigError, match=r"layer: 'rusty' is unknown \(did you mean rust"):
-            generator.render(index=0, layer="rusty")
-        with pytest.raises(ConfigError, match="either index or scene"):
-            generator.render()

@@ -253,8 +253,8 @@ def test_a_divided_mesh_is_the_same_surface_with_short_edges():
         pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
         return np.unique(pairs, axis=0, return_counts=True)[1]
 
-    if (alone(old) >= 2).all():
-        assert (alone(whole) >= 2).all()
+    assert (alone(old) >= 2).all()
+    assert (alone(whole) >= 2).all()
     assert len(points) > len(mesh.positions_mm)
 
 

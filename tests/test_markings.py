@@ -206,7 +206,7 @@ def test_unknown_characters_and_fonts_are_named():
     font = next(iter(glyph_tiles()[1].values()))
     with pytest.raises(AssetError, match="no glyph for 'é'"):
         layout(("é",), font, 100.0)
-    with pytest.raises(ConfigError, match="unknown font 'comic'"):
+    with pytest.raises(ConfigError, match="'comic' is unknown"):
         Config.from_values({"markings": {"fonts": ["comic"]}})
 
 

@@ -1,6 +1,5 @@
 """Runs on a Ray cluster of two nodes give the bytes of a run without Ray, whatever dies."""
 
-import hashlib
 import os
 import secrets
 import signal
@@ -22,6 +21,7 @@ from fastgen.generate import generate, run_here
 from fastgen.on_ray import run_on_ray
 from fastgen.shards import Job
 from tests.crash_run import FAULTY_SCENE, QuickMaker
+from tests.folders import content
 
 ROOT = str(Path(__file__).parent.parent)
 SCENES = 24
@@ -55,14 +55,6 @@ class BrokenMaker(QuickMaker):
 def job_at(out, scenes):
     config = Config.preset()
     return Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
-
-
-def content(folder):
-    return {
-        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file()
-    }
 
 
 @pytest.fixture(scope="module")

@@ -50,9 +50,7 @@ def blocks(gl, **changed):
     """Uniform blocks of zeros but for `changed`, bound."""
     kept = []
     for block in (SCENE_BLOCK, VIEW_BLOCK):
-        values = {
-            member[1]: np.zeros(4) if member[0] == "vec4" else 0.0 for member in block.members
-        }
+        values = {}
         for member in block.members:
             size = {"vec2": 2, "vec3": 3, "vec4": 4, "mat4": 16}.get(member[0], 1)
             values[member[1]] = changed.get(member[1], np.zeros(size))

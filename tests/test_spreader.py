@@ -15,6 +15,7 @@ from fastgen.container import build_container
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.scene import Decal, Scene, Spreader
+from fastgen.shapes import spreader_mesh
 from fastgen.spreader import build_spreader, tier_bounds_mm
 from tests import oracle
 from tests.mesh_probe import ISO_668, first_hits, winding_normals
@@ -28,14 +29,6 @@ POSES = [(True, True), (False, False), (True, False)]
 def generator():
     with Generator(ALWAYS, seed=31, size=SIZE) as made:
         yield made
-
-
-def near_edge(values):
-    """Pixels within one pixel of a place where `values` changes."""
-    padded = np.pad(values, 1, mode="edge")
-    height, width = values.shape
-    around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
-    return np.any([a != values for a in around], axis=0)
 
 
 def surface_points(mesh):
@@ -130,9 +123,10 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     assert wrong.mean() < 3e-4
     # what is wrong away from edges: a centre right on a seam between two sheets of the container
     of_spreader = (sample.ids == oracle.SPREADER) | hits.spreader
-    assert not (wrong & of_spreader & ~near_edge(expected)).any()
-    assert (wrong & ~near_edge(expected)).sum() <= 1
-    both = np.isfinite(hits.depth_m) & np.isfinite(sample.depth) & ~wrong & ~near_edge(expected)
+    assert not (wrong & of_spreader & ~oracle.near_edge(expected)).any()
+    assert (wrong & ~oracle.near_edge(expected)).sum() <= 1
+    both = np.isfinite(hits.depth_m) & np.isfinite(sample.depth)
+    both &= ~wrong & ~oracle.near_edge(expected)
     error = np.abs(sample.depth[both] - hits.depth_m[both]) / hits.depth_m[both]
     assert np.quantile(error, 0.999) < 1e-3
     spreader = both & hits.spreader
@@ -189,7 +183,7 @@ def test_damage_neither_moves_nor_marks_the_spreader():
                 assert both.sum() >= 0.99 * spreader.sum()
                 np.testing.assert_allclose(damaged.depth[both], sound.depth[both], rtol=1e-5)
                 same = (damaged.image == sound.image).all(axis=-1)
-                inner.append(same[both & ~near_edge(damaged.ids)])
+                inner.append(same[both & ~oracle.near_edge(damaged.ids)])
     assert np.concatenate(inner).mean() > 0.99
 
 
@@ -199,7 +193,7 @@ def test_decals_do_not_print_on_the_spreader(generator):
     for camera in scene.cameras:
         with_decals = generator.render(scene=scene, camera=camera)
         without = generator.render(scene=bare, camera=camera)
-        inner = (with_decals.ids == oracle.SPREADER) & ~near_edge(with_decals.ids)
+        inner = (with_decals.ids == oracle.SPREADER) & ~oracle.near_edge(with_decals.ids)
         np.testing.assert_array_equal(with_decals.image[inner], without.image[inner])
         spreader = with_decals.ids == oracle.SPREADER
         np.testing.assert_array_equal(spreader, without.ids == oracle.SPREADER)
@@ -217,7 +211,7 @@ def test_paint_of_the_spreader_is_the_scenes(generator):
 def test_the_renderer_gives_the_mesh_that_it_draws(generator):
     scene = generator.scene(1)
     generator.render(scene=scene, camera="B")
-    mesh = generator._open().spreader_mesh(scene)
+    mesh = spreader_mesh(scene)
     pixels, depth = view_of(scene.camera("B"), SIZE).project(mesh.positions_mm)
     assert (depth > 0).all()
     sample = generator.render(scene=scene, camera="B")
@@ -228,7 +222,7 @@ def test_the_renderer_gives_the_mesh_that_it_draws(generator):
     assert max(low[1], 0) - 1 <= y0
     assert y1 <= high[1] + 1
     none = replace(scene, spreader=Spreader(present=False))
-    assert generator._open().spreader_mesh(none) is None
+    assert spreader_mesh(none) is None
     assert not (generator.render(scene=none, camera="B").ids == oracle.SPREADER).any()
 
 

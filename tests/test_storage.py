@@ -128,7 +128,6 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path, monkeypatch):
 
 
 def test_a_small_disk_stops_the_run_with_one_line(tmp_path):
-    """On a real file system of 1 MB where this user may mount one, else by a limit on file size."""
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500));"
         f"sys.argv[1:] = ['{tmp_path / 'out'}', '8', '1'];"

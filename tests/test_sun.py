@@ -9,11 +9,12 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Generator
 from fastgen.container import KINDS, build_container
+from fastgen.damage import deform
 from fastgen.environment import irradiance_at, load_environment, prefilter_environment
 from fastgen.gl import open_context
 from fastgen.openness import probe_points
 from fastgen.programs import link
-from fastgen.scene import Camera, EnvironmentView, Spreader
+from fastgen.scene import Camera, Damage, EnvironmentView, Spreader
 from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.sun import split_sun
 from fastgen.sun_shadow import MAP_SIZE, ShadowMap
@@ -116,6 +117,47 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, toward):
     clear = (free == free[0]).all(axis=0) & ~buried
     assert 0.05 < free[0, clear].mean() < 0.95
     assert (found == free[0])[clear].mean() > 0.98
+    shadow.release()
+
+
+def test_a_dent_shades_itself_as_rays_say(gl):
+    """Under a raking sun, half of a deep dent lies in the shade of the other."""
+    toward = np.array([0.93, -0.3, 0.2]) / np.linalg.norm([0.93, -0.3, 0.2])
+    container = build_container("20")
+    half_width = KINDS["20"].size_mm[1] / 2
+    dent = Damage(
+        "concave", "front", (0.0, -half_width, 1300.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0),
+        (0.0, 1.0, 0.0), (900.0, 1400.0), 230.0,
+    )  # fmt: skip
+    shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
+    shadow.cast(container, None, toward, (dent,))
+    depth = np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(MAP_SIZE[::-1])
+
+    moved = deform((dent,), container.positions_mm)
+    body = trimesh.Trimesh(moved, container.triangles.astype(np.int64), process=False)
+    at = np.stack(np.meshgrid(np.linspace(-440, 440, 60), np.linspace(700, 1900, 60)), -1)
+    eyes = np.insert(at.reshape(-1, 2), 1, -half_width - 500, axis=1)
+    seen = RayMeshIntersector(body)
+    points, _, triangle = seen.intersects_location(
+        eyes, np.tile([0.0, 1.0, 0.0], (len(eyes), 1)), multiple_hits=False
+    )
+    normals = body.face_normals[triangle]
+    facing = normals @ toward > 0.1
+    points = (points + 2.0 * normals)[facing]
+
+    def free_of(mesh, offset):
+        rays = np.tile(toward, (len(points), 1))
+        return ~RayMeshIntersector(mesh).intersects_any(points + offset, rays)
+
+    aside = np.cross(toward, [0.0, 0.0, 1.0])
+    around = [free_of(body, step * aside) for step in (-10, 0, 10)]
+    clear = (around[0] == around[1]) & (around[2] == around[1])
+    assert 0.2 < around[1].mean() < 0.8
+    matrix = shadow.from_ray(np.zeros(3))
+    uvd = points / 1000 @ matrix[:3, :3].T + matrix[:3, 3]
+    column, row = (uvd[:, :2] * MAP_SIZE).astype(int).T
+    found = uvd[:, 2] <= depth[row, column]
+    assert (found == around[1])[clear].mean() > 0.97
     shadow.release()
 
 

@@ -17,9 +17,7 @@ BLOCK = Block(
         ("vec2", "d"),
         ("vec4", "e", 2),
         ("mat4", "f"),
-        ("vec3", "g", 2),
-        ("int", "h"),
-        ("ivec2", "i"),
+        ("int", "g"),
     ),
 )
 
@@ -30,17 +28,14 @@ VALUES = {
     "d": (6, 7),
     "e": [(8, 9, 10, 11), (12, 13, 14, 15)],
     "f": np.arange(16, 32).reshape(4, 4),
-    "g": [(32, 33, 34), (35, 36, 37)],
-    "h": 38,
-    "i": (39, 40),
+    "g": 32,
 }
 
 READ = [
     *("a", "b.x", "b.y", "b.z", "c", "d.x", "d.y"),
     *(f"e[{k}].{c}" for k in (0, 1) for c in "xyzw"),
     *(f"f[{column}][{row}]" for row in range(4) for column in range(4)),
-    *(f"g[{k}].{c}" for k in (0, 1) for c in "xyz"),
-    *("float(h)", "float(i.x)", "float(i.y)"),
+    "float(g)",
 ]
 
 

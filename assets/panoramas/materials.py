@@ -253,7 +253,7 @@ def build_materials(lamp_strength: float, wet: float, swell: float) -> None:
     _lamp("led", (1.0, 0.93, 0.82), lamp_strength)
     _lamp("sodium", (1.0, 0.52, 0.16), lamp_strength)
     _lamp("beacon", (1.0, 0.05, 0.03), 0.3 * lamp_strength)
-    _ground("concrete", (0.36, 0.34, 0.31), 6.0, wet)
+    _ground("concrete", (0.29, 0.275, 0.25), 6.0, wet)
     _ground("asphalt", (0.11, 0.11, 0.112), 0.0, wet)
     _water(swell, (0.012, 0.035, 0.038))
     _cladding()

@@ -15,8 +15,9 @@ from typing import Any
 import torch
 from torch import nn
 
-from common.data import Feed
+from common.data import Feed, rendered
 from fastgen.errors import ConfigError
+from fastgen.torch import ContainerDataset
 
 RESULTS = Path(__file__).parent.parent / "results"
 
@@ -102,6 +103,12 @@ def start(
     asked.results.mkdir(parents=True, exist_ok=True)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
+
+
+def feed_of(data: ContainerDataset, run: Run) -> Feed:
+    """Batches of `data`, rendered anew each pass or once, as the plan has it."""
+    source = data if run.plan.workers else rendered(data, run.cache)
+    return Feed(source, run.plan.batch, run.seed, run.plan.workers)
 
 
 def train(model: Learner, feed: Feed, run: Run) -> list[float]:

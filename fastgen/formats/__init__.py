@@ -16,11 +16,12 @@ from typing import Any
 import orjson
 
 from fastgen.camera import View
+from fastgen.classes import DETECTION_CLASSES
 from fastgen.config import LabelConfig
 from fastgen.encode import jpeg
-from fastgen.errors import ConfigError
-from fastgen.records import nearest
-from fastgen.sample import Sample
+from fastgen.programs import CONTAINER_ID
+from fastgen.records import check_known
+from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
@@ -43,8 +44,8 @@ Record = dict[str, Any]
 Records = Callable[[], Iterable[Record]]
 """The records of one split in order; each call goes through them from the start."""
 
-
 DatasetFiles = Iterator[tuple[str, Iterable[str] | bytes]]
+"""Files over a whole split: path, and text piece by piece or bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,18 @@ class Item:
     def image_path(self) -> str:
         """Where the image itself lies."""
         return f"images/{self.split}/{self.stem}.jpg"
+
+    @property
+    def container(self) -> Object:
+        """The container, seen or not."""
+        return next(thing for thing in self.sample.objects if thing.id == CONTAINER_ID)
+
+    @property
+    def detections(self) -> Iterator[tuple[Object, Box]]:
+        """What the marker task labels, ignored or not, each with its visible box."""
+        for thing in self.sample.objects:
+            if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:
+                yield thing, thing.bbox
 
     @cached_property
     def jpeg(self) -> bytes:
@@ -101,8 +114,7 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     """Formats by name. Raises ConfigError for an unknown one."""
     known = known_formats()
     for name in names:
-        if name not in known:
-            raise ConfigError(f"also: {name!r} is no format{nearest(name, known)}")
+        check_known("also", name, known)
     return [known[name] for name in names]
 
 

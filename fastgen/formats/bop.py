@@ -15,7 +15,6 @@ from fastgen.container import KINDS, WallProfiles, build_container
 from fastgen.encode import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
-from fastgen.programs import CONTAINER_ID
 from fastgen.sampling import SPLITS
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
@@ -36,7 +35,7 @@ class _Bop(Format):
             f"{folder}/rgb/{name}.jpg": Same(item.image_path),
             f"{folder}/depth/{name}.png": png(depth_mm(sample.depth)),
         }
-        thing = next(thing for thing in sample.objects if thing.id == CONTAINER_ID)
+        thing = item.container
         intrinsics = sample.view.intrinsics.copy()
         intrinsics[:2, 2] -= 0.5
         camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}

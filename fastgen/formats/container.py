@@ -5,7 +5,6 @@ from typing import Any
 from fastgen import coco
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, view_values
 from fastgen.labels import CASTINGS
-from fastgen.programs import CONTAINER_ID
 from fastgen.visibility import window
 
 _EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
@@ -18,7 +17,7 @@ class _Container(Format):
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample = item.sample
-        thing = next(thing for thing in sample.objects if thing.id == CONTAINER_ID)
+        thing = item.container
         if thing.bbox is None:
             return {}, []
         pose = view_values(sample.view)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import coco
-from fastgen.classes import SEGMENTATION_CLASSES
+from fastgen.classes import DAMAGE_VALUES, SEGMENTATION_CLASSES
 from fastgen.encode import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records
 from fastgen.formats.yolo import line, outline
@@ -26,7 +26,7 @@ def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], boo
     that is seen. The container's mask spans its damages: they are part of it."""
     own = [thing for thing in sample.objects if thing.class_name in SEGMENTATION_CLASSES]
     ignored = {thing.id: thing.ignored for thing in own}
-    damaged = sample.damage.ravel()[np.flatnonzero(sample.damage >= 200)]
+    damaged = sample.damage.ravel()[np.flatnonzero(sample.damage >= DAMAGE_VALUES.start)]
     for value in (0, *np.unique(damaged).tolist()):
         mask = sample.damage == value if value else sample.damage > 0
         box = mask_box(mask)

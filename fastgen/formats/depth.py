@@ -1,5 +1,4 @@
-"""Depth along the optical axis as 16-bit PNG: tenths of a millimetre would not reach 45 m, so
-millimetres; 0 where void."""
+"""Depth along the optical axis as 16-bit PNG: millimetres, which reach 65 m, and 0 where void."""
 
 from typing import Any
 

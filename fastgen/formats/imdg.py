@@ -27,17 +27,15 @@ class _Imdg(Format):
             f"imdg/labels/{split}/{stem}.txt": labels.encode(),
         }
         found = []
-        for thing in sample.objects:
-            if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
-                continue
+        for thing, box in item.detections:
             on_top = thing.id == CONTAINER_ID
-            target = window(sample.damage if on_top else sample.ids, thing.bbox)
+            target = window(sample.damage if on_top else sample.ids, box)
             part = target > 0 if on_top else target == thing.id
             category = DETECTION_CLASSES.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
             found.append(
                 {
-                    **coco.annotation(category, thing.bbox, part, sample.view.size, thing.ignored),
+                    **coco.annotation(category, box, part, sample.view.size, thing.ignored),
                     **more,
                 }
             )

@@ -3,7 +3,6 @@ development kit says to; what is ignored is a DontCare region. Geiger et al. 201
 
 from typing import Any
 
-from fastgen.classes import DETECTION_CLASSES
 from fastgen.formats import Files, Format, Item, Same
 
 _UNKNOWN = "-1 -1 -1 -1000 -1000 -1000 -10"
@@ -15,10 +14,8 @@ class _Kitti(Format):
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         lines = []
-        for thing in item.sample.objects:
-            if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
-                continue
-            box = " ".join(f"{value:.2f}" for value in thing.bbox)
+        for thing, edges in item.detections:
+            box = " ".join(f"{value:.2f}" for value in edges)
             state = f"{thing.class_name} {float(thing.truncated):.2f} {int(thing.occluded)} -10"
             head = "DontCare -1 -1 -10" if thing.ignored else state
             lines.append(f"{head} {box} {_UNKNOWN}\n")

@@ -4,7 +4,6 @@ development kit, section 7."""
 from typing import Any
 from xml.etree import ElementTree
 
-from fastgen.classes import DETECTION_CLASSES
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
 
 
@@ -20,10 +19,7 @@ class _Voc(Format):
         for name, value in (("width", width), ("height", height), ("depth", 3)):
             _add(size, name, value)
         _add(root, "segmented", 0)
-        for thing in item.sample.objects:
-            if thing.class_name not in DETECTION_CLASSES or thing.bbox is None:
-                continue
-            x0, y0, x1, y1 = thing.bbox
+        for thing, (x0, y0, x1, y1) in item.detections:
             each = ElementTree.SubElement(root, "object")
             _add(each, "name", thing.class_name)
             _add(each, "pose", "Unspecified")

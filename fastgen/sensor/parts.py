@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from fastgen.errors import ConfigError
-from fastgen.records import bounds, nearest
+from fastgen.records import UNIT, bounds, check_known
 
 WHOLE = bounds(0, 2**63 - 1)
 
@@ -26,8 +26,7 @@ class Lens:
 
     def __post_init__(self) -> None:
         """Refuse what no formula fits."""
-        if self.model not in LENS_MODELS:
-            raise ConfigError(f"model: {self.model!r} is unknown{nearest(self.model, LENS_MODELS)}")
+        check_known("model", self.model, LENS_MODELS)
         wanted = LENS_MODELS[self.model]
         if len(self.coefficients) != wanted:
             raise ConfigError(
@@ -37,8 +36,8 @@ class Lens:
 
 @dataclass(frozen=True)
 class Noise:
-    """A sensor's noise, see sensor/noise.py. full_well_e: electrons that make white; read_noise_e:
-    standard deviation without light, in electrons; seed: of this image's noise."""
+    """A sensor's noise, see sensor/electronics.py. full_well_e: electrons that make white;
+    read_noise_e: standard deviation without light, in electrons; seed: of this image's noise."""
 
     full_well_e: float = field(metadata=bounds(1.0, 1e9, "electrons"))
     read_noise_e: float = field(metadata=bounds(0.0, 1e6, "electrons"))
@@ -47,7 +46,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Stamp:
-    """Text that the camera burns in: lines of it, in which corner (top or bottom, left or right),
+    """Text that the camera burns in: one line, in which corner (top or bottom, left or right),
     height of its capitals as a share of the image's."""
 
     text: str
@@ -100,4 +99,4 @@ class Weather:
 
     visibility_mm: float = field(default=0.0, metadata=bounds(0.0, 1e9, "mm"))
     rain: Rain | None = None
-    wetness: float = field(default=0.0, metadata=bounds(0.0, 1.0))
+    wetness: float = field(default=0.0, metadata=UNIT)

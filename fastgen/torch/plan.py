@@ -9,7 +9,7 @@ import torch
 from fastgen.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import DOOR_CLASSES
-from fastgen.records import nearest, whole
+from fastgen.records import check_known, nearest, whole
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
 
@@ -36,8 +36,7 @@ class Plan:
         all_views: bool,
     ) -> None:
         if split is not None:
-            if split not in SPLITS:
-                raise ConfigError(f"split: {split!r} is unknown{nearest(split, SPLITS)}")
+            check_known("split", split, SPLITS)
             if not getattr(config.split, split):
                 raise ConfigError(f"split: config.split gives {split} no scenes; raise its share")
         self.cameras = tuple(cameras)

@@ -1,7 +1,7 @@
 """Sample -> image and target tensors for each task of the paper, and their collate functions.
 
-What is labelled at all is decided where the files are written: coco.instances, yolo.detections,
-text_crops and door_class.
+What is labelled at all is decided where the files are written: formats.damage.instances,
+yolo.detections, text_crops and door_class.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_class
-from fastgen.records import nearest
+from fastgen.records import check_known
 from fastgen.sample import Box, Sample
 
 Item = tuple[Any, Any]
@@ -34,8 +34,6 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "door": DOOR_CLASSES,
 }
 
-TASKS = tuple(_NAMES)
-
 FORMS = ("detection", "yolo")
 
 
@@ -44,15 +42,13 @@ def class_names(task: str) -> tuple[str, ...]:
 
     Raises ConfigError for an unknown task.
     """
-    if task not in _NAMES:
-        raise ConfigError(f"task: {task!r} is unknown{nearest(task, _NAMES)}")
+    check_known("task", task, _NAMES)
     return _NAMES[task]
 
 
 def check_form(task: str, form: str) -> None:
     """Raise ConfigError where `form` is unknown or means nothing to `task`."""
-    if form not in FORMS:
-        raise ConfigError(f"form: {form!r} is unknown{nearest(form, FORMS)}")
+    check_known("form", form, FORMS)
     if form == "yolo" and task not in ("damage", "imdg"):
         raise ConfigError(f"form: 'yolo' holds boxes, which the {task} task has not; leave it out")
 
