@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.programs import SPREADER_ID
+from fastgen.classes import SPREADER_ID
 from fastgen.sample import Sample
 
 STEP_M = 0.15

@@ -20,3 +20,9 @@ SOUND_CONTAINER = 101
 
 DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance, which are their ids as well."""
+
+CONTAINER_ID = 1
+"""In the id target, where 0 is the void and decals count up from 2."""
+
+SPREADER_ID = 60000
+"""Above all decals."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.artwork import Font
-from fastgen.classes import DAMAGE_VALUES
+from fastgen.classes import CONTAINER_ID, DAMAGE_VALUES, SPREADER_ID
 from fastgen.errors import FastgenError
 from fastgen.lettering import layout
 from fastgen.mesh import Mesh
-from fastgen.programs import CONTAINER_ID, DECAL_CELL_MM, DECAL_KINDS, SPREADER_ID
+from fastgen.programs import DECAL_CELL_MM, DECAL_KINDS
 from fastgen.scene import Decal, Scene
 
 DECAL_TEXELS = 5

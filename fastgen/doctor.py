@@ -9,6 +9,9 @@ from typing import Any
 from fastgen.errors import FastgenError
 from fastgen.gl import egl_devices, open_context
 
+_START_S = 60.0
+"""For a new process to import what it needs; then its driver's time begins."""
+
 _TIMEOUT_S = 30.0
 
 
@@ -66,6 +69,8 @@ def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
     process.start()
     sender.close()
     try:
+        if receiver.poll(_START_S):
+            receiver.recv()
         if receiver.poll(_TIMEOUT_S):
             answer: tuple[bool, Any] = receiver.recv()
             return answer
@@ -82,6 +87,7 @@ def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
 
 
 def _answer(sender: Any, attempt: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    sender.send("started")
     try:
         answer = True, attempt(*arguments)
     except FastgenError as error:

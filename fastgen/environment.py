@@ -31,13 +31,10 @@ SPECULAR_SIZE = 128
 IRRADIANCE_SIZE = 34
 """Texels along a side, border included, as for SPECULAR_SIZE."""
 
-"""Luminance of linear red, green and blue: ITU-R BT.709-6, section 3.2."""
-
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
 _SKY_CELLS = 42  # along a side of `Ambient.sky`: 5 degrees
-_DFG_POINTS = 4096
 _MAPS = ("specular", "irradiance", "background", "luminance", "sun")
 _SUN_WIDTH = 2048  # a texel is a third of the real sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
@@ -304,47 +301,3 @@ def metered_luminance(
     luminance = env.luminance.ravel()
     log_average = np.exp(weight @ np.log(np.maximum(luminance, _LUMINANCE_FLOOR)))
     return float(log_average), float(weight @ luminance)
-
-
-@functools.cache
-def dfg_table(size: int = 32) -> NDArray[np.float32]:
-    """Split-sum scale and bias (A, B), float32 [size, size, 2]: specular albedo = A F0 + B.
-
-    Row r is roughness (r + 0.5) / size, column c is n.v (c + 0.5) / size: texel centres, so that GL
-    linear sampling with clamping reads it right at (n.v, roughness). GGX with height-correlated
-    Smith masking and Schlick's Fresnel, single scattering. The array is read-only.
-
-    Karis 2013, Real Shading in Unreal Engine 4, environment BRDF; Heitz 2014, Understanding the
-    Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
-    mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
-    """
-    center = (np.arange(size) + 0.5) / size
-    n_dot_v = center[:, None]
-    view = np.stack([np.sqrt(1 - n_dot_v**2), n_dot_v])
-    # a golden-ratio lattice; half the circle mirrors the other across the plane of incidence
-    point = np.arange(_DFG_POINTS)
-    height = ((point + 0.5) / _DFG_POINTS)[None]
-    phi = np.pi * (point * (5**0.5 - 1) / 2 % 1.0)[None]
-    table = np.empty((size, size, 2), np.float32)
-    for row, alpha in enumerate(center**2):
-        stretched = view * np.array([alpha, 1.0])[:, None, None]
-        stretched /= np.sqrt((stretched**2).sum(0))
-        cap_z = 1.0 - height * (1.0 + stretched[1])
-        cap_r = np.sqrt(1.0 - cap_z**2)
-        hx, hy = alpha * (cap_r * np.cos(phi) + stretched[0]), alpha * cap_r * np.sin(phi)
-        hz = cap_z + stretched[1]
-        v_dot_h = (view[0] * hx + view[1] * hz) / np.sqrt(hx**2 + hy**2 + hz**2)
-        n_dot_h = hz / np.sqrt(hx**2 + hy**2 + hz**2)
-        n_dot_l = 2.0 * v_dot_h * n_dot_h - n_dot_v
-        lit = n_dot_l > 0
-        masked_v = _smith_lambda(n_dot_v, alpha)
-        masked_l = _smith_lambda(np.where(lit, n_dot_l, 1.0), alpha)
-        weight = lit * (1.0 + masked_v) / (1.0 + masked_v + masked_l)  # G2 / G1
-        fresnel = (1.0 - np.clip(v_dot_h, 0.0, 1.0)) ** 5
-        table[row] = np.stack([weight * (1.0 - fresnel), weight * fresnel]).mean(-1).T
-    table.flags.writeable = False
-    return table
-
-
-def _smith_lambda(cosine: NDArray[np.float64], alpha: float) -> NDArray[np.float64]:
-    return 0.5 * (np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0)) - 1.0)

@@ -4,6 +4,7 @@ Which files come is decided by the job alone, so any number of workers makes the
 running again on the same place makes only what is missing.
 """
 
+import hashlib
 import json
 import os
 import reprlib
@@ -24,7 +25,7 @@ from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
 from fastgen.hdri import find_hdris
 from fastgen.progress import Progress
-from fastgen.records import nearest
+from fastgen.records import check_known, nearest
 from fastgen.sampling import SPLITS
 from fastgen.shards import (
     FORMATS,
@@ -137,15 +138,12 @@ def _checked(job: Job, worker_count: int) -> Job:
     ):
         if not 1 <= value <= _MOST:
             raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
-    if job.fmt not in FORMATS:
-        raise ConfigError(f"format: {job.fmt!r} is unknown{nearest(job.fmt, FORMATS)}")
+    check_known("format", job.fmt, FORMATS)
     for name in job.cameras:
-        if name not in job.config.cameras:
-            raise ConfigError(f"cameras: {name!r} is unknown{nearest(name, job.config.cameras)}")
+        check_known("cameras", name, job.config.cameras)
     if not job.cameras or len(set(job.cameras)) != len(job.cameras):
         raise ConfigError("cameras: name at least one, and each only once")
-    if job.backend not in BACKENDS:
-        raise ConfigError(f"backend: {job.backend!r} is unknown{nearest(job.backend, BACKENDS)}")
+    check_known("backend", job.backend, BACKENDS)
     formats_of(job.formats)
     if job.fmt == "webdataset" and "bop" in job.formats:
         raise ConfigError(
@@ -311,8 +309,6 @@ class _Sums:
     """Passes pieces on, and adds up their size and hash."""
 
     def __init__(self, pieces: Iterable[bytes]) -> None:
-        import hashlib
-
         self._pieces, self._size, self._hash = pieces, 0, hashlib.sha256()
 
     def __iter__(self) -> Iterator[bytes]:

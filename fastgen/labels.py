@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import MM, NEAR_M
+from fastgen.classes import CONTAINER_ID, SPREADER_ID
 from fastgen.container import KINDS
 from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
@@ -16,7 +17,6 @@ from fastgen.decal_tables import object_ids
 from fastgen.divided_mesh import as_drawn
 from fastgen.facets import Facets, decal_facets, mesh_facets
 from fastgen.mesh import Mesh
-from fastgen.programs import CONTAINER_ID, SPREADER_ID
 from fastgen.sample import Box, Keypoint, Object
 from fastgen.scene import Decal, Scene
 from fastgen.visibility import Shot, float_box, mask_box, visibility

@@ -340,6 +340,7 @@ def map_matrix(toward: Array, low: Array, high: Array) -> Array:
 
 
 def without_cables(spreader: Mesh) -> Body:
+    """What of a spreader throws shade; its cables are too thin for the maps."""
     solid = tier_of_vertices(spreader) != CABLE_TIER
     triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
     used, numbers = np.unique(triangles, return_inverse=True)

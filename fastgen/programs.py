@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastgen import damage as fields
 from fastgen import environment
 from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
-from fastgen.classes import DAMAGE_CLASSES, SOUND_CONTAINER
+from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, noise_tiles
@@ -53,11 +53,6 @@ MAX_DAMAGES = 128
 
 CLASS_DEPTH_STEP = 0.125
 """Classes are told apart as depths, multiples of this (exact in every depth format)."""
-
-CONTAINER_ID = 1
-
-SPREADER_ID = 60000
-"""Above all decals, which count up from 2."""
 
 SPREADER_CHART = MAX_CHARTS
 """The spreader's charts number from here on, the container's below."""

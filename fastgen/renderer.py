@@ -18,7 +18,7 @@ from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
-from fastgen.environment import Ambient, EnvironmentLight, dfg_table, to_map_frame
+from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
@@ -34,6 +34,7 @@ from fastgen.programs import (
     VIEW_BLOCK,
     link,
 )
+from fastgen.reflectance import dfg_table
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading

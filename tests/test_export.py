@@ -10,6 +10,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen.camera import view_of
+from fastgen.classes import SPREADER_ID
 from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
@@ -18,7 +19,6 @@ from fastgen.damaged_mesh import damaged_mesh
 from fastgen.errors import ConfigError
 from fastgen.export import export_glb
 from fastgen.generator import Generator
-from fastgen.programs import SPREADER_ID
 from fastgen.scene import Camera, Scene, Spreader
 from fastgen.sensor.parts import Lens
 

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
+from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES, SPREADER_ID
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
-from fastgen.programs import SPREADER_ID
 from fastgen.scene import Camera, Container, Decal, Spreader
 from tests import oracle
 

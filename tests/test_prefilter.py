@@ -7,11 +7,11 @@ import pytest
 from fastgen.environment import (
     ROUGHNESS_LEVELS,
     EnvironmentLight,
-    dfg_table,
     irradiance_at,
     prefilter_environment,
 )
 from fastgen.prefilter import octahedral_decode, octahedral_encode, sample_octahedral, shrink
+from fastgen.reflectance import dfg_table
 from fastgen.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE, dfg_table
+from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
 from fastgen.gl import open_context
 from fastgen.noise import NOISE_SIZE, noise_tiles
 from fastgen.programs import SCENE_BLOCK, VIEW_BLOCK, expand
+from fastgen.reflectance import dfg_table
 from fastgen.resources import shader_path
 
 HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'

@@ -16,10 +16,9 @@ from typing import Any
 import orjson
 
 from fastgen.camera import View
-from fastgen.classes import DETECTION_CLASSES
+from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.config import LabelConfig
 from fastgen.encode import jpeg
-from fastgen.programs import CONTAINER_ID
 from fastgen.records import check_known
 from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene

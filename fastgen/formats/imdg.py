@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from fastgen import coco
-from fastgen.classes import DETECTION_CLASSES
+from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
 from fastgen.formats.yolo import detection_lines
-from fastgen.programs import CONTAINER_ID
 from fastgen.sampling import SPLITS
 from fastgen.visibility import window
 
