@@ -107,8 +107,10 @@ class CameraConfig:
     """One camera of the rig: it looks at the middle of a face from a varied position.
 
     azimuth_deg turns the camera about the vertical through that middle (0: straight at the face,
-    positive: it stands to the right, seen from the camera); elevation_deg lifts it. lens: its
-    distortion, none for a pinhole; a fisheye's focal_mm is what an angle of one radian spans.
+    positive: it stands to the right, seen from the camera); elevation_deg lifts it. roll_deg turns
+    the image from where a wall stands upright, or the length of roof or underside lies across.
+    lens: its distortion, none for a pinhole; a fisheye's focal_mm is what an angle of one radian
+    spans.
     """
 
     face: str

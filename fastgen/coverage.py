@@ -202,31 +202,51 @@ def spans(pixels: Array, rows: int | None = None) -> Runs:
 
 
 _MOST_POINTS = 4_000_000
-"""Of things that cover more, only what lies within the image is looked at."""
+"""Of things that cover more, what lies outside the image is looked at on a coarser grid."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """What single pixel centres see. pixel: int [P, 2], column and row; depth_m: float64 [P];
-    rest_mm: float64 [P, 3]."""
+    """What single pixel centres see. pixel: int [P, 2], column and row; within: bool [P], whether
+    that is in the image; depth_m: float64 [P]; rest_mm: float64 [P, 3]. Outside the image a point
+    is the centre of `step` by `step` pixels, of which `pixel` is the first."""
 
     pixel: NDArray[np.int64]
+    within: NDArray[np.bool_]
     depth_m: Array
     rest_mm: Array
+    step: int
 
 
 def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
-    """Every pixel centre in every facet, also outside an image of `size` unless they are too many.
+    """Every pixel centre in every facet, also outside an image of `size`: there on a grid that is
+    coarser the larger the facets are together."""
+    bounds = boxes(seen.pixels, np.zeros(len(seen.owner), np.int64), 1)[0]
+    area = np.prod(bounds[2:] - bounds[:2]) if np.isfinite(bounds).all() else 0.0
+    if area <= _MOST_POINTS:
+        return _points(seen, spans(seen.pixels), 1, size)
+    polygon, row, left, right = spans(seen.pixels, size[1])
+    left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
+    fine = _points(seen, (polygon, row, left, right), 1, size)
+    step = int(np.ceil(2 * np.sqrt(area / _MOST_POINTS)))
+    coarse = _points(seen, spans(seen.pixels / step), step, size)
+    off = ~coarse.within
+    return Points(
+        np.concatenate([fine.pixel, coarse.pixel[off]]),
+        np.concatenate([fine.within, coarse.within[off]]),
+        np.concatenate([fine.depth_m, coarse.depth_m[off]]),
+        np.concatenate([fine.rest_mm, coarse.rest_mm[off]]),
+        step,
+    )
+
+
+def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Points:
+    """The centres of squares of `step` pixels along `runs`, which count such squares.
 
     What is linear on a facet is linear in the image when divided by depth; Blinn 1992,
     "Hyperbolic Interpolation".
     """
-    bounds = boxes(seen.pixels, np.zeros(len(seen.owner), np.int64), 1)[0]
-    if np.isfinite(bounds).all() and np.prod(bounds[2:] - bounds[:2]) > _MOST_POINTS:
-        polygon, row, left, right = spans(seen.pixels, size[1])
-        left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
-    else:
-        polygon, row, left, right = spans(seen.pixels)
+    polygon, row, left, right = runs
     length = right - left
     run = np.repeat(np.arange(len(row)), length)
     column = left[run] + np.arange(len(run)) - np.repeat(np.cumsum(length) - length, length)
@@ -239,8 +259,10 @@ def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
     # clipping leaves corners that repeat; of three as drawn the inverse is the same for less
     inverse = np.linalg.pinv if flat.shape[1] > 3 else np.linalg.inv
     to_values = inverse(flat) @ (values / depth_m[..., None])
-    pixel = np.stack([column, row], axis=1)
-    at = np.concatenate([pixel + 0.5 - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
+    pixel = np.stack([column, row], axis=1) * step
+    center = pixel + 0.5 * step
+    within = np.all((center >= 0) & (center < size), axis=1)
+    at = np.concatenate([center - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
     found = np.einsum("pi,pij->pj", at, to_values[polygon])
     depth = 1 / found[:, 3]
-    return Points(pixel, depth, found[:, :3] * depth[:, None])
+    return Points(pixel, within, depth, found[:, :3] * depth[:, None], step)

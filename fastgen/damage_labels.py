@@ -54,22 +54,22 @@ def _cover(
         return NOTHING, unbounded
     size = shot.view.size
     points = surface_points(project(_facets(shot.scene, shot.mesh, damage), shot.view), size)
-    pixel = points.pixel
-    within = np.all((pixel >= 0) & (pixel < size), axis=1)
+    pixel, within = points.pixel, points.within
     x, y = np.where(within[:, None], pixel, 0).T
     # where the sheet itself is seen, the damage target knows the answer already
     known = within & (points.depth_m <= shot.frame.depth[y, x] * (1 + _DEPTH_SLACK))
     known &= (shot.frame.damage[y, x] == SOUND_CONTAINER) | shown[y, x]
-    pixel, rest_mm = pixel[~known], points.rest_mm[~known]
+    rest_mm = points.rest_mm[~known]
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     part |= in_hole(damage, rest_mm)
     rows, columns = np.divmod(np.flatnonzero(shown), size[0])
-    covered = np.concatenate([pixel[part], np.stack([columns, rows], axis=1)])
+    covered = np.concatenate([pixel[~known][part], np.stack([columns, rows], axis=1)])
     if not len(covered):
         return NOTHING, unbounded
-    bounds = np.concatenate([covered.min(axis=0), covered.max(axis=0) + 1]).astype(np.float64)
-    within = np.all((covered >= 0) & (covered < size), axis=1)
-    beyond = len(np.unique(covered[~within], axis=0))
+    within = np.append(within[~known][part], np.ones(len(rows), bool))
+    ends = covered + np.where(within, 1, points.step)[:, None]
+    bounds = np.concatenate([covered.min(axis=0), ends.max(axis=0)]).astype(np.float64)
+    beyond = len(np.unique(covered[~within], axis=0)) * points.step**2
     inside = covered[within]
     if not len(inside):
         return Cover(NOTHING.mask, (0, 0), beyond), bounds

@@ -2,7 +2,7 @@
 atlases, cameras, light.
 
 What glTF has no place for stands in `extras`: of the scene the environment and the Scene itself,
-of each camera node the exposure.
+of each camera node the exposure and its lens's distortion; to viewers it is a pinhole.
 """
 
 from collections.abc import Iterable
@@ -19,6 +19,7 @@ from fastgen.damage import variant
 from fastgen.damaged_mesh import DamagedMesh, damaged_mesh
 from fastgen.encode import png, write
 from fastgen.errors import OutputError
+from fastgen.formats import view_values
 from fastgen.generator import Generator
 from fastgen.gltf import Glb
 from fastgen.programs import INSIDE_ALBEDO
@@ -158,5 +159,7 @@ def _add_camera(glb: Glb, generator: Generator, scene: Scene, camera: Camera) ->
         "exposure": generator.exposure(scene, camera),
         "size": [width, height],
     }
+    if view.distortion:
+        extras |= {key: view_values(view)[key] for key in ("distortion_model", "distortion")}
     yfov = 2 * float(np.arctan(height / 2 / view.focal_px))
     glb.add_camera(camera.name, yfov, width / height, pose, extras)

@@ -19,12 +19,15 @@ def metered_exposure(
     """Factor on radiance that puts the metered mean at a mid-tone, then exposure_ev stops off it.
 
     The middle of the picture is the container: its paint, half adapted to grey as a metering
-    pattern averages over it, under the light that falls on the side facing the camera; around it
-    stands the background in view.
+    pattern averages over it, under the light that falls on the side facing the camera, a wall or
+    from more than 45 degrees above or below the roof or the underside; around it stands the
+    background in view.
     """
     forward = view.rotation[2]
-    toward_camera = -forward * np.array([1.0, 1.0, 0.0])
-    toward_camera /= max(float(np.linalg.norm(toward_camera)), 1e-6)
+    level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    steep = abs(forward[2]) > np.linalg.norm(forward * level)
+    toward_camera = -forward * (upright if steep else level)
+    toward_camera /= np.linalg.norm(toward_camera)
     falling = float(irradiance_at(light, toward_camera[None], yaw_deg)[0] @ REC_709)
     reflectance = float(np.sqrt(MIDDLE_GREY * max(float(np.array(paint) @ REC_709), 0.02)))
     behind, _ = metered_luminance(light, forward, view.half_angle_deg, yaw_deg)

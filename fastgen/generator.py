@@ -1,9 +1,12 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
+import contextlib
 import hashlib
 import os
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, Self
@@ -16,7 +19,7 @@ from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, ContextError
 from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
@@ -56,6 +59,12 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
     return scene.camera(name)
 
 
+_Left = tuple[int, int, GLContext, Renderer | None, CudaFrames | None]
+
+_left: list[_Left] = []
+"""Process and thread that used a Generator which was dropped unclosed, and what it held."""
+
+
 class Generator:
     """Makes scenes and renders them. A context manager; GL is opened at the first render.
 
@@ -64,7 +73,8 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel), balanced or high. Use it from
     one thread, and make one in each process.
 
-    A process that is forked off, or that gets it pickled, opens a context of its own.
+    A process that is forked off, or that gets it pickled, opens a context of its own. What one that
+    was dropped unclosed held is freed when the thread that used it next opens another.
     Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
     """
 
@@ -115,7 +125,7 @@ class Generator:
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
-        self._process = 0
+        self._process, self._thread = 0, 0
 
     @property
     def environments(self) -> dict[str, float]:
@@ -124,7 +134,7 @@ class Generator:
 
     def environment_digest(self, name: str) -> str:
         """SHA-256 in hexadecimal of an HDRI's file. Raises ConfigError for an unknown name."""
-        return hashlib.sha256(self._hdri(name).read_bytes()).hexdigest()
+        return hashlib.sha256(_hdri(self._hdris, name).read_bytes()).hexdigest()
 
     @property
     def renderer_name(self) -> str:
@@ -263,14 +273,15 @@ class Generator:
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
-        if self._process == os.getpid():
-            if self._cuda is not None:
-                self._cuda.release()
-            if self._renderer is not None:
-                self._renderer.release()
-            if self._gl is not None:
-                self._gl.release()
+        if self._process == os.getpid() and self._gl is not None:
+            _free(self._gl, self._renderer, self._cuda)
         self._cuda, self._renderer, self._gl = None, None, None
+
+    def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
+        # not freed here, perhaps in the middle of another's render: that switches contexts
+        gl = getattr(self, "_gl", None)
+        if gl is not None and self._process == process():
+            left.append((self._process, self._thread, gl, self._renderer, self._cuda))
 
     def __enter__(self) -> Self:
         return self
@@ -310,12 +321,16 @@ class Generator:
         if self._process != os.getpid():  # what was opened before a fork is the parent's
             self.close()
         if self._renderer is None:
-            self._process = os.getpid()
+            self._process, self._thread = os.getpid(), threading.get_ident()
+            for each in [each for each in _left if each[:2] == (self._process, self._thread)]:
+                _left.remove(each)
+                with contextlib.suppress(ContextError):  # no fault of who opens another
+                    _free(*each[2:])
             self._gl = open_context(self.backend, self._device_index)
             threshold_mm = self.config.damage.mask_threshold_mm
-            self._renderer = Renderer(
-                self._gl, self._load_light, self._samples_per_axis, threshold_mm
-            )
+            # bound to no method of ours, so that one dropped is gone at once
+            light = partial(_load_light, self._hdris)
+            self._renderer = Renderer(self._gl, light, self._samples_per_axis, threshold_mm)
         else:
             assert self._gl is not None
             self._gl.make_current()  # another generator may have been at work in between
@@ -326,13 +341,24 @@ class Generator:
         assert self._gl is not None
         return self._gl
 
-    def _hdri(self, name: str) -> Path:
-        if name not in self._hdris:
-            raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, self._hdris)}")
-        return self._hdris[name]
 
-    def _load_light(self, name: str) -> EnvironmentLight:
-        return load_environment(self._hdri(name))
+def _hdri(hdris: Mapping[str, Path], name: str) -> Path:
+    if name not in hdris:
+        raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, hdris)}")
+    return hdris[name]
+
+
+def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
+    return load_environment(_hdri(hdris, name))
+
+
+def _free(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
+    gl.make_current()  # else what has the same names in another context is freed
+    if cuda is not None:
+        cuda.release()
+    if renderer is not None:
+        renderer.release()
+    gl.release()
 
 
 def _whole_size(size: Any) -> tuple[int, int]:

@@ -80,3 +80,12 @@ class Sample(Frame):
     view: View
     objects: list[Object]
     normals: NDArray[np.float32] | None = None
+
+    def __repr__(self) -> str:
+        """One line: a notebook shows what its last line gives, and arrays and scene fill pages."""
+        width, height = self.view.size
+        seen = sum(item.area > 0 for item in self.objects)
+        return (
+            f"Sample(seed {self.scene.seed}, index {self.scene.index}, camera "
+            f"{self.camera.name!r}, {width}x{height}, {seen} of {len(self.objects)} objects seen)"
+        )

@@ -5,12 +5,14 @@ drawing one value more does not change the others in any scene.
 """
 
 import hashlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from fastgen.camera import view_of
 from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
@@ -230,16 +232,23 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     shift = _between(rng, rig.target_shift_mm) * right + _between(rng, rig.target_shift_mm) * up
     target = np.array(middle) + shift
     position = target + direction * _between(rng, rig.distance_mm)
-    return Camera(
+    roll = _between(rng, rig.roll_deg)
+    camera = Camera(
         name=name,
         position_mm=_rounded(position),
         target_mm=_rounded(target),
         focal_mm=rig.focal_mm,
-        roll_deg=round(_between(rng, rig.roll_deg), 3),
+        roll_deg=round(roll, 3),
         sensor_width_mm=rig.sensor_width_mm,
         exposure_ev=round(_between(rng, rig.exposure_ev), 3),
         lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
+    if axis[2] == 0:
+        return camera
+    # near the vertical "up" means nothing: there the face's own right stays the image's
+    rows = view_of(replace(camera, roll_deg=0.0, lens=None), (1, 1)).rotation
+    level = math.degrees(math.atan2(-rows[1] @ right, rows[0] @ right))
+    return replace(camera, roll_deg=round((roll + level + 180) % 360 - 180, 3))
 
 
 def _with_sensor(camera: Camera, config: Config, streams: Streams) -> Camera:

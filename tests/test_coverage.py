@@ -156,6 +156,30 @@ def test_damages_cover_what_rays_say(generator):
     assert seen > 8
 
 
+def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
+    """An image of a ninth of the pixels is labelled the way that rays have confirmed above."""
+    damage = {"probability": 1.0, "kinds": ["concave"], "faces": ["door"], "count": [2, 2]}
+    config = Config.from_values({"damage": damage, "spreader": {"probability": 0.0}})
+    with (
+        Generator(config, seed=3, size=(96, 72)) as small,
+        Generator(config, seed=3, size=(288, 216)) as large,
+    ):
+        scene = small.scene(0)
+        target = np.array(scene.damages[0].origin_mm) + 700 * np.array(scene.damages[0].along)
+        camera = scene.camera("Cr")
+        camera = dataclasses.replace(camera, target_mm=tuple(target.tolist()), focal_mm=120.0)
+        wanted = small.render(scene=scene, camera=camera).objects
+        monkeypatch.setattr("fastgen.coverage._MOST_POINTS", 40_000)
+        found = large.render(scene=scene, camera=camera).objects
+    pairs = [(a, b) for a, b in zip(wanted, found, strict=True) if a.class_name == "concave"]
+    assert len(pairs) == 2
+    for a, b in pairs:
+        assert a.truncated
+        assert b.truncated
+        assert b.visible_fraction == pytest.approx(a.visible_fraction, rel=0.05)
+        assert np.abs(np.array(b.amodal_bbox) - 3 * np.array(a.amodal_bbox)).max() <= 12
+
+
 def test_the_container_covers_its_silhouette(generator):
     cut = 0
     for sample in views(generator):

@@ -20,6 +20,7 @@ from fastgen.errors import ConfigError
 from fastgen.export import export_glb
 from fastgen.generator import Generator
 from fastgen.scene import Camera, Scene, Spreader
+from fastgen.sensor.parts import Lens
 
 SIZE = (320, 240)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
@@ -286,6 +287,17 @@ def test_the_file_keeps_scene_light_and_exposure(generator, torn):
     for camera in scene.cameras:
         expected = generator.exposure(scene, camera)
         assert nodes[camera.name]["extras"]["exposure"] == expected
+
+
+def test_what_a_lens_does_stands_in_its_cameras_extras(generator, tmp_path):
+    scene = generator.scene(0)
+    lens = Lens("brown_conrady", (-0.1, 0.02, 1e-3, 0.0, 0.0))
+    bent = replace(scene.cameras[0], lens=lens)
+    export_glb(generator, scene, tmp_path / "bent.glb", [bent, scene.cameras[1]], 20.0)
+    nodes = {node["name"]: node for node in tree_of(tmp_path / "bent.glb")["nodes"]}
+    extras = nodes[bent.name]["extras"]
+    assert (extras["distortion_model"], extras["distortion"]) == (lens.model, [*lens.coefficients])
+    assert "distortion" not in nodes[scene.cameras[1].name]["extras"]
 
 
 def test_gltf_cameras_look_through_the_renderers_pixels(torn):

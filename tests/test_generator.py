@@ -7,8 +7,10 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+import psutil
 import pytest
 
+from fastgen.camera import view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
@@ -191,3 +193,60 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         monkeypatch.setattr("fastgen.renderer.GpuLight", never)
         for index in range(30):
             generator.render(index)
+
+
+def test_a_sample_prints_in_one_line(generator):
+    sample = generator.render(index=3, camera="Cr")
+    words = repr(sample)
+    assert "index 3" in words
+    assert "'Cr'" in words
+    assert len(words) < 120
+
+
+def test_closing_one_generator_leaves_another_as_it_is():
+    with Generator(seed=2, size=SIZE) as kept:
+        before = kept.render(index=0)
+        with Generator(seed=1, size=SIZE) as other:
+            other.render(index=0)
+            kept.render(index=0)  # so that the other is not current when it goes
+        after = kept.render(index=0)
+        np.testing.assert_array_equal(after.image, before.image)
+        np.testing.assert_array_equal(after.ids, before.ids)
+        assert after.objects == before.objects
+
+
+def test_generators_dropped_unclosed_do_not_pile_up():
+    def resident_mib():
+        return psutil.Process().memory_info().rss / 2**20
+
+    with Generator(seed=2, size=SIZE, quality="draft") as kept:
+        before = kept.render(index=0)
+        Generator(seed=1, size=SIZE, quality="draft").render(index=0)
+        start = resident_mib()
+        for _ in range(6):
+            Generator(seed=1, size=SIZE, quality="draft").render(index=0)
+        assert resident_mib() - start < 250  # each holds 130
+        np.testing.assert_array_equal(kept.render(index=0).image, before.image)
+
+
+def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see():
+    rig = {"focal_mm": 20, "distance_mm": 9000, "roll_deg": 0}
+    plumb = {"azimuth_deg": 0, "elevation_deg": 0, "target_shift_mm": 0}
+    cameras = {
+        "top": {"face": "roof", **rig},
+        "plumb": {"face": "roof", **rig, **plumb},
+        "pit": {"face": "underside", **rig},
+    }
+    with Generator(Config.from_values({"cameras": cameras}), seed=1, size=SIZE) as generator:
+        for index in range(3):
+            scene = generator.scene(index)
+            for camera in scene.cameras:
+                across, down, _ = view_of(camera, SIZE).rotation @ [1.0, 0.0, 0.0]
+                assert across > 0.9
+                assert abs(down) < 0.01
+            plumb = scene.camera("plumb")
+            x, y, z = plumb.position_mm
+            beside = replace(plumb, position_mm=(x + 30, y - 20, z))
+            exposures = [generator.exposure(scene, camera) for camera in (plumb, beside)]
+            assert exposures[0] == pytest.approx(exposures[1], rel=0.02)
+            assert generator.render(scene=scene, camera="plumb").image.mean() > 25

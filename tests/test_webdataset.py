@@ -2,6 +2,8 @@
 
 import io
 import json
+import re
+from pathlib import Path
 
 import boto3
 import numpy as np
@@ -52,6 +54,26 @@ def test_samples_stream_with_all_their_labels(out, tmp_path):
                 if thing["id"] in (1, *range(200, 600)) or not thing["bbox"]:
                     continue
                 assert (ids == thing["id"]).sum() == thing["area"]
+            seen += 1
+    assert seen == 12
+
+
+def test_a_decoder_of_the_manual_keeps_sixteen_bits(out):
+    page = Path(__file__).parents[1] / "docs/output.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    seen = 0
+    for path in out.glob("*.tar"):
+        names: dict = {}
+        exec(code.replace("OUT/train-000000.tar", str(path)), names)
+        for sample in names["samples"]:
+            assert sample["damage.png"].dtype == np.uint16
+            found = {int(value) for value in np.unique(sample["ids.png"])} - {0}
+            assert found == {
+                thing["id"]
+                for thing in sample["json"]["objects"]
+                if thing["id"] not in range(200, 600) and thing["bbox"]
+            }
+            assert max(found) > 255
             seen += 1
     assert seen == 12
 
