@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import os
 import re
+import shlex
 import signal
 import sys
 import threading
@@ -290,7 +291,7 @@ def _verify(options: argparse.Namespace) -> int:
     else:
         found = examine(options.out)
         faults = found.faults
-        hint = f"fastgen verify {options.out} --repair" if found.broken else ""
+        hint = f"fastgen verify {shlex.quote(options.out)} --repair" if found.broken else ""
     print("\n".join(faults) if faults else f"{options.out}: whole and consistent")
     if hint:
         print(f"to make what is damaged or missing again: {hint}")

@@ -54,7 +54,8 @@ def object_ids(scene: Scene) -> list[int]:
 def pack_decals(
     scene: Scene, mesh: Mesh, art_layers: Mapping[str, int], fonts: Mapping[str, Font]
 ) -> DecalTables:
-    """Tables for `scene` on `mesh`. Raises SceneError where more than CELL_SLOTS decals meet."""
+    """Tables for `scene` on `mesh`. Raises SceneError where one lies off its sheet or
+    more than CELL_SLOTS meet."""
     columns, rows = (int(np.ceil(side / DECAL_CELL_MM)) for side in mesh.atlas_size_mm)
     slots = np.zeros((rows, columns, CELL_SLOTS), np.uint32)
     table = np.zeros((max(len(scene.decals), 1), DECAL_TEXELS, 4), np.float32)
@@ -77,6 +78,11 @@ def pack_decals(
         reach = np.abs([[cos, -sin], [sin, cos]]) @ half + _MARGIN_MM
         low = np.maximum(center - reach, (x0, y0)) / DECAL_CELL_MM
         high = np.minimum(center + reach, (x0 + width, y0 + height)) / DECAL_CELL_MM
+        if (low > high).any():
+            raise SceneError(
+                f"decals[{i}] ({decal.kind} on {decal.face}): center_mm {decal.center_mm} lies off "
+                f"its sheet, which is {width:.0f} by {height:.0f} mm"
+            )
         cells = slots[int(low[1]) : int(high[1]) + 1, int(low[0]) : int(high[0]) + 1]
         used = np.count_nonzero(cells, axis=-1)
         if used.size and used.max() >= CELL_SLOTS:

@@ -34,6 +34,7 @@ IRRADIANCE_SIZE = 34
 _LUMINANCE_WIDTH = 32
 _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
 _DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
+_BRIGHTEST = 1e4  # leaves what is six times the mean within half floats
 _SKY_CELLS = 42  # along a side of `Ambient.sky`: 5 degrees
 _MAPS = ("specular", "irradiance", "background", "luminance", "sun")
 _SUN_WIDTH = 2048  # a texel is a third of the real sun
@@ -158,7 +159,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
     cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen. The key is the content of the
     file, so a renamed file hits and a changed one misses. Cached or not, the result is the same to
     the bit. A broken entry is built again, and without a writable folder nothing is cached.
-    Raises AssetError, as `load_radiance` does, and where it is too dark to be exposed.
+    Raises AssetError, as `load_radiance` does, and where it is too dark or too bright.
     """
     path = Path(path)
     try:
@@ -173,6 +174,11 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
         cached = prefilter_environment(path.stem, load_radiance(path))
         _write_cache(cached, entry)
         _remove_earlier(entry)
+    if cached.mean_luminance > _BRIGHTEST:
+        raise AssetError(
+            f"{path}: is too bright, with a mean luminance of {cached.mean_luminance:.2g}; scale "
+            f"it to {_BRIGHTEST:g} or less"
+        )
     if cached.mean_luminance < _DARKEST:
         raise AssetError(
             f"{path}: is dark, with a mean luminance of {cached.mean_luminance:.2g}; an HDRI must "

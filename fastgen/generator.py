@@ -27,7 +27,12 @@ from fastgen.programs import LAYERS
 from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
-from fastgen.sampling import one_container_each, possible_shapes, sample_scene
+from fastgen.sampling import (
+    one_container_each,
+    one_damage_each,
+    possible_shapes,
+    sample_scene,
+)
 from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
@@ -265,10 +270,22 @@ class Generator:
             for container, spreader in possible_shapes(self.config)
         )
         lens = any(camera.lens is not None for camera in scene.cameras)
-        self._open().preload(chain(lit, shaped), lens)
-        for i, config in enumerate(one_container_each(self.config)):
-            scene = sample_scene(config, self.seed, i, self.environments)
-            for camera in scene.cameras:  # programs, targets, and what labels ask of meshes
+        renderer = self._open()
+        renderer.preload(chain(lit, shaped), lens)
+        # a light with a sun, and one without
+        unlike = {renderer.ambient(name).sun is not None: name for name in names}.values()
+        shown = [
+            replace(
+                sample_scene(config, self.seed, i, self.environments),
+                environment=EnvironmentView(name, 0.0),
+            )
+            for i, config in enumerate(
+                chain(one_container_each(self.config), one_damage_each(self.config))
+            )
+            for name in unlike
+        ]
+        for scene in shown:  # programs, targets, and what labels ask of meshes
+            for camera in scene.cameras:
                 self.render(scene=scene, camera=camera)
 
     def close(self) -> None:

@@ -193,6 +193,17 @@ def one_container_each(config: Config) -> Iterator[Config]:
             yield replace(config, container=only, damage=damage)
 
 
+def one_damage_each(config: Config) -> Iterator[Config]:
+    """`config` without damage, with bent steel for certain, and with a hole, as far as it has
+    them: a renderer draws the three in different ways."""
+    damage = config.damage
+    yield replace(config, damage=replace(damage, probability=0.0))
+    holes = ("perforation",)
+    for kinds in (tuple(k for k in damage.kinds if k not in holes), holes):
+        if damage.probability > 0 and set(kinds) & set(damage.kinds):
+            yield replace(config, damage=replace(damage, probability=1.0, kinds=kinds))
+
+
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     lowered = streams("spreader.flippers").random(2) < c.flippers_down
     gap = _whole_gap(c, _between(streams("spreader.gap"), c.gap_mm))

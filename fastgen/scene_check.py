@@ -89,6 +89,9 @@ def _check_decal(decal: Decal, path: str) -> None:
             raise ConfigError(f"{path}.cap_mm: {decal.cap_mm:g} is out of range; give more than 0")
         if not decal.text.strip():
             raise ConfigError(f"{path}.lines: nothing to write")
+        for char in decal.text:
+            if char != " ":
+                check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
     elif decal.kind in _ART_KINDS and decal.art != "stripes":
         check_known(f"{path}.art", decal.art, art_images()[1])
 

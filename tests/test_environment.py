@@ -243,6 +243,13 @@ def test_an_hdri_without_light_is_refused_by_name_cached_or_not(tmp_path, value)
             load_environment(path, tmp_path / "cache")
 
 
+@pytest.mark.parametrize("value", [3e4, 1e30])
+def test_an_hdri_beyond_half_floats_is_refused_by_name(tmp_path, value):
+    path = write_exr(tmp_path / "lamp.exr", np.full((128, 256, 3), value, np.float32))
+    with pytest.raises(AssetError, match=r"lamp\.exr: is too bright"):
+        load_environment(path, tmp_path / "cache")
+
+
 def test_a_faint_light_is_light(tmp_path):
     image = np.zeros((128, 256, 3), np.float32)
     image[64] = 0.01  # a glow along the horizon

@@ -8,6 +8,7 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.camera import view_of
+from fastgen.decal_tables import SceneError
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene
@@ -154,3 +155,19 @@ def test_rules_of_labels_are_a_label_config(labels):
         pytest.raises(ConfigError, match=r"^labels: expected a LabelConfig"),
     ):
         generator.render(index=0, labels=labels)
+
+
+def test_a_letter_that_the_font_lacks_is_named(full):
+    i = next(i for i, decal in enumerate(full.decals) if decal.kind == "text")
+    path = ("decals", i, "lines")
+    with pytest.raises(ConfigError, match=rf"scene\.decals\[{i}\]\.lines: 'Ü' is unknown"):
+        check_scene(spoilt(full, path, ("ÜBER",)))
+
+
+def test_a_decal_beside_its_sheet_is_named():
+    with Generator(seed=2, size=SIZE) as generator:
+        scene = generator.scene(3)
+        beside = replace(scene.decals[0], center_mm=(90000.0, 300.0))
+        scene = replace(scene, decals=(beside,))
+        with pytest.raises(SceneError, match=r"decals\[0\].* lies off its sheet"):
+            generator.render(scene=scene, camera="A")
