@@ -18,6 +18,7 @@ from fastgen.lettering import TILE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, noise_tiles
 from fastgen.resources import shader_path
+from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
 from fastgen.uniforms import Block
 
 LAYERS = (
@@ -130,6 +131,8 @@ VIEW_BLOCK = Block(
         ("vec3", "sun_direction"),
         ("float", "sun_radius"),
         ("vec3", "sun_light"),  # irradiance / pi on what faces it
+        ("float", "cable_chart"),
+        ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m, and length, 0 for none
     ),
 )
 
@@ -231,6 +234,9 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "PORTAL_CHART": f"{PORTAL_CHART}u",
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),
+        "CABLES": CABLES,
+        "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
+        "CABLE_MATERIAL": list(MATERIALS).index("cable"),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,
     }

@@ -41,7 +41,7 @@ from fastgen.shading import UNITS, Shading
 from fastgen.shapes import Shapes
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
-from fastgen.surface_values import damage_values, scene_values
+from fastgen.surface_values import cable_values, damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
 from fastgen.textures import art_texture, mipmapped_array, noise_texture
 from fastgen.uniforms import Block
@@ -140,7 +140,8 @@ class Renderer:
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
         sunny = sun_values(light.ambient.sun, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
-        self._set(VIEW_BLOCK, {**seen, **sunny})
+        hung = cable_values(scene, spreader.mesh if spreader else None, view.position_m)
+        self._set(VIEW_BLOCK, {**seen, **sunny, **hung})
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
@@ -176,12 +177,20 @@ class Renderer:
         self._bind_surface(scene, mesh, spreader)
         near = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
+        cables: list[Region | None] = []
         if spreader is not None:
             frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
+            cables = [_region(view, above[-1])]
         regions = bands([_region(view, box) for box in boxes])
         shading.draw(
-            targets, regions, damage, near, sun=shadow is not None, bent=camera.lens is not None
+            targets,
+            regions,
+            damage,
+            near,
+            cables,
+            sun=shadow is not None,
+            bent=camera.lens is not None,
         )
         return targets
 

@@ -59,6 +59,7 @@ class Shading:
         regions: Sequence[Region | None],
         damage: str,
         near_damage: Sequence[Region | None],
+        cables: Sequence[Region | None] = (),
         sun: bool = False,
         bent: bool = False,
     ) -> None:
@@ -66,8 +67,8 @@ class Shading:
 
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
-        None where that is not known. sun: whether there is one, with its shadow map bound.
-        bent: whether a lens bends the view.
+        None where that is not known. cables: likewise, of each bundle of them. sun: whether there
+        is one, with its shadow map bound. bent: whether a lens bends the view.
         """
         image = targets.image
         image.use()
@@ -78,6 +79,9 @@ class Shading:
         self._run("classify", "sky", "sound", regions)
         for part in near_damage:
             self._run("classify", "sky", damage, [part] if part else regions)
+        if self._samples_per_axis > 1:
+            self._ctx.depth_func = ">"
+            self._run("cables", "mixed", "sound", cables)
         image.depth_mask = False
         self._ctx.depth_func = "=="
         listed = listed_classes(self._samples_per_axis, damage)

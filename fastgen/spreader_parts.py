@@ -48,6 +48,12 @@ _HEADBLOCK_MM = (690.0, 1000.0)
 _SHEAVE_X_MM, _SHEAVE_Z_MM, _SHEAVE_RADIUS_MM = 950.0, 1250.0, 330.0
 _CABLE_RADIUS_MM = 15.0
 
+CABLES = 8
+CABLE_CHART = "spreader.cables.falls"
+
+CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
+"""A cable's four sides lie along x and y."""
+
 
 @dataclass(frozen=True)
 class Hang:
@@ -182,19 +188,24 @@ def headblock(hang: Hang) -> list[Sheet]:
 
 def cables(hang: Hang) -> list[Sheet]:
     """Eight falls, two from each sheave straight up; under a pixel thick, so four sides will do."""
-    z = hang.base + _SHEAVE_Z_MM
     falls = [
         prism(
-            _regular((x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM), _CABLE_RADIUS_MM, 4),
-            (z, z + CABLE_LENGTH_MM),
-            2,
-            capped=(True, True),
+            _regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
         )
+        for x, y, z in cable_feet_mm(hang)
+    ]
+    return [Sheet(CABLE_CHART, "roof", "cable", "frame", beside(falls))]
+
+
+def cable_feet_mm(hang: Hang) -> list[tuple[float, float, float]]:
+    """Lower ends of the axes of the CABLES cables in the container's frame."""
+    z = hang.base + _SHEAVE_Z_MM
+    return [
+        (x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM, z)
         for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM)
         for side in _SIGNS
         for turn in _SIGNS
     ]
-    return [Sheet("spreader.cables.falls", "roof", "cable", "frame", beside(falls))]
 
 
 def _painted(name: str, patch: Patch) -> Sheet:

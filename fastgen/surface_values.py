@@ -3,13 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.classes import DAMAGE_CLASSES
+from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values
-from fastgen.mesh import MATERIALS
-from fastgen.programs import noise_deviation
+from fastgen.mesh import MATERIALS, Mesh
+from fastgen.programs import SPREADER_CHART, noise_deviation
 from fastgen.scene import Damage, Scene, Spreader, Surface
+from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm
 
 _TILE_OF_SCALE = 4.0
 """A noise tile spans this many of its pattern's typical lengths."""
@@ -94,4 +96,19 @@ def damage_values(
         "dent_end": sum(damage.kind in ("perforation", "dented") for damage in damages),
         "damage_threshold_mm": threshold_mm,
         "inner_row": inner_row,
+    }
+
+
+def cable_values(
+    scene: Scene, mesh: Mesh | None, eye_m: NDArray[np.float64]
+) -> dict[str, ArrayLike]:
+    """Members of VIEW_BLOCK about the cables of a scene's spreader, none where `mesh` is None."""
+    if mesh is None:
+        return {"cable_chart": -1.0, "cable_foot": np.zeros((CABLES, 4))}
+    feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
+    from_eye = np.array(feet) / 1000 - eye_m
+    lengths = np.full((CABLES, 1), CABLE_LENGTH_MM / 1000)
+    return {
+        "cable_chart": float(SPREADER_CHART + mesh.chart_index(CABLE_CHART)),
+        "cable_foot": np.concatenate([from_eye, lengths], axis=1),
     }

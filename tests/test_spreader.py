@@ -135,6 +135,39 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     assert np.quantile(error, 0.99) < 1e-5
 
 
+@pytest.mark.parametrize(
+    ("quality", "camera"), [("balanced", "A"), ("balanced", "B"), ("high", "A")]
+)
+def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
+    """A cable of a third of a pixel comes out neither in dashes nor in steps."""
+    size, steps = (240, 240), 12
+    with Generator(seed=6, size=size, quality=quality) as generator:
+        scene = generator.scene(0)
+        held = replace(scene.spreader, present=True)
+        scene = replace(scene, spreader=held)
+        sample = generator.render(scene=scene, camera=camera, layer="base")
+    code = sample.image[8:32].mean(axis=2) / 255
+    # the sky is white in a layer; all codes here lie above the linear part of sRGB
+    lit = 1 - ((np.maximum(code, 0.05) + 0.055) / 1.055) ** 2.4
+
+    reach = 1.0 if quality == "balanced" else 0.5
+    offset = (np.arange(steps) + 0.5) / steps * 2 * reach - reach
+    weight = np.maximum(1 - np.abs(offset), 0) if quality == "balanced" else np.ones(steps)
+    weight = weight[:, None] * weight / np.sum(weight[:, None] * weight)
+    x, y = np.meshgrid(np.arange(size[0]), np.arange(8, 32))
+    centers = np.stack([x, y], axis=-1)[..., None, None, :] + 0.5
+    around = np.stack(np.meshgrid(offset, offset), axis=-1)
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    hits = oracle.cast(mesh, sample.view, scene, centers + around)
+    expected = (hits.spreader * weight).sum(axis=(2, 3))
+    assert np.count_nonzero(expected > 0.1) > 100
+    assert expected.max() < 0.95
+    black = lit.ravel() @ expected.ravel() / (expected.ravel() @ expected.ravel())
+    assert 0.85 < black < 1.0
+    assert np.abs(lit / black - expected).max() < 0.15
+    assert np.abs(lit / black - expected)[expected > 0.1].mean() < 0.03
+
+
 def front_marker(scene, down):
     """The scene with one marker up in the front side's left corner, and a camera before it."""
     kind = scene.container.kind
