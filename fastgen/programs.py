@@ -36,8 +36,10 @@ PIXEL_CLASSES = {
     "damaged": ("DECALS", "DAMAGE"),
     "mixed_damaged": ("MIXED", "DECALS", "DAMAGE"),
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
+    "cable": (),
 }
-"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near."""
+"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near;
+cables that cover part of the sky."""
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 
@@ -157,11 +159,13 @@ DAMAGE_BLOCK = Block(
 def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
     """The classes of scattered pixels that such a frame may hold; they are shaded from lists.
 
-    damage: one of DAMAGE_VARIANTS. The other classes, sky and plain, are drawn.
+    damage: one of DAMAGE_VARIANTS. The other classes, sky, plain and cable, are drawn.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if name in ("sky", "plain") or (samples_per_axis == 1 and name.startswith("mixed")):
+        if name in ("sky", "plain", "cable") or (
+            samples_per_axis == 1 and name.startswith("mixed")
+        ):
             return False
         if "HOLES" in traits:
             return damage == "holed"

@@ -81,7 +81,7 @@ class Shading:
             self._run("classify", "sky", damage, [part] if part else regions)
         if self._samples_per_axis > 1:
             self._ctx.depth_func = ">"
-            self._run("cables", "mixed", "sound", cables)
+            self._run("cables", "cable", "sound", cables)
         image.depth_mask = False
         self._ctx.depth_func = "=="
         listed = listed_classes(self._samples_per_axis, damage)
@@ -91,6 +91,8 @@ class Shading:
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
         self._run("shade", "plain", "sound", regions, sun)
+        if self._samples_per_axis > 1:
+            self._run("shade", "cable", "sound", cables, sun)
         self._draw_sky(bent)
         self._ctx.scissor = None
         self._ctx.memory_barrier()

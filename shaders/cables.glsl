@@ -16,8 +16,6 @@ float turned(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 // cables are upright; pixel: its centre
 float cables_cover(vec2 pixel) {
     vec3 ray = view_ray(pixel);
-    vec2 next = view_ray(pixel + vec2(1.0, 0.0)).xy;
-    vec2 below = view_ray(pixel + vec2(0.0, 1.0)).xy;
     // of four sides along the axes; this and the distances below times the ray's level length
     float half_width = CABLE_HALF_SIDE_M * (abs(ray.x) + abs(ray.y));
     float cover = 0.0;
@@ -26,8 +24,9 @@ float cables_cover(vec2 pixel) {
     do {
         vec4 foot = cable_foot[i];
         float aside = turned(foot.xy, ray.xy);
-        vec2 slope = vec2(turned(foot.xy, next), turned(foot.xy, below)) - aside;
-        float pixels = 1.0 / max(length(slope), 1e-9);
+        // by how much a pixel to the right or down moves it; what a lens magnifies is left out
+        vec2 slope = vec2(turned(foot.xy, ray_right.xy), turned(foot.xy, ray_down.xy));
+        float pixels = inversesqrt(max(dot(slope, slope), 1e-18));
         float depth = dot(foot.xy, ray.xy) / max(dot(ray.xy, ray.xy), 1e-9);
         float height = depth * ray.z - foot.z;
         bool there = depth > 0.0 && height > 0.0 && height < foot.w;

@@ -1,16 +1,46 @@
-// Shades the pixels of one class that see a single surface, or only the sky.
+// Shades the pixels of one class that see a single surface, only the sky, or only cables before it.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
+#if CLASS == CLASS_CABLE
+#include "cables.glsl"
+#endif
 
 layout(location = 0) out vec4 out_color;
 layout(location = 1) out uint out_labels;   // object id | damage value << 16
 layout(location = 2) out float out_depth;
 
+#if CLASS == CLASS_CABLE
+// bare steel that faces the eye, as much of it as covers the pixel
+Shaded cable(ivec2 pixel) {
+    vec2 center = vec2(pixel) + 0.5;
+    vec3 ray = view_ray(center);
+    vec3 view = -normalize(ray);
+    vec3 normal = normalize(vec3(view.xy, 0.0));
+    vec4 base = material_base[CABLE_MATERIAL];
+    Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
+    SurfacePoint at = SurfacePoint(steel, 0u, vec3(0.0));
+    vec3 color = layer_color(at, normal, view, Openness(normal, 0.0, 1.0));
+#if SUN && LAYER == LAYER_ALL
+    color += exposure * sunlit(steel, normal, view);
+#endif
+    Shaded s = sky(ray);
+    s.color = mix(s.color, color, cables_cover(center));
+    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    if (key_at(middle) != 0u) {
+        s.id = SPREADER_ID;
+        s.depth = texelFetch(sheet_depths, middle, 0).r;
+    }
+    return s;
+}
+#endif
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
 #if CLASS == CLASS_SKY
     Shaded s = sky(view_ray(vec2(pixel) + 0.5));
+#elif CLASS == CLASS_CABLE
+    Shaded s = cable(pixel);
 #else
     Shaded s = single_surface(pixel);
 #endif

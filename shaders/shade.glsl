@@ -4,9 +4,6 @@
 #include "keys_around.glsl"
 #include "lens.glsl"
 #include "view_ray.glsl"
-#if WITH_MIXED
-#include "cables.glsl"
-#endif
 #include "tone.glsl"
 #include "ibl.glsl"
 #if SUN
@@ -133,23 +130,6 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 #endif
     return color;
 }
-
-#if WITH_MIXED
-// a cable between the samples: bare steel that faces the eye
-vec3 cable_color(vec3 view) {
-    vec3 normal = normalize(vec3(view.xy, 0.0));
-    vec4 base = material_base[CABLE_MATERIAL];
-    SurfacePoint s;
-    s.material = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
-    s.decal_id = 0u;
-    s.outward = vec3(0.0);
-    vec3 color = layer_color(s, normal, view, Openness(normal, 0.0, 1.0));
-#if SUN && LAYER == LAYER_ALL
-    color += exposure * sunlit(s.material, normal, view);
-#endif
-    return color;
-}
-#endif
 
 // a pixel all of whose samples see the same surface
 Shaded single_surface(ivec2 pixel) {

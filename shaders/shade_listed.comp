@@ -30,16 +30,11 @@ void main() {
 #endif
     }
     bool sees_sky = keys[0] == 0u;
-    bool only_cables = true;
-    for (int i = 0; i < TENT_SAMPLES; ++i)
-        only_cables = only_cables && (keys[i] == 0u || float(key_chart(keys[i])) == cable_chart);
     Shaded s = sky(view_ray(center));
-    vec3 behind = s.color;
-    vec3 color = sky_weight * behind;
+    vec3 color = sky_weight * s.color;
     float done = sky_weight;
     // a driver that runs all lanes until the last is done runs a loop's body once more to find that
-    // its condition fails ahead of it: conditions come last. A pixel of sky alone, which a cable
-    // crosses between its samples, goes through once and gathers nothing.
+    // its condition fails ahead of it: conditions come last. Of several surfaces one is no sky.
     int part = 0;
     do {
         uint first_key = 0u;
@@ -65,7 +60,7 @@ void main() {
             float weight = 0.0;
             uint of_side = 0u;
             for (int i = 0; i < TENT_SAMPLES; ++i)
-                if (keys[i] == key && key != 0u) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
+                if (keys[i] == key) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
             of_part &= ~of_side;
             left &= ~of_side;
             vec3 lit_color = part_color(p, middle + side_offset, key, view);
@@ -80,12 +75,6 @@ void main() {
             done += weight;
         } while (++side < MAX_SIDES && of_part != 0u);
     } while (++part < MAX_PARTS && left != 0u);
-    if (only_cables) {
-        vec3 bare = cable_color(-normalize(view_ray(center)));
-        vec3 cable = done > sky_weight ? (color - sky_weight * behind) / (done - sky_weight) : bare;
-        color = mix(behind, cable, cables_cover(center));
-        done = 1.0;
-    }
     color /= done;   // of a busy pixel, what was not come to counts like the rest
 #else
     Shaded s = single_surface(pixel);
