@@ -188,7 +188,12 @@ ELEMENTS = (
         "shape", "underside: members, fork pockets", container=without_charts("member.", "fork.")
     ),
     Element("shape", "spreader", lambda scene: replace(scene, spreader=Spreader())),
-    Element("shape", "spreader: cables", spreader=without_charts("cables.")),
+    Element(
+        "shape",
+        "spreader: cables",
+        spreader=without_charts("cables."),
+        text=(("return min(cover, 1.0);", "return 0.0;"),),
+    ),
     Element("shape", "spreader: headblock", spreader=without_charts("headblock.")),
     Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),
     Element("shape", "spreader: twist locks", spreader=without_charts(".locks.")),
