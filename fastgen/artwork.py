@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fastgen.classes import MARKER_CLASSES
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
+from fastgen.srgb import DECODED, ENCODED
 
 ART_SIZE = 512
 GLYPH_TILE_SIZE = 64
@@ -90,25 +91,15 @@ def smaller(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
         rgba = cv2.resize(rgba, (len(rgba) // 2,) * 2, interpolation=cv2.INTER_AREA)
         light = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
         half = np.empty(rgba.shape, np.uint8)
-        half[..., :3] = _CODE[(light * (len(_CODE) - 1) + 0.5).astype(np.uint16)]
+        half[..., :3] = ENCODED[(light * (len(ENCODED) - 1) + 0.5).astype(np.uint16)]
         half[..., 3] = rgba[..., 3] * 255 + 0.5
         found.append(half)
     return found
 
 
-def _srgb_light() -> NDArray[np.float32]:
-    """Linear light of each 8-bit sRGB value; IEC 61966-2-1."""
-    code = np.arange(256) / 255
-    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(
-        np.float32
-    )
-
-
-_LIGHT = _srgb_light()
-_LIGHT_AND_ALPHA = np.stack([_LIGHT, _LIGHT, _LIGHT, np.arange(256) / 255], axis=1)[None]
-_LIGHT_AND_ALPHA = _LIGHT_AND_ALPHA.astype(np.float32)
-_CODE = np.searchsorted((_LIGHT[1:] + _LIGHT[:-1]) / 2, np.linspace(0, 1, 2**16)).astype(np.uint8)
-"""The 8-bit sRGB value of light, by its 16-bit value."""
+_LIGHT_AND_ALPHA = np.stack([DECODED] * 3 + [np.linspace(0, 1, 256)], axis=1)[None].astype(
+    np.float32
+)
 
 
 @lru_cache(maxsize=1)

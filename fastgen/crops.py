@@ -71,9 +71,7 @@ def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
         base = glyph.y0 + TILE_BASELINE_CAPS * decal.cap_mm
         center = np.array([(glyph.x0 + glyph.x1) / 2, base + decal.cap_mm / 2]) - middle
         letters.append(center + grid * decal.cap_mm * (ink.ink_right - ink.ink_left, 1.0))
-    angle = np.deg2rad(decal.rotation_deg)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    sheet = np.concatenate(letters) @ turn.T + np.array(decal.center_mm)
+    sheet = np.concatenate(letters) @ decal.turn.T + np.array(decal.center_mm)
     container = sample.scene.container
     rest, _ = build_container(container.kind, container.profiles).sheet_to_surface(
         decal.face, sheet

@@ -64,8 +64,7 @@ def pack_decals(
         x0, y0, width, height = mesh.charts[mesh.chart_index(decal.face)].rect_mm
         center = np.array([x0 + decal.center_mm[0], y0 + decal.center_mm[1]])
         half = np.array(decal.size_mm) / 2
-        angle = np.deg2rad(decal.rotation_deg)
-        cos, sin = np.cos(angle), np.sin(angle)
+        cos, sin = decal.turn[:, 0]
         kind = decal.art if decal.art == "stripes" else decal.kind
         table[i, 0] = cos, sin, -sin, cos
         table[i, 1] = *center, *half

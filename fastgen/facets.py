@@ -102,9 +102,7 @@ def half_planes(decal: Decal) -> tuple[Array, Array]:
     else:
         local = np.array([[1.0, 0], [0, 1], [-1, 0], [0, -1]])
         reach = np.array([half[0], half[1], half[0], half[1]])
-    angle = np.deg2rad(decal.rotation_deg)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    normals = -local @ turn.T
+    normals = -local @ decal.turn.T
     return normals, reach - normals @ np.array(decal.center_mm)
 
 

@@ -272,21 +272,22 @@ class Generator:
         lens = any(camera.lens is not None for camera in scene.cameras)
         renderer = self._open()
         renderer.preload(chain(lit, shaped), lens)
-        # a light with a sun, and one without
+        # what labels ask of meshes
+        shown = [self._sampled(config) for config in one_container_each(self.config)]
+        # programs and targets: a light with a sun, and one without
         unlike = {renderer.ambient(name).sun is not None: name for name in names}.values()
-        shown = [
-            replace(
-                sample_scene(config, self.seed, i, self.environments),
-                environment=EnvironmentView(name, 0.0),
-            )
-            for i, config in enumerate(
-                chain(one_container_each(self.config), one_damage_each(self.config))
-            )
+        shown += [
+            replace(scene, environment=EnvironmentView(name, 0.0))
+            for scene in map(self._sampled, one_damage_each(self.config))
             for name in unlike
         ]
-        for scene in shown:  # programs, targets, and what labels ask of meshes
+        for scene in shown:
             for camera in scene.cameras:
                 self.render(scene=scene, camera=camera)
+
+    def _sampled(self, config: Config) -> Scene:
+        """A scene of another distribution, under this one's lights."""
+        return sample_scene(config, self.seed, 0, self.environments)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""

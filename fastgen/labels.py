@@ -150,9 +150,7 @@ def _outline(decal: Decal) -> NDArray[np.float64]:
     edge = np.concatenate(
         [a + steps * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
     )
-    angle = np.deg2rad(decal.rotation_deg)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return np.asarray(edge @ turn.T + np.array(decal.center_mm), np.float64)
+    return np.asarray(edge @ decal.turn.T + np.array(decal.center_mm), np.float64)
 
 
 def _container(shot: Shot) -> Object:

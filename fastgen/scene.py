@@ -11,6 +11,7 @@ import json
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastgen.container import WallProfiles
 from fastgen.errors import ConfigError
@@ -127,6 +128,12 @@ class Decal:
     def text(self) -> str:
         """The whole text, lines joined by one space; '' for markers and stickers."""
         return " ".join(self.lines)
+
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """From the decal's axes to its sheet's, float64 [2, 2]: columns are its right and up."""
+        angle = np.deg2rad(self.rotation_deg)
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.srgb import DECODED, ENCODED
+
 Light = NDArray[np.float32]
 """float32 [H, W, 3], linear Rec.709; 1 is what a white surface in metered light reflects, about."""
 
@@ -20,26 +22,16 @@ _DESATURATION = np.float32(0.15)
 _BRIGHTEST = np.float32(12.0)
 _TOP = np.float32(1 - _ROOM**2 / (_BRIGHTEST + _ROOM - _START))
 
-_CODES = np.arange(256) / 255
-# IEC 61966-2-1
-_DECODED = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(
-    np.float32
-)
-_STEPS = np.linspace(0, 1, 1 << 16)
-_ENCODED = np.rint(
-    255 * np.where(_STEPS <= 0.0031308, 12.92 * _STEPS, 1.055 * _STEPS ** (1 / 2.4) - 0.055)
-).astype(np.uint8)
-
 
 def light_of(image: NDArray[np.uint8]) -> Light:
     """The light that `displayed` would show as an sRGB image uint8 [H, W, 3]."""
     red, green, blue = planes = cv2.split(image)
     peak = cv2.max(cv2.max(red, green), blue)
     scale, offset = _UNSHOWN_SCALE[peak], _UNSHOWN_OFFSET[peak]
-    low = _DECODED[cv2.min(cv2.min(red, green), blue)] * scale + offset
+    low = DECODED[cv2.min(cv2.min(red, green), blue)] * scale + offset
     low = np.maximum(low, 0)
     offset += np.where(low < 0.04, np.sqrt(low / np.float32(6.25)) - low, np.float32(0.04))
-    return _joined([np.maximum(_DECODED[plane] * scale + offset, 0) for plane in planes])
+    return _joined([np.maximum(DECODED[plane] * scale + offset, 0) for plane in planes])
 
 
 def displayed(light: Light) -> NDArray[np.uint8]:
@@ -53,7 +45,7 @@ def displayed(light: Light) -> NDArray[np.uint8]:
         np.clip(plane * scale + offset, 0, 1) * np.float32(65535) + np.float32(0.5)
         for plane in planes
     ]
-    return _joined([_ENCODED[plane.astype(np.uint16)] for plane in shown])
+    return _joined([ENCODED[plane.astype(np.uint16)] for plane in shown])
 
 
 def _shown(peak: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -67,7 +59,7 @@ def _shown(peak: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.f
 
 def _unshown() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """The inverse of `_shown`, by the brightest channel's eight bits."""
-    new = np.clip(_DECODED, _START, _TOP)
+    new = np.clip(DECODED, _START, _TOP)
     old = _ROOM**2 / (1 - new) - _ROOM + _START
     scale = old * (_DESATURATION * (old - new) + 1) / new
     return np.asarray(scale, np.float32), np.asarray(old - new * scale, np.float32)
