@@ -290,7 +290,7 @@ def _finish(
                 storage.make_folders(each.folders(split))
                 for path, content in each.dataset_files(split, _records(job, storage, split)):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
-        if isinstance(storage, Folder):
+        if isinstance(storage, Folder) and images:
             put(CONTACT_SHEET, [png(contact_sheet(storage.root, images))])
     result = {
         **settings,
