@@ -1,6 +1,7 @@
 """Environments: files, the cache, metering and what is bundled."""
 
 import json
+import os
 import threading
 from collections import Counter
 from pathlib import Path
@@ -279,6 +280,12 @@ def test_folder_listing_is_sorted_and_ignores_other_files(tmp_path):
     for name in ("b.HDR", "a.exr", "c.Exr", "notes.txt", "d.png", "._a.exr", ".hidden.hdr"):
         (tmp_path / name).touch()
     assert [p.name for p in find_hdris(tmp_path)] == ["a.exr", "b.HDR", "c.Exr"]
+
+
+def test_a_name_that_is_not_utf_8_is_refused(tmp_path):
+    (tmp_path / os.fsdecode(b"sk\xff.hdr")).write_bytes(b"")
+    with pytest.raises(AssetError, match=r"hdr: is no name in UTF-8; rename it"):
+        find_hdris(tmp_path)
 
 
 def test_folder_without_hdris_is_refused_by_name(tmp_path):
