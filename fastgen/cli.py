@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import io
 import os
 import re
 import shlex
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Stopped by a signal, it is 128 and the signal's number: 130 after Ctrl-C, 143 after SIGTERM.
     """
+    _mend_streams()
     try:
         try:
             options = _parser().parse_args(arguments)
@@ -57,6 +59,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
+
+
+def _mend_streams() -> None:
+    """What is printed to a stream that was closed goes nowhere; escapes stand for letters that
+    standard output has not, as standard error has it by itself."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 class _Terminated(KeyboardInterrupt):

@@ -1,6 +1,7 @@
 """The command line where people go wrong: odd folders, damaged files, pipes that close."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -152,6 +153,25 @@ def test_a_reader_that_goes_away_is_no_error(dataset, arguments):
     process.stdout.close()
     assert process.stderr.read() == ""
     assert process.wait() in (0, 141)  # argparse ends with 0
+
+
+def test_closed_streams_stop_no_run(tmp_path):
+    out = tmp_path / "out"
+    run = ["generate", str(out), "--images", "1", "--size", "64x64", "--workers", "1"]
+    command = ["sh", "-c", 'exec "$@" >&- 2>&-', "sh", sys.executable, "-m", "fastgen", *run]
+    assert subprocess.run(command, check=False).returncode == 0
+    assert main(["verify", str(out)]) == 0
+
+
+def test_a_folder_may_have_a_name_that_is_not_utf_8(tmp_path):
+    out = os.fsencode(tmp_path) + b"/caf\xe9"
+    run = [b"generate", out, b"--images", b"1", b"--size", b"64x64", b"--workers", b"1"]
+    for arguments, words in ((run, b"1 images in "), ([b"verify", out], b"whole and consistent")):
+        command = [os.fsencode(sys.executable), b"-m", b"fastgen", *arguments]
+        done = subprocess.run(command, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert words in done.stdout
+        assert b"caf\\udce9" in done.stdout
 
 
 def test_show_takes_the_first_camera_of_a_rig(tmp_path):
