@@ -109,6 +109,17 @@ def test_nothing_in_view_has_objects_without_boxes():
         assert item.ignored
 
 
+@pytest.mark.parametrize("camera", ["A", "Cr"])
+def test_a_dent_that_comes_out_on_the_other_side_leaves_no_pixel_undrawn(camera):
+    deep = {"kinds": ["axis"], "probability": 1, "count": [4, 4], "axis": {"depth_mm": 12000}}
+    for seed in (0, 1):
+        with Generator(Config.from_values({"damage": deep}), seed, (128, 96)) as generator:
+            sample = generator.render(index=0, camera=camera)
+        assert np.isin(sample.ids, [0, *(item.id for item in sample.objects)]).all()
+        np.testing.assert_array_equal(np.isinf(sample.depth), sample.ids == 0)
+        assert (sample.depth > 0).all()
+
+
 def test_a_marker_on_the_border_is_truncated_and_one_within_is_not():
     with Generator(seed=8, size=(400, 400)) as generator:
         scene = replace(bare(generator), decals=markers(1, 1, 0, ("C9.1",), size=300.0))
