@@ -45,6 +45,9 @@ CONTACT_SHEET = "contact_sheet.png"
 _MOST = 10**9
 """Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
 
+_words = reprlib.Repr()
+_words.maxlist = 100  # all formats, cameras or HDRIs: what differs may be the last
+
 Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
 """Makes the shards of `tasks` and reports on the way; see `run_here`."""
 
@@ -150,7 +153,8 @@ def _checked(job: Job, worker_count: int) -> Job:
             "also: bop keeps poses in files over all images, which webdataset has not; "
             "the poses stand in each sample's json, or use the seafront format"
         )
-    names = dict.fromkeys((*SEAFRONT, *job.formats))
+    # in one order, so that who asks for them in another still resumes
+    names = dict.fromkeys((*SEAFRONT, *sorted(job.formats)))
     return replace(job, formats=tuple(names))
 
 
@@ -233,7 +237,7 @@ def _difference(name: str, old: Any, new: Any) -> str:
     if isinstance(old, dict) and isinstance(new, dict):
         key = min(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
         return _difference(f"{name}.{key}", old.get(key), new.get(key))
-    said = ["missing" if value is None else reprlib.repr(value) for value in (old, new)]
+    said = ["missing" if value is None else _words.repr(value) for value in (old, new)]
     return f"{name} was {said[0]}, is now {said[1]}"
 
 

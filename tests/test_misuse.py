@@ -95,6 +95,15 @@ def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
         assert f"fastgen: {copy}: was made with other settings ({words}" in error
 
 
+def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp_path, capsys):
+    run = ["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1", "--images", "1"]
+    assert main([*run, "--also", "ids,depth"]) == 0
+    assert main([*run, "--also", "depth,ids"]) == 0
+    assert main([*run, "--also", "depth,ids,voc"]) == 2
+    assert "'depth', 'ids'], is now" in (error := capsys.readouterr().err)
+    assert "'depth', 'ids', 'voc'])" in error
+
+
 def test_stats_equal_a_foreign_readers_count(dataset, capsys):
     assert main(["stats", str(dataset)]) == 0
     lines = capsys.readouterr().out.splitlines()
