@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES, SPREADER_ID
+from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
@@ -93,6 +94,17 @@ def test_the_largest_size_renders():
         sample = generator.render(index=1, camera="Cr")
     assert sample.image.shape == (4096, 4096, 3)
     assert (sample.ids > 0).mean() > 0.02
+
+
+def test_a_dataset_too_high_for_holes_is_refused_rather_than_made_without_them(tmp_path, capfd):
+    (tmp_path / "port.yaml").write_text("damage: {probability: 1, kinds: [perforation]}")
+    sized = ["--size", "64x2800", "--quality", "high", "--config", str(tmp_path / "port.yaml")]
+    code = main(["generate", str(tmp_path / "out"), "--images", "2", "--workers", "1", *sized])
+    if code == 0:
+        pytest.skip("this driver has larger textures")
+    assert code == 2
+    error = capfd.readouterr().err
+    assert "size: 64x2800 with 3 samples along a pixel needs textures of 16800 texels" in error
 
 
 def test_nothing_in_view_has_objects_without_boxes():
