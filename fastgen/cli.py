@@ -220,7 +220,8 @@ def _size(text: str) -> tuple[int, int]:
 
 def _generate(options: argparse.Namespace) -> int:
     config = parse_split(options.split, _config(options))
-    cameras = tuple(options.cameras.split(",")) if options.cameras else tuple(config.cameras)
+    named: str | None = options.cameras
+    cameras = tuple(config.cameras) if named is None else tuple(named.split(","))
     shard = options.shard if options.shard is not None else SHARD_SCENES.get(options.format, 1)
     job = Job(
         out=options.out,
@@ -287,7 +288,7 @@ def _export(options: argparse.Namespace) -> int:
         hdri_dir=options.hdri,
     ) as generator:
         scene = generator.scene(options.index)
-        cameras = [find_camera(scene, options.camera)] if options.camera else None
+        cameras = None if options.camera is None else [find_camera(scene, options.camera)]
         export_glb(generator, scene, options.file, cameras, options.texel_mm)
     return 0
 

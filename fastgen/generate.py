@@ -218,10 +218,11 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         raise OutputError(f"{where}: is damaged; remove the dataset or give another")
     for key, value in settings.items():
         if old.get(key) != value:
+            them = "them, --hdri too," if key == "environments" else "them"
             raise OutputError(
                 f"{job.out}: was made with other settings "
                 f"({_difference(key, old.get(key), value)}); "
-                f"repeat them to resume, or give another folder"
+                f"repeat {them} to resume, or give another folder"
             )
     beyond = manifest_path(job.shard_count)
     made = sorted(path for path in storage.sizes() if path.startswith("shards/"))

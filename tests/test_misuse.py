@@ -13,6 +13,7 @@ from pycocotools.coco import COCO
 
 from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli import main
+from fastgen.hdri import bundled_hdris
 from tests.folders import content
 
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
@@ -95,6 +96,15 @@ def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
         assert f"fastgen: {copy}: was made with other settings ({words}" in error
 
 
+def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, capsys):
+    (tmp_path / "lights").mkdir()
+    shutil.copy(bundled_hdris()["dawn"], tmp_path / "lights/mine.exr")
+    assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
+    error = capsys.readouterr().err
+    assert "environments.city was '" in error
+    assert "repeat them, --hdri too, to resume" in error
+
+
 def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp_path, capsys):
     run = ["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1", "--images", "1"]
     assert main([*run, "--also", "ids,depth"]) == 0
@@ -102,6 +112,14 @@ def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp
     assert main([*run, "--also", "depth,ids,voc"]) == 2
     assert "'depth', 'ids'], is now" in (error := capsys.readouterr().err)
     assert "'depth', 'ids', 'voc'])" in error
+
+
+@pytest.mark.parametrize("names", ["", "A,", "A,A"])
+def test_cameras_that_name_none_or_one_twice_are_refused(tmp_path, capsys, names):
+    out = tmp_path / "out"
+    assert main(["generate", str(out), "--images", "1", "--cameras", names]) == 2
+    assert capsys.readouterr().err.startswith("fastgen: cameras: ")
+    assert not out.exists()
 
 
 def test_stats_equal_a_foreign_readers_count(dataset, capsys):
