@@ -317,12 +317,20 @@ def _from_disk(
 ) -> NDArray[np.uint8]:
     """The disk cache's array of `key`; where there is none of `shape`, what `make` gives."""
     entry = cache.default_folder() / f"openness-{key[:32]}.npz"
-    stored = cache.read(entry).get("values")
-    if stored is not None and stored.shape == shape and stored.dtype == np.uint8:
-        return stored.astype(np.uint8)
-    made = make()
-    cache.write(entry, {"values": made}, compress=True)
-    return made
+
+    def kept() -> NDArray[np.uint8] | None:
+        stored = cache.read(entry).get("values")
+        fits = stored is not None and stored.shape == shape and stored.dtype == np.uint8
+        return stored.astype(np.uint8) if stored is not None and fits else None
+
+    found = kept()
+    if found is None:
+        with cache.alone(entry):
+            found = kept()
+            if found is None:
+                found = make()
+                cache.write(entry, {"values": found}, compress=True)
+    return found
 
 
 def map_matrix(toward: Array, low: Array, high: Array) -> Array:

@@ -159,6 +159,7 @@ class Targets:
         return Frame(
             # NumPy takes 20 times as long to leave a channel out
             image=np.asarray(cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), np.uint8),
+            cover=np.asarray(cv2.extractChannel(color, 3), np.uint8),
             ids=np.ascontiguousarray(pairs[..., 0]),
             damage=np.ascontiguousarray(pairs[..., 1]),
             depth=depth,

@@ -35,6 +35,7 @@ struct Shaded {
     uint id;
     uint damage;
     float depth;
+    float cover;   // share of the pixel that is no sky
 };
 
 // as openness.py encodes it
@@ -72,7 +73,7 @@ Shaded sky(vec3 ray) {
 #else
     vec3 color = vec3(1.0);
 #endif
-    return Shaded(color, 0u, 0u, VOID_DEPTH);
+    return Shaded(color, 0u, 0u, VOID_DEPTH, 0.0);
 }
 
 // all that the samples of one part within a pixel share: its layers, the point they are taken at
@@ -137,7 +138,7 @@ Shaded single_surface(ivec2 pixel) {
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
-    return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth);
+    return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
 }
 
 #if WITH_HOLES
@@ -153,7 +154,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
 #if LAYER == LAYER_ALL
         seen *= exposure;
 #endif
-        s = Shaded(seen, CONTAINER_ID, 0u, depth);
+        s = Shaded(seen, CONTAINER_ID, 0u, depth, 1.0);
     }
     s.damage = uint(damage_shape[3 * int(key >> 10) + 2].w);
     return s;
