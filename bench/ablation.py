@@ -66,13 +66,13 @@ class Drawer:
     def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
         """The case's view of the scene."""
         with self._absence.gone():
-            renderer = self._generator._open()
+            renderer = self._generator._gpu.renderer()
             return renderer.render(self._absence.scene(scene), scene.camera(case.camera), size)
 
     def seconds(self, case: Case, scene: Scene, size: tuple[int, int]) -> float:
         """Processor time of a draw that is warm."""
         with self._absence.gone():
-            renderer = self._generator._open()
+            renderer = self._generator._gpu.renderer()
             less, camera = self._absence.scene(scene), scene.camera(case.camera)
             renderer._ctx.finish()
             began = time.process_time()

@@ -76,7 +76,7 @@ def measure(
     spent: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with Generator(config, seed=7, size=size, backend="egl") as generator:
-        renderer = generator._open()
+        renderer = generator._gpu.renderer()
         ctx = renderer._ctx
         for index in range(scenes):
             scene = generator.scene(index)

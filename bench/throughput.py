@@ -54,7 +54,7 @@ def stages(backend: str, size: tuple[int, int], scenes: int) -> tuple[str, dict[
             for name in config.cameras:  # make meshes, lights and programs
                 generator.render(index=index, camera=name)
         driver = generator.renderer_name
-        renderer = generator._open()
+        renderer = generator._gpu.renderer()
         finish = renderer._ctx.finish
         clock = time.process_time  # of all threads, so that other programs do not count
         for index in range(scenes):

@@ -1,15 +1,12 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
-import contextlib
 import hashlib
-import os
-import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial, wraps
+from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +14,13 @@ from numpy.typing import NDArray
 from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
-from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
+from fastgen.cuda import CudaFrame, cuda_reason
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
-from fastgen.errors import ConfigError, ContextError, FastgenError
-from fastgen.gl import BACKENDS, GLContext, open_context
+from fastgen.errors import ConfigError
+from fastgen.gl import BACKENDS, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
+from fastgen.opened import Opened
 from fastgen.programs import LAYERS
 from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
@@ -62,34 +60,6 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
         return scene.cameras[0]
     check_known("camera", name, names)
     return scene.camera(name)
-
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-_Left = tuple[int, int, GLContext, Renderer | None, CudaFrames | None]
-
-_left: list[_Left] = []
-"""Process and thread that used a Generator which was dropped unclosed, and what it held."""
-
-
-def _or_closed(
-    method: Callable[Concatenate["Generator", P], R],
-) -> Callable[Concatenate["Generator", P], R]:
-    """A method that draws. What stops it half way, as Ctrl-C does, closes the generator: nobody
-    knows what stands on the GPU then, and the next draw would build on it."""
-
-    @wraps(method)
-    def drawn(self: "Generator", *args: P.args, **kwargs: P.kwargs) -> R:
-        try:
-            return method(self, *args, **kwargs)
-        except FastgenError:  # refused, not stopped
-            raise
-        except BaseException:
-            self.close()
-            raise
-
-    return drawn
 
 
 class Generator:
@@ -139,8 +109,8 @@ class Generator:
                     ),
                     self.size,
                 )
-        self._samples_per_axis = QUALITY[quality]
-        self._device_index = None if device_index is None else whole("device_index", device_index)
+        if device_index is not None:
+            device_index = whole("device_index", device_index)
         if not isinstance(hdri_dir, str | Path | None):
             raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
@@ -150,10 +120,15 @@ class Generator:
         # a scene's cameras are mostly rendered one after the other
         self._latest: tuple[tuple[Config, int, int], Scene] | None = None
         self._sound: Scene | None = None
-        self._gl: GLContext | None = None
-        self._renderer: Renderer | None = None
-        self._cuda: CudaFrames | None = None
-        self._process, self._thread = 0, 0
+        self._gpu = Opened(
+            partial(open_context, backend, device_index),
+            partial(
+                Renderer,
+                light=partial(_load_light, self._hdris),
+                samples_per_axis=QUALITY[quality],
+                mask_threshold_mm=self.config.damage.mask_threshold_mm,
+            ),
+        )
 
     @property
     def environments(self) -> dict[str, float]:
@@ -167,12 +142,12 @@ class Generator:
     @property
     def renderer_name(self) -> str:
         """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
-        return self._context().renderer
+        return self._gpu.context().renderer
 
     @property
     def used_backend(self) -> str:
         """Which backend 'auto' came to: egl or osmesa."""
-        return self._context().backend
+        return self._gpu.context().backend
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
@@ -181,7 +156,6 @@ class Generator:
             self._latest = key, sample_scene(*key, self.environments)
         return self._latest[1]
 
-    @_or_closed
     def render(
         self,
         index: int | None = None,
@@ -203,13 +177,14 @@ class Generator:
             check_fields(labels, LabelConfig, "labels")
         check_known("layer", layer, LAYERS)
         scene, camera = self._chosen(index, camera, scene)
-        renderer = self._open()
-        frame = renderer.render(scene, camera, self.size, layer)
         view = view_of(camera, self.size)
-        if layer == "all" and is_needed(camera, scene.weather):
-            airlight = self._airlight(scene, camera)
-            frame = develop(frame, view, camera, scene.weather, airlight)
-        mesh, spreader = renderer.mesh(scene.container), spreader_mesh(scene)
+        with self._gpu.drawing() as renderer:
+            frame = renderer.render(scene, camera, self.size, layer)
+            if layer == "all" and is_needed(camera, scene.weather):
+                airlight = self._airlight(scene, camera)
+                frame = develop(frame, view, camera, scene.weather, airlight)
+            mesh, spreader = renderer.mesh(scene.container), spreader_mesh(scene)
+            seen_normals = self._normals(frame, scene, camera, view) if normals else None
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
@@ -222,12 +197,12 @@ class Generator:
             camera=camera,
             view=view,
             objects=objects,
-            normals=self._normals(frame, scene, camera, view) if normals else None,
+            normals=seen_normals,
         )
 
     def _airlight(self, scene: Scene, camera: Camera) -> Color:
         """Mean light from around in the camera's exposure, no more than its meter would admit."""
-        light = self._open().ambient(scene.environment.name)
+        light = self._gpu.renderer().ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
         mean = mean * self.exposure(scene, camera)
@@ -238,14 +213,13 @@ class Generator:
         self, frame: Frame, scene: Scene, camera: Camera, view: View
     ) -> NDArray[np.float32]:
         """From the layer that shows them, where 0..255 stands for -1..1 along the world's axes."""
-        shown = self._open().render(scene, camera, self.size, "normals").image
+        shown = self._gpu.renderer().render(scene, camera, self.size, "normals").image
         world = shown.astype(np.float32) / 127.5 - 1
         normals = (world @ view.rotation.T.astype(np.float32)).astype(np.float32)
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
         normals[frame.ids == 0] = 0
         return normals
 
-    @_or_closed
     def render_cuda(
         self,
         index: int | None = None,
@@ -259,35 +233,33 @@ class Generator:
         Raises ContextError where `cuda_reason` gives one.
         """
         scene, camera = self._chosen(index, camera, scene)
-        renderer = self._open()
-        if self._cuda is None:
-            self._cuda = CudaFrames(self._context(), self.size)
-        image, labels, depth = self._cuda.take(renderer.draw(scene, camera, self.size))
+        with self._gpu.drawing() as renderer:
+            frames = self._gpu.frames(self.size)
+            image, labels, depth = frames.take(renderer.draw(scene, camera, self.size))
         return CudaFrame(image, labels, depth, scene, camera, view_of(camera, self.size))
 
     def cuda_reason(self) -> str:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
-        return cuda_reason(self._context())
+        return cuda_reason(self._gpu.context())
 
-    @_or_closed
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
 
         Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
         """
-        return self._open().bake(self._check(scene), texel_mm)
+        with self._gpu.drawing() as renderer:
+            return renderer.bake(self._check(scene), texel_mm)
 
-    @_or_closed
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
         """As `bake`, of the spreader; None where the scene has none."""
-        return self._open().bake_spreader(self._check(scene), texel_mm)
+        with self._gpu.drawing() as renderer:
+            return renderer.bake_spreader(self._check(scene), texel_mm)
 
-    @_or_closed
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        return self._open().exposure(self._check(scene), check_camera(camera), self.size)
+        with self._gpu.drawing() as renderer:
+            return renderer.exposure(self._check(scene), check_camera(camera), self.size)
 
-    @_or_closed
     def preload(self) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
         later."""
@@ -300,16 +272,16 @@ class Generator:
             for container, spreader in possible_shapes(self.config)
         )
         lens = any(camera.lens is not None for camera in scene.cameras)
-        renderer = self._open()
-        renderer.preload(chain(lit, shaped), lens)
+        with self._gpu.drawing() as renderer:
+            renderer.preload(chain(lit, shaped), lens)
+            sunny = {renderer.ambient(name).sun is not None: name for name in names}
         # what labels ask of meshes
         shown = [self._sampled(config) for config in one_container_each(self.config)]
         # programs and targets: a light with a sun, and one without
-        unlike = {renderer.ambient(name).sun is not None: name for name in names}.values()
         shown += [
             replace(scene, environment=EnvironmentView(name, 0.0))
             for scene in map(self._sampled, one_damage_each(self.config))
-            for name in unlike
+            for name in sunny.values()
         ]
         for scene in shown:
             for camera in scene.cameras:
@@ -321,17 +293,7 @@ class Generator:
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
-        gl, held = self._gl, (self._renderer, self._cuda)
-        # first, so that nothing goes on with what is freed in part
-        self._cuda, self._renderer, self._gl = None, None, None
-        if self._process == os.getpid() and gl is not None:
-            _free(gl, *held)
-
-    def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
-        # not freed here, perhaps in the middle of another's render: that switches contexts
-        gl = getattr(self, "_gl", None)
-        if gl is not None and self._process == process():
-            left.append((self._process, self._thread, gl, self._renderer, self._cuda))
+        self._gpu.close()
 
     def __enter__(self) -> Self:
         return self
@@ -367,30 +329,6 @@ class Generator:
             self._sound = check_scene(scene)
         return scene
 
-    def _open(self) -> Renderer:
-        if self._process != os.getpid():  # what was opened before a fork is the parent's
-            self.close()
-        if self._renderer is None:
-            self._process, self._thread = os.getpid(), threading.get_ident()
-            for each in [each for each in _left if each[:2] == (self._process, self._thread)]:
-                _left.remove(each)
-                with contextlib.suppress(ContextError):  # no fault of who opens another
-                    _free(*each[2:])
-            self._gl = open_context(self.backend, self._device_index)
-            threshold_mm = self.config.damage.mask_threshold_mm
-            # bound to no method of ours, so that one dropped is gone at once
-            light = partial(_load_light, self._hdris)
-            self._renderer = Renderer(self._gl, light, self._samples_per_axis, threshold_mm)
-        else:
-            assert self._gl is not None
-            self._gl.make_current()  # another generator may have been at work in between
-        return self._renderer
-
-    def _context(self) -> GLContext:
-        self._open()
-        assert self._gl is not None
-        return self._gl
-
 
 def _hdri(hdris: Mapping[str, Path], name: str) -> Path:
     if name not in hdris:
@@ -400,15 +338,6 @@ def _hdri(hdris: Mapping[str, Path], name: str) -> Path:
 
 def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     return load_environment(_hdri(hdris, name))
-
-
-def _free(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
-    gl.make_current()  # else what has the same names in another context is freed
-    if cuda is not None:
-        cuda.release()
-    if renderer is not None:
-        renderer.release()
-    gl.release()
 
 
 def _whole_size(size: Any) -> tuple[int, int]:

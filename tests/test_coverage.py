@@ -82,7 +82,7 @@ def views(generator):
         close = Camera("near", (2500, -2600, 1900), (1500, -1000, 1300), 24.0)
         for camera in (*scene.cameras, close):
             yield generator.render(scene=scene, camera=camera)
-        mesh = generator._renderer.mesh(scene.container)
+        mesh = generator._gpu.renderer().mesh(scene.container)
         for decal in [d for d in scene.decals if d.class_name and d.face == "front"][:3]:
             (x, y, z), *_ = mesh.sheet_to_surface("front", decal.center_mm)[0]
             # 4 m before it, the image is 3.6 m wide: its border goes through the decal
@@ -93,7 +93,7 @@ def views(generator):
 def test_decals_cover_what_rays_say(generator):
     seen = cut = 0
     for sample in views(generator):
-        mesh = generator._renderer.mesh(sample.scene.container)
+        mesh = generator._gpu.renderer().mesh(sample.scene.container)
         view = unbounded(sample.view)
         hits = {}
         for item in (o for o in sample.objects if o.class_name == "text" or o.class_name[0] == "C"):
@@ -134,7 +134,7 @@ def test_damages_cover_what_rays_say(generator):
     seen = 0
     threshold = generator.config.damage.mask_threshold_mm
     for sample in views(generator):
-        mesh = generator._renderer.mesh(sample.scene.container)
+        mesh = generator._gpu.renderer().mesh(sample.scene.container)
         view = unbounded(sample.view)
         everything = np.arange(len(mesh.triangles))
         ray, rest, _ = all_hits(mesh, everything, view, sample.scene.damages)
@@ -183,7 +183,7 @@ def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
 def test_the_container_covers_its_silhouette(generator):
     cut = 0
     for sample in views(generator):
-        mesh = generator._renderer.mesh(sample.scene.container)
+        mesh = generator._gpu.renderer().mesh(sample.scene.container)
         bare = dataclasses.replace(sample.scene, spreader=Spreader())
         whole = oracle.cast(mesh, unbounded(sample.view), bare).hit
         container = sample.objects[0]
@@ -218,7 +218,7 @@ def test_the_spreader_covers_what_rays_say(generator):
 def test_casting_corners_are_seen_as_rays_see_them(generator):
     flags = set()
     for sample in views(generator):
-        mesh = generator._renderer.mesh(sample.scene.container)
+        mesh = generator._gpu.renderer().mesh(sample.scene.container)
         low, high = mesh.bounds_mm
         moved = fields.deform(sample.scene.damages, mesh.positions_mm)
         body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))

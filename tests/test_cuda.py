@@ -154,8 +154,8 @@ def generator():
 def driver(generator, monkeypatch):
     """The stand-in, with `generator` said to draw on an NVIDIA GPU."""
     assert generator.renderer_name  # opens its context
-    fake = FakeDriver(generator._gl)
-    monkeypatch.setattr(cuda, "_VENDOR", generator._gl.vendor)
+    fake = FakeDriver(generator._gpu.context())
+    monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
     monkeypatch.setattr(cuda, "_load_library", lambda: fake)
     return fake
 
@@ -247,7 +247,7 @@ def test_what_the_driver_lacks_is_the_reason(generator, driver, monkeypatch):
 
 def test_a_missing_library_is_the_reason(generator, monkeypatch):
     assert generator.renderer_name
-    monkeypatch.setattr(cuda, "_VENDOR", generator._gl.vendor)
+    monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
     monkeypatch.setattr(cuda, "_LIBRARY", "libcuda-of-no-machine.so.1")
     assert "libcuda-of-no-machine.so.1: cannot open" in generator.cuda_reason()
 

@@ -55,7 +55,7 @@ def samples(lens, focal_mm):
         for index in (1, 2):
             scene = generator.scene(index)
             sample = generator.render(scene=scene, camera=camera(lens, focal_mm))
-            yield sample, generator._renderer.mesh(scene.container)
+            yield sample, generator._gpu.renderer().mesh(scene.container)
 
 
 @pytest.fixture(scope="module", params=LENSES, ids=lambda name: name.replace(" ", "_"))

@@ -230,9 +230,9 @@ def test_what_mirrors_open_sky_is_what_rays_find(camera, index):
     with Generator(sound, 8, size, quality="draft") as g:
         scene = g.scene(index)
         sample = g.render(scene=scene, camera=camera, normals=True)
-        targets = g._open().draw(scene, scene.camera(camera), size)
+        targets = g._gpu.renderer().draw(scene, scene.camera(camera), size)
         found = np.frombuffer(targets.mirror.read(alignment=1), np.uint8).reshape(size[::-1]) / 255
-        mesh = g._open().mesh(scene.container)
+        mesh = g._gpu.renderer().mesh(scene.container)
     start, rays = sample.view.rays()
     seen = (sample.ids > 0) & (sample.ids < SPREADER_ID)
     rays = rays[seen] / np.linalg.norm(rays[seen], axis=1, keepdims=True)
