@@ -241,10 +241,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     rows = [[name, len(parts[name]), *found[name].values()] for name in parts]
     table = Table("Identifiers read, %", ["layout", "crops", *found["all"]], rows)
     charts.loss_curve(losses, run.folder / "text_loss.png")
-    titles = [f"{joined(texts[i])}\nread {read[i]}" for i in range(min(20, len(test)))]
+    titles = [f"{joined(texts[i])}, read {read[i]}" for i in range(min(20, len(test)))]
     strips = [test[i][0].expand(3, -1, -1) for i in range(len(titles))]
     if strips:
-        charts.pictures(strips, titles, run.folder / "text_pictures.png", columns=2)
+        charts.pictures(strips, titles, run.folder / "text_pictures.png", 2, inches=4.5)
     conclude(run, [table], {"parameters": parameters(model), **found, "last_loss": losses[-1]})
 
 
