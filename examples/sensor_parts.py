@@ -3,7 +3,7 @@
 python examples/sensor_parts.py docs/sensor_parts.jpg
 """
 
-import sys
+import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,8 +60,11 @@ def tiles(generator: Generator, scene: Scene, camera: Camera) -> list[np.ndarray
     return images
 
 
-def main(path: Path) -> None:
+def main() -> None:
     """Write the picture, five tiles a row."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("out", type=Path, help="the JPEG file to write")
+    path = parser.parse_args().out
     with Generator(Config.preset(), seed=7, size=SIZE) as generator:
         scene = generator.scene(INDEX)
         camera = replace(scene.camera("A"), focal_mm=16.0)
@@ -71,4 +74,4 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

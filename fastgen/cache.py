@@ -1,13 +1,18 @@
 """Arrays kept on disk from one run to the next. Losing them costs time only."""
 
+import contextlib
+import fcntl
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+LIMIT_BYTES = 4 << 30
+"""Of a folder; beyond it, what was not read for longest goes. About 150 lights."""
 
 
 def default_folder() -> Path:
@@ -21,7 +26,10 @@ def read(entry: Path) -> dict[str, NDArray[np.generic]]:
     """The arrays of an entry by name; none where it is absent or damaged."""
     try:
         with np.load(entry, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
+            arrays = {name: stored[name] for name in stored.files}
+        with contextlib.suppress(OSError):  # few disks note when a file is read, and _trim asks
+            os.utime(entry)
+        return arrays
     except Exception:  # an archive can be damaged in many ways
         return {}
 
@@ -38,6 +46,35 @@ def write(entry: Path, arrays: Mapping[str, Any], compress: bool = False) -> Non
             temporary = Path(file.name)
             (np.savez_compressed if compress else np.savez)(file, **arrays)
         temporary.replace(entry)
+        _trim(entry.parent)
     except OSError:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def alone(entry: Path) -> Iterator[None]:
+    """While inside, no other worker is inside for the same entry, so that of many that miss it one
+    makes it and the others then read it. A process that ends lets go.
+
+    Where files cannot be locked, nobody waits.
+    """
+    mark = entry.with_suffix(".lock")
+    with contextlib.ExitStack() as held:
+        with contextlib.suppress(OSError):
+            entry.parent.mkdir(parents=True, exist_ok=True)
+            file = held.enter_context(mark.open("ab"))
+            held.callback(mark.unlink, missing_ok=True)
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _trim(folder: Path) -> None:
+    """Remove entries, oldest first, until the rest is within LIMIT_BYTES."""
+    found = [(entry, entry.stat()) for entry in folder.glob("*.npz")]
+    spare = sum(about.st_size for _, about in found) - LIMIT_BYTES
+    for entry, about in sorted(found, key=lambda one: one[1].st_mtime):
+        if spare <= 0:
+            break
+        entry.unlink(missing_ok=True)
+        spare -= about.st_size

@@ -75,9 +75,9 @@ class CudaArray:
 class CudaFrame:
     """One draw in GPU memory, row 0 at the top; good until the next `Generator.render_cuda`.
 
-    image: uint8 [H, W, 4], sRGB and 255. labels: uint32 [H, W], id | damage << 16, see Frame.
-    depth: float32 [H, W], metres along the optical axis, inf where void. Objects are worked out
-    from ids on the host, so there are none here: `Generator.render` gives them.
+    image: uint8 [H, W, 4], sRGB and Frame.cover. labels: uint32 [H, W], id | damage << 16, see
+    Frame. depth: float32 [H, W], metres along the optical axis, inf where void. Objects are worked
+    out from ids on the host, so there are none here: `Generator.render` gives them.
     """
 
     image: CudaArray

@@ -190,6 +190,7 @@ class Generator:
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
             image=frame.image,
+            cover=frame.cover,
             ids=frame.ids,
             damage=frame.damage,
             depth=frame.depth,

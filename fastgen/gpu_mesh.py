@@ -61,7 +61,7 @@ class GpuMesh:
         self._views = ctx.buffer(np.arange(2, dtype=np.uint32).tobytes())
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
-        contents = [content, (self._openness, "4f1", "in_openness")]
+        contents = [content, (self._openness, "4f1 3u", "in_openness", "in_open_to")]
         views = (self._views, "1u/i", "in_inner")
         self._arrays = {
             damage: ctx.vertex_array(

@@ -19,11 +19,15 @@ from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
+from fastgen.prefilter import octahedral_decode
 from fastgen.programs import LIGHT_STEPS, link
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
 
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface; a multiple of 8."""
+
+VERTEX_BYTES = 4 + DIRECTIONS // 8
+"""What the shader reads of a vertex: a cone, the light from it, and a bit for each direction."""
 
 _VERSION = 3
 """Part of the disk cache's key: count up whenever the openness changes."""
@@ -44,6 +48,10 @@ interpolated between the vertices is then right on average, where creases would 
 _INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
+_LOBE = 4
+"""Directions about a mirrored ray: as many as a cap of 24 degrees radius holds. With more or fewer
+path-traced containers are farther off."""
+
 _CAPACITY = 128
 _LIT_CAPACITY = 8  # a scene asks for two, once a camera
 _DARK = 1e-20  # instead of no light at all, which has no ratios
@@ -88,10 +96,29 @@ def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
 
 
 def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """What the shader reads of surfaces that see their whole hemisphere, uint8 [V, 4]: as `encoded`
-    and `Openness.under` have it."""
-    whole = np.full((len(normals), 1), LIGHT_STEPS)
-    return np.rint(np.concatenate([128 + 127 * normals, whole], axis=1)).astype(np.uint8)
+    """What the shader reads of surfaces that see their whole hemisphere, uint8 [V, VERTEX_BYTES]:
+    as `encoded` and `Openness.under` have it."""
+    found = np.full((len(normals), VERTEX_BYTES), 255, np.uint8)
+    found[:, :3] = np.rint(128 + 127 * normals)
+    found[:, 3] = LIGHT_STEPS
+    return found
+
+
+def lobe_masks(cells: int) -> NDArray[np.uint32]:
+    """Bit masks of directions for each cell of an octahedral map, uint32 [2 cells, cells, 4]; the
+    bits of three words in the order of `Openness.under`.
+
+    Upper half: the _LOBE directions nearest to a cell's. Lower half: those before a surface that
+    faces where the cell points to.
+    """
+    step = (np.arange(cells) + 0.5) / cells
+    toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1))
+    cosine = toward @ sky_directions().T
+    least = np.sort(cosine, axis=-1)[..., -_LOBE, None]
+    bits = np.packbits(np.concatenate([cosine >= least, cosine > 0]), axis=-1)
+    words = np.zeros((2 * cells, cells, 4), np.uint32)
+    words[..., :3] = bits.view(np.uint32)
+    return words
 
 
 def encoded(normals: NDArray[np.floating], open_to: Directions) -> NDArray[np.uint8]:
@@ -153,9 +180,10 @@ class Openness:
         self._cones, self._which = cone[first], _narrow(which)
 
     def under(self, sky: Sky) -> NDArray[np.uint8]:
-        """As the shader reads it under `sky`, uint8 [V, 4].
+        """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
+        comes in, and open_to.
 
-        After the cone there is, as LIGHT_STEPS r, the ratio r of two irradiances' luminances: of
+        Of light there is, as LIGHT_STEPS r, the ratio r of two irradiances' luminances: of
         what reaches a vertex from where the sky is open, to that of a whole sky about the cone's
         direction, which is what the shader looks up. The first is a part of the irradiance about
         the normal: that of the open ones in sums over all directions. Of such sums over eight
@@ -172,9 +200,10 @@ class Openness:
         for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
             light += np.take(table, row + bits)
         light /= np.take(self._irradiance(sky, _directions(self._cones)), self._which)
-        found = np.empty((len(light), 4), np.uint8)
+        found = np.empty((len(light), VERTEX_BYTES), np.uint8)
         found[:, :3] = self._cones[self._which]
         found[:, 3] = np.minimum(light + 0.5, 255)  # rounds
+        found[:, 4:] = self._open_to.T
         return found
 
     @staticmethod
@@ -317,12 +346,20 @@ def _from_disk(
 ) -> NDArray[np.uint8]:
     """The disk cache's array of `key`; where there is none of `shape`, what `make` gives."""
     entry = cache.default_folder() / f"openness-{key[:32]}.npz"
-    stored = cache.read(entry).get("values")
-    if stored is not None and stored.shape == shape and stored.dtype == np.uint8:
-        return stored.astype(np.uint8)
-    made = make()
-    cache.write(entry, {"values": made}, compress=True)
-    return made
+
+    def kept() -> NDArray[np.uint8] | None:
+        stored = cache.read(entry).get("values")
+        fits = stored is not None and stored.shape == shape and stored.dtype == np.uint8
+        return stored.astype(np.uint8) if stored is not None and fits else None
+
+    found = kept()
+    if found is None:
+        with cache.alone(entry):
+            found = kept()
+            if found is None:
+                found = make()
+                cache.write(entry, {"values": found}, compress=True)
+    return found
 
 
 def map_matrix(toward: Array, low: Array, high: Array) -> Array:

@@ -73,6 +73,9 @@ LIGHT_STEPS = 127.0
 """What of 255 stands for all the light of an open sky, see openness.py; what is open may face more
 of it than the surface does, hence up to twice as much."""
 
+LOBE_CELLS = 32
+"""Along each side of the octahedral maps of openness.lobe_masks."""
+
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 
@@ -117,6 +120,7 @@ VIEW_BLOCK = Block(
         ("mat4", "world_to_clip"),
         ("vec3", "ray_corner"),
         ("float", "pixel_angle"),
+        ("vec3", "eye_m"),
         ("vec3", "ray_right"),
         ("float", "exposure"),
         ("vec3", "ray_down"),
@@ -204,6 +208,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",
+        "LOBE_CELLS": LOBE_CELLS,
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
         "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",
         "SPECULAR_LAYERS": f"{len(levels):.1f}",

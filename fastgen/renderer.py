@@ -25,10 +25,12 @@ from fastgen.gpu_light import GpuLight
 from fastgen.gpu_mesh import GpuMesh
 from fastgen.kept import Kept
 from fastgen.mesh import Mesh
+from fastgen.openness import lobe_masks
 from fastgen.programs import (
     DAMAGE_BLOCK,
     DAMAGE_VARIANTS,
     LAYERS,
+    LOBE_CELLS,
     SCENE_BLOCK,
     SPREADER_CHART,
     VIEW_BLOCK,
@@ -89,7 +91,7 @@ class Renderer:
         self._samples_per_axis = samples_per_axis
         self._mask_threshold_mm = mask_threshold_mm
         self._geometry = {
-            damage: link(self._ctx, "geometry.vert", "geometry.frag", {}, damage=damage)
+            damage: link(self._ctx, "geometry.vert", "geometry.frag", UNITS, damage=damage)
             for damage in DAMAGE_VARIANTS
         }
         self._shading: Kept[Shading] = Kept(len(LAYERS))
@@ -112,6 +114,9 @@ class Renderer:
         table = dfg_table()
         self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         self._dfg.repeat_x = self._dfg.repeat_y = False
+        masks = lobe_masks(LOBE_CELLS)
+        self._lobes = self._ctx.texture(masks.shape[1::-1], 4, masks.tobytes(), dtype="u4")
+        self._lobes.filter = (moderngl.NEAREST, moderngl.NEAREST)
 
     def render(
         self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
@@ -149,6 +154,7 @@ class Renderer:
         holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
         targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._lobes.use(UNITS["lobe_masks"])
         ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
         # a dent may tilt a face into view that the rest mesh turns away
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
@@ -163,6 +169,7 @@ class Renderer:
             "sheet_points": targets.points,
             "sheet_depths": targets.depths,
             "openness_points": targets.openness,
+            "mirror_points": targets.mirror,
             "specular_light": light.specular,
             "irradiance_light": light.irradiance,
             "background_light": light.background,
@@ -284,7 +291,7 @@ class Renderer:
         blocks: list[Any] = [*self._blocks.values()]
         for item in (*blocks, *self._geometry.values(), self._occluder):
             item.release()
-        for texture in (self._art, self._tiles, self._noise, self._dfg):
+        for texture in (self._art, self._tiles, self._noise, self._dfg, self._lobes):
             texture.release()
 
     def __enter__(self) -> Self:
@@ -328,6 +335,7 @@ def _view_values(
     return {
         "world_to_clip": to_samples @ view.clip_matrix(),
         "ray_corner": forward - (center_x * right + center_y * down) / view.focal_px,
+        "eye_m": view.position_m,
         "ray_right": right / view.focal_px,
         "ray_down": down / view.focal_px,
         "pixel_angle": 1 / view.focal_px,

@@ -27,6 +27,8 @@ UNITS = {
     "sheet_depths": 14,
     "openness_points": 15,
     "sun_shadow": 16,
+    "lobe_masks": 17,
+    "mirror_points": 18,
 }
 
 

@@ -82,8 +82,9 @@ class Targets:
         self.points = ctx.texture(stored, 2, dtype="f4")
         self.depths = ctx.texture(stored, 1, dtype="f4")
         self.openness = ctx.texture(stored, 4)
+        self.mirror = ctx.texture(stored, 1)
         self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        always = [self.keys, self.points, self.depths, self.openness]
+        always = [self.keys, self.points, self.depths, self.openness, self.mirror]
         attached = [*always, self.rest] if self.rest is not None else always
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -157,6 +158,7 @@ class Targets:
         return Frame(
             # NumPy takes 20 times as long to leave a channel out
             image=np.asarray(cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), np.uint8),
+            cover=np.asarray(cv2.extractChannel(color, 3), np.uint8),
             ids=np.ascontiguousarray(pairs[..., 0]),
             damage=np.ascontiguousarray(pairs[..., 1]),
             depth=depth,

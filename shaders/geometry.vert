@@ -12,12 +12,14 @@ layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_chart;
 layout(location = 5) in vec4 in_openness;
+layout(location = 6) in uvec3 in_open_to;   // a bit for each of openness.py's directions
 #if HOLED
 layout(location = 4) in uint in_inner;   // one an instance: 0 the outer view, 1 what holes show
 #endif
 
 out vec2 atlas_mm;
 out vec4 openness;
+out float mirror_open;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
@@ -25,6 +27,21 @@ out vec3 rest_mm;
 #if HOLED
 flat out uint inner;
 #endif
+
+uniform usampler2D lobe_masks;   // as openness.py makes them
+
+uvec3 lobe_mask(vec3 direction, int below) {
+    ivec2 cell = min(ivec2(octahedral(direction) * float(LOBE_CELLS)), ivec2(LOBE_CELLS - 1));
+    return texelFetch(lobe_masks, cell + ivec2(0, below), 0).xyz;
+}
+
+// share of open sky about where a mirror there would show the eye
+float open_about_mirror(vec3 position_m, vec3 normal) {
+    vec3 mirror = reflect(position_m - eye_m, normal);
+    uvec3 lobe = lobe_mask(mirror, 0) & lobe_mask(normal, LOBE_CELLS);
+    ivec3 whole = bitCount(lobe), open = bitCount(lobe & in_open_to);
+    return float(open.x + open.y + open.z) / float(max(whole.x + whole.y + whole.z, 1));
+}
 
 void main() {
     atlas_mm = in_atlas_mm;
@@ -39,6 +56,7 @@ void main() {
         position_mm = in_position_mm;
     }
 #endif
+    mirror_open = open_about_mirror(position_mm * MM, in_normal);
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // seen in a mirror, the sheets' backs pass for fronts: face culling keeps the insides

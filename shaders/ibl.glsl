@@ -44,11 +44,13 @@ vec3 background(vec3 direction) {
 }
 
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
-// and its irradiance from there, relative to that of a whole sky about that direction
+// its irradiance from there, relative to that of a whole sky about that direction, and the share
+// that is open about where it mirrors the eye's ray
 struct Openness {
     vec3 direction;
     float rim;
     float light;
+    float mirrored;
 };
 
 // Light that gets here by way of what hides the sky, which is taken for the same paint: Jimenez et
@@ -62,11 +64,13 @@ vec3 bounced(Openness sky, vec3 albedo) {
     return 0.75 * (clamp(((share * a + b) * share + c) * share, share, 1.0) - share);
 }
 
-// Share of a lobe about `mirror` within the cone of open sky. Fitted to sampled GGX lobes over random
-// roughness, view and cones within the hemisphere: 0.07 off in the root mean square.
+// Share of a lobe about `mirror` that meets open sky. Within a cone it is fitted to sampled GGX lobes
+// over random roughness, view and cones within the hemisphere; the more is hidden, the less is what is
+// open a cone, and the more it is asked for just where the mirror points.
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
-    return smoothstep(sky.rim - 0.03 - 0.64 * roughness, sky.rim - 0.13 + 1.4 * roughness,
-                      dot(mirror, sky.direction));
+    float within = smoothstep(sky.rim - 0.03 - 0.64 * roughness, sky.rim - 0.13 + 1.4 * roughness,
+                              dot(mirror, sky.direction));
+    return mix(within, sky.mirrored, sky.rim);
 }
 
 vec3 lit(Material m, vec3 normal, vec3 view, Openness sky) {

@@ -20,12 +20,13 @@ Shaded cable(ivec2 pixel) {
     vec4 base = material_base[CABLE_MATERIAL];
     Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
     SurfacePoint at = SurfacePoint(steel, 0u, vec3(0.0));
-    vec3 color = layer_color(at, normal, view, Openness(normal, 0.0, 1.0));
+    vec3 color = layer_color(at, normal, view, Openness(normal, 0.0, 1.0, 1.0));
 #if SUN && LAYER == LAYER_ALL
     color += exposure * sunlit(steel, normal, view);
 #endif
     Shaded s = sky(ray);
-    s.color = mix(s.color, color, cables_cover(center));
+    s.cover = cables_cover(center);
+    s.color = mix(s.color, color, s.cover);
     ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
     if (key_at(middle) != 0u) {
         s.id = SPREADER_ID;
@@ -44,7 +45,7 @@ void main() {
 #else
     Shaded s = single_surface(pixel);
 #endif
-    out_color = vec4(developed(s.color), 1.0);
+    out_color = vec4(developed(s.color), s.cover);
     out_labels = s.id | (s.damage << 16);
     out_depth = s.depth;
 }

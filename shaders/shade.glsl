@@ -29,12 +29,14 @@ uniform sampler2D rest_points;
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 uniform sampler2D openness_points;
+uniform sampler2D mirror_points;
 
 struct Shaded {
     vec3 color;   // exposed radiance; of a single layer, what is displayed
     uint id;
     uint damage;
     float depth;
+    float cover;   // share of the pixel that is no sky
 };
 
 // as openness.py encodes it
@@ -43,7 +45,8 @@ Openness openness_at(ivec2 sample_at) {
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
     float light = stored.w * (255.0 / LIGHT_STEPS);
-    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light);
+    float mirrored = texelFetch(mirror_points, sample_at, 0).r;
+    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, mirrored);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -72,7 +75,7 @@ Shaded sky(vec3 ray) {
 #else
     vec3 color = vec3(1.0);
 #endif
-    return Shaded(color, 0u, 0u, VOID_DEPTH);
+    return Shaded(color, 0u, 0u, VOID_DEPTH, 0.0);
 }
 
 // all that the samples of one part within a pixel share: its layers, the point they are taken at
@@ -137,7 +140,7 @@ Shaded single_surface(ivec2 pixel) {
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
-    return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth);
+    return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
 }
 
 #if WITH_HOLES
@@ -153,7 +156,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
 #if LAYER == LAYER_ALL
         seen *= exposure;
 #endif
-        s = Shaded(seen, CONTAINER_ID, 0u, depth);
+        s = Shaded(seen, CONTAINER_ID, 0u, depth, 1.0);
     }
     s.damage = uint(damage_shape[3 * int(key >> 10) + 2].w);
     return s;

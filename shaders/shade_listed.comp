@@ -50,7 +50,7 @@ void main() {
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
         bool at_center = part == 0 && !sees_sky;
-        if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth);
+        if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth, 1.0);
         int side = 0;
         do {
             uint key = 0u;
@@ -76,11 +76,12 @@ void main() {
         } while (++side < MAX_SIDES && of_part != 0u);
     } while (++part < MAX_PARTS && left != 0u);
     color /= done;   // of a busy pixel, what was not come to counts like the rest
+    s.cover = 1.0 - sky_weight / done;
 #else
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
 #endif
-    imageStore(color_image, pixel, vec4(developed(color), 1.0));
+    imageStore(color_image, pixel, vec4(developed(color), s.cover));
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
     imageStore(depth_image, pixel, vec4(s.depth));
 }

@@ -13,7 +13,7 @@ layout(location = 2) out float out_depth;
 
 void main() {
     vec3 radiance = textureLod(background_light, map_uv, 0.0).rgb;
-    out_color = vec4(srgb_encode(neutral_tone(exposure * radiance)), 1.0);
+    out_color = vec4(srgb_encode(neutral_tone(exposure * radiance)), 0.0);
     out_labels = 0u;
     out_depth = VOID_DEPTH;
 }

@@ -1,6 +1,9 @@
 """Environments: files, the cache, metering and what is bundled."""
 
 import json
+import os
+import subprocess
+import sys
 import threading
 from collections import Counter
 from pathlib import Path
@@ -10,7 +13,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from fastgen import Config, environment
+from fastgen import Config, cache, environment
 from fastgen.environment import (
     EnvironmentLight,
     irradiance_at,
@@ -154,6 +157,45 @@ def test_racing_writers_leave_one_whole_entry(tmp_path):
     with np.load(entry) as stored:
         for light in found:
             np.testing.assert_array_equal(light.specular, stored["specular"])
+
+
+def test_of_many_workers_one_prefilters_and_the_others_read(tmp_path):
+    path = write_exr(tmp_path / "a.exr", patchwork(1))
+    code = """if True:
+        import sys, time
+        from fastgen import environment
+        made = environment.prefilter_environment
+        def slowly(*of):
+            print("prefilters", flush=True)
+            time.sleep(1)
+            return made(*of)
+        environment.prefilter_environment = slowly
+        print("ready", flush=True)
+        sys.stdin.readline()
+        environment.load_environment(sys.argv[1], sys.argv[2])
+    """
+    command = [sys.executable, "-c", code, str(path), str(tmp_path / "cache")]
+    pipe = subprocess.PIPE
+    workers = [subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True) for _ in range(3)]
+    assert [worker.stdout.readline() for worker in workers] == 3 * ["ready\n"]
+    for worker in workers:
+        worker.stdin.write("go\n")
+        worker.stdin.flush()
+    said = [worker.communicate(timeout=120)[0] for worker in workers]
+    assert [worker.returncode for worker in workers] == [0, 0, 0]
+    assert "".join(said).count("prefilters") == 1
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+def test_what_was_not_read_for_longest_leaves_a_full_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "LIMIT_BYTES", 3 * 9000)  # each takes 8000 bytes and a header
+    for age, name in enumerate("abcd"):
+        cache.write(tmp_path / f"{name}.npz", {"values": np.zeros(1000)})
+        if name < "d":
+            os.utime(tmp_path / f"{name}.npz", (1000 + age, 1000 + age))
+        if name == "c":
+            assert "values" in cache.read(tmp_path / "a.npz")
+    assert {entry.stem for entry in tmp_path.iterdir()} == {"a", "c", "d"}
 
 
 def test_unwritable_cache_folder_only_means_no_caching(tmp_path):

@@ -5,19 +5,23 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import openness
+from fastgen import Config, Generator, openness
+from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container
 from fastgen.environment import Ambient, prefilter_environment
 from fastgen.gl import open_context
 from fastgen.openness import (
+    VERTEX_BYTES,
     Openness,
     Sky,
     SkyProbe,
     encoded,
+    lobe_masks,
     open_sky,
     probe_points,
     sky_directions,
 )
+from fastgen.shapes import spreader_mesh
 from fastgen.spreader import build_spreader
 
 
@@ -33,7 +37,7 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def decoded(values):
-    """Directions [V, 3] and shares [V] of the cones in `values`, uint8 [V, 3 or 4]."""
+    """Directions [V, 3] and shares [V] of the cones in `values`, uint8 [V, 3 or more]."""
     cone = (values[:, :3].astype(float) - 128) / 127
     length = np.linalg.norm(cone, axis=1)
     return cone / length[:, None], 1 - np.clip(2 - 2 * length, 0, 1) ** 2
@@ -162,7 +166,7 @@ def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
     spreader = build_spreader(kind) if held else None
     probe = SkyProbe(gl.ctx)
     found = probe.openness(container, spreader, even_sky)
-    share = np.frombuffer(found, np.uint8).reshape(-1, 4)[:, 3] / 127
+    share = np.frombuffer(found, np.uint8).reshape(-1, VERTEX_BYTES)[:, 3] / 127
     probe.release()
     sheets = [i for i, c in enumerate(container.charts) if c.face != "underside"]
     rng = np.random.default_rng(1)
@@ -179,6 +183,22 @@ def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
     assert len(error) > 600
     assert np.quantile(np.abs(error), 0.9) < 0.1
     assert abs(error.mean()) < 0.02
+
+
+def test_lobe_masks_hold_the_nearest_directions_and_the_hemisphere():
+    cells = 16
+    masks = np.unpackbits(lobe_masks(cells)[..., :3].view(np.uint8), axis=-1).astype(bool)
+    directions = sky_directions()
+    for row, column in np.random.default_rng(4).integers(0, cells, (40, 2)):
+        x, y = (2 * (column + 0.5) / cells - 1, 2 * (row + 0.5) / cells - 1)
+        z = 1 - abs(x) - abs(y)
+        if z < 0:  # the corners of the square fold under
+            x, y = (1 - abs(y)) * np.sign(x), (1 - abs(x)) * np.sign(y)
+        toward = np.array([x, y, z])
+        order = np.argsort(-directions @ toward)
+        np.testing.assert_array_equal(np.sort(order[:4]), np.flatnonzero(masks[row, column]))
+        below = masks[cells + row, column]
+        np.testing.assert_array_equal(below, directions @ toward > 0)
 
 
 def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
@@ -200,3 +220,33 @@ def test_backends_find_the_same(even_sky):
             probe = SkyProbe(context.ctx)
             found.append(probe.openness(container, None, even_sky))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(("camera", "index"), [("A", 2), ("Cl", 5), ("Cr", 3)])
+def test_what_mirrors_open_sky_is_what_rays_find(camera, index):
+    """Rays some 12 degrees about the mirrored one, from points that pixels see."""
+    size = (120, 90)
+    sound = Config.from_values({"damage": {"probability": 0.0}})
+    with Generator(sound, 8, size, quality="draft") as g:
+        scene = g.scene(index)
+        sample = g.render(scene=scene, camera=camera, normals=True)
+        targets = g._open().draw(scene, scene.camera(camera), size)
+        found = np.frombuffer(targets.mirror.read(alignment=1), np.uint8).reshape(size[::-1]) / 255
+        mesh = g._open().mesh(scene.container)
+    start, rays = sample.view.rays()
+    seen = (sample.ids > 0) & (sample.ids < SPREADER_ID)
+    rays = rays[seen] / np.linalg.norm(rays[seen], axis=1, keepdims=True)
+    normals = sample.normals[seen] @ sample.view.rotation
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    away = sample.depth[seen] / (rays @ sample.view.rotation[2])
+    points = start + 1000 * away[:, None] * rays + 3 * normals
+    mirrored = rays - 2 * (rays * normals).sum(1)[:, None] * normals
+    spread = mirrored[:, None] + np.random.default_rng(5).normal(0, 0.2, (len(rays), 40, 3))
+    ahead = (spread * normals[:, None]).sum(-1) > 0
+    spreader = spreader_mesh(scene)
+    meshes = [mesh] if spreader is None else [mesh, spreader]
+    free = rays_open(meshes, np.repeat(points, 40, axis=0), spread.reshape(-1, 3))
+    expected = (free.reshape(ahead.shape) & ahead).sum(1) / ahead.sum(1)
+    error = found[seen] - expected
+    assert np.abs(error).mean() < 0.1
+    assert np.corrcoef(found[seen], expected)[0, 1] > 0.75

@@ -116,11 +116,31 @@ def test_fog_leaves_a_fiftieth_of_a_contrast_at_its_visibility():
     air = np.array([0.5, 0.5, 0.6], np.float32)
     light = np.array([[[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]]] * 2, np.float32)
     away = np.array([[40.0, 40.0], [0.0, 0.0]], np.float32)
-    seen = foggy(light, away, 40e3, air)
+    whole = np.full((2, 2), 255, np.uint8)
+    seen = foggy(light, away, whole, 40e3, air)
     np.testing.assert_allclose(seen[0, 0] - seen[0, 1], 0.02, rtol=1e-3)
     np.testing.assert_allclose(seen[1], light[1])
-    behind = foggy(light, np.full((2, 2), np.inf, np.float32), 40e3, air)
+    behind = foggy(light, np.full((2, 2), np.inf, np.float32), 0 * whole, 40e3, air)
     np.testing.assert_allclose(behind, np.broadcast_to(air, behind.shape), atol=1e-6)
+
+
+def test_fog_lies_between_an_edge_and_what_shows_beside_it():
+    # a thing 20 m away covers a part of a pixel; so does one that meets no pixel's centre
+    air, sky, thing = (
+        np.array([0.4, 0.5, 0.6]),
+        np.array([2.0, 1.8, 1.5]),
+        np.array([0.1, 0.2, 0.05]),
+    )
+    share = np.repeat([[0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.6, 1.0, 1.0]], 6, axis=0)
+    away = np.where(share == 1, 20.0, np.inf)
+    clear = share[..., None] * thing + (1 - share[..., None]) * sky
+    near, far = np.exp(-3.912 * 20 / 40), np.exp(-3.912 * 300 / 40)
+    veiled = [light * t + air * (1 - t) for light, t in ((thing, near), (sky, far))]
+    expected = share[..., None] * veiled[0] + (1 - share[..., None]) * veiled[1]
+    cover = np.rint(255 * share).astype(np.uint8)
+    values = [array.astype(np.float32) for array in (clear, away, air)]
+    seen = foggy(values[0], values[1], cover, 40e3, values[2])
+    np.testing.assert_allclose(seen, expected, atol=1e-5)
 
 
 def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
@@ -263,4 +283,6 @@ def test_fog_counts_the_way_along_each_ray(lens):
     away = np.minimum(sample.depth / (rays @ forward), 300)
     left = np.exp(-3.912 * away / 40)[..., None]
     expected = displayed((light_of(clear.image) * left + air * (1 - left)).astype(np.float32))
-    assert np.abs(expected.astype(int) - sample.image).max() <= 1
+    unmixed = np.isin(clear.cover, (0, 255))
+    assert unmixed.mean() > 0.9
+    assert np.abs(expected.astype(int) - sample.image)[unmixed].max() <= 1

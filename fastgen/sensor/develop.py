@@ -45,7 +45,8 @@ def develop(frame: Frame, view: View, camera: Camera, weather: Weather, airlight
 
 def _weathered(light: Light, frame: Frame, view: View, weather: Weather, sky: Light) -> Light:
     if weather.visibility_mm:
-        light = foggy(light, _ray_m(frame, view), weather.visibility_mm, sky)
+        away = _ray_m(frame, view)
+        light = foggy(light, away, frame.cover, weather.visibility_mm, sky)
     if weather.rain:
         light = rained(light, frame.depth, view, weather.rain, sky)
     return light

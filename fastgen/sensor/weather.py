@@ -14,6 +14,9 @@ _CONTRAST = 3.912
 _BACKDROP_M = 300.0
 """How far away the surroundings are taken to be, of which an HDRI does not say it."""
 
+_BESIDE = (5, 5)
+"""Pixels around one in which its surroundings are looked for."""
+
 _NEAREST_M, _FARTHEST_M = 0.12, 4.0
 """Drops nearer are blurs before the lens, drops farther are too fine to tell apart."""
 
@@ -23,14 +26,51 @@ _DROP_LIGHT = 0.94
 """Of the mean light around, that a drop sends on (Garg and Nayar 2007, "Vision and Rain", 3)."""
 
 
-def foggy(light: Light, ray_m: NDArray[np.float32], visibility_mm: float, airlight: Light) -> Light:
+def foggy(
+    light: Light,
+    ray_m: NDArray[np.float32],
+    cover: NDArray[np.uint8],
+    visibility_mm: float,
+    airlight: Light,
+) -> Light:
     """Koschmieder's law: light L t + A (1 - t), t = exp(-3.912 d / V).
 
-    ray_m: float32 [H, W], distance along each ray, inf for the surroundings. airlight: [3].
+    ray_m: float32 [H, W], distance along the ray through each pixel's centre, inf for the
+    surroundings. cover: uint8 [H, W], see Frame. airlight: [3].
     """
-    distance = np.minimum(ray_m, _BACKDROP_M)
-    left = np.exp(np.float32(-_CONTRAST * 1e3 / visibility_mm) * distance)
-    return _mixed(light, airlight, 1 - left)
+    decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
+    far, near = np.exp(decay * np.float32(_BACKDROP_M)), np.exp(decay * _objects_m(ray_m))
+    share = cover * np.float32(1 / 255)
+    open_share = 1 - share
+    left = near + (far - near) * open_share
+    planes = []
+    for plane, beyond, air in zip(
+        cv2.split(light), cv2.split(_beyond(light, cover)), airlight, strict=True
+    ):
+        behind = np.minimum(open_share * beyond, plane)
+        planes.append((plane - behind) * near + behind * far + air * (1 - left))
+    return np.asarray(cv2.merge(planes))
+
+
+def _beyond(light: Light, cover: NDArray[np.uint8]) -> Light:
+    """Light [H, W, 3] of the surroundings in each pixel: where objects cover a part of one, that of
+    pixels beside it that show nothing else; its own where there are none."""
+    bare = (cover == 0).astype(np.float32)
+    count = cv2.boxFilter(bare, -1, _BESIDE, normalize=False)
+    total = cv2.boxFilter(light * bare[..., None], -1, _BESIDE, normalize=False)
+    mixed = (cover > 0) & (count > 0.5)
+    found = light.copy()
+    found[mixed] = total[mixed] / count[mixed][:, None]
+    return found
+
+
+def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How far away is what covers a pixel [H, W], also where its centre shows the surroundings:
+    as far as beside it, or, of a cable that no centre meets, as the nearest thing."""
+    beside = cv2.erode(ray_m, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
+    nearest = np.minimum(ray_m.min(), np.float32(_BACKDROP_M))
+    away = np.where(np.isfinite(beside), beside, nearest)
+    return np.where(np.isfinite(ray_m), ray_m, away)
 
 
 def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, sky: Light) -> Light:
