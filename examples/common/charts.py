@@ -45,7 +45,8 @@ def bars(names: Sequence[str], series: Mapping[str, Sequence[float]], path: Path
         axes.bar(np.arange(len(names)) + number * width, values, width, label=label)
     axes.set_xticks(np.arange(len(names)) + 0.4 - width / 2, names, rotation=60, ha="right")
     axes.set(ylabel="%", ylim=(0, 100))
-    axes.legend(loc="lower right")
+    # above the axes, where no bar is
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(series), frameon=False)
     _save(figure, path)
 
 
