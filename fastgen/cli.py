@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import io
 import os
 import re
 import shlex
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Stopped by a signal, it is 128 and the signal's number: 130 after Ctrl-C, 143 after SIGTERM.
     """
+    _mend_streams()
     try:
         try:
             options = _parser().parse_args(arguments)
@@ -57,6 +59,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
+
+
+def _mend_streams() -> None:
+    """What is printed to a stream that was closed goes nowhere; escapes stand for letters that
+    standard output has not, as standard error has it by itself."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 class _Terminated(KeyboardInterrupt):
@@ -208,7 +220,8 @@ def _size(text: str) -> tuple[int, int]:
 
 def _generate(options: argparse.Namespace) -> int:
     config = parse_split(options.split, _config(options))
-    cameras = tuple(options.cameras.split(",")) if options.cameras else tuple(config.cameras)
+    named: str | None = options.cameras
+    cameras = tuple(config.cameras) if named is None else tuple(named.split(","))
     shard = options.shard if options.shard is not None else SHARD_SCENES.get(options.format, 1)
     job = Job(
         out=options.out,
@@ -275,7 +288,7 @@ def _export(options: argparse.Namespace) -> int:
         hdri_dir=options.hdri,
     ) as generator:
         scene = generator.scene(options.index)
-        cameras = [find_camera(scene, options.camera)] if options.camera else None
+        cameras = None if options.camera is None else [find_camera(scene, options.camera)]
         export_glb(generator, scene, options.file, cameras, options.texel_mm)
     return 0
 

@@ -256,7 +256,7 @@ class Config:
         Raises ConfigError naming the file and the key or value that does not fit.
         """
         try:
-            data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+            data = yaml.load(Path(path).read_text(encoding="utf-8"), _UniqueKeys)
         except (OSError, TypeError) as error:
             words = error.strerror if isinstance(error, OSError) else "give a path"
             raise ConfigError(f"{path}: cannot be read ({words})") from None
@@ -271,6 +271,21 @@ class Config:
         """The configuration as plain values, ready for JSON or YAML."""
         plain: dict[str, Any] = to_plain(self)
         return plain
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """Refuses a key that stands twice, of which PyYAML would drop the first without a word; YAML
+    1.2.2, section 3.2.1.1: the keys of a mapping are unique."""
+
+    def compose_mapping_node(self, anchor: dict[Any, Any]) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+            if key.value in seen:
+                words = f"the key {key.value!r} stands twice in one mapping"
+                raise yaml.composer.ComposerError(None, None, words, key.start_mark)
+            seen.add(key.value)
+        return node
 
 
 PRESETS: dict[str, dict[str, Any]] = {

@@ -17,8 +17,8 @@ _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.uint8]:
     """Up to 24 of `images`, (split, stem) each, of the dataset in folder `out`.
 
-    They are spread evenly; returns one picture uint8 [H, W, 3]. Raises OutputError that names a
-    file which is not as it was written.
+    At least one; they are spread evenly. Returns one picture uint8 [H, W, 3]. Raises OutputError
+    that names a file which is not as it was written.
     """
     by_camera: dict[str, list[Path]] = {}
     for split, stem in sorted(images, key=lambda image: image[1]):
@@ -33,22 +33,26 @@ def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.ui
         for views in by_camera.values()
         if i < len(views)
     ][:count]
-    rows = -(-count // _COLUMNS)
-    sheet = np.full((rows * _TILE_PX, _COLUMNS * _TILE_PX, 3), 32, np.uint8)
-    for i, image_path in enumerate(chosen):
-        y, x = i // _COLUMNS * _TILE_PX, i % _COLUMNS * _TILE_PX
+    tiles = []
+    for image_path in chosen:
         try:
-            tile = _tile(out, image_path)
+            tiles.append(_tile(out, image_path))
         except (cv2.error, OSError, ValueError, IndexError):
             raise OutputError(
                 f"{image_path}: it or its labels are damaged; run fastgen verify --repair"
             ) from None
-        sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
+    height, width = tiles[0].shape[:2]  # of all: a dataset has one size
+    columns = min(count, _COLUMNS)
+    sheet = np.full((-(-count // columns) * height, columns * width, 3), 32, np.uint8)
+    for i, tile in enumerate(tiles):
+        y, x = i // columns * height, i % columns * width
+        sheet[y : y + height, x : x + width] = tile
     return sheet
 
 
 def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
-    stored = cv2.imread(str(path))
+    # not imread, which ends the process at a path that is not UTF-8
+    stored = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     if stored is None:
         raise ValueError
     image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)

@@ -27,6 +27,9 @@ GASKET_MM = 14.0
 _GASKET_INSET_MM = 72.0
 _CENTER_GAP_MM = 12.0
 _STILE_MM = 70.0
+_SHADE_MM = 50.0
+"""The leaves are cut as narrow: what a locking bar takes of the sky's light changes over that."""
+
 _UP = FACE_AXES["door"].up
 _RIGHT = FACE_AXES["door"].right
 
@@ -71,7 +74,7 @@ def leaves(layout: Layout) -> tuple[list[Sheet], Flats]:
         ):  # fmt: skip
             x = place.x - LEAF_MM - waves * depth
             profile = np.column_stack([x, np.zeros(len(z)), z])
-            rows = breaks(a, b, 0.7 * layout.max_edge_mm)
+            rows = breaks(a, b, min(_SHADE_MM, 0.7 * layout.max_edge_mm))
             patch = sweep(profile, rows, _RIGHT, upright=False, arc_mm=arc)
             # one sheet for both leaves: its x is y, up to a constant
             shift = (a - place.left[0], 0.0)

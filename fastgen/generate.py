@@ -45,6 +45,9 @@ CONTACT_SHEET = "contact_sheet.png"
 _MOST = 10**9
 """Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
 
+_words = reprlib.Repr()
+_words.maxlist = 100  # all formats, cameras or HDRIs: what differs may be the last
+
 Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
 """Makes the shards of `tasks` and reports on the way; see `run_here`."""
 
@@ -150,7 +153,8 @@ def _checked(job: Job, worker_count: int) -> Job:
             "also: bop keeps poses in files over all images, which webdataset has not; "
             "the poses stand in each sample's json, or use the seafront format"
         )
-    names = dict.fromkeys((*SEAFRONT, *job.formats))
+    # in one order, so that who asks for them in another still resumes
+    names = dict.fromkeys((*SEAFRONT, *sorted(job.formats)))
     return replace(job, formats=tuple(names))
 
 
@@ -214,10 +218,11 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         raise OutputError(f"{where}: is damaged; remove the dataset or give another")
     for key, value in settings.items():
         if old.get(key) != value:
+            them = "them, --hdri too," if key == "environments" else "them"
             raise OutputError(
                 f"{job.out}: was made with other settings "
                 f"({_difference(key, old.get(key), value)}); "
-                f"repeat them to resume, or give another folder"
+                f"repeat {them} to resume, or give another folder"
             )
     beyond = manifest_path(job.shard_count)
     made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
@@ -233,7 +238,7 @@ def _difference(name: str, old: Any, new: Any) -> str:
     if isinstance(old, dict) and isinstance(new, dict):
         key = min(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
         return _difference(f"{name}.{key}", old.get(key), new.get(key))
-    said = ["missing" if value is None else reprlib.repr(value) for value in (old, new)]
+    said = ["missing" if value is None else _words.repr(value) for value in (old, new)]
     return f"{name} was {said[0]}, is now {said[1]}"
 
 
@@ -290,7 +295,7 @@ def _finish(
                 storage.make_folders(each.folders(split))
                 for path, content in each.dataset_files(split, _records(job, storage, split)):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
-        if isinstance(storage, Folder):
+        if isinstance(storage, Folder) and images:
             put(CONTACT_SHEET, [png(contact_sheet(storage.root, images))])
     result = {
         **settings,

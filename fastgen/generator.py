@@ -6,10 +6,10 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import partial, wraps
 from itertools import chain
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, CudaFrames, cuda_reason
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
-from fastgen.errors import ConfigError, ContextError
+from fastgen.errors import ConfigError, ContextError, FastgenError
 from fastgen.gl import BACKENDS, GLContext, open_context
 from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.labels import label
@@ -64,10 +64,32 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
     return scene.camera(name)
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
 _Left = tuple[int, int, GLContext, Renderer | None, CudaFrames | None]
 
 _left: list[_Left] = []
 """Process and thread that used a Generator which was dropped unclosed, and what it held."""
+
+
+def _or_closed(
+    method: Callable[Concatenate["Generator", P], R],
+) -> Callable[Concatenate["Generator", P], R]:
+    """A method that draws. What stops it half way, as Ctrl-C does, closes the generator: nobody
+    knows what stands on the GPU then, and the next draw would build on it."""
+
+    @wraps(method)
+    def drawn(self: "Generator", *args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return method(self, *args, **kwargs)
+        except FastgenError:  # refused, not stopped
+            raise
+        except BaseException:
+            self.close()
+            raise
+
+    return drawn
 
 
 class Generator:
@@ -76,7 +98,8 @@ class Generator:
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
     in place of the bundled ones. quality: draft (one sample a pixel), balanced or high. Use it from
-    one thread, and make one in each process.
+    one thread, and make one in each process. Where a driver's textures end at 16384 texels, as
+    Mesa's do, `high` draws scenes with holes up to a height of 2730 only.
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that
     was dropped unclosed held is freed when the thread that used it next opens another.
@@ -158,6 +181,7 @@ class Generator:
             self._latest = key, sample_scene(*key, self.environments)
         return self._latest[1]
 
+    @_or_closed
     def render(
         self,
         index: int | None = None,
@@ -221,6 +245,7 @@ class Generator:
         normals[frame.ids == 0] = 0
         return normals
 
+    @_or_closed
     def render_cuda(
         self,
         index: int | None = None,
@@ -244,6 +269,7 @@ class Generator:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
         return cuda_reason(self._context())
 
+    @_or_closed
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.
 
@@ -251,14 +277,17 @@ class Generator:
         """
         return self._open().bake(self._check(scene), texel_mm)
 
+    @_or_closed
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
         """As `bake`, of the spreader; None where the scene has none."""
         return self._open().bake_spreader(self._check(scene), texel_mm)
 
+    @_or_closed
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         return self._open().exposure(self._check(scene), check_camera(camera), self.size)
 
+    @_or_closed
     def preload(self) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
         later."""
@@ -292,9 +321,11 @@ class Generator:
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""
-        if self._process == os.getpid() and self._gl is not None:
-            _free(self._gl, self._renderer, self._cuda)
+        gl, held = self._gl, (self._renderer, self._cuda)
+        # first, so that nothing goes on with what is freed in part
         self._cuda, self._renderer, self._gl = None, None, None
+        if self._process == os.getpid() and gl is not None:
+            _free(gl, *held)
 
     def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
         # not freed here, perhaps in the middle of another's render: that switches contexts

@@ -30,7 +30,7 @@ def find_hdris(folder: str | Path) -> list[Path]:
     """The .hdr and .exr files directly in a folder, sorted by name; any case of the extension.
 
     Hidden files, such as those that macOS leaves beside others on foreign disks, do not count.
-    Raises AssetError where the folder does not exist or holds none.
+    Raises AssetError where the folder does not exist, holds none or has one that no UTF-8 names.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -39,6 +39,11 @@ def find_hdris(folder: str | Path) -> list[Path]:
     found = sorted(path for path in seen if path.suffix.lower() in (".hdr", ".exr"))
     if not found:
         raise AssetError(f"{folder}: no .hdr or .exr file in this folder")
+    for path in found:
+        try:
+            str(path).encode()
+        except UnicodeEncodeError:  # scene files hold the name, and decoders ask for the path
+            raise AssetError(f"{path}: is no name in UTF-8; rename it") from None
     return found
 
 

@@ -155,10 +155,12 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
 
 
 def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
-    if not isinstance(value, (list, tuple)):
-        raise ConfigError(f"{path}: expected a list, got {_short(value)}")
     args = typing.get_args(hint)
-    if len(args) == 2 and args[1] is Ellipsis:
+    any_length = len(args) == 2 and args[1] is Ellipsis
+    if not isinstance(value, (list, tuple)):
+        many = "" if any_length else f" of {len(args)} values"
+        raise ConfigError(f"{path}: expected a list{many}, got {_short(value)}")
+    if any_length:
         args = (args[0],) * len(value)
     if len(args) != len(value):
         raise ConfigError(f"{path}: expected {len(args)} values, got {len(value)}")
@@ -172,6 +174,9 @@ def _mapping(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any
     if not isinstance(value, Mapping):
         raise ConfigError(f"{path}: expected a mapping, got {_short(value)}")
     item_hint = typing.get_args(hint)[1]
+    for key in value:
+        if isinstance(key, bool) or not isinstance(key, (str, int, float)):  # YAML 1.1's no, off, ~
+            raise ConfigError(f"{path}: expected a name, got {_short(key)}; put it in quotes")
     old = old or {}
     # what is given is the whole mapping; an item with a namesake inherits what it leaves out
     return {

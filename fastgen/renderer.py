@@ -317,9 +317,11 @@ def _region(view: View, corners_mm: np.ndarray) -> Region | None:
 def _box_corners(
     bounds_mm: tuple[np.ndarray, np.ndarray], damages: tuple[Damage, ...] = ()
 ) -> np.ndarray:
-    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included."""
-    bulge = sum(max(-damage.depth_mm, 0.0) for damage in damages)
+    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included, and
+    dents so deep that they come out on the other side."""
     low, high = bounds_mm
+    inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
+    bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     return low - bulge + corners * (high - low + 2 * bulge)
 

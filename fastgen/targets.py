@@ -9,7 +9,7 @@ import cv2
 import moderngl
 import numpy as np
 
-from fastgen.errors import FastgenError
+from fastgen.errors import ContextError
 from fastgen.gl import GLContext
 from fastgen.pixel_lists import PixelLists
 from fastgen.programs import listed_classes
@@ -72,9 +72,11 @@ class Targets:
         self.inner_row = fine[1] - (spare if spare <= 2 else 0)
         stored = (fine[0], fine[1] + self.inner_row if holed else fine[1])
         if max(stored) > limit:
-            raise FastgenError(
-                f"size {size[0]}x{size[1]} with {samples_per_axis} samples an axis needs textures "
-                f"of {max(stored)} texels, this driver has {limit}; take fewer or a smaller size"
+            what = "a scene with holes" if holed else "a scene"
+            raise ContextError(
+                f"size: {size[0]}x{size[1]} with {samples_per_axis} samples along a pixel needs "
+                f"textures of {max(stored)} texels for {what}, and this driver has {limit}; take a "
+                "lower quality or a smaller size"
             )
         self.scale = (size[0] * samples_per_axis / fine[0], size[1] * samples_per_axis / fine[1])
         self.keys = ctx.texture(stored, 1, dtype="u4")

@@ -118,11 +118,24 @@ def test_errors_about_names_name_the_file(tmp_path):
             "container: {profiles: {side: {slope_mm: 1}}}",
             "container.profiles.side.pitch_mm: 278 is",
         ),
+        ("damage: {count: 2}", "damage.count: expected a list of 2 values, got 2"),
+        ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
+        ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),
+        ("cameras: {no: {face: front}}", "cameras: expected a name, got False; put it in quotes"),
     ):
         path = tmp_path / "port.yaml"
         path.write_text(text)
         with pytest.raises(ConfigError, match=f"{path}: {words}"):
             Config.load(path)
+
+
+def test_cameras_may_share_values_by_an_anchor(tmp_path):
+    path = tmp_path / "port.yaml"
+    shared = "{face: front, focal_mm: 12, distance_mm: 5000}"
+    path.write_text(f"cameras:\n  gantry: &shared {shared}\n  gate: {{<<: *shared, focal_mm: 35}}")
+    rig = Config.load(path).cameras
+    assert (rig["gantry"].focal_mm, rig["gate"].focal_mm) == (12, 35)
+    assert rig["gate"].distance_mm == rig["gantry"].distance_mm
 
 
 def test_possible_shapes_are_just_what_scenes_draw():

@@ -323,6 +323,12 @@ def test_folder_listing_is_sorted_and_ignores_other_files(tmp_path):
     assert [p.name for p in find_hdris(tmp_path)] == ["a.exr", "b.HDR", "c.Exr"]
 
 
+def test_a_name_that_is_not_utf_8_is_refused(tmp_path):
+    (tmp_path / os.fsdecode(b"sk\xff.hdr")).write_bytes(b"")
+    with pytest.raises(AssetError, match=r"hdr: is no name in UTF-8; rename it"):
+        find_hdris(tmp_path)
+
+
 def test_folder_without_hdris_is_refused_by_name(tmp_path):
     for folder in (tmp_path, tmp_path / "missing"):
         with pytest.raises(AssetError, match=str(folder)):

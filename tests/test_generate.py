@@ -106,8 +106,8 @@ def test_one_worker_makes_the_same_bytes_as_two(dataset, tmp_path):
 
 def test_contact_sheet_shows_every_image_of_a_small_dataset(dataset):
     sheet = cv2.imread(str(dataset / "contact_sheet.png"))
-    rows, columns = sheet.shape[0] // 400, sheet.shape[1] // 400
-    tiles = sheet.reshape(rows, 400, columns, 400, 3).swapaxes(1, 2).reshape(-1, 400 * 400 * 3)
+    assert sheet.shape == (3 * 333, 6 * 400, 3)  # of images of 96x80, without gaps
+    tiles = sheet.reshape(3, 333, 6, 400, 3).swapaxes(1, 2).reshape(-1, 333 * 400 * 3)
     assert sum(np.ptp(tile) > 0 for tile in tiles) == 14
 
 
@@ -245,6 +245,23 @@ def test_a_scene_that_always_fails_is_told_of_and_the_rest_goes_on(tmp_path, cap
     monkeypatch.undo()
     assert generate(job, 1, runner=run_inside)["failed"] == []
     assert main(["verify", str(tmp_path / "out")]) == 0
+
+
+def test_a_run_whose_scenes_all_fail_ends_as_others_do(tmp_path, monkeypatch):
+    class Broken(Generator):
+        def render(self, **_):
+            raise RuntimeError("no such luck")
+
+    def run_inside(job, tasks, on_report):
+        maker = Maker(job, False, on_report)
+        for task in tasks:
+            maker(task)
+
+    monkeypatch.setattr(shards, "Generator", Broken)
+    job = Job(str(tmp_path / "out"), 2, Config.preset(), 0, (64, 64), ("A",), None, "auto")
+    made = generate(job, 1, runner=run_inside)
+    assert [each["scene"] for each in made["failed"]] == [0, 1]
+    assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
 
 
 def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):

@@ -1,11 +1,13 @@
 """The public class: what it refuses, what it passes on through pickles and forks."""
 
+import contextlib
 import math
 import multiprocessing
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import psutil
 import pytest
@@ -250,3 +252,39 @@ def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see()
             exposures = [generator.exposure(scene, camera) for camera in (plumb, beside)]
             assert exposures[0] == pytest.approx(exposures[1], rel=0.02)
             assert generator.render(scene=scene, camera="plumb").image.mean() > 25
+
+
+def test_a_render_that_was_stopped_anywhere_spoils_none_after_it(monkeypatch):
+    """Ctrl-C between two draws, as a notebook's stop button may come."""
+    arguments = {"seed": 7, "size": (96, 64)}
+    with Generator(**arguments) as generator:
+        wanted = generator.render(index=0, camera="Cr")
+    calls, stop_at = 0, 0
+    real = {kind: kind.render for kind in (moderngl.VertexArray,)}
+    real[moderngl.ComputeShader] = moderngl.ComputeShader.run
+
+    def counted(kind):
+        def call(self, *given, **named):
+            nonlocal calls
+            calls += 1
+            if calls == stop_at:
+                raise KeyboardInterrupt
+            return real[kind](self, *given, **named)
+
+        return call
+
+    monkeypatch.setattr(moderngl.VertexArray, "render", counted(moderngl.VertexArray))
+    monkeypatch.setattr(moderngl.ComputeShader, "run", counted(moderngl.ComputeShader))
+    stopped = 0
+    for stop_at in (2, 8):
+        with Generator(**arguments) as generator:
+            calls = 0
+            with contextlib.suppress(KeyboardInterrupt):
+                generator.render(index=1, camera="A")
+            stopped += calls == stop_at
+            calls = stop_at
+            sample = generator.render(index=0, camera="Cr")
+        np.testing.assert_array_equal(sample.image, wanted.image)
+        np.testing.assert_array_equal(sample.ids, wanted.ids)
+        assert sample.objects == wanted.objects
+    assert stopped == 2

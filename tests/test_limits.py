@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES, SPREADER_ID
+from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
@@ -95,6 +96,17 @@ def test_the_largest_size_renders():
     assert (sample.ids > 0).mean() > 0.02
 
 
+def test_a_dataset_too_high_for_holes_is_refused_rather_than_made_without_them(tmp_path, capfd):
+    (tmp_path / "port.yaml").write_text("damage: {probability: 1, kinds: [perforation]}")
+    sized = ["--size", "64x2800", "--quality", "high", "--config", str(tmp_path / "port.yaml")]
+    code = main(["generate", str(tmp_path / "out"), "--images", "2", "--workers", "1", *sized])
+    if code == 0:
+        pytest.skip("this driver has larger textures")
+    assert code == 2
+    error = capfd.readouterr().err
+    assert "size: 64x2800 with 3 samples along a pixel needs textures of 16800 texels" in error
+
+
 def test_nothing_in_view_has_objects_without_boxes():
     with Generator(seed=8, size=(96, 64)) as generator:
         camera = Camera("away", (0, -8000, 1000), (0, -20000, 1000), 14.5)
@@ -107,6 +119,17 @@ def test_nothing_in_view_has_objects_without_boxes():
         assert item.visible_fraction == 0
         assert not item.truncated
         assert item.ignored
+
+
+@pytest.mark.parametrize("camera", ["A", "Cr"])
+def test_a_dent_that_comes_out_on_the_other_side_leaves_no_pixel_undrawn(camera):
+    deep = {"kinds": ["axis"], "probability": 1, "count": [4, 4], "axis": {"depth_mm": 12000}}
+    for seed in (0, 1):
+        with Generator(Config.from_values({"damage": deep}), seed, (128, 96)) as generator:
+            sample = generator.render(index=0, camera=camera)
+        assert np.isin(sample.ids, [0, *(item.id for item in sample.objects)]).all()
+        np.testing.assert_array_equal(np.isinf(sample.depth), sample.ids == 0)
+        assert (sample.depth > 0).all()
 
 
 def test_a_marker_on_the_border_is_truncated_and_one_within_is_not():

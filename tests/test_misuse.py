@@ -1,6 +1,7 @@
 """The command line where people go wrong: odd folders, damaged files, pipes that close."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ from pycocotools.coco import COCO
 
 from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli import main
+from fastgen.hdri import bundled_hdris
 from tests.folders import content
 
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
@@ -94,6 +96,32 @@ def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
         assert f"fastgen: {copy}: was made with other settings ({words}" in error
 
 
+def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, capsys):
+    (tmp_path / "lights").mkdir()
+    shutil.copy(bundled_hdris()["dawn"], tmp_path / "lights/mine.exr")
+    assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
+    error = capsys.readouterr().err
+    assert "environments.city was '" in error
+    assert "repeat them, --hdri too, to resume" in error
+
+
+def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp_path, capsys):
+    run = ["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1", "--images", "1"]
+    assert main([*run, "--also", "ids,depth"]) == 0
+    assert main([*run, "--also", "depth,ids"]) == 0
+    assert main([*run, "--also", "depth,ids,voc"]) == 2
+    assert "'depth', 'ids'], is now" in (error := capsys.readouterr().err)
+    assert "'depth', 'ids', 'voc'])" in error
+
+
+@pytest.mark.parametrize("names", ["", "A,", "A,A"])
+def test_cameras_that_name_none_or_one_twice_are_refused(tmp_path, capsys, names):
+    out = tmp_path / "out"
+    assert main(["generate", str(out), "--images", "1", "--cameras", names]) == 2
+    assert capsys.readouterr().err.startswith("fastgen: cameras: ")
+    assert not out.exists()
+
+
 def test_stats_equal_a_foreign_readers_count(dataset, capsys):
     assert main(["stats", str(dataset)]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -152,6 +180,25 @@ def test_a_reader_that_goes_away_is_no_error(dataset, arguments):
     process.stdout.close()
     assert process.stderr.read() == ""
     assert process.wait() in (0, 141)  # argparse ends with 0
+
+
+def test_closed_streams_stop_no_run(tmp_path):
+    out = tmp_path / "out"
+    run = ["generate", str(out), "--images", "1", "--size", "64x64", "--workers", "1"]
+    command = ["sh", "-c", 'exec "$@" >&- 2>&-', "sh", sys.executable, "-m", "fastgen", *run]
+    assert subprocess.run(command, check=False).returncode == 0
+    assert main(["verify", str(out)]) == 0
+
+
+def test_a_folder_may_have_a_name_that_is_not_utf_8(tmp_path):
+    out = os.fsencode(tmp_path) + b"/caf\xe9"
+    run = [b"generate", out, b"--images", b"1", b"--size", b"64x64", b"--workers", b"1"]
+    for arguments, words in ((run, b"1 images in "), ([b"verify", out], b"whole and consistent")):
+        command = [os.fsencode(sys.executable), b"-m", b"fastgen", *arguments]
+        done = subprocess.run(command, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert words in done.stdout
+        assert b"caf\\udce9" in done.stdout
 
 
 def test_show_takes_the_first_camera_of_a_rig(tmp_path):
