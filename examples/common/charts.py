@@ -45,7 +45,8 @@ def bars(names: Sequence[str], series: Mapping[str, Sequence[float]], path: Path
         axes.bar(np.arange(len(names)) + number * width, values, width, label=label)
     axes.set_xticks(np.arange(len(names)) + 0.4 - width / 2, names, rotation=60, ha="right")
     axes.set(ylabel="%", ylim=(0, 100))
-    axes.legend(loc="lower right")
+    # above the axes, where no bar is
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(series), frameon=False)
     _save(figure, path)
 
 
@@ -101,12 +102,16 @@ def pairs(above: NDArray[np.uint8], below: NDArray[np.uint8], path: Path, count:
 
 
 def pictures(
-    images: Sequence[torch.Tensor], titles: Sequence[str], path: Path, columns: int = 4
+    images: Sequence[torch.Tensor],
+    titles: Sequence[str],
+    path: Path,
+    columns: int = 4,
+    inches: float = 2.6,
 ) -> None:
-    """Images uint8 [3, H, W] in a grid, a title above each."""
+    """Images uint8 [3, H, W] in a grid, each so many inches wide, a title above each."""
     rows = -(-len(images) // columns)
     height, width = images[0].shape[1:]
-    cell = (2.6, 2.6 * height / width + 0.3)
+    cell = (inches, inches * height / width + 0.3)
     figure, grid = pyplot.subplots(
         rows, columns, figsize=(cell[0] * columns, cell[1] * rows), squeeze=False
     )

@@ -1,11 +1,15 @@
-"""A text crop laid out as one line: columns turned over, slant taken out, rows side by side."""
+"""A text crop laid out as one line: slant taken out, rows and letters of columns side by side."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch.nn import functional
+
+from fastgen.lettering import GLYPH_PITCH_CAPS
 
 Grey = NDArray[Any]
 """A grey image [h, w], uint8 or float32."""
@@ -13,21 +17,50 @@ Grey = NDArray[Any]
 HEIGHT, WIDTH = 24, 400
 """Pixels of a strip."""
 
+LETTER_WIDTH = 32
+"""Pixels of a letter by itself, as high as a strip."""
+
 _UPRIGHT = 1.6  # a crop this many times as high as wide holds columns
 _SLANTS = np.linspace(-0.3, 0.3, 31)
-_ROW_SHARE = 0.1  # of its height that a row also shows of its neighbours, each side
+_SHARE = 0.1  # of its height that a row or letter also shows of its neighbours, each side
+_MARGIN_PX = 3  # of a crop around its ink
+_NUMBER, _ALL = 11, 15  # letters of an identifier, without and with its size and type
+_GAP_CAPS = 0.6  # what a blank adds to a column
+_GRAIN = 6.0  # of 255
+_TILTS = np.linspace(-0.3, 0.3, 25)  # of columns away from the camera
 
 
 def strip(crop: torch.Tensor) -> torch.Tensor:
     """A crop uint8 [3, h, w] as a grey strip, uint8 [1, HEIGHT, WIDTH].
 
-    Columns are transposed, so that their letters run to the right, lying on their sides. How many
-    rows there are follows from the proportions of the text without its slant.
+    Rows are put side by side, columns are cut into letters. How many rows or columns there are
+    follows from the proportions of the text without its slant.
     """
-    grey = cv2.cvtColor(np.ascontiguousarray(crop.permute(1, 2, 0).numpy()), cv2.COLOR_RGB2GRAY)
-    upright = grey.shape[0] > _UPRIGHT * grey.shape[1]
-    level = straightened(np.ascontiguousarray(grey.T) if upright else grey)
-    return torch.from_numpy(_in_one_line(level, row_count(level.shape, upright)))[None]
+    return torch.from_numpy(_in_one_line(_parts(_grey(crop))))[None]
+
+
+def letters(crop: torch.Tensor) -> list[torch.Tensor]:
+    """The letters of a crop of columns, uint8 [1, HEIGHT, LETTER_WIDTH] each; of rows none."""
+    grey = _grey(crop)
+    if not _upright(grey):
+        return []
+    return [torch.from_numpy(_in_one_line([part], LETTER_WIDTH))[None] for part in _parts(grey)]
+
+
+def varied(strips: torch.Tensor) -> torch.Tensor:
+    """Strips float32 [B, 1, H, W] stretched, moved, slanted and grainy, each by chance."""
+
+    def drawn(low: float, high: float) -> torch.Tensor:
+        return torch.empty(len(strips), device=strips.device).uniform_(low, high)
+
+    # the sides of an image are at -1 and 1, and a line begins at the left
+    wide, high = drawn(0.9, 1.12), drawn(0.85, 1.2)
+    across = [wide, drawn(-0.012, 0.012), wide - 1 + drawn(-0.04, 0.03)]
+    down = [drawn(-0.25, 0.25), high, drawn(-0.15, 0.15)]
+    maps = torch.stack([torch.stack(across, dim=1), torch.stack(down, dim=1)], dim=1)
+    grid = functional.affine_grid(maps, list(strips.shape), align_corners=False)
+    moved = functional.grid_sample(strips, grid, padding_mode="border", align_corners=False)
+    return moved + torch.randn_like(moved) * drawn(0, _GRAIN)[:, None, None, None]
 
 
 def straightened(grey: Grey) -> Grey:
@@ -57,6 +90,53 @@ def row_count(shape: tuple[int, int], upright: bool) -> int:
     return 2 if proportion > 2.2 else 3
 
 
+def letter_places(column: Grey, columns: int) -> list[tuple[float, float]]:
+    """Where each letter of the first of `columns` columns begins and ends, in rows of [h, w].
+
+    Letters stand at one pitch, but the camera sees one end of a column larger: of several ratios
+    the one is taken that leaves the fewest strokes between the letters.
+    """
+    count, gap = (_NUMBER, 0.0) if columns > 1 else (_ALL, _GAP_CAPS)
+    middles = np.arange(count) * GLYPH_PITCH_CAPS + gap * (np.arange(count) >= _NUMBER) + 0.5
+    ends = middles[:, None] + GLYPH_PITCH_CAPS * np.array([-0.5, 0.5])
+    share = ends / (middles[-1] + 0.5)
+    strokes = np.abs(cv2.Sobel(column, cv2.CV_32F, 1, 0, ksize=3)).mean(axis=1)
+    ink = len(column) - 2 * _MARGIN_PX
+    best, found = np.inf, ends
+    for tilt in _TILTS:
+        # a straight line seen in perspective, both of its ends kept
+        places = _MARGIN_PX + ink * share / (1 + tilt * (1 - share))
+        between = float(np.interp(places, np.arange(len(strokes)) + 0.5, strokes).mean())
+        if between < best:
+            best, found = between, places
+    return [(float(low), float(high)) for low, high in found]
+
+
+def _grey(crop: torch.Tensor) -> Grey:
+    return cv2.cvtColor(np.ascontiguousarray(crop.permute(1, 2, 0).numpy()), cv2.COLOR_RGB2GRAY)
+
+
+def _upright(grey: Grey) -> bool:
+    return grey.shape[0] > _UPRIGHT * grey.shape[1]
+
+
+def _parts(grey: Grey) -> list[Grey]:
+    """Rows of a text, or the letters of columns, in the order in which they are read."""
+    upright = _upright(grey)
+    level = straightened(_turned(grey) if upright else grey)
+    if upright:  # the letters of both columns too stand level with each other
+        level = _turned(straightened(_turned(level)))
+    count = row_count(level.shape, upright)
+    pitch = level.shape[0] / count
+    bands = [_cut(level, row * pitch, (row + 1) * pitch) for row in range(count)]
+    if not upright:
+        return bands
+    columns = [_turned(band) for band in bands]
+    places = letter_places(columns[0], count)
+    which = [places, places[: _ALL - _NUMBER]][:count]
+    return [_cut(c, *ends) for c, each in zip(columns, which, strict=True) for ends in each]
+
+
 def _sheared(image: Grey, slant: float) -> Grey:
     height, width = image.shape
     matrix = np.array([[1, 0, 0], [slant, 1, -slant * width / 2]], np.float32)
@@ -66,16 +146,23 @@ def _sheared(image: Grey, slant: float) -> Grey:
     )
 
 
-def _in_one_line(level: Grey, rows: int) -> Grey:
-    height, width = level.shape
-    pitch, parts = height / rows, []
-    for row in range(rows):
-        low = max(round((row - _ROW_SHARE) * pitch), 0)
-        high = min(round((row + 1 + _ROW_SHARE) * pitch), height)
-        part = level[low:high]
-        wide = max(round(width * HEIGHT / part.shape[0]), 1)
-        parts.append(cv2.resize(part, (wide, HEIGHT), interpolation=cv2.INTER_LINEAR))
-    line = np.concatenate(parts, axis=1)
-    if line.shape[1] >= WIDTH:
-        return cv2.resize(line, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return np.pad(line, ((0, 0), (0, WIDTH - line.shape[1])), mode="median")
+def _turned(image: Grey) -> Grey:
+    return np.ascontiguousarray(image.T)
+
+
+def _cut(image: Grey, low: float, high: float) -> Grey:
+    """Rows low to high of an image [h, w], and some of their neighbours."""
+    share = _SHARE * (high - low)
+    return image[max(round(low - share), 0) : min(round(high + share), len(image))]
+
+
+def _in_one_line(parts: Sequence[Grey], width: int = WIDTH) -> Grey:
+    """Images [h, w] side by side, all HEIGHT high, and beyond them the median of each row."""
+    scaled = []
+    for part in parts:
+        wide = max(round(part.shape[1] * HEIGHT / part.shape[0]), 1)
+        scaled.append(cv2.resize(part, (wide, HEIGHT), interpolation=cv2.INTER_LINEAR))
+    line = np.concatenate(scaled, axis=1)
+    if line.shape[1] >= width:
+        return cv2.resize(line, (width, HEIGHT), interpolation=cv2.INTER_AREA)
+    return np.pad(line, ((0, 0), (0, width - line.shape[1])), mode="median")
