@@ -1,8 +1,7 @@
 """How open each vertex of a container or spreader lies to the sky, by depth maps from all around,
 and how much of the light of a sky that lets in.
 
-A point is hidden from a direction where a back face (one turned away from that direction) stands
-before it. Back faces rather than front ones: a lit surface is then no occluder of itself.
+A point is hidden from a direction where a face of an occluders.DepthMap stands before it.
 """
 
 import hashlib
@@ -19,9 +18,9 @@ from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
+from fastgen.occluders import Body, DepthMap, DrawnBody, map_matrix, without_cables
 from fastgen.prefilter import octahedral_decode
 from fastgen.programs import LIGHT_STEPS, link
-from fastgen.spreader import CABLE_TIER, tier_of_vertices
 
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface; a multiple of 8."""
@@ -69,15 +68,6 @@ def sky_directions() -> Array:
     turn = np.pi * (3 - 5**0.5) * i
     flat = np.sqrt(1 - z * z)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class Body:
-    """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
-    counter-clockwise from outside."""
-
-    positions_mm: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
 
 
 def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
@@ -305,16 +295,8 @@ class SkyProbe:
         )
 
     def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
-        ctx = self._ctx
-        vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
-        indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
-        array = ctx.vertex_array(self._program, [(vertices, "3f", "in_position_mm")], indices)
-        depth = ctx.depth_texture(size)
-        target = ctx.framebuffer([], depth)
-        target.use()
-        ctx.scissor = None
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.front_face, ctx.cull_face = "ccw", "front"
+        shape = DrawnBody(self._ctx, self._program, body)
+        depths = DepthMap(self._ctx, self._program, size)
         low, high = body.positions_mm.min(axis=0), body.positions_mm.max(axis=0)
         # what is probed outside of the box of occluders may be hidden too
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
@@ -322,18 +304,15 @@ class SkyProbe:
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
             to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-            target.clear(depth=1.0)
-            self._program["to_map"] = tuple(to_map.T.ravel())
-            array.render(moderngl.TRIANGLES)
-            nearest = np.frombuffer(depth.read(alignment=1), np.float32)
+            depths.draw([shape], to_map)
+            nearest = np.frombuffer(depths.depth.read(alignment=1), np.float32)
             at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
             texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)
             bias = _BIAS_MM * np.linalg.norm(to_map[2, :3])
             before = nearest[texel[:, 1] * size[0] + texel[:, 0]] * 2 - 1
             found[:, i] = at[:, 2] - bias <= before
-        ctx.cull_face = "back"
-        for item in (target, depth, array, vertices, indices):
-            item.release()
+        depths.release()
+        shape.release()
         return found
 
     def release(self) -> None:
@@ -360,25 +339,3 @@ def _from_disk(
                 found = make()
                 cache.write(entry, {"values": found}, compress=True)
     return found
-
-
-def map_matrix(toward: Array, low: Array, high: Array) -> Array:
-    """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
-    the box's x axis lies along the view's."""
-    along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
-    along /= np.linalg.norm(along)
-    axes = np.stack([along, np.cross(toward, along), -toward])
-    center = (low + high) / 2
-    half = np.abs(axes) @ ((high - low) / 2) * 1.001
-    matrix = np.eye(4)
-    matrix[:3, :3] = axes / half[:, None]
-    matrix[:3, 3] = -matrix[:3, :3] @ center
-    return matrix
-
-
-def without_cables(spreader: Mesh) -> Body:
-    """What of a spreader throws shade; its cables are too thin for the maps."""
-    solid = tier_of_vertices(spreader) != CABLE_TIER
-    triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
-    used, numbers = np.unique(triangles, return_inverse=True)
-    return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))

@@ -1,7 +1,6 @@
 """The shadow of a container and its spreader under a sun: one depth map from where it stands.
 
-As openness.py does, it keeps the faces turned away from the light, so that a lit surface is not its
-own occluder. Dents are bent in, holes are not cut out. Williams 1978, Casting Curved Shadows on
+Dents are bent in, holes are not cut out. Williams 1978, Casting Curved Shadows on
 Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 """
 
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
-from fastgen.openness import Body, map_matrix, without_cables
+from fastgen.occluders import Body, DepthMap, DrawnBody, map_matrix, without_cables
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
@@ -36,11 +35,11 @@ class ShadowMap:
         self._shown: tuple[object, ...] = ()
         self.toward = np.zeros(3)
         self._to_map = np.eye(4)
-        self.depth = ctx.depth_texture(MAP_SIZE)
+        self._map = DepthMap(ctx, program, MAP_SIZE)
+        self.depth = self._map.depth
         self.depth.compare_func = "<="
         self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
         self.depth.repeat_x = self.depth.repeat_y = False
-        self._target = ctx.framebuffer([], self.depth)
 
     def cast(
         self,
@@ -62,24 +61,10 @@ class ShadowMap:
         high = np.max([body.positions_mm.max(axis=0) for body in bodies], axis=0)
         self.toward = toward
         self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-        self._draw(bodies)
-
-    def _draw(self, bodies: list[Body]) -> None:
-        ctx = self._ctx
-        self._target.use()
-        ctx.scissor = None
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.front_face, ctx.cull_face = "ccw", "front"
-        self._target.clear(depth=1.0)
-        self._program["to_map"] = tuple(self._to_map.T.ravel())
-        for body in bodies:
-            vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
-            indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
-            array = ctx.vertex_array(self._program, [(vertices, "3f", "in_position_mm")], indices)
-            array.render(moderngl.TRIANGLES)
-            for item in (array, vertices, indices):
-                item.release()
-        ctx.cull_face = "back"
+        drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
+        self._map.draw(drawn, self._to_map)
+        for body in drawn:
+            body.release()
 
     def from_ray(self, eye_m: Array) -> Array:
         """From a vector in metres, from the eye to a point, to (u, v, depth) in the map: [4, 4]."""
@@ -91,8 +76,7 @@ class ShadowMap:
 
     def release(self) -> None:
         """Free all GL objects."""
-        for item in (self._target, self.depth):
-            item.release()
+        self._map.release()
 
 
 def _bent(positions_mm: NDArray[np.float32], damages: tuple[Damage, ...]) -> NDArray[np.float32]:

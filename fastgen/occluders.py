@@ -1,0 +1,93 @@
+"""What stands in the way of light, as depth maps that light from far away in one direction sees.
+
+Maps keep back faces (those turned away from the light) rather than front ones: a lit surface is
+then no occluder of itself.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.mesh import Mesh
+from fastgen.spreader import CABLE_TIER, tier_of_vertices
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
+    counter-clockwise from outside."""
+
+    positions_mm: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+
+
+def without_cables(spreader: Mesh) -> Body:
+    """What of a spreader throws shade; its cables are too thin for the maps."""
+    solid = tier_of_vertices(spreader) != CABLE_TIER
+    triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
+    used, numbers = np.unique(triangles, return_inverse=True)
+    return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
+
+
+def map_matrix(toward: Array, low: Array, high: Array) -> Array:
+    """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
+    the box's x axis lies along the view's."""
+    along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
+    along /= np.linalg.norm(along)
+    axes = np.stack([along, np.cross(toward, along), -toward])
+    center = (low + high) / 2
+    half = np.abs(axes) @ ((high - low) / 2) * 1.001
+    matrix = np.eye(4)
+    matrix[:3, :3] = axes / half[:, None]
+    matrix[:3, 3] = -matrix[:3, :3] @ center
+    return matrix
+
+
+class DrawnBody:
+    """A Body on the GPU. program: of occluder.vert."""
+
+    def __init__(self, ctx: moderngl.Context, program: moderngl.Program, body: Body) -> None:
+        self._vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
+        self._indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
+        content = [(self._vertices, "3f", "in_position_mm")]
+        self.array = ctx.vertex_array(program, content, self._indices)
+
+    def release(self) -> None:
+        """Free it."""
+        for item in (self.array, self._vertices, self._indices):
+            item.release()
+
+
+class DepthMap:
+    """A depth texture of (along, across) = size texels. program: of occluder.vert, the owner's."""
+
+    def __init__(
+        self, ctx: moderngl.Context, program: moderngl.Program, size: tuple[int, int]
+    ) -> None:
+        self._ctx = ctx
+        self._program = program
+        self.depth = ctx.depth_texture(size)
+        self._target = ctx.framebuffer([], self.depth)
+
+    def draw(self, bodies: Iterable[DrawnBody], to_map: Array) -> None:
+        """Show what a map_matrix sees of bodies."""
+        ctx = self._ctx
+        self._target.use()
+        ctx.scissor = None
+        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.front_face, ctx.cull_face = "ccw", "front"
+        self._target.clear(depth=1.0)
+        self._program["to_map"] = tuple(to_map.T.ravel())
+        for body in bodies:
+            body.array.render(moderngl.TRIANGLES)
+        ctx.cull_face = "back"
+
+    def release(self) -> None:
+        """Free all but the program."""
+        for item in (self._target, self.depth):
+            item.release()
