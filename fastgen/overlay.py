@@ -11,6 +11,9 @@ from fastgen.sample import Sample
 
 Image = NDArray[np.uint8]
 
+_LINE_PX = 1000
+"""Side of an image for each pixel of a line's width."""
+
 
 def class_color(name: str) -> tuple[int, int, int]:
     """A bright RGB colour that stays with a class name."""
@@ -21,16 +24,20 @@ def class_color(name: str) -> tuple[int, int, int]:
 
 
 def draw_box(image: Image, box: tuple[float, float, float, float], name: str) -> None:
-    """Draw box (x0, y0, x1, y1; x1 and y1 exclusive) with its name into uint8 RGB, in place."""
+    """Draw box (x0, y0, x1, y1; x1 and y1 exclusive) with its name into uint8 RGB, in place.
+
+    In large images lines and letters grow, so that they show when the whole is looked at.
+    """
     color = class_color(name)
     x0, y0, x1, y1 = (round(v) for v in box)
-    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), color, 1)
-    (width, height), base = cv2.getTextSize(name, cv2.FONT_HERSHEY_SIMPLEX, 0.36, 1)
+    line = max(round(max(image.shape[:2]) / _LINE_PX), 1)
+    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), color, line)
+    font, scale = cv2.FONT_HERSHEY_SIMPLEX, 0.36 * line
+    (width, height), base = cv2.getTextSize(name, font, scale, line)
     top = y0 - height - base if y0 - height - base >= 0 else y0
     left = min(x0, image.shape[1] - width)
     cv2.rectangle(image, (left, top), (left + width, top + height + base), color, -1)
-    place = (left, top + height)
-    cv2.putText(image, name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, (0, 0, 0), 1, cv2.LINE_AA)
+    cv2.putText(image, name, (left, top + height), font, scale, (0, 0, 0), line, cv2.LINE_AA)
 
 
 def label_colors(labels: NDArray[np.uint16]) -> Image:

@@ -50,6 +50,8 @@ def test_bad_ranks_states_and_batches_are_named():
             ShardSampler(dataset(), rank, world)
     with pytest.raises(ConfigError, match="batch_size: 0"):
         Loader(dataset(), batch_size=0)
+    with pytest.raises(ConfigError, match="dataset: list is neither"):
+        Loader([1, 2])
     with pytest.raises(ConfigError, match="a stream has its own"):
         Loader(stream(), shuffle=True)
     with pytest.raises(ConfigError, match="epoch: -1"):

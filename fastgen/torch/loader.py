@@ -83,6 +83,11 @@ class Loader:
             dataset.batch_size = self.batch_size
             self._items, self._part = dataset.items, dataset.part
             self._length = dataset.length
+        elif not isinstance(dataset, ContainerDataset):
+            raise ConfigError(
+                f"dataset: {type(dataset).__name__} is neither a ContainerDataset nor a "
+                "ContainerStream; torch's own DataLoader takes others"
+            )
         else:
             self._sampler = ShardSampler(dataset, rank, world_size, shuffle)
             self._items, self._part = dataset, self._sampler.part
