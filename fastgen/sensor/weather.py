@@ -40,8 +40,7 @@ def foggy(
     """
     decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
     far, near = np.exp(decay * np.float32(_BACKDROP_M)), np.exp(decay * _objects_m(ray_m))
-    share = cover * np.float32(1 / 255)
-    open_share = 1 - share
+    open_share = 1 - cover * np.float32(1 / 255)
     left = near + (far - near) * open_share
     planes = []
     for plane, beyond, air in zip(
