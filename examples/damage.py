@@ -23,7 +23,7 @@ from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.torch import ContainerDataset
 
 PLANS = {
-    "cpu": Plan(images=1400, test_images=600, size=(320, 320), batch=4, passes=4, rate=1.5e-3),
+    "cpu": Plan(images=3500, test_images=600, size=(320, 320), batch=4, passes=3, rate=1.5e-3),
     "full": Plan(
         images=7910, test_images=2480, size=(640, 640), batch=16, passes=20, rate=1e-3, workers=12
     ),
