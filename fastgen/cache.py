@@ -4,12 +4,14 @@ import contextlib
 import fcntl
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+T = TypeVar("T")
 
 LIMIT_BYTES = 4 << 30
 """Of a folder; beyond it, what was not read for longest goes. About 150 lights."""
@@ -52,10 +54,23 @@ def write(entry: Path, arrays: Mapping[str, Any], compress: bool = False) -> Non
             temporary.unlink(missing_ok=True)
 
 
+def once(entry: Path, read: Callable[[], T | None], make: Callable[[], T]) -> T:
+    """What `read` finds of an entry; where that is None, what `make` makes of it and writes.
+
+    Of many workers that miss it one makes it, and the others then read it.
+    """
+    found = read()
+    if found is None:
+        with _alone(entry):
+            found = read()
+            if found is None:
+                found = make()
+    return found
+
+
 @contextlib.contextmanager
-def alone(entry: Path) -> Iterator[None]:
-    """While inside, no other worker is inside for the same entry, so that of many that miss it one
-    makes it and the others then read it. A process that ends lets go.
+def _alone(entry: Path) -> Iterator[None]:
+    """While inside, no other worker is inside for the same entry. A process that ends lets go.
 
     Where files cannot be locked, nobody waits.
     """

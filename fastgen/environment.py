@@ -169,9 +169,14 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
         raise AssetError(f"{path}: cannot read this HDRI: {error.strerror}") from None
     folder = Path(cache_dir) if cache_dir is not None else cache.default_folder()
     entry = folder / f"{key[:32]}-{PREFILTER_VERSION}.npz"
-    cached = _read_cache(path.stem, entry)
-    if cached is None:
-        cached = _prefiltered_once(path, entry)
+
+    def make() -> EnvironmentLight:
+        made = prefilter_environment(path.stem, load_radiance(path))
+        _write_cache(made, entry)
+        _remove_earlier(entry)
+        return made
+
+    cached = cache.once(entry, lambda: _read_cache(path.stem, entry), make)
     if cached.mean_luminance > _BRIGHTEST:
         raise AssetError(
             f"{path}: is too bright, with a mean luminance of {cached.mean_luminance:.2g}; scale "
@@ -182,17 +187,6 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
             f"{path}: is dark, with a mean luminance of {cached.mean_luminance:.2g}; an HDRI must "
             f"have {_DARKEST:g} or more to be exposed"
         )
-    return cached
-
-
-def _prefiltered_once(path: Path, entry: Path) -> EnvironmentLight:
-    """Prefilter an HDRI, or wait for another process that is at it."""
-    with cache.alone(entry):
-        cached = _read_cache(path.stem, entry)
-        if cached is None:
-            cached = prefilter_environment(path.stem, load_radiance(path))
-            _write_cache(cached, entry)
-            _remove_earlier(entry)
     return cached
 
 

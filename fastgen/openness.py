@@ -331,11 +331,9 @@ def _from_disk(
         fits = stored is not None and stored.shape == shape and stored.dtype == np.uint8
         return stored.astype(np.uint8) if stored is not None and fits else None
 
-    found = kept()
-    if found is None:
-        with cache.alone(entry):
-            found = kept()
-            if found is None:
-                found = make()
-                cache.write(entry, {"values": found}, compress=True)
-    return found
+    def made() -> NDArray[np.uint8]:
+        values = make()
+        cache.write(entry, {"values": values}, compress=True)
+        return values
+
+    return cache.once(entry, kept, made)
