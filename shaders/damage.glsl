@@ -92,7 +92,7 @@ Field damage_field(int i, vec3 p) {
         vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
                           taper * profile_slope * side, 0.0);
         return Field(depth * taper * fade * profile, depth * fade * slope,
-                     0.7 * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
+                     0.7 * fade * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
     }
     float r = max(length(q.xy), 1e-3);
     float outside = r - hole_radius(i, atan(q.y, q.x));
