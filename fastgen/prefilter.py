@@ -135,7 +135,8 @@ def resample_octahedral(
         x = np.arctan2(dy, dx) * np.float32(-width / (2 * np.pi)) + np.float32(width / 2 + 0.5)
         y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
         taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        result[BORDER + first : BORDER + last, BORDER:-BORDER] = _resize(taken, last - first, inner)
+        mean = _resize(np.asarray(taken, np.float32), last - first, inner)
+        result[BORDER + first : BORDER + last, BORDER:-BORDER] = mean
     fill_border(result)
     return result
 

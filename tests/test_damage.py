@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fastgen.container import build_container
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.scene import Scene, Spreader
+from fastgen.targets import Targets
 from tests import oracle
 
 SIZE = (256, 256)
@@ -111,6 +113,46 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert (sample.ids[through] == 1).all()
     around = sample.image[(sample.damage == 101)].mean()
     assert sample.image[through].mean() < 0.6 * around
+
+
+def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    sample = generator.render(scene=scene, camera="close", normals=True)
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    hits = oracle.cast(mesh, sample.view, scene)
+    behind = (hits.hole >= 0) & (hits.triangle >= 0) & (sample.depth > 3.5)
+    corners = mesh.positions_mm[mesh.triangles[hits.triangle[behind]]].astype(np.float64)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= -np.linalg.norm(normal, axis=1, keepdims=True)  # they show their backs
+    cosine = (sample.normals[behind] * (normal @ sample.view.rotation.T)).sum(axis=1)
+    assert behind.sum() > 50
+    assert np.median(cosine) > 0.999
+    assert (cosine > 0.99).mean() > 0.8  # other pixels blend two sides of a corrugation
+
+
+def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeypatch):
+    """The inner view of a hole, where textures are two rows too short for both."""
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    usual = generator.render(scene=scene, camera="close")
+
+    class Shorter:
+        def __init__(self, ctx):
+            self._ctx = ctx
+            self.info = {**ctx.info, "GL_MAX_TEXTURE_SIZE": 2 * (2 * SIZE[1] + 1) - 2}
+
+        def __getattr__(self, name):
+            return getattr(self._ctx, name)
+
+    def made(gl, *rest):
+        return Targets(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
+
+    monkeypatch.setattr("fastgen.renderer.Targets", made)
+    with Generator(DAMAGED, seed=21, size=SIZE) as other:
+        short = other.render(scene=scene, camera="close")
+    assert (usual.depth > 3.5).sum() > 50
+    for name in ("image", "ids", "damage"):
+        np.testing.assert_array_equal(getattr(short, name), getattr(usual, name))
+    np.testing.assert_allclose(short.depth, usual.depth, rtol=2e-6)
 
 
 def test_a_hole_torn_through_rods_and_handles_shows_no_sky():
