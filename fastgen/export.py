@@ -56,7 +56,8 @@ def export_glb(
     written.
     """
     check_scene(scene)
-    chosen = [check_camera(camera) for camera in (scene.cameras if cameras is None else cameras)]
+    cameras = scene.cameras if cameras is None else cameras
+    chosen = [check_camera(camera, scene.container) for camera in cameras]
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: no folder {path.parent}; make it first")

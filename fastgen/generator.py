@@ -258,7 +258,8 @@ class Generator:
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         with self._gpu.drawing() as renderer:
-            return renderer.exposure(self._check(scene), check_camera(camera), self.size)
+            checked = self._check(scene)
+            return renderer.exposure(checked, check_camera(camera, checked.container), self.size)
 
     def preload(self) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
@@ -320,7 +321,7 @@ class Generator:
             self._check(scene)
         if camera is None or isinstance(camera, str):
             return scene, find_camera(scene, camera)
-        return scene, check_camera(camera)
+        return scene, check_camera(camera, scene.container)
 
     def _check(self, scene: Scene) -> Scene:
         """`check_scene`, once for all cameras of a scene, and never for what was made here."""

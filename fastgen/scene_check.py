@@ -13,7 +13,7 @@ from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
 from fastgen.programs import DECAL_KINDS, MAX_DAMAGES
 from fastgen.records import check_fields, check_known
-from fastgen.scene import Camera, Damage, Decal, Scene
+from fastgen.scene import Camera, Container, Damage, Decal, Scene
 from fastgen.sensor_config import CORNERS
 
 MAX_DECALS = 4096
@@ -50,7 +50,7 @@ def check_scene(scene: Any) -> Scene:
     check_fields(scene, Scene, "scene", _FAR)
     check_known("scene.container.kind", scene.container.kind, KINDS)
     for i, camera in enumerate(scene.cameras):
-        _check_camera(camera, f"scene.cameras[{i}]")
+        _check_camera(camera, f"scene.cameras[{i}]", scene.container)
     for i, decal in enumerate(scene.decals):
         _check_decal(decal, f"scene.decals[{i}]")
     for i, damage in enumerate(scene.damages):
@@ -63,18 +63,25 @@ def check_scene(scene: Any) -> Scene:
     return scene
 
 
-def check_camera(camera: Any) -> Camera:
-    """`camera`, if it sees anything. Raises ConfigError that begins with 'camera'."""
+def check_camera(camera: Any, container: Container) -> Camera:
+    """`camera`, if it stands outside `container`. Raises ConfigError that begins with "camera"."""
     if not isinstance(camera, Camera):
         raise ConfigError(f"camera: {camera!r} is neither a Camera nor the name of one")
     check_fields(camera, Camera, "camera", _FAR)
-    _check_camera(camera, "camera")
+    _check_camera(camera, "camera", container)
     return camera
 
 
-def _check_camera(camera: Camera, path: str) -> None:
+def _check_camera(camera: Camera, path: str, container: Container) -> None:
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is where the camera itself stands")
+    length, width, height = KINDS[container.kind].size_mm
+    x, y, z = camera.position_mm
+    if abs(x) < length / 2 and abs(y) < width / 2 and 0 < z < height:
+        raise ConfigError(
+            f"{path}.position_mm: {camera.position_mm} is inside the container, of which only the "
+            "outside is drawn"
+        )
     if camera.sensor is not None and camera.sensor.stamp is not None:
         check_known(f"{path}.sensor.stamp.corner", camera.sensor.stamp.corner, CORNERS)
 

@@ -140,12 +140,22 @@ def test_what_a_damages_formula_divides_by_is_above_zero(full):
                 check_scene(spoilt(full, path, 0.0))
 
 
-def test_a_camera_given_by_itself_is_held_to_the_same():
+def test_a_camera_given_by_itself_is_held_to_the_same(full):
     camera = Camera("c", (0, -9000, 1000), (0, 0, 1000), 20)
-    assert check_camera(camera) is camera
+    assert check_camera(camera, full.container) is camera
     assert view_of(camera, SIZE).size == SIZE
     with pytest.raises(ConfigError, match=r"^camera.lens.coefficients\[0\]: nan is out of range"):
-        check_camera(replace(camera, lens=Lens("fisheye", (math.nan, 0, 0, 0))))
+        check_camera(replace(camera, lens=Lens("fisheye", (math.nan, 0, 0, 0))), full.container)
+
+
+@pytest.mark.parametrize("inside", [(0, 0, 1300), (2900, -1200, 10)])
+def test_a_camera_inside_the_container_is_refused(full, inside):
+    camera = Camera("c", inside, (9000, 0, 1000), 20)
+    with pytest.raises(ConfigError, match=r"^camera.position_mm: .* is inside the container"):
+        check_camera(camera, full.container)
+    check_camera(replace(camera, position_mm=(inside[0], inside[1], -1)), full.container)
+    with pytest.raises(ConfigError, match=r"^scene.cameras\[0\].position_mm"):
+        check_scene(replace(full, cameras=(camera,)))
 
 
 @pytest.mark.parametrize("labels", ["x", {}, 3])

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -157,6 +158,36 @@ def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
     assert seen.max() <= 1.0
     heavy = rained(light, depth, view, replace(rain, rate_mm_h=250), sky)
     assert heavy.sum() > seen.sum()
+
+
+@pytest.mark.parametrize(
+    ("position", "roll", "ratio"),
+    [
+        ((0, -9000, 0), 0.0, 8),
+        ((0, -9000, 0), 90.0, 8),
+        ((0, -9000, 0), -35.0, 8),
+        ((0, -500, 9000), 0.0, 2),  # streaks are short about where they run to
+    ],
+)
+def test_streaks_of_rain_run_where_falling_points_are_projected(position, roll, ratio):
+    size = (320, 240)
+    view = view_of(Camera("T", position, (0, 0, 0), 30.0, roll_deg=roll), size)
+    dark = np.zeros((240, 320, 3), np.float32)
+    depth = np.full((240, 320), np.inf, np.float32)
+    rain = Rain(150, 0.01, 0.0, 3)
+    seen = rained(dark, depth, view, rain, np.ones(3, np.float32))[..., 0]
+    dy, dx = np.gradient(cv2.GaussianBlur(seen, (0, 0), 1.5))
+    # where a point on each pixel's ray, three metres away, moves to as it falls
+    rows, columns = np.mgrid[0:240, 0:320] + 0.5
+    offset = (np.stack([columns, rows], axis=-1) - view.center_px) / view.focal_px
+    rays = np.concatenate([offset, np.ones((240, 320, 1))], axis=-1) @ view.rotation
+    place = 1e3 * np.array(view.position_m) + 3000 * rays
+    ends = [view.project((place + [0, 0, drop]).reshape(-1, 3))[0] for drop in (20, -20)]
+    way = (ends[1] - ends[0]).reshape(240, 320, 2)
+    way /= np.linalg.norm(way, axis=2, keepdims=True)
+    along = (dx * way[..., 0] + dy * way[..., 1]) ** 2
+    across = (dx * way[..., 1] - dy * way[..., 0]) ** 2
+    assert across.sum() > ratio * along.sum()
 
 
 def test_stamps_stay_in_their_corner():

@@ -93,10 +93,14 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
     least, most = np.exp(-slope * _LARGEST_MM), np.exp(-slope * _SMALLEST_MM)
     size_mm = -np.log(least + rng.random(count) * (most - least)) / slope
     speed = 9.65 - 10.3 * np.exp(-0.6 * size_mm)  # m/s
-    fall_px = speed * rain.shutter_s / z * view.focal_px
+    down = view.rotation @ (0.0, 0.0, -1.0)
+    aside = np.array([down[1], -down[0], 0.0])
+    fall_m = (speed * rain.shutter_s)[:, None] * (down + rain.wind * aside)
+    # the derivative of a pinhole's projection
+    from_center = (start - view.center_px) / view.focal_px
+    way_px = (fall_m[:, :2] - from_center * fall_m[:, 2:]) / z[:, None] * view.focal_px
     wide_px = size_mm * 1e-3 / z * view.focal_px
-    share = np.minimum(size_mm * 1e-3 / (speed * rain.shutter_s), 1.0)
-    cover = _streaks(start, fall_px, rain.wind, wide_px, share, z, depth_m)
+    cover = _streaks(start, way_px, wide_px, z, depth_m)
     return _mixed(light, _DROP_LIGHT * sky, cover)
 
 
@@ -107,30 +111,34 @@ def _mixed(light: Light, other: Light, share: NDArray[np.float32]) -> Light:
 
 
 def _streaks(
-    start: NDArray[np.float64],
-    fall_px: NDArray[np.float64],
-    wind: float,
+    middle: NDArray[np.float64],
+    way_px: NDArray[np.float64],
     wide_px: NDArray[np.float64],
-    share: NDArray[np.float64],
     z: NDArray[np.float64],
     depth_m: NDArray[np.float32],
 ) -> NDArray[np.float32]:
     """Share of the exposure that drops cover each pixel for, float32 [H, W] in 0..1.
 
-    A streak adds to each pixel of its line, and of its width where it is wider than one.
+    middle, way_px: [N, 2] in pixels, of each streak. A streak adds to each pixel of its line, and
+    of its width where it is wider than one.
     """
     height, width = depth_m.shape
-    steps = np.ceil(fall_px).astype(np.int64) + 1
+    length = np.abs(way_px).max(axis=1)
+    share = np.minimum(wide_px / np.maximum(np.hypot(*way_px.T), 1e-6), 1.0)
+    steps = np.ceil(length).astype(np.int64) + 1
     drop = np.repeat(np.arange(len(z)), steps)
     along = np.arange(len(drop)) - np.repeat(np.cumsum(steps) - steps, steps)
+    step = way_px / np.maximum(length, 1e-6)[:, None]
+    # what is wider than a pixel is so across its way
+    across = (np.abs(way_px[:, :1]) > np.abs(way_px[:, 1:])) == [False, True]
     cover = np.zeros(height * width)
     thick = np.maximum(np.ceil(wide_px), 1).astype(int)
     for side in range(int(thick.max(initial=1))):
         wide = thick[drop] > side
         which = drop[wide]
-        x = start[which, 0] + wind * along[wide] + side - thick[which] / 2
-        y = start[which, 1] + along[wide] - fall_px[which] / 2
-        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        at_px = middle[which] + step[which] * (along[wide] - length[which] / 2)[:, None]
+        at_px += across[which] * (side - thick[which] / 2)[:, None]
+        column, row = np.floor(at_px).astype(np.int64).T
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         at, which = row[inside] * width + column[inside], which[inside]
         before = z[which] < depth_m.ravel()[at]
