@@ -24,7 +24,7 @@ from fastgen.classes import DETECTION_CLASSES
 from fastgen.torch import ContainerDataset
 
 PLANS = {
-    "cpu": Plan(images=1500, test_images=500, size=(320, 320), batch=4, passes=4, rate=1.5e-3),
+    "cpu": Plan(images=4000, test_images=500, size=(320, 320), batch=4, passes=4, rate=1.5e-3),
     "full": Plan(
         images=7910, test_images=2480, size=(640, 640), batch=16, passes=20, rate=2e-4, workers=12
     ),

@@ -49,7 +49,7 @@ from fastgen.textures import art_texture, mipmapped_array, noise_texture
 from fastgen.uniforms import Block
 
 _BOW_STEPS = 17
-"""Points along a line that a lens may bend, where bounds of it are asked for to a pixel or two."""
+"""Points along a line that a lens may bend, where bounds of it are asked for."""
 
 
 class _SceneDecals:
@@ -305,12 +305,16 @@ def _region(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
     if view.distortion:  # what lies between two corners may bow out farther than both
         a, b = corners_mm[:, None, None], corners_mm[:, None]
-        corners_mm = (a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)).reshape(-1, 3)
+        corners_mm = a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)
     pixels, depth = view.project(corners_mm)
     if depth.min() <= NEAR_M:
         return None
-    x0, y0 = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, view.size)
-    x1, y1 = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, view.size)
+    margin = 1.0
+    if view.distortion:  # an arc leaves its chord by an eighth of the second difference
+        margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
+    pixels = pixels.reshape(-1, 2)
+    x0, y0 = np.clip(np.floor(pixels.min(axis=0) - margin), 0, view.size)
+    x1, y1 = np.clip(np.ceil(pixels.max(axis=0) + margin), 0, view.size)
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
 
 

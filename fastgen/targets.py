@@ -131,9 +131,10 @@ class Targets:
             scale = width / self.size[0]
             left, right = int((x - 1) * scale), int((x + w + 1) * scale)
             top, bottom = max(int((y - 1) * scale), 0), int((y + h + 1) * scale)
-            self._viewport(1, 0.0, height, width, height)
+            first = self.inner_row
+            self._viewport(1, 0.0, first, width, height)
             # the inner view is mirrored; it begins below the outer one
-            self._scissor(1, width - right, height + top, right - left, bottom - top)
+            self._scissor(1, width - right, first + top, right - left, bottom - top)
             self._enable(_GL_SCISSOR_TEST, 1)
 
     def end_samples(self) -> None:

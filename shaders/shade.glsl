@@ -152,7 +152,12 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);
     if (inner_key != 0u) {
-        vec3 seen = inside(-key_normal(inner_key), rest_mm);
+        vec3 normal = -key_normal(inner_key);   // sheets are seen from behind
+#if LAYER == LAYER_NORMALS
+        vec3 seen = srgb_decode(bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5);
+#else
+        vec3 seen = inside(normal, rest_mm);
+#endif
 #if LAYER == LAYER_ALL
         seen *= exposure;
 #endif

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
-from fastgen.scene import Scene
+from fastgen.scene import Scene, Spreader
+from fastgen.targets import Targets
 from tests import oracle
 
 SIZE = (256, 256)
@@ -81,6 +83,27 @@ def test_every_kind_is_seen_whole_from_close_by(generator, kind):
     assert item.bbox == oracle.box_of(sample.damage == value)
 
 
+@pytest.mark.parametrize(
+    ("kind", "ranges"),
+    [
+        ("axis", {"reach_mm": 1500}),
+        ("dented", {"amplitude_mm": 200, "width_mm": 300, "sink_share": 0.9, "depth_mm": 90}),
+    ],
+)
+def test_a_damage_is_marked_as_far_as_it_moves_the_steel(kind, ranges):
+    """Farther than sheets fade for a wide edge, farther than its width for a path that swings."""
+    values = {"probability": 1.0, "count": [1, 1], "kinds": [kind], kind: ranges}
+    with Generator(Config.from_values({"damage": values}), 5, SIZE) as generator:
+        for index in range(3):
+            scene = close_up(replace(generator.scene(index), spreader=Spreader()), kind)
+            sample = generator.render(scene=scene, camera="close")
+            mesh = build_container(scene.container.kind, scene.container.profiles)
+            hits = oracle.cast(mesh, sample.view, scene)
+            expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
+            wrong = sample.damage != expected
+            assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
+
+
 def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     scene = close_up(scene_with(generator, "perforation"), "perforation")
     sample = generator.render(scene=scene, camera="close")
@@ -90,6 +113,46 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert (sample.ids[through] == 1).all()
     around = sample.image[(sample.damage == 101)].mean()
     assert sample.image[through].mean() < 0.6 * around
+
+
+def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    sample = generator.render(scene=scene, camera="close", normals=True)
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    hits = oracle.cast(mesh, sample.view, scene)
+    behind = (hits.hole >= 0) & (hits.triangle >= 0) & (sample.depth > 3.5)
+    corners = mesh.positions_mm[mesh.triangles[hits.triangle[behind]]].astype(np.float64)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= -np.linalg.norm(normal, axis=1, keepdims=True)  # they show their backs
+    cosine = (sample.normals[behind] * (normal @ sample.view.rotation.T)).sum(axis=1)
+    assert behind.sum() > 50
+    assert np.median(cosine) > 0.999
+    assert (cosine > 0.99).mean() > 0.8  # other pixels blend two sides of a corrugation
+
+
+def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeypatch):
+    """The inner view of a hole, where textures are two rows too short for both."""
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    usual = generator.render(scene=scene, camera="close")
+
+    class Shorter:
+        def __init__(self, ctx):
+            self._ctx = ctx
+            self.info = {**ctx.info, "GL_MAX_TEXTURE_SIZE": 2 * (2 * SIZE[1] + 1) - 2}
+
+        def __getattr__(self, name):
+            return getattr(self._ctx, name)
+
+    def made(gl, *rest):
+        return Targets(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
+
+    monkeypatch.setattr("fastgen.renderer.Targets", made)
+    with Generator(DAMAGED, seed=21, size=SIZE) as other:
+        short = other.render(scene=scene, camera="close")
+    assert (usual.depth > 3.5).sum() > 50
+    for name in ("image", "ids", "damage"):
+        np.testing.assert_array_equal(getattr(short, name), getattr(usual, name))
+    np.testing.assert_allclose(short.depth, usual.depth, rtol=2e-6)
 
 
 def test_a_hole_torn_through_rods_and_handles_shows_no_sky():

@@ -354,3 +354,28 @@ def test_the_texel_that_an_error_proposes_fits(generator, tmp_path):
     proposed = float(str(caught.value).split("give ")[1].split()[0])
     mesh = build_container(scene.container.kind, scene.container.profiles)
     assert max(mesh.atlas_size_mm) / proposed <= 8192
+
+
+def test_a_dent_marks_the_wall_that_it_is_in_and_not_the_opposite_one(generator):
+    sound = replace(generator.scene(0), damages=())
+    mesh = build_container(sound.container.kind, sound.container.profiles)
+    (_, low, _), (_, _, high) = mesh.bounds_mm
+    dent = next(d for i in range(40) for d in generator.scene(i).damages if d.kind == "dented")
+    dent = replace(
+        dent,
+        face="front",
+        origin_mm=(0.0, float(low), float(high) / 2),
+        along=(1.0, 0.0, 0.0),
+        across=(0.0, 0.0, 1.0),
+        inward=(0.0, 1.0, 0.0),
+    )
+    without, dented = (generator.bake(replace(sound, damages=d), 16.0) for d in ((), (dent,)))
+    changed = (without.base_color != dented.base_color).any(axis=2)
+    found = {}
+    for face in ("front", "back"):
+        x, y, width, height = mesh.charts[mesh.chart_index(face)].rect_mm
+        ends = without.uv(np.array([(x, y + height), (x + width, y)])) * changed.shape[::-1]
+        (left, top), (right, bottom) = np.rint(ends).astype(int)
+        found[face] = int(changed[top:bottom, left:right].sum())
+    assert found["front"] > 50
+    assert found["back"] == 0

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from itertools import combinations, product
 
 import cv2
 import numpy as np
@@ -16,6 +17,7 @@ from fastgen.errors import ConfigError
 from fastgen.formats import view_values
 from fastgen.generator import Generator
 from fastgen.labels import decal_of
+from fastgen.renderer import _region
 from fastgen.scene import Camera, Scene
 from fastgen.sensor.parts import Lens
 from fastgen.spreader import build_spreader
@@ -301,3 +303,27 @@ def test_a_rig_that_cannot_be_drawn_is_refused_at_once():
     config = Config.from_values({"cameras": {"A": {"focal_mm": 11, "lens": lens}}})
     with pytest.raises(ConfigError, match=r"cameras.A.lens: .* take a larger focal_mm"):
         Generator(config)
+
+
+def test_what_a_lens_bows_out_stays_within_the_pixels_that_are_shaded():
+    """Large images through the widest fisheye: points close together on the edges of a box."""
+    size = 4096
+    focal_mm = 18 * 2**0.5 / np.deg2rad(77)
+    corners = np.array(list(product((-6096.0, 6096.0), (-1219.0, 1219.0), (0.0, 2896.0))))
+    pairs = [(a, b) for a, b in combinations(corners, 2) if (a != b).sum() == 1]
+    along = np.linspace(0, 1, 4001)[:, None]
+    edges = np.concatenate([a + along * (b - a) for a, b in pairs])
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        place = rng.uniform((-3000, -6000, -1500), (3000, -3000, 5000))
+        lens = Lens("fisheye", (0.0, 0.0, 0.0, 0.0))
+        camera = Camera("wide", tuple(place.tolist()), (0, 0, 1400), focal_mm, lens=lens)
+        view = view_of(camera, (size, size))
+        region = _region(view, corners)
+        if region is None:
+            continue
+        x, y, width, height = region
+        pixels, depth = view.project(edges)
+        seen = pixels[(depth > 0.1) & ((pixels > 0) & (pixels < size)).all(axis=1)]
+        assert (seen >= (x, y)).all()
+        assert (seen <= (x + width, y + height)).all()
