@@ -1,8 +1,16 @@
-"""`python -m fastgen` is the `fastgen` command."""
+"""The `fastgen` command, also as `python -m fastgen`."""
 
 import sys
 
-from fastgen.cli import main
+from fastgen.stopping import ended_at_once
+
+
+def main() -> int:
+    """Run the command line; returns its exit code, see `fastgen.cli.main`."""
+    with ended_at_once():
+        from fastgen import cli
+    return cli.main()
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -29,6 +29,7 @@ from fastgen.programs import LAYERS
 from fastgen.records import check_known
 from fastgen.repair import repair
 from fastgen.shards import FORMATS, SHARD_SCENES, Job
+from fastgen.stopping import STOPPED
 from fastgen.verify import examine
 
 SHOWN_LAYERS = (*LAYERS, "ids", "damage")
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
     except KeyboardInterrupt as stop:
-        print("fastgen: stopped; run the same command again to go on", file=sys.stderr)
+        print(STOPPED, file=sys.stderr)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
 

@@ -99,6 +99,16 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
         return _finish(job, storage, settings, made_by)
 
 
+def check_goes_on(job: Job, worker_count: int, manifest: Mapping[str, Any]) -> None:
+    """See, without a change to the place, that `generate` would go on with what is there.
+
+    manifest: what dataset.json says. Raises what `generate` raises for other settings than those of
+    the dataset and for values that cannot be.
+    """
+    job = _checked(job, worker_count)
+    _check_alike(storage_of(job.out), job, _settings(job), manifest)
+
+
 def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Maker) -> Runner:
     """A runner with so many processes on this machine."""
 
@@ -195,7 +205,13 @@ def _make_folder(root: Path) -> None:
                     f"{root}: holds something else (no {MANIFEST}); give an empty or new folder"
                 )
     except FileExistsError:
-        raise OutputError(f"{root}: is a file; give a folder") from None
+        # mkdir says so of a link to nowhere too
+        astray = [path for path in (root, *root.parents) if path.is_symlink() and not path.exists()]
+        what = "is a file; give a folder"
+        if astray:
+            to = os.readlink(astray[0])
+            what = f"{astray[0]} is a link to {to}, which is not there; make it, or remove the link"
+        raise OutputError(f"{root}: {what}") from None
     except OSError as error:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
 
@@ -216,6 +232,13 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
     if not isinstance(old, dict):
         raise OutputError(f"{where}: is damaged; remove the dataset or give another")
+    _check_alike(storage, job, settings, old)
+    return old
+
+
+def _check_alike(
+    storage: Folder | Remote, job: Job, settings: Mapping[str, Any], old: Mapping[str, Any]
+) -> None:
     for key, value in settings.items():
         if old.get(key) != value:
             them = "them, --hdri too," if key == "environments" else "them"
@@ -230,7 +253,6 @@ def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> d
         raise OutputError(
             f"{job.out}: holds more than {job.images} images; give --images as before or more"
         )
-    return old
 
 
 def _difference(name: str, old: Any, new: Any) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 from fastgen.config import Config
 from fastgen.errors import OutputError
-from fastgen.generate import MANIFEST, generate
+from fastgen.generate import MANIFEST, check_goes_on, generate
 from fastgen.shards import Job
 from fastgen.storage import storage_of
 from fastgen.verify import examine
@@ -23,11 +23,13 @@ def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> l
         raise OutputError(f"{out}: {found.faults[0]}")
     if not found.broken and not found.manifest["failed"]:
         return found.faults
+    job = _job(out, found.manifest, hdri_dir)
+    check_goes_on(job, worker_count, found.manifest)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():
         for path in found.broken:
             storage.remove(path)  # `generate` makes what is missing, but reads no file's content
-    generate(_job(out, found.manifest, hdri_dir), worker_count)
+    generate(job, worker_count)
     return examine(out).faults
 
 

@@ -66,6 +66,23 @@ def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys)
     assert "dataset.json: was changed after it was written" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("others", ["lights", "workers", "shards"])
+def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
+    flip(next(copy.glob("images/*/*.jpg")))
+    flip(next(copy.glob("scenes/*/*.json")))
+    arguments = ["verify", str(copy), "--repair", "--workers", "1"]
+    if others == "lights":  # as of a dataset made with --hdri, repaired without
+        shutil.copy(bundled_hdris()["sky"], tmp_path / "mine.exr")
+        arguments += ["--hdri", str(tmp_path)]
+    elif others == "workers":
+        arguments[-1] = "0"
+    else:
+        (copy / "shards/zebra.json").write_text("{}")
+    before = content(copy)
+    assert main(arguments) == 2
+    assert content(copy) == before
+
+
 def test_strange_files_among_the_images_do_not_stop_a_run(copy):
     for name in ("stray.jpg", "more_A.jpg", "Thumbs.db"):
         (copy / "images/train" / name).write_bytes(b"no image")
@@ -170,6 +187,16 @@ def test_what_cannot_be_written_is_named_in_one_line(tmp_path, capsys, spoil):
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith(f"fastgen: {tmp_path / 'out'}")
     assert "cannot be" in error
+
+
+@pytest.mark.parametrize("below", [".", "deeper/still"])
+def test_a_link_to_nowhere_is_called_one(tmp_path, capsys, below):
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "unmounted")
+    assert main(["generate", str(link / below), *ARGUMENTS, "--workers", "1"]) == 2
+    error = capsys.readouterr().err
+    assert f"{link} is a link to {tmp_path / 'unmounted'}, which is not there" in error
+    assert not (tmp_path / "unmounted").exists()
 
 
 @pytest.mark.parametrize("arguments", [["stats", "{}"], ["verify", "{}"], ["generate", "--help"]])

@@ -85,3 +85,37 @@ def test_a_run_that_sigterm_stopped_goes_on(tmp_path):
     assert main(["generate", str(out), *ARGUMENTS, "--images", "40"]) == 0
     assert signal.getsignal(signal.SIGTERM) == before
     assert main(["verify", str(out)]) == 0
+
+
+LOADING = """
+import os, runpy, signal, sys
+
+class Signalled:
+    def find_spec(self, name, path=None, target=None):
+        if name == MODULE:
+            os.kill(os.getpid(), SIGNAL)
+
+signal.signal(signal.SIGINT, BEFORE)
+sys.meta_path.insert(0, Signalled())
+sys.argv = ["fastgen", "--version"]
+runpy.run_module("fastgen", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("module", ["numpy", "fastgen.config", "scipy", "argparse"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_modules_load_ends_in_one_line(module, number):
+    code, error = loading(module, number, "signal.default_int_handler")
+    assert (code, error) == (128 + number, f"{STOPPED}\n")
+
+
+def test_what_ignores_ctrl_c_ignores_it_while_modules_load():
+    assert loading("numpy", signal.SIGINT, "signal.SIG_IGN") == (0, "")
+
+
+def loading(module, number, before):
+    """Exit code and standard error of a command that is sent a signal as it loads a module."""
+    text = LOADING.replace("MODULE", repr(module)).replace("SIGNAL", str(int(number)))
+    command = [sys.executable, "-c", text.replace("BEFORE", before)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    return done.returncode, done.stderr

@@ -44,6 +44,20 @@ def test_bad_arguments_are_named(arguments, words):
         ContainerDataset(**{"task": "imdg", "size": SMALL, **arguments})
 
 
+def test_the_last_epoch_has_scenes_and_the_next_is_refused():
+    data = dataset()
+    last = (2**63 - 1 - 10**9) // 10**9  # e times a thousand million, and as many scenes more
+    for epoch in (last, np.int64(last)):
+        data.set_epoch(epoch)
+        assert data.locate(0)[0] == last * 10**9
+    for epoch in (last + 1, 10**10, 2**62):
+        words = f"epoch: {epoch} is not a whole number of 0 to {last}"
+        with pytest.raises(ConfigError, match=words):
+            data.set_epoch(epoch)
+    assert data.epoch == last
+    assert data[0][0].shape[0] == 3
+
+
 def test_bad_ranks_states_and_batches_are_named():
     for rank, world, words in ((2, 2, "rank: 2 is out of range"), (0, None, "give both")):
         with pytest.raises(ConfigError, match=words):

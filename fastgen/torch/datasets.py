@@ -19,6 +19,7 @@ from fastgen.sampling import sample_scene
 from fastgen.scene import Scene
 from fastgen.torch.plan import (
     EPOCH_SCENES,
+    MAX_EPOCH,
     Plan,
     chosen_cameras,
     config_of,
@@ -140,8 +141,8 @@ class ContainerDataset(Dataset[Item]):
         return int(self._epoch)
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch, 0 or more, between two passes over the data."""
-        epoch = whole("epoch", epoch, 0)
+        """Go to an epoch, 0 to plan.MAX_EPOCH, between two passes over the data."""
+        epoch = whole("epoch", epoch, 0, MAX_EPOCH)
         config_of(self.curriculum, self.config, epoch)  # refused here, not in a worker
         self._epoch.fill_(epoch)
 
@@ -246,7 +247,7 @@ class ContainerStream(IterableDataset[Item]):
         return self.items.epoch
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch, 0 or more, between two passes over the data."""
+        """Go to an epoch, 0 to plan.MAX_EPOCH, between two passes over the data."""
         self.items.set_epoch(epoch)
 
     def start_at(self, position: int) -> None:

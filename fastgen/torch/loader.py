@@ -9,7 +9,7 @@ from fastgen.errors import ConfigError
 from fastgen.records import whole
 from fastgen.sampling import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
-from fastgen.torch.plan import shard
+from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.torch.targets import Collate
 
 
@@ -132,7 +132,7 @@ class Loader:
         for key in ("epoch", "position", "made"):
             if key not in state:
                 raise ConfigError(f"state: has no {key!r}; give what state_dict returned")
-        epoch = whole("state.epoch", state["epoch"])
+        epoch = whole("state.epoch", state["epoch"], 0, MAX_EPOCH)
         most = 2**62 if self._length is None else self._length
         made, ours = state["made"], self.state_dict()["made"]
         taught = made.get("curriculum")

@@ -16,6 +16,9 @@ from fastgen.torch.targets import class_names
 EPOCH_SCENES = 10**9
 """Scenes of epoch e count up from e times this, so that no two epochs share one."""
 
+MAX_EPOCH = 2**63 // EPOCH_SCENES - 1
+"""The last epoch all of whose scene numbers a Scene can have."""
+
 
 class Plan:
     """Position in an epoch -> scene index and camera; plain arithmetic, no GL.
