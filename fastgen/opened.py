@@ -86,7 +86,9 @@ class Opened:
         # first, so that nothing goes on with what is freed in part
         self._cuda, self._renderer, self._gl = None, None, None
         if self._process == os.getpid() and gl is not None:
-            _free(gl, *held)
+            # one that another thread holds, even one that ended, goes with the process
+            with contextlib.suppress(ContextError):
+                _free(gl, *held)
 
     def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
         # not freed here, perhaps in the middle of another's render: that switches contexts

@@ -4,6 +4,7 @@ import contextlib
 import math
 import multiprocessing
 import pickle
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ import pytest
 
 from fastgen.camera import view_of
 from fastgen.config import Config, LabelConfig
-from fastgen.errors import AssetError, ConfigError
+from fastgen.errors import AssetError, ConfigError, ContextError
 from fastgen.generator import Generator
 from fastgen.scene import Camera, Scene
 
@@ -215,6 +216,20 @@ def test_closing_one_generator_leaves_another_as_it_is():
         np.testing.assert_array_equal(after.image, before.image)
         np.testing.assert_array_equal(after.ids, before.ids)
         assert after.objects == before.objects
+
+
+def test_closing_what_a_thread_that_ended_still_holds_is_quiet():
+    with Generator(size=(64, 64)) as other, Generator(size=(64, 64)) as held:
+        expected = other.render(index=0).image
+        held.render(index=0)
+        other.render(index=0)  # this thread holds one context at a time
+        thread = threading.Thread(target=held.render, args=(1,))
+        thread.start()
+        thread.join()
+        with pytest.raises(ContextError):
+            held.render(index=0)
+        held.close()
+        np.testing.assert_array_equal(held.render(index=0).image, expected)
 
 
 def test_generators_dropped_unclosed_do_not_pile_up():
