@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from fastgen import srgb
 from fastgen.container import KINDS, WallProfiles
 from fastgen.damage_config import DamageConfig
 from fastgen.errors import ConfigError
@@ -323,16 +324,15 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
-    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'. IEC 61966-2-1.
+    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'.
 
     Raises ConfigError naming `path` when the text is no color.
     """
     digits = text.removeprefix("#")
     if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
         raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'")
-    encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
-    return r, g, b
+    red, green, blue = (srgb.linear(code / 255) for code in bytes.fromhex(digits))
+    return red, green, blue
 
 
 def _check_colors(name: str, colors: tuple[str, ...]) -> None:
