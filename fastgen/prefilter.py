@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 BORDER = 1
 
-_BAND_SAMPLES = 1 << 22  # samples gathered at a time: bounds memory at large maps
+_BAND_SAMPLES = 1 << 17  # samples gathered at a time, as a core's cache holds them
 _CHUNK_ROWS = 16
 
 
@@ -122,18 +122,20 @@ def resample_octahedral(
 
     inner = size - 2 * BORDER
     result = np.empty((size, size, 3), np.float32)
-    offset = (np.arange(inner * samples) + 0.5) / (inner * samples)
+    along = np.linspace(-1.0, 1.0, 2 * inner * samples + 1, dtype=np.float32)[1::2]
     band = max(_BAND_SAMPLES // (inner * samples * samples), 1)
     for first in range(0, inner, band):
         last = min(first + band, inner)
-        grid = np.meshgrid(offset, offset[first * samples : last * samples])
-        uv = equirect_encode(octahedral_decode(np.stack(grid, axis=-1)))
+        across = along[first * samples : last * samples, None]
+        # octahedral_decode and equirect_encode, without the unit length that no angle needs
+        z = 1.0 - np.abs(along) - np.abs(across)
+        folded = np.maximum(-z, 0.0)
+        dx, dy = along - np.copysign(folded, along), across - np.copysign(folded, across)
         # texel centres lie at half integers, and the padding shifts by one
-        x = (uv[..., 0] * width + 0.5).astype(np.float32)
-        y = (uv[..., 1] * height + 0.5).astype(np.float32)
+        x = np.arctan2(dy, dx) * np.float32(-width / (2 * np.pi)) + np.float32(width / 2 + 0.5)
+        y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
         taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        mean = taken.reshape(last - first, samples, inner, samples, 3).mean(axis=(1, 3))
-        result[BORDER + first : BORDER + last, BORDER:-BORDER] = mean
+        result[BORDER + first : BORDER + last, BORDER:-BORDER] = _resize(taken, last - first, inner)
     fill_border(result)
     return result
 

@@ -16,7 +16,7 @@ _BITS, _BIAS = 9, 15
 def packed(rgb: NDArray[np.floating]) -> NDArray[np.uint32]:
     """Colours [..., 3] of 0 to LARGEST as uint32 [...]; what is beyond is clamped."""
     colour = np.clip(rgb, 0, LARGEST).astype(np.float32)
-    largest = colour.max(axis=-1)
+    largest = np.maximum.reduce(np.moveaxis(colour, -1, 0))
     _, exponent = np.frexp(largest)  # largest = m 2^exponent with m in 0.5 to 1
     shared = np.where(largest > 0, np.maximum(exponent + _BIAS, 0), 0)
     step = _step(shared)

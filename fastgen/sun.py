@@ -42,24 +42,27 @@ def split_sun(radiance: NDArray[np.float32]) -> tuple[Sun | None, NDArray[np.flo
     brightest = np.unravel_index(int(np.argmax(luminance)), luminance.shape)
     toward = directions[brightest]
     for _ in range(2):  # the second time around the centre of its light, not one texel
-        angle = np.arccos(np.clip(directions @ toward, -1.0, 1.0))
-        cap = angle < np.deg2rad(CAP_DEG)
-        around = (angle < np.deg2rad(2 * CAP_DEG)) & ~cap
-        sky = np.median(radiance[around], axis=0)
-        excess = np.where(cap[..., None], np.maximum(radiance - sky, 0.0), 0.0)
-        share = excess @ REC_709 * weights
+        cosine = directions @ toward
+        cap = cosine > np.cos(np.deg2rad(CAP_DEG))
+        around = (cosine > np.cos(np.deg2rad(2 * CAP_DEG))) & ~cap
+        excess = np.maximum(radiance[cap] - np.median(radiance[around], axis=0), 0.0)
+        weight = np.broadcast_to(weights, cap.shape)[cap]
+        share = excess @ REC_709 * weight
         if not share.any():
             return None, radiance
-        toward = (directions * share[..., None]).sum(axis=(0, 1))
+        toward = share @ directions[cap]
         toward /= np.linalg.norm(toward)
     cosine = np.maximum(directions @ toward, 0.0)
-    if (share * cosine).sum() < MIN_SHARE * (luminance * weights * cosine).sum():
+    whole = (luminance * cosine).sum(axis=1) @ weights[:, 0]
+    cosine = cosine[cap]
+    if share @ cosine < MIN_SHARE * whole:
         return None, radiance
     squared_angle = np.arccos(np.clip(cosine, 0.0, 1.0)) ** 2
     # an even disc of radius r has a mean square of r^2 / 2
-    radius = np.sqrt(2 * (share * squared_angle).sum() / share.sum())
-    light = (excess * (weights * cosine)[..., None]).sum(axis=(0, 1)) / np.pi
+    radius = np.sqrt(2 * (share @ squared_angle) / share.sum())
+    light = (weight * cosine) @ excess / np.pi
+    rest = radiance.copy()
+    rest[cap] -= excess
     x, y, z = (float(v) for v in toward)
     red, green, blue = (float(v) for v in light)
-    rest = (radiance - excess).astype(np.float32)
     return Sun((x, y, z), (red, green, blue), float(radius)), rest
