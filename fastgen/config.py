@@ -19,11 +19,14 @@ from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
+from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
 REACH = bounds(1.0, 1e6, "mm")
 """What falls off over a reach is divided by it."""
+
+ROUGHNESS = bounds(MIN_ROUGHNESS, 1.0)
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class SurfaceConfig:
             "charcoal": "#3a3d40",
         }
     )
-    roughness: Range = field(default=Range(0.38, 0.62), metadata=bounds(0.045, 1.0))
+    roughness: Range = field(default=Range(0.38, 0.62), metadata=ROUGHNESS)
     tone_variation: Range = field(default=Range(0.02, 0.12), metadata=UNIT)
     ageing_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
     ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=REACH)
@@ -62,7 +65,7 @@ class SurfaceConfig:
     rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)  # squared: mostly low
     rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
     rust_colors: tuple[str, ...] = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
-    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=bounds(0.045, 1.0))
+    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=ROUGHNESS)
     scratch_coverage: Range = field(default=Range(0.0, 0.003), metadata=UNIT)
     wear_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
     wear_scale_mm: Range = field(default=Range(700, 2500), metadata=bounds(50, 1e5, "mm"))
