@@ -91,13 +91,21 @@ def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]
     return moved
 
 
-def corners_mm(damage: Damage) -> NDArray[np.float64]:
-    """Corners [8, 3] in mm of a box that holds all that a damage touches, before and after."""
+def reach_mm(damage: Damage) -> tuple[float, float, float]:
+    """How far from its origin a damage may move or tear what is at rest: along, across, inward."""
     u, v = damage.size_mm[0] / 2, damage.size_mm[1] / 2
-    depth = abs(damage.depth_mm) + 60.0
-    low, high = -depth, FADE_END_MM
     if damage.kind == "perforation":
         u = v = u * HOLE_REACH + damage.shape[0]
+    if damage.kind == "dented":
+        v += damage.shape[2]  # its path swings
+    return u, v, v if damage.kind == "axis" else FADE_END_MM
+
+
+def corners_mm(damage: Damage) -> NDArray[np.float64]:
+    """Corners [8, 3] in mm of a box that holds all that a damage touches, before and after."""
+    u, v, inward = reach_mm(damage)
+    depth = abs(damage.depth_mm) + 60.0
+    low, high = -depth, inward
     if damage.kind == "axis":
         low, high = -v, v + depth
     axes = np.array([damage.along, damage.across, damage.inward])

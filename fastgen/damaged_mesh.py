@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.damage import (
-    FADE_END_MM,
     FADE_START_MM,
-    HOLE_REACH,
     deform,
     hole_radius_mm,
     local_coordinates,
+    reach_mm,
 )
 from fastgen.mesh import Mesh
 from fastgen.scene import Damage
@@ -82,14 +81,8 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
 
 def _within_reach(damage: Damage, corners: Array) -> NDArray[np.bool_]:
     """Which triangles, bool [T], a damage may move or tear."""
-    half_length, half_width = np.array(damage.size_mm) / 2
-    depth = FADE_END_MM
-    if damage.kind == "perforation":
-        half_length = half_width = half_length * HOLE_REACH + damage.shape[0]
-    if damage.kind == "axis":
-        depth = half_width
     local = np.stack(local_coordinates(damage, corners[..., _REST]), axis=-1)
-    reach = np.array([half_length, half_width, depth])
+    reach = np.array(reach_mm(damage))
     touches: NDArray[np.bool_] = ((local.min(1) < reach) & (local.max(1) > -reach)).all(axis=1)
     return touches
 

@@ -36,6 +36,10 @@ _BEAM_Y_MM = 520.0
 _FRAME_HALF_MM = 2650.0
 """Half the main frame's length: what a spreader drawn in to 20 feet leaves room for."""
 
+_CUT_MM = 150.0
+"""Members are cut across so often: light is interpolated between vertices, and they hide it from
+each other where they meet."""
+
 _TWISTLOCK_DEPTH_MM = 45.0
 """How far a twistlock's head reaches into its casting, which is 70 deep there."""
 
@@ -72,7 +76,7 @@ class Hang:
     ) -> Patch:
         """A box; x and y in either order."""
         low, high = (min(x), min(y), self.base + above[0]), (max(x), max(y), self.base + above[1])
-        return box(low, high)
+        return box(low, high, _CUT_MM)
 
 
 def frame(hang: Hang) -> list[Sheet]:

@@ -214,13 +214,14 @@ def prism(
     return beside(patches)
 
 
-def box(low_mm: ArrayLike, high_mm: ArrayLike) -> Patch:
-    """All six faces of an axis-aligned box, unfolded around its longest edge."""
+def box(low_mm: ArrayLike, high_mm: ArrayLike, step_mm: float = np.inf) -> Patch:
+    """All six faces of an axis-aligned box, unfolded around its longest edge and cut across it
+    every step_mm."""
     low, high = np.asarray(low_mm, np.float64), np.asarray(high_mm, np.float64)
     axis = int(np.argmax(high - low))
     i, j = (axis + 1) % 3, (axis + 2) % 3
     outline = [(low[i], low[j]), (high[i], low[j]), (high[i], high[j]), (low[i], high[j])]
-    return prism(outline, (low[axis], high[axis]), axis, capped=(True, True))
+    return prism(outline, breaks(low[axis], high[axis], step_mm), axis, capped=(True, True))
 
 
 def assemble(

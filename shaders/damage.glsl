@@ -43,9 +43,11 @@ int hole_at(vec3 p) {
 // whether damage i may move or mark the surface at p, or a pixel beside it
 bool within_reach(int i, vec3 p) {
     vec3 q = abs(damage_local(i, p));
-    vec2 reach = vec2(damage_along[i].w, damage_across[i].w);
-    if (i < hole_count) reach = reach * HOLE_REACH + damage_shape[3 * i].x;
-    return all(lessThan(q, vec3(reach, DAMAGE_FADE_END_MM) + REACH_MARGIN_MM));
+    vec3 reach = vec3(damage_along[i].w, damage_across[i].w, DAMAGE_FADE_END_MM);
+    if (i < hole_count) reach.xy = reach.xy * HOLE_REACH + damage_shape[3 * i].x;
+    else if (i < dent_end) reach.y += damage_shape[3 * i].z;   // its path swings
+    else if (int(damage_origin[i].w) == DAMAGE_AXIS) reach.z = reach.y;
+    return all(lessThan(q, reach + REACH_MARGIN_MM));
 }
 
 struct Field {
@@ -92,7 +94,7 @@ Field damage_field(int i, vec3 p) {
         vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
                           taper * profile_slope * side, 0.0);
         return Field(depth * taper * fade * profile, depth * fade * slope,
-                     0.7 * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
+                     0.7 * fade * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
     }
     float r = max(length(q.xy), 1e-3);
     float outside = r - hole_radius(i, atan(q.y, q.x));

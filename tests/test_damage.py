@@ -12,7 +12,7 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
-from fastgen.scene import Scene
+from fastgen.scene import Scene, Spreader
 from tests import oracle
 
 SIZE = (256, 256)
@@ -79,6 +79,27 @@ def test_every_kind_is_seen_whole_from_close_by(generator, kind):
     assert (sample.damage != expected).mean() < 2e-3
     item = next(o for o in sample.objects if o.class_name == kind)
     assert item.bbox == oracle.box_of(sample.damage == value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "ranges"),
+    [
+        ("axis", {"reach_mm": 1500}),
+        ("dented", {"amplitude_mm": 200, "width_mm": 300, "sink_share": 0.9, "depth_mm": 90}),
+    ],
+)
+def test_a_damage_is_marked_as_far_as_it_moves_the_steel(kind, ranges):
+    """Farther than sheets fade for a wide edge, farther than its width for a path that swings."""
+    values = {"probability": 1.0, "count": [1, 1], "kinds": [kind], kind: ranges}
+    with Generator(Config.from_values({"damage": values}), 5, SIZE) as generator:
+        for index in range(3):
+            scene = close_up(replace(generator.scene(index), spreader=Spreader()), kind)
+            sample = generator.render(scene=scene, camera="close")
+            mesh = build_container(scene.container.kind, scene.container.profiles)
+            hits = oracle.cast(mesh, sample.view, scene)
+            expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
+            wrong = sample.damage != expected
+            assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
 
 
 def test_a_hole_shows_the_inside_and_never_the_sky(generator):
