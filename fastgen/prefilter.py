@@ -138,7 +138,8 @@ def resample_octahedral(
         # texel centres lie at half integers, and the padding shifts by one
         x = np.arctan2(dy, dx) * np.float32(-width / (2 * np.pi)) + np.float32(width / 2 + 0.5)
         y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
-        taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        found = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        taken = np.asarray(found, np.float32)
         result[BORDER + first : BORDER + last, BORDER:-BORDER] = _resize(taken, last - first, inner)
     fill_border(result)
     return result
