@@ -180,7 +180,7 @@ def pyrender(chosen: list[Case], repeats: int) -> list[Point]:
     """pyrender's point; none where it is not installed."""
     (peer,) = (p for p in peers.PEERS if p.script == "with_pyrender.py")
     if not peer.interpreter.exists():
-        print("pyrender: not installed, see --help")
+        print("pyrender: not installed: python bench/peers.py --install --only pyrender")
         return []
     with tempfile.TemporaryDirectory() as place:
         job, out = Path(place) / "job", Path(place) / "out"

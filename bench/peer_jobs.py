@@ -122,9 +122,7 @@ def _marker_mesh(scene: Scene, mesh: Mesh, decal: Decal) -> trimesh.Trimesh:
     steps = np.linspace(-0.5, 0.5, _CELLS + 1)
     s, t = (a.ravel() for a in np.meshgrid(steps, steps))
     local = np.stack([s - t, s + t], axis=-1) / 2  # a diamond in [-1/2, 1/2] squared
-    angle = np.deg2rad(decal.rotation_deg)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    sheet = local * decal.size_mm @ turn.T + decal.center_mm
+    sheet = local * decal.size_mm @ decal.turn.T + decal.center_mm
     positions, normals = mesh.sheet_to_surface(decal.face, sheet)
     lifted = (deform(scene.damages, positions) + _LIFT_MM * normals) * MM @ _Y_UP.T
     corner = np.arange(_CELLS)[:, None] * (_CELLS + 1) + np.arange(_CELLS)

@@ -16,7 +16,7 @@ from common.run import Learner, Plan, Run, Table, conclude, feed_of, parameters,
 from torch.nn import functional
 from transformers import ResNetConfig, ResNetForImageClassification
 
-from fastgen.torch import ContainerDataset
+from fastgen.torch import ContainerDataset, class_names
 
 PLANS = {
     "cpu": Plan(images=1200, test_images=400, size=(192, 192), batch=16, passes=6, rate=2e-3),
@@ -26,8 +26,8 @@ PLANS = {
     "smoke": Plan(images=8, test_images=8, size=(64, 64), batch=4, passes=1, rate=1e-3),
 }
 
-DOOR, NO_DOOR = 0, 1
-"""Labels as fastgen.torch numbers them."""
+DOOR = class_names("door").index("door")
+"""Its label, as fastgen.torch numbers them."""
 
 PAPER = {"1: Cl, Cr": (100.0, 100.0), "2: with A, B": (90.4, 96.0)}
 

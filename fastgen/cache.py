@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 T = TypeVar("T")
 
 LIMIT_BYTES = 4 << 30
-"""Of a folder; beyond it, what was not read for longest goes. About 150 lights."""
+"""Of a folder; beyond it, what was not read for longest goes. About 240 lights."""
 
 
 def default_folder() -> Path:

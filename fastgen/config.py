@@ -12,17 +12,21 @@ from typing import Any
 
 import yaml
 
+from fastgen import srgb
 from fastgen.container import KINDS, WallProfiles
 from fastgen.damage_config import DamageConfig
 from fastgen.errors import ConfigError
 from fastgen.markings_config import MarkingsConfig
 from fastgen.mesh import FACES
 from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
+from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
 
 REACH = bounds(1.0, 1e6, "mm")
 """What falls off over a reach is divided by it."""
+
+ROUGHNESS = bounds(MIN_ROUGHNESS, 1.0)
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class SurfaceConfig:
             "charcoal": "#3a3d40",
         }
     )
-    roughness: Range = field(default=Range(0.38, 0.62), metadata=bounds(0.045, 1.0))
+    roughness: Range = field(default=Range(0.38, 0.62), metadata=ROUGHNESS)
     tone_variation: Range = field(default=Range(0.02, 0.12), metadata=UNIT)
     ageing_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
     ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=REACH)
@@ -61,7 +65,7 @@ class SurfaceConfig:
     rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)  # squared: mostly low
     rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
     rust_colors: tuple[str, ...] = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
-    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=bounds(0.045, 1.0))
+    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=ROUGHNESS)
     scratch_coverage: Range = field(default=Range(0.0, 0.003), metadata=UNIT)
     wear_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
     wear_scale_mm: Range = field(default=Range(700, 2500), metadata=bounds(50, 1e5, "mm"))
@@ -323,16 +327,15 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
-    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'. IEC 61966-2-1.
+    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'.
 
     Raises ConfigError naming `path` when the text is no color.
     """
     digits = text.removeprefix("#")
     if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
         raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'")
-    encoded = [int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
-    return r, g, b
+    red, green, blue = (srgb.linear(code / 255) for code in bytes.fromhex(digits))
+    return red, green, blue
 
 
 def _check_colors(name: str, colors: tuple[str, ...]) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.errors import OutputError
+from fastgen.formats.yolo import pixel_box
 from fastgen.overlay import draw_box
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
@@ -62,12 +63,6 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
     labels = out / "imdg/labels" / path.parent.name / f"{path.stem}.txt"
     for line in labels.read_text(encoding="utf-8").splitlines():
         index, *numbers = line.split()
-        x, y, width, height = (float(v) for v in numbers)
-        box = (
-            (x - width / 2) * size[0],
-            (y - height / 2) * size[1],
-            (x + width / 2) * size[0],
-            (y + height / 2) * size[1],
-        )
+        box = pixel_box([float(v) for v in numbers], size)
         draw_box(tile, box, DETECTION_CLASSES[int(index)])
     return tile

@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
-from fastgen.records import UNIT, Range, bounds, check_known, check_order
+from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_order
 
-MM = bounds(0.0, 20000.0, "mm")
 EXTENT = bounds(5.0, 20000.0, "mm")
 """Fields are scaled by their extents, which must not vanish."""
 
@@ -21,7 +20,7 @@ class AxisConfig:
 
     length_mm: Range = field(default=Range(700, 1900), metadata=EXTENT)
     reach_mm: Range = field(default=Range(320, 650), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(110, 260), metadata=MM)
+    depth_mm: Range = field(default=Range(110, 260), metadata=LENGTH)
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class ConcaveConfig:
 
     length_mm: Range = field(default=Range(900, 2600), metadata=EXTENT)
     width_mm: Range = field(default=Range(800, 2000), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(110, 250), metadata=MM)
+    depth_mm: Range = field(default=Range(110, 250), metadata=LENGTH)
     outward: float = field(default=0.3, metadata=UNIT)
 
 
@@ -41,10 +40,10 @@ class DentedConfig:
 
     length_mm: Range = field(default=Range(600, 1700), metadata=EXTENT)
     width_mm: Range = field(default=Range(180, 420), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(40, 90), metadata=MM)
+    depth_mm: Range = field(default=Range(40, 90), metadata=LENGTH)
     crease_mm: Range = field(default=Range(35, 70), metadata=bounds(5, 1000, "mm"))
     sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
-    amplitude_mm: Range = field(default=Range(25, 110), metadata=MM)
+    amplitude_mm: Range = field(default=Range(25, 110), metadata=LENGTH)
     wavelength_mm: Range = field(default=Range(280, 800), metadata=bounds(20, 1e5, "mm"))
     stretch_mm: Range = field(default=Range(250, 600), metadata=bounds(20, 1e5, "mm"))
     turn_deg: Range = field(default=Range(-50, 50), metadata=bounds(-180, 180, "degrees"))
@@ -56,7 +55,7 @@ class PerforationConfig:
 
     diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
     rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
-    depth_mm: Range = field(default=Range(35, 100), metadata=MM)
+    depth_mm: Range = field(default=Range(35, 100), metadata=LENGTH)
     lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, 0.19))
 
 

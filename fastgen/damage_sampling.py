@@ -72,7 +72,7 @@ def _planes(size_mm: Vec3) -> dict[str, _Plane]:
 
 
 def _draw(rng: np.random.Generator, values: Range, most: float = math.inf) -> float:
-    return round(min(float(rng.uniform(values.lo, values.hi)), most), 2)
+    return round(min(values.draw(rng), most), 2)
 
 
 def _place(

@@ -6,10 +6,10 @@ pixel) is under 3 px wide, so eight sides are round enough; hinge knuckles of 28
 
 import numpy as np
 
-from fastgen.container_layout import DOOR_RING_MM, Array, Layout
+from fastgen.container_layout import DOOR_RING_MM, Layout
 from fastgen.container_parts import DOOR_FACE_MM
 from fastgen.door import LEAF_MM, SWAGE, Opening, opening
-from fastgen.unfold import Patch, Sheet, beside, box, breaks, prism
+from fastgen.unfold import Patch, Sheet, beside, box, breaks, prism, regular
 
 BAR_RADIUS_MM = 17.0
 BAR_Y_MM = (-825.0, -275.0, 275.0, 825.0)
@@ -55,15 +55,9 @@ def _block(
     return box((place.x - inset[1], low, z[0]), (place.x - inset[0], high, z[1]))
 
 
-def _round(x: float, y: float, radius: float, sides: int) -> Array:
-    turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
-    # vertices, not flats, lie on the radius: nothing stands out further than it
-    return np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
-
-
 def _bar(layout: Layout, place: Opening, y: float) -> Patch:
     stations = breaks(_BAR_END_MM, layout.top - _BAR_END_MM, 2 * layout.max_edge_mm)
-    outline = _round(place.x - _BAR_INSET_MM, y, BAR_RADIUS_MM, 8)
+    outline = regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8)
     return prism(outline, stations, 2, capped=(True, True))
 
 
@@ -124,7 +118,7 @@ def _hinges(place: Opening, sign: float) -> list[Patch]:
     patches = []
     for z in np.linspace(place.low + 160, place.high - 160, 5):
         patches.append(_block(place, (strap_end, pin), (z - 42, z + 42), (40.0, LEAF_MM + 2)))
-        outline = _round(place.x - 32.0, pin, 14.0, 6)
+        outline = regular((place.x - 32.0, pin), 14.0, 6)
         patches.append(prism(outline, (z - 72, z + 72), 2, capped=(True, True)))
         for side in (-1.0, 1.0):
             span = (z + side * 57 - 11, z + side * 57 + 11)

@@ -26,7 +26,7 @@ from fastgen.programs import INSIDE_ALBEDO
 from fastgen.records import to_plain
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene
-from fastgen.spreader import build_spreader
+from fastgen.shapes import spreader_mesh
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""
@@ -111,11 +111,10 @@ def _baked_material(glb: Glb, name: str, atlas: Atlas, prefix: str = "") -> int:
 
 def _add_spreader(glb: Glb, generator: Generator, scene: Scene) -> None:
     """What the container hangs on; its textures are coarse, for nothing on it is printed."""
-    spreader = scene.spreader
+    mesh = spreader_mesh(scene)
     atlas = generator.bake_spreader(scene, SPREADER_TEXEL_MM)
-    if atlas is None:
+    if mesh is None or atlas is None:
         return
-    mesh = build_spreader(scene.container.kind, spreader.flippers_down, spreader.gap_mm)
     glb.add_mesh(
         "spreader",
         _baked_material(glb, "spreader", atlas, "spreader_"),

@@ -112,7 +112,7 @@ def _tenth(value: float) -> float:
 
 
 def _between(rng: np.random.Generator, values: Range) -> float:
-    return _tenth(rng.uniform(values.lo, values.hi))
+    return _tenth(values.draw(rng))
 
 
 def _style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) -> _Style:

@@ -4,9 +4,7 @@ from dataclasses import dataclass, field
 
 from fastgen.artwork import glyph_tiles
 from fastgen.mesh import SHEET_FACES
-from fastgen.records import UNIT, Range, bounds, check_known, check_order
-
-MM = bounds(0.0, 20000.0, "mm")
+from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_order
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class MarkingsConfig:
     marker_faces: tuple[str, ...] = ("front", "back", "door", "no_door")
     markers_per_face: tuple[int, int] = field(default=(1, 6), metadata=bounds(0, 300))
     marker_side_mm: Range = field(default=Range(250, 300), metadata=bounds(20, 5000, "mm"))
-    marker_gap_mm: Range = field(default=Range(8, 40), metadata=MM)
+    marker_gap_mm: Range = field(default=Range(8, 40), metadata=LENGTH)
     marker_tilt_deg: Range = field(default=Range(-2.5, 2.5), metadata=bounds(-45, 45, "degrees"))
     marker_wear: Range = field(default=Range(0.0, 0.35), metadata=UNIT)
     fonts: tuple[str, ...] = ()  # empty: all that are shipped

@@ -60,8 +60,13 @@ def equirect_directions(height: int) -> NDArray[np.float64]:
 
 def row_solid_angle(height: int) -> NDArray[np.float64]:
     """Solid angle [H], in steradian, of one texel in each row of an [H, 2H] equirectangular map."""
+    return _row_spans(height) * np.pi / height
+
+
+def _row_spans(height: int) -> NDArray[np.float64]:
+    """How far each row [H] of an equirectangular map reaches along z on the unit sphere."""
     edges = np.cos(np.linspace(0.0, np.pi, height + 1))
-    return (edges[:-1] - edges[1:]) * np.pi / height
+    return edges[:-1] - edges[1:]
 
 
 def shrink(radiance: NDArray[np.float32], width: int) -> NDArray[np.float32]:
@@ -75,8 +80,7 @@ def shrink(radiance: NDArray[np.float32], width: int) -> NDArray[np.float32]:
         return radiance
     # area resampling is separable: columns first, then rows weighted by the solid angle they span
     narrow = _resize(radiance, height, width)
-    edges = np.cos(np.linspace(0.0, np.pi, height + 1))
-    span = (edges[:-1] - edges[1:]).astype(np.float32).reshape(-1, 1, 1)
+    span = _row_spans(height).astype(np.float32).reshape(-1, 1, 1)
     narrow *= span
     result = _resize(narrow, width // 2, width)
     result /= _resize(span, width // 2, 1)

@@ -17,6 +17,7 @@ from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREA
 from fastgen.lettering import TILE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, noise_tiles
+from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.resources import shader_path
 from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
 from fastgen.uniforms import Block
@@ -204,7 +205,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "CONTAINER_ID": f"{CONTAINER_ID}u",
         "SPREADER_ID": f"{SPREADER_ID}u",
         "SPREADER_CHART": f"{SPREADER_CHART}u",
-        "MIN_ROUGHNESS": "0.045",
+        "MIN_ROUGHNESS": MIN_ROUGHNESS,
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",

@@ -17,6 +17,8 @@ import typing
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
+
 from fastgen.errors import ConfigError
 
 T = TypeVar("T")
@@ -30,6 +32,10 @@ class Range(NamedTuple):
     lo: float
     hi: float
 
+    def draw(self, rng: np.random.Generator) -> float:
+        """A value of it, each as likely as any other."""
+        return float(rng.uniform(self.lo, self.hi))
+
 
 def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[str, Any]:
     """Field metadata: the closed interval that all numbers of the field lie in, and their unit."""
@@ -38,6 +44,9 @@ def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[
 
 UNIT = bounds(0.0, 1.0)
 """Bounds of shares, probabilities and colours."""
+
+LENGTH = bounds(0.0, 20000.0, "mm")
+"""Bounds of what is measured on a container, with room to spare."""
 
 
 def nearest(word: Any, choices: typing.Iterable[str]) -> str:

@@ -5,6 +5,10 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+MIN_ROUGHNESS = 0.045
+"""Least perceptual roughness that is shaded: Filament's where it computes in single precision (Guy
+and Agopian 2018, Physically Based Rendering in Filament)."""
+
 _POINTS = 4096
 
 

@@ -1,4 +1,4 @@
-"""Renderer: Scene -> Frame, the only user of GL.
+"""Renderer: Scene -> Frame, the owner of all GL objects that this takes.
 
 Two indirect draws, of the container and of the spreader that holds it, write for each sample which
 surface it sees and where on the unfolded sheet. Passes over the image then shade each pixel once

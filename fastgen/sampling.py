@@ -103,10 +103,6 @@ def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
     return {face: (rect[2], rect[3]) for face, rect in rects.items()}
 
 
-def _between(rng: np.random.Generator, values: Range) -> float:
-    return float(rng.uniform(values.lo, values.hi))
-
-
 def _surface(config: Config, streams: Streams) -> Surface:
     c = config.surface
     name = str(streams("paint.color").choice(list(c.colors)))
@@ -119,32 +115,32 @@ def _surface(config: Config, streams: Streams) -> Surface:
         paint=Paint(
             name,
             linear_color(c.colors[name]),
-            _between(streams("paint.roughness"), c.roughness),
-            _between(streams("paint.tone"), c.tone_variation),
+            c.roughness.draw(streams("paint.roughness")),
+            c.tone_variation.draw(streams("paint.tone")),
         ),
         ageing=Ageing(
-            _between(streams("ageing.strength"), c.ageing_strength),
-            _between(streams("ageing.reach"), c.ageing_reach_mm),
+            c.ageing_strength.draw(streams("ageing.strength")),
+            c.ageing_reach_mm.draw(streams("ageing.reach")),
         ),
         dirt=Dirt(
-            _between(streams("dirt.strength"), c.dirt_strength),
-            _between(streams("dirt.reach"), c.dirt_reach_mm),
+            c.dirt_strength.draw(streams("dirt.strength")),
+            c.dirt_reach_mm.draw(streams("dirt.reach")),
             linear_color(c.dirt_color),
         ),
         rust=Rust(
             coverage,
-            _between(streams("rust.scale"), c.rust_scale_mm),
+            c.rust_scale_mm.draw(streams("rust.scale")),
             linear_color(rust_color),
-            _between(streams("rust.roughness"), c.rust_roughness),
+            c.rust_roughness.draw(streams("rust.roughness")),
         ),
-        scratches=Scratches(_between(streams("scratches"), c.scratch_coverage)),
+        scratches=Scratches(c.scratch_coverage.draw(streams("scratches"))),
         wear=Wear(
-            _between(streams("wear"), c.wear_strength),
-            _between(streams("wear.scale"), c.wear_scale_mm),
+            c.wear_strength.draw(streams("wear")),
+            c.wear_scale_mm.draw(streams("wear.scale")),
         ),
         noise_offset_mm=(
-            _between(streams("noise.x"), Range(0, 50000)),
-            _between(streams("noise.y"), Range(0, 50000)),
+            Range(0, 50000).draw(streams("noise.x")),
+            Range(0, 50000).draw(streams("noise.y")),
         ),
     )
 
@@ -161,7 +157,7 @@ def _environment(
     weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
     share = np.array(list(weights.values())) / sum(weights.values())
     name = str(streams("environment").choice(list(weights), p=share))
-    return EnvironmentView(name, _between(streams("environment.yaw"), config.environment.yaw_deg))
+    return EnvironmentView(name, config.environment.yaw_deg.draw(streams("environment.yaw")))
 
 
 def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
@@ -206,7 +202,7 @@ def one_damage_each(config: Config) -> Iterator[Config]:
 
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     lowered = streams("spreader.flippers").random(2) < c.flippers_down
-    gap = _whole_gap(c, _between(streams("spreader.gap"), c.gap_mm))
+    gap = _whole_gap(c, c.gap_mm.draw(streams("spreader.gap")))
     return Spreader(
         present=bool(streams("spreader").random() < c.probability),
         albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
@@ -236,14 +232,14 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     axis = np.array(outward, float)
     right = np.cross((0, 0, 1), axis) if axis[2] == 0 else np.array([1.0, 0.0, 0.0])
     up = np.cross(axis, right)
-    azimuth = np.deg2rad(_between(rng, rig.azimuth_deg))
-    elevation = np.deg2rad(_between(rng, rig.elevation_deg))
+    azimuth = np.deg2rad(rig.azimuth_deg.draw(rng))
+    elevation = np.deg2rad(rig.elevation_deg.draw(rng))
     direction = np.cos(elevation) * (np.cos(azimuth) * axis + np.sin(azimuth) * right)
     direction += np.sin(elevation) * up
-    shift = _between(rng, rig.target_shift_mm) * right + _between(rng, rig.target_shift_mm) * up
+    shift = rig.target_shift_mm.draw(rng) * right + rig.target_shift_mm.draw(rng) * up
     target = np.array(middle) + shift
-    position = target + direction * _between(rng, rig.distance_mm)
-    roll = _between(rng, rig.roll_deg)
+    position = target + direction * rig.distance_mm.draw(rng)
+    roll = rig.roll_deg.draw(rng)
     camera = Camera(
         name=name,
         position_mm=_rounded(position),
@@ -251,7 +247,7 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
         focal_mm=rig.focal_mm,
         roll_deg=round(roll, 3),
         sensor_width_mm=rig.sensor_width_mm,
-        exposure_ev=round(_between(rng, rig.exposure_ev), 3),
+        exposure_ev=round(rig.exposure_ev.draw(rng), 3),
         lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
     if axis[2] == 0:

@@ -102,10 +102,11 @@ class Surface:
 class Decal:
     """One thing printed or stuck on the sheet.
 
-    kind: marker, text or sticker. class_name: label class, or '' for things without a label.
+    kind: marker, text, sticker or emblem. class_name: label class, or '' for things without one.
     face: chart it lies on. center_mm: centre in sheet coordinates. size_mm: width and height of
     the drawn rectangle before rotation (a marker's is the square around the standing diamond; a
-    text's is the tight box around its ink). art: marker, sticker or emblem name.
+    text's is the tight box around its ink). art: marker, sticker or emblem name, or 'stripes' for
+    the bands of high cubes. albedo: of the ink of texts, emblems and stripes.
     lines: text, one string a line; vertical text has one glyph below the other, columns from left
     to right. cap_mm: height of the capitals. wear 0..1: how much of the print has gone.
     """

@@ -14,7 +14,7 @@ import numpy as np
 from fastgen.container_castings import APERTURE_CENTER_MM
 from fastgen.container_layout import ContainerKind
 from fastgen.container_parts import ring
-from fastgen.unfold import Patch, Sheet, beside, box, prism
+from fastgen.unfold import Patch, Sheet, beside, box, prism, regular
 
 TIERS = ("frame", "headblock", "cables")
 """What a spreader is made of from below, ever narrower: charts are named spreader.TIER.PART."""
@@ -114,7 +114,7 @@ def ends(hang: Hang) -> list[Sheet]:
             y = side * (half_width - APERTURE_CENTER_MM[1])
             housings.append(hang.block(_around(x, 106.0), _around(y, 95.0), (0.0, 300.0)))
             low = hang.base - hang.gap_mm - _TWISTLOCK_DEPTH_MM
-            stem = _regular((x, y), 24.0, 8)
+            stem = regular((x, y), 24.0, 8)
             locks.append(prism(stem, (low, hang.base + 20.0), 2, capped=(True, True)))
         # plates that carry the end beam's load into the telescopic beams
         gussets = [
@@ -164,7 +164,7 @@ def headblock(hang: Hang) -> list[Sheet]:
         hang.block(_around(2080.0, 300.0), (-560.0, 560.0), (555.0, 920.0)),
     ]
     basket = prism(
-        _regular((0.0, 0.0), 420.0, 12),
+        regular((0.0, 0.0), 420.0, 12),
         (hang.base + 480.0, hang.base + 1300.0),
         2,
         capped=(True, True),
@@ -174,7 +174,7 @@ def headblock(hang: Hang) -> list[Sheet]:
     for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM):
         for side in _SIGNS:
             y = side * _BEAM_Y_MM
-            wheel = _regular((z, x), _SHEAVE_RADIUS_MM, 16)
+            wheel = regular((z, x), _SHEAVE_RADIUS_MM, 16)
             sheaves.append(prism(wheel, _around(y, 45.0), 1, capped=(True, True)))
             foot = hang.base + high - 10
             plate = [(foot, x - 300), (foot, x + 300), (z + 190, x + 130), (z + 190, x - 130)]
@@ -194,7 +194,7 @@ def cables(hang: Hang) -> list[Sheet]:
     """Eight falls, two from each sheave straight up; under a pixel thick, so four sides will do."""
     falls = [
         prism(
-            _regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
+            regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
         )
         for x, y, z in cable_feet_mm(hang)
     ]
@@ -218,12 +218,6 @@ def _painted(name: str, patch: Patch) -> Sheet:
 
 def _around(middle: float, half: float) -> tuple[float, float]:
     return middle - half, middle + half
-
-
-def _regular(center: tuple[float, float], radius: float, sides: int) -> np.ndarray:
-    """Corners [sides, 2] of a regular polygon, counter-clockwise."""
-    turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
-    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def _guide(

@@ -1,14 +1,21 @@
-"""sRGB's transfer function as tables, IEC 61966-2-1."""
+"""sRGB's transfer function, IEC 61966-2-1, and its tables."""
 
 import numpy as np
 
-_CODES = np.arange(256) / 255
-_STEPS = np.linspace(0, 1, 1 << 16)
 
-DECODED = np.where(_CODES <= 0.04045, _CODES / 12.92, ((_CODES + 0.055) / 1.055) ** 2.4).astype(
-    np.float32
-)
+def linear(encoded: float) -> float:
+    """Linear light, 0..1, of an encoded value 0..1.
+
+    By Python's own power: NumPy's may differ in the last bit between processors, and scenes, which
+    are the same on every machine, hold what comes out.
+    """
+    return encoded / 12.92 if encoded <= 0.04045 else float(((encoded + 0.055) / 1.055) ** 2.4)
+
+
+DECODED = np.array([linear(code / 255) for code in range(256)], np.float32)
 """Linear light, float32 [256], of each 8-bit code."""
+
+_STEPS = np.linspace(0, 1, 1 << 16)
 
 ENCODED = np.rint(
     255 * np.where(_STEPS <= 0.0031308, 12.92 * _STEPS, 1.055 * _STEPS ** (1 / 2.4) - 0.055)

@@ -163,6 +163,15 @@ def polygon(points_mm: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
     return flat(points_mm, fan, right, up)
 
 
+def regular(center: tuple[float, float], radius: float, sides: int) -> Array:
+    """Corners [sides, 2] of a regular polygon, counter-clockwise, for `prism`.
+
+    Corners, not edges, lie on the radius: nothing stands out farther.
+    """
+    turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
 def beside(patches: Sequence[Patch]) -> Patch:
     """Patches on one sheet, upright and side by side."""
     x = 0.0

@@ -13,6 +13,7 @@ from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record
+from fastgen.formats.yolo import pixel_box
 from fastgen.generate import MANIFEST
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
@@ -193,11 +194,9 @@ def _rows(text: bytes) -> list[tuple[int, list[float]]]:
 
 def _same_boxes(rows: list[tuple[int, list[float]]], scene: dict[str, Any]) -> bool:
     """The marker labels are the visible boxes of the scene file's objects, to 0.1 pixel."""
-    width, height = scene["size"]
-    held = []
-    for index, (x, y, w, h) in rows:
-        edges = ((x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width)
-        held.append((index, [round(v, 1) for v in (*edges, (y + h / 2) * height)]))
+    held = [
+        (index, [round(v, 1) for v in pixel_box(values, scene["size"])]) for index, values in rows
+    ]
     wanted = [
         (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
         for item in scene["objects"]

@@ -7,6 +7,7 @@ inside its box.
 """
 
 import itertools
+import math
 from typing import Any
 
 import torch
@@ -65,7 +66,8 @@ class Detector(Learner):
         self.heat = nn.Conv2d(width * 3 // 2, classes, 1)
         self.box = nn.Conv2d(width * 3 // 2, 8, 1)
         self.mask = nn.Conv2d(width * 3 // 2, 2, 1) if masks else None
-        nn.init.constant_(self.heat.bias, -torch.tensor(1 / _RARE - 1).log().item())  # type: ignore[arg-type]
+        assert self.heat.bias is not None
+        nn.init.constant_(self.heat.bias, -math.log(1 / _RARE - 1))
 
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Maps at a quarter of the size of images [B, 3, H, W] in -1..1.

@@ -69,15 +69,20 @@ class Item:
 
     @property
     def detections(self) -> Iterator[tuple[Object, Box]]:
-        """What the marker task labels, ignored or not, each with its visible box."""
-        for thing in self.sample.objects:
-            if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:
-                yield thing, thing.bbox
+        """As `detections`, of the sample's objects."""
+        return detections(self.sample.objects)
 
     @cached_property
     def jpeg(self) -> bytes:
         """The image as JPEG."""
         return jpeg(self.sample.image)
+
+
+def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
+    """What the marker task labels, ignored or not, each with its visible box."""
+    for thing in objects:
+        if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:
+            yield thing, thing.bbox
 
 
 class Format(ABC):

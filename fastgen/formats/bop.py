@@ -78,6 +78,7 @@ def _by_image(records: Records, key: str) -> Iterator[str]:
 def _models() -> Iterator[tuple[str, bytes]]:
     """Each kind of container with nominal corrugation, in its own frame, in mm."""
     import trimesh
+    from trimesh.exchange.ply import export_ply
 
     infos = {}
     for kind, number in OBJECT_IDS.items():
@@ -89,7 +90,7 @@ def _models() -> Iterator[tuple[str, bytes]]:
             **{f"size_{axis}": float(v) for axis, v in zip("xyz", high - low, strict=True)},
         }
         body = trimesh.Trimesh(mesh.positions_mm, mesh.triangles, process=False)
-        data: bytes = body.export(file_type="ply")  # type: ignore[assignment]
+        data: bytes = export_ply(body)
         yield f"bop/models/obj_{number:06d}.ply", data
     yield "bop/models/models_info.json", json.dumps(infos, indent=1).encode()
 

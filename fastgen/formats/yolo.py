@@ -1,23 +1,24 @@
 """YOLO text labels, normalised to the image and clipped to it: trainers refuse values beyond 1."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen import formats
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.sample import Box, Object
 from fastgen.visibility import mask_box, window
 
 
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
-    """Class, object and visible box of what is labelled in the marker task, ignored ones left out:
-    the format cannot tell them from the rest."""
+    """Class, object and visible box of formats.detections, ignored ones left out: the format cannot
+    tell them from the rest."""
     return [
-        (DETECTION_CLASSES.index(item.class_name), item, item.bbox)
-        for item in objects
-        if item.class_name in DETECTION_CLASSES and item.bbox is not None and not item.ignored
+        (DETECTION_CLASSES.index(item.class_name), item, box)
+        for item, box in formats.detections(objects)
+        if not item.ignored
     ]
 
 
@@ -25,6 +26,12 @@ def normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, fl
     """Centre x, y, width and height of a pixel box as shares of an image of (width, height)."""
     (x0, y0, x1, y1), (width, height) = box, size
     return (x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height
+
+
+def pixel_box(values: Sequence[float], size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """The pixel box (x0, y0, x1, y1) of what `normalised` gave: its inverse."""
+    (x, y, w, h), (width, height) = values, size
+    return (x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width, (y + h / 2) * height
 
 
 def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:

@@ -13,7 +13,7 @@ from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 
 def sample_lens(config: LensConfig, rng: np.random.Generator) -> Lens:
     """One lens of the kind that `config` describes; coefficients to a millionth."""
-    drawn = {name: _between(rng, getattr(config, name)) for name in sorted(config.names)}
+    drawn = {name: getattr(config, name).draw(rng) for name in sorted(config.names)}
     return Lens(config.model, tuple(round(drawn[name], 6) for name in config.names))
 
 
@@ -21,10 +21,6 @@ def extreme_lenses(config: LensConfig) -> Iterator[Lens]:
     """The lenses at the ends of all ranges."""
     ends = [sorted({*getattr(config, name)}) for name in config.names]
     return (Lens(config.model, values) for values in itertools.product(*ends))
-
-
-def _between(rng: np.random.Generator, values: Range) -> float:
-    return float(rng.uniform(values.lo, values.hi))
 
 
 def sample_sensor(
@@ -56,11 +52,11 @@ def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Gen
     )
     wets = wet.random() < config.wet_probability or rains
     return Weather(
-        visibility_mm=round(_between(fog, config.visibility_mm)) if foggy else 0.0,
+        visibility_mm=round(config.visibility_mm.draw(fog)) if foggy else 0.0,
         rain=Rain(
             rate_mm_h=_drawn(rain, config.rate_mm_h),
             # to four digits, as four decimals would make 0 of the shortest
-            shutter_s=float(f"{_between(rain, config.shutter_s):.4g}"),
+            shutter_s=float(f"{config.shutter_s.draw(rain):.4g}"),
             wind=_drawn(rain, config.wind),
             seed=_seed(rain),
         )
@@ -73,19 +69,19 @@ def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Gen
 def _defocus(config: SensorConfig, distance_mm: float, rng: np.random.Generator) -> Defocus | None:
     if rng.random() >= config.defocus.probability:
         return None
-    focus = _between(rng, config.defocus.focus) * distance_mm
+    focus = config.defocus.focus.draw(rng) * distance_mm
     return Defocus(round(focus), _drawn(rng, config.defocus.f_number))
 
 
 def _motion(config: SensorConfig, rng: np.random.Generator) -> tuple[float, float]:
     if rng.random() >= config.motion.probability:
         return 0.0, 0.0
-    extent, angle = _between(rng, config.motion.extent), rng.uniform(0, 2 * np.pi)
+    extent, angle = config.motion.extent.draw(rng), rng.uniform(0, 2 * np.pi)
     return round(float(extent * np.cos(angle)), 6), round(float(extent * np.sin(angle)), 6)
 
 
 def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
-    red, blue = (round(2.0 ** _between(rng, ev), 4) for _ in range(2))
+    red, blue = (round(2.0 ** ev.draw(rng), 4) for _ in range(2))
     return red, 1.0, blue
 
 
@@ -112,7 +108,7 @@ def _stamp(config: SensorConfig, rng: np.random.Generator) -> Stamp | None:
 
 
 def _drawn(rng: np.random.Generator, values: Range) -> float:
-    return round(_between(rng, values), 4)
+    return round(values.draw(rng), 4)
 
 
 def _seed(rng: np.random.Generator) -> int:
