@@ -16,6 +16,7 @@ from common.run import Learner, Plan, Run, Table, conclude, feed_of, parameters,
 from torch.nn import functional
 from transformers import ResNetConfig, ResNetForImageClassification
 
+from fastgen import Config
 from fastgen.torch import ContainerDataset, class_names
 
 PLANS = {
@@ -68,12 +69,26 @@ def precision_recall(door: torch.Tensor, called_door: torch.Tensor) -> tuple[flo
     )
 
 
-def training_data(run: Run) -> ContainerDataset:
-    """Images of Cl and Cr."""
+FROM_AFAR = {
+    "distance_mm": [7200, 20000],
+    "azimuth_deg": [-20, 20],
+    "target_shift_mm": [-600, 600],
+}
+"""Where Cl and Cr stand for two thirds of the CPU version's images: containers are then as small as
+A and B have them, of which a net that saw large ones only makes what chance has it."""
+
+
+def training_data(run: Run) -> tuple[ContainerDataset, list[ContainerDataset]]:
+    """Images of Cl and Cr as the preset has them, and what the CPU version adds from afar."""
     plan = run.plan
-    return ContainerDataset(
-        "door", seed=run.seed, size=plan.size, length=plan.images, split="train"
-    )
+    options: dict[str, Any] = {"size": plan.size, "split": "train"}
+    near = ContainerDataset("door", seed=run.seed, length=plan.images, **options)
+    if run.full:
+        return near, []
+    config = Config.from_values({"cameras": {"Cl": FROM_AFAR, "Cr": FROM_AFAR}})
+    # with another seed: not the same scenes again
+    far = ContainerDataset("door", config, run.seed + 1, length=2 * plan.images, **options)
+    return near, [far]
 
 
 def test_data(run: Run) -> tuple[Kept, Kept]:
@@ -97,7 +112,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Train, test both experiments, and write what was found."""
     run = start("door", __doc__ or "", PLANS, argv)
     plan = run.plan
-    feed = feed_of(training_data(run), run)
+    near, far = training_data(run)
+    feed = feed_of(near, run, far)
     model = Classifier(run.full)
     losses = train(model, feed, run)
 

@@ -105,10 +105,15 @@ def start(
     return Run(name, mode, plans[mode], asked.full, asked.results, asked.seed, device)
 
 
-def feed_of(data: ContainerDataset, run: Run) -> Feed:
-    """Batches of `data`, rendered anew each pass or once, as the plan has it."""
-    source = data if run.plan.workers else rendered(data, run.cache)
-    return Feed(source, run.plan.batch, run.seed, run.plan.workers)
+def feed_of(data: ContainerDataset, run: Run, more: Sequence[ContainerDataset] = ()) -> Feed:
+    """Batches of `data`, rendered anew each pass or once, as the plan has it; once, with `more`."""
+    plan = run.plan
+    if plan.workers:
+        return Feed(data, plan.batch, run.seed, plan.workers)
+    kept = rendered(data, run.cache)
+    for other in more:
+        kept = kept.with_more(rendered(other, run.cache))
+    return Feed(kept, plan.batch, run.seed)
 
 
 def train(model: Learner, feed: Feed, run: Run) -> list[float]:
