@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import damage as fields
-from fastgen import environment
+from fastgen import environment, tone
 from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
 from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS
@@ -208,6 +208,9 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "MIN_ROUGHNESS": MIN_ROUGHNESS,
         "DIELECTRIC_F0": "0.04",
         "INSIDE_LIGHT": "0.10",
+        "TONE_FRESNEL": tone.FRESNEL,
+        "TONE_SHOULDER": tone.SHOULDER,
+        "TONE_DESATURATION": tone.DESATURATION,
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",
         "LOBE_CELLS": LOBE_CELLS,
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},

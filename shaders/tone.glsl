@@ -1,18 +1,17 @@
 // Exposed linear radiance to what a screen shows, and sRGB encoding.
 
-// Khronos PBR Neutral tone mapper (Khronos Group 2024, specification section 2): the identity below
-// 0.8 less the Fresnel offset, then a shoulder that leans to white.
+// Khronos PBR Neutral (fastgen/tone.py): the identity less the Fresnel offset, then a shoulder that
+// leans to white.
 vec3 neutral_tone(vec3 c) {
-    const float start = 0.8 - 0.04;
-    const float desaturation = 0.15;
+    const float start = TONE_SHOULDER - TONE_FRESNEL;
     float low = min(c.r, min(c.g, c.b));
-    c -= low < 0.08 ? low - 6.25 * low * low : 0.04;
+    c -= low < 2.0 * TONE_FRESNEL ? low - 0.25 / TONE_FRESNEL * low * low : TONE_FRESNEL;
     float peak = max(c.r, max(c.g, c.b));
     // where the peak is below the start, the shoulder's own formula leaves c as it is
     const float d = 1.0 - start;
     float shoulder = max(peak, start);
     float new_peak = 1.0 - d * d / (shoulder + d - start);
-    float white = desaturation * (shoulder - new_peak) + 1.0;
+    float white = TONE_DESATURATION * (shoulder - new_peak) + 1.0;
     float keep = 1.0 / (shoulder * white);
     return c * (new_peak * keep) + (new_peak - new_peak * shoulder * keep);
 }

@@ -10,15 +10,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen import tone
 from fastgen.srgb import DECODED, ENCODED
 
 Light = NDArray[np.float32]
 """float32 [H, W, 3], linear Rec.709; 1 is what a white surface in metered light reflects, about."""
 
-# Khronos PBR Neutral (Khronos Group 2024, specification section 2), as in shaders/tone.glsl
-_START = np.float32(0.8 - 0.04)
+_FRESNEL = np.float32(tone.FRESNEL)
+_CURVE = np.float32(0.25 / tone.FRESNEL)
+_START = np.float32(tone.SHOULDER - tone.FRESNEL)
 _ROOM = np.float32(1 - _START)
-_DESATURATION = np.float32(0.15)
+_DESATURATION = np.float32(tone.DESATURATION)
 _BRIGHTEST = np.float32(12.0)
 _TOP = np.float32(1 - _ROOM**2 / (_BRIGHTEST + _ROOM - _START))
 
@@ -30,7 +32,7 @@ def light_of(image: NDArray[np.uint8]) -> Light:
     scale, offset = _UNSHOWN_SCALE[peak], _UNSHOWN_OFFSET[peak]
     low = DECODED[cv2.min(cv2.min(red, green), blue)] * scale + offset
     low = np.maximum(low, 0)
-    offset += np.where(low < 0.04, np.sqrt(low / np.float32(6.25)) - low, np.float32(0.04))
+    offset += np.where(low < _FRESNEL, np.sqrt(low / _CURVE) - low, _FRESNEL)
     return _joined([np.maximum(DECODED[plane] * scale + offset, 0) for plane in planes])
 
 
@@ -38,7 +40,7 @@ def displayed(light: Light) -> NDArray[np.uint8]:
     """Light through the tone curve and sRGB's encoding, uint8 [H, W, 3]; below 0 is black."""
     red, green, blue = planes = [np.maximum(plane, 0) for plane in cv2.split(light)]
     low = cv2.min(cv2.min(red, green), blue)
-    taken = np.where(low < 0.08, low - np.float32(6.25) * low * low, np.float32(0.04))
+    taken = np.where(low < 2 * _FRESNEL, low - _CURVE * low * low, _FRESNEL)
     scale, offset = _shown(np.maximum(np.maximum(red, green), blue) - taken)
     offset -= taken * scale
     shown = [
