@@ -42,14 +42,6 @@ def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
     return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 
-def equirect_encode(direction: ArrayLike) -> NDArray[np.float64]:
-    """Unit directions [..., 3] to equirectangular (u, v) [..., 2], u in [0, 1), v in [0, 1]."""
-    n = np.asarray(direction, np.float64)
-    u = (0.5 - np.arctan2(n[..., 1], n[..., 0]) / (2 * np.pi)) % 1.0
-    v = np.arctan2(np.hypot(n[..., 0], n[..., 1]), n[..., 2]) / np.pi  # acos(z), exact at the poles
-    return np.stack([u, v], axis=-1)
-
-
 def equirect_directions(height: int) -> NDArray[np.float64]:
     """Unit directions [H, 2H, 3] of the texel centres of an equirectangular map."""
     theta = np.pi * (np.arange(height) + 0.5)[:, None] / height
@@ -131,11 +123,12 @@ def resample_octahedral(
     for first in range(0, inner, band):
         last = min(first + band, inner)
         across = along[first * samples : last * samples, None]
-        # octahedral_decode and equirect_encode, without the unit length that no angle needs
+        # octahedral_decode, without the unit length that no angle needs
         z = 1.0 - np.abs(along) - np.abs(across)
         folded = np.maximum(-z, 0.0)
         dx, dy = along - np.copysign(folded, along), across - np.copysign(folded, across)
-        # texel centres lie at half integers, and the padding shifts by one
+        # texel centres lie at half integers, and the padding shifts by one; arctan2 gives acos(z),
+        # exact at the poles
         x = np.arctan2(dy, dx) * np.float32(-width / (2 * np.pi)) + np.float32(width / 2 + 0.5)
         y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
         taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
