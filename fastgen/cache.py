@@ -2,6 +2,8 @@
 
 import contextlib
 import fcntl
+import functools
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -66,6 +68,33 @@ def once(entry: Path, read: Callable[[], T | None], make: Callable[[], T]) -> T:
             if found is None:
                 found = make()
     return found
+
+
+def computed(
+    name: str, inputs: object, make: Callable[[], Mapping[str, NDArray[Any]]]
+) -> dict[str, NDArray[Any]]:
+    """What `make` gives, arrays by name; read where the same code gave it before.
+
+    inputs: all that it hangs on but for the package's own code, told apart by its repr.
+    """
+    key = hashlib.sha256(f"{_code_digest()} {inputs!r}".encode()).hexdigest()
+    entry = default_folder() / f"{name}-{key[:32]}.npz"
+
+    def made() -> dict[str, NDArray[Any]]:
+        arrays = dict(make())
+        write(entry, arrays)
+        return arrays
+
+    return once(entry, lambda: read(entry) or None, made)
+
+
+@functools.cache
+def _code_digest() -> str:
+    """Of the package's modules and of numpy's version: nobody forgets to raise this number."""
+    digest = hashlib.sha256(np.__version__.encode())
+    for module in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(module.read_bytes())
+    return digest.hexdigest()
 
 
 @contextlib.contextmanager

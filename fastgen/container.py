@@ -31,6 +31,7 @@ from fastgen.door_gear import gear
 from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
 from fastgen.records import check_known
+from fastgen.stored_mesh import stored
 from fastgen.unfold import assemble
 
 __all__ = ["KINDS", "ContainerKind", "WallProfiles", "Wave", "build_container"]
@@ -57,7 +58,14 @@ def build_container(kind: str, profiles: WallProfiles = _USUAL, max_edge_mm: flo
 
 @lru_cache(maxsize=32)
 def _built(kind: str, profiles: WallProfiles, max_edge_mm: float) -> Mesh:
-    layout = Layout(KINDS[kind], profiles, max_edge_mm)
+    return stored(
+        "container",
+        (kind, profiles, max_edge_mm),
+        lambda: _assembled(Layout(KINDS[kind], profiles, max_edge_mm)),
+    )
+
+
+def _assembled(layout: Layout) -> Mesh:
     walls = panels(layout)
     door_sheets, door_flats = leaves(layout)
     sheets = [

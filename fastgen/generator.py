@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Any, Self
 
@@ -267,8 +267,8 @@ class Generator:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
         later."""
         scene = self.scene(0)
-        drawn = [name for name, weight in self._weights.items() if weight > 0]
-        names = self.config.environment.names or drawn
+        weighty = [name for name, weight in self._weights.items() if weight > 0]
+        names = self.config.environment.names or weighty
         lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
         shaped = (
             replace(scene, container=container, spreader=spreader)
@@ -278,21 +278,18 @@ class Generator:
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)
             sunny = {renderer.ambient(name).sun is not None: name for name in names}
-        # what labels ask of meshes
-        shown = [self._sampled(config) for config in one_container_each(self.config)]
-        # programs and targets: a light with a sun, and one without
-        shown += [
-            replace(scene, environment=EnvironmentView(name, 0.0))
-            for scene in map(self._sampled, one_damage_each(self.config))
-            for name in sunny.values()
-        ]
-        for scene in shown:
-            for camera in scene.cameras:
-                self.render(scene=scene, camera=camera)
-
-    def _sampled(self, config: Config) -> Scene:
-        """A scene of another distribution, under this one's lights."""
-        return sample_scene(config, self.seed, 0, self.environments)
+        # programs and targets, and what labels ask of meshes: every way to draw, every container
+        ways = list(product(one_damage_each(self.config), sunny.values()))
+        boxes = list(one_container_each(self.config))
+        for i in range(max(len(ways), len(boxes))):
+            (config, name), box = ways[i % len(ways)], boxes[i % len(boxes)]
+            drawn = sample_scene(
+                replace(config, container=box.container), self.seed, 0, self.environments
+            )
+            drawn = replace(drawn, environment=EnvironmentView(name, 0.0))
+            # cameras that draw alike share what they draw with
+            for camera in {camera.lens is None: camera for camera in drawn.cameras}.values():
+                self.render(scene=drawn, camera=camera)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""

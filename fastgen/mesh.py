@@ -4,6 +4,7 @@ Container frame: right-handed, z up, origin at the centre of the footprint, z = 
 the bottom castings, +x the door end.
 """
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,7 +12,6 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial import ConvexHull
 
 from fastgen.distinct import distinct_rows
 from fastgen.errors import ConfigError
@@ -160,7 +160,15 @@ class Mesh:
     @cached_property
     def hull(self) -> NDArray[np.int64]:
         """Which of points_mm are corners of their convex hull."""
+        from scipy.spatial import ConvexHull  # takes 0.3 s, and stored_mesh.py knows most hulls
+
         return np.asarray(ConvexHull(self.points_mm).vertices, np.int64)
+
+    @cached_property
+    def shape_digest(self) -> str:
+        """SHA-256, in hexadecimal, of positions, normals and triangles."""
+        arrays = (self.positions_mm, self.normals, self.triangles)
+        return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
     @cached_property
     def _numbers(self) -> dict[str, int]:
@@ -212,14 +220,17 @@ class _Locator:
         limit = (columns - 1, rows - 1)
         low = np.clip((corners.min(axis=1) - 1e-3) // _CELL_MM, 0, limit).astype(int)
         high = np.clip((corners.max(axis=1) + 1e-3) // _CELL_MM, 0, limit).astype(int)
-        lists: list[list[int]] = [[] for _ in range(columns * rows)]
-        for i, ((c0, r0), (c1, r1)) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
-            for row in range(r0, r1 + 1):
-                for column in range(c0, c1 + 1):
-                    lists[row * columns + column].append(i)
-        candidates = np.full((columns * rows, max(map(len, lists))), -1)
-        for cell, members in enumerate(lists):
-            candidates[cell, : len(members)] = members
+        wide, tall = (high - low + 1).T
+        touched = wide * tall
+        triangle = np.repeat(np.arange(len(low)), touched)
+        step = np.arange(len(triangle)) - np.repeat(np.cumsum(touched) - touched, touched)
+        row, column = np.divmod(step, wide[triangle])
+        cell = (low[triangle, 1] + row) * columns + low[triangle, 0] + column
+        order = np.argsort(cell, kind="stable")
+        count = np.bincount(cell, minlength=columns * rows)
+        place = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
+        candidates = np.full((columns * rows, count.max()), -1)
+        candidates[cell[order], place] = triangle[order]
         return _Locator(triangles, to_weights, candidates, (columns, rows))
 
     def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

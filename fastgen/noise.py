@@ -9,11 +9,13 @@ variance that filtering removes comes back as softness).
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
+
+from fastgen import cache
 
 NOISE_SIZE = 1024
 _SEED = 20261
@@ -53,9 +55,9 @@ def _spectral(
     frequency = np.maximum(np.hypot(fx, fy), 1e-3)
     amplitude = frequency ** (-slope / 2)
     amplitude *= np.exp(-((low / frequency) ** 4)) * np.exp(-((frequency / high) ** 2))
-    white = scipy.fft.rfft2(rng.standard_normal((NOISE_SIZE, NOISE_SIZE), np.float32))
+    white = np.fft.rfft2(rng.standard_normal((NOISE_SIZE, NOISE_SIZE), np.float32))
     shaped = white * amplitude.astype(np.float32)
-    return np.asarray(scipy.fft.irfft2(shaped, s=(NOISE_SIZE, NOISE_SIZE)))
+    return np.asarray(np.fft.irfft2(shaped, s=(NOISE_SIZE, NOISE_SIZE)))
 
 
 def _stain(rust: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -94,7 +96,14 @@ def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def noise_tiles() -> NoiseTiles:
-    """Bake both layers and their mip chain; always the same, about half a second."""
+    """Both layers and their mip chain; always the same. Baking them takes half a second, once."""
+    arrays = cache.computed("noise", _SEED, _baked)
+    return NoiseTiles(
+        tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1)), arrays["lost_deviation"]
+    )
+
+
+def _baked() -> dict[str, NDArray[Any]]:
     rng = np.random.default_rng(_SEED)
     tone = _uniform(_spectral(rng, 2.6, 1.0, 90.0))
     ridges = -np.abs(_spectral(rng, 2.4, 3.0, 300.0))
@@ -115,5 +124,5 @@ def noise_tiles() -> NoiseTiles:
         levels.append(_halved(levels[-1]))
     variance = np.stack([level.var(axis=(1, 2)) for level in levels], axis=1)
     lost = np.sqrt(np.maximum(variance[:, :1] - variance, 0)).astype(np.float32)
-    encoded = tuple(np.rint(np.clip(level, 0, 1) * 255).astype(np.uint8) for level in levels)
-    return NoiseTiles(encoded, lost)
+    encoded = (np.rint(np.clip(level, 0, 1) * 255).astype(np.uint8) for level in levels)
+    return {"lost_deviation": lost, **{f"level{i}": level for i, level in enumerate(encoded)}}

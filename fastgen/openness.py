@@ -252,10 +252,8 @@ class SkyProbe:
     def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
     ) -> Openness:
-        digest = hashlib.sha256(f"{_VERSION} {self._driver}".encode())
-        for mesh in key:
-            for array in (mesh.positions_mm, mesh.normals, mesh.triangles) if mesh else ():
-                digest.update(array.tobytes())
+        shapes = [mesh.shape_digest if mesh else "" for mesh in key]
+        digest = hashlib.sha256(f"{_VERSION} {self._driver} {shapes}".encode())
         normals = key[0].normals
 
         def make() -> NDArray[np.uint8]:

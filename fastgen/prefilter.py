@@ -14,7 +14,6 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
-import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 BORDER = 1
@@ -203,6 +202,8 @@ def convolve(
     (Driscoll and Healy 1994, Computing Fourier Transforms and Convolutions on the 2-Sphere, use
     the same separation). Being a sum of weights of 0 or more it has no ringing.
     """
+    import scipy.fft  # takes 0.1 s, and lights are kept on disk
+
     height, width, channels = radiance.shape
     theta = np.pi * (np.arange(height) + 0.5) / height
     cosine_phi = np.cos(np.pi * np.arange(height + 1) / height)[:, None, None]

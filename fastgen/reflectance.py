@@ -5,6 +5,8 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen import cache
+
 MIN_ROUGHNESS = 0.045
 """Least perceptual roughness that is shaded: Filament's where it computes in single precision (Guy
 and Agopian 2018, Physically Based Rendering in Filament)."""
@@ -24,6 +26,12 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
     Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
     mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
     """
+    table = cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
+    table.flags.writeable = False
+    return table
+
+
+def _integrated(size: int) -> NDArray[np.float32]:
     center = (np.arange(size) + 0.5) / size
     n_dot_v = center[:, None]
     view = np.stack([np.sqrt(1 - n_dot_v**2), n_dot_v])
@@ -48,7 +56,6 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
         weight = lit * (1.0 + masked_v) / (1.0 + masked_v + masked_l)  # G2 / G1
         fresnel = (1.0 - np.clip(v_dot_h, 0.0, 1.0)) ** 5
         table[row] = np.stack([weight * (1.0 - fresnel), weight * fresnel]).mean(-1).T
-    table.flags.writeable = False
     return table
 
 

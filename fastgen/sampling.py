@@ -180,13 +180,11 @@ def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
 
 
 def one_container_each(config: Config) -> Iterator[Config]:
-    """For every container of `config` one that has only that, and damage for certain, if any."""
-    c, damage = config.container, config.damage
-    damage = replace(damage, probability=float(damage.probability > 0))
+    """For every container of `config` one that has only that."""
+    c = config.container
     for kind, weight in c.kinds.items():
         for scale in c.depth_scale * (weight > 0):
-            only = replace(c, kinds={kind: 1.0}, depth_scale=(scale,))
-            yield replace(config, container=only, damage=damage)
+            yield replace(config, container=replace(c, kinds={kind: 1.0}, depth_scale=(scale,)))
 
 
 def one_damage_each(config: Config) -> Iterator[Config]:

@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from fastgen.distinct import distinct_rows
 
@@ -48,6 +47,8 @@ def junctions(
         return {}
     vertex_of = np.zeros(point.max() + 1, np.int64)
     vertex_of[point] = np.arange(len(point))
+    from scipy.spatial import cKDTree  # takes 0.3 s, and finished meshes are kept on disk
+
     starts, ends = (positions_mm[vertex_of[edges[loose, side]]] for side in (0, 1))
     length = np.linalg.norm(ends - starts, axis=1)
     candidates = vertex_of[np.unique(edges[loose])]

@@ -40,8 +40,9 @@ _CUT_MM = 150.0
 """Members are cut across so often: light is interpolated between vertices, and they hide it from
 each other where they meet."""
 
-_TWISTLOCK_DEPTH_MM = 45.0
-"""How far a twistlock's head reaches into its casting, which is 70 deep there."""
+_TWISTLOCK_MM = (-45.0, 220.0)
+"""A twistlock's ends above the castings' upper plane: its head reaches into a casting, which is 70
+deep there; its stem ends in its housing, however wide the gap below that is."""
 
 _PIVOT_MM = 200.0
 """Height about which flippers swing: raised ones are lowered ones mirrored there."""
@@ -54,6 +55,9 @@ _CABLE_RADIUS_MM = 15.0
 
 CABLES = 8
 CABLE_CHART = "spreader.cables.falls"
+
+LOCKS_CHARTS = {end: f"spreader.frame.locks.{end}" for end in ("no_door", "door")}
+"""Of the twistlocks at each end: what stays where it is when the rest is lifted."""
 
 CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
 """A cable's four sides lie along x and y."""
@@ -102,9 +106,10 @@ def ends(hang: Hang) -> list[Sheet]:
     sheets = []
     half_length, half_width = hang.kind.length_mm / 2, hang.kind.width_mm / 2
     for name, end in (("no_door", -1.0), ("door", 1.0)):
-        reach = (end * (_FRAME_HALF_MM - 400.0), end * (half_length - 200.0))
+        drawn_out = (end * (_FRAME_HALF_MM - 400.0), end * (half_length - 200.0))
         beams = [
-            hang.block(reach, _around(side * _BEAM_Y_MM, 110.0), (160.0, 490.0)) for side in _SIGNS
+            hang.block(drawn_out, _around(side * _BEAM_Y_MM, 110.0), (160.0, 490.0))
+            for side in _SIGNS
         ]
         across = (20.0 - half_width, half_width - 20.0)
         beam = hang.block((end * (half_length - 260), end * (half_length - 12)), across, (70, 450))
@@ -113,9 +118,9 @@ def ends(hang: Hang) -> list[Sheet]:
             x = end * (half_length - APERTURE_CENTER_MM[0])
             y = side * (half_width - APERTURE_CENTER_MM[1])
             housings.append(hang.block(_around(x, 106.0), _around(y, 95.0), (0.0, 300.0)))
-            low = hang.base - hang.gap_mm - _TWISTLOCK_DEPTH_MM
             stem = regular((x, y), 24.0, 8)
-            locks.append(prism(stem, (low, hang.base + 20.0), 2, capped=(True, True)))
+            reach = [hang.kind.height_mm + z for z in _TWISTLOCK_MM]
+            locks.append(prism(stem, reach, 2, capped=(True, True)))
         # plates that carry the end beam's load into the telescopic beams
         gussets = [
             hang.block(
@@ -125,7 +130,7 @@ def ends(hang: Hang) -> list[Sheet]:
         ]
         sheets += [
             _painted(f"spreader.frame.{name}", beside([beam, *beams, *housings, *gussets])),
-            Sheet(f"spreader.frame.locks.{name}", "roof", "cable", "frame", beside(locks)),
+            Sheet(LOCKS_CHARTS[name], "roof", "cable", "frame", beside(locks)),
         ]
     return sheets
 

@@ -1,0 +1,50 @@
+"""Meshes that are built once and then read from the disk cache."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import cache
+from fastgen.mesh import Chart, Mesh
+
+_ARRAYS = ("positions_mm", "normals", "atlas_mm", "chart", "triangles")
+
+
+def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
+    """What `build` gives for `inputs`, its hull known and its arrays read-only; see
+    cache.computed."""
+    arrays = cache.computed(name, inputs, lambda: _packed(build()))
+    about = json.loads(arrays["about"].tobytes())
+    mesh = Mesh(
+        **{key: arrays[key] for key in _ARRAYS},
+        charts=tuple(
+            Chart(part, face, material, (x, y, width, height))
+            for part, face, material, (x, y, width, height) in about["charts"]
+        ),
+        atlas_size_mm=(about["atlas_size_mm"][0], about["atlas_size_mm"][1]),
+        groups={group: slice(*ends) for group, ends in about["groups"].items()},
+        flats={
+            face: tuple((start, end) for start, end in flats)
+            for face, flats in about["flats"].items()
+        },
+    )
+    vars(mesh)["hull"] = arrays["hull"]  # where its cached_property looks first
+    for array in arrays.values():  # meshes are shared, so nobody may write into them
+        array.flags.writeable = False
+    return mesh
+
+
+def _packed(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
+    about = {
+        "charts": [(c.name, c.face, c.material, c.rect_mm) for c in mesh.charts],
+        "atlas_size_mm": mesh.atlas_size_mm,
+        "groups": {name: (part.start, part.stop) for name, part in mesh.groups.items()},
+        "flats": dict(mesh.flats),
+    }
+    return {
+        **{key: getattr(mesh, key) for key in _ARRAYS},
+        "hull": mesh.hull,
+        "about": np.frombuffer(json.dumps(about).encode(), np.uint8),
+    }

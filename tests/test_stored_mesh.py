@@ -1,0 +1,80 @@
+"""Meshes and tables that the disk cache keeps are those that were computed."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from fastgen import cache
+from fastgen.container import build_container
+from fastgen.mesh import Mesh
+from fastgen.stored_mesh import stored
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "cache")
+    return tmp_path / "cache"
+
+
+@pytest.fixture(scope="module")
+def built() -> Mesh:
+    return build_container("20")
+
+
+def never():
+    raise AssertionError("built again")
+
+
+def assert_equal(found: Mesh, wanted: Mesh) -> None:
+    for each in fields(Mesh):
+        one, other = (getattr(mesh, each.name) for mesh in (found, wanted))
+        if isinstance(other, np.ndarray):
+            assert one.dtype == other.dtype
+            np.testing.assert_array_equal(one, other)
+            assert not one.flags.writeable
+        else:
+            assert one == other
+
+
+def test_a_mesh_comes_back_as_it_was(folder, built):
+    stored("box", ("20", 1.5), lambda: built)
+    found = stored("box", ("20", 1.5), never)
+    assert_equal(found, built)
+    # the hull is that of the very points, in whichever order they are found
+    away = found.points_mm @ np.random.default_rng(1).normal(size=(3, 200))
+    np.testing.assert_array_equal(away[found.hull].max(axis=0), away.max(axis=0))
+
+
+def test_what_differs_is_built_anew(folder, built, monkeypatch):
+    moved = replace(built, positions_mm=built.positions_mm + np.float32(1))
+    stored("box", ("20", 1.5), lambda: built)
+    assert_equal(stored("box", ("20", 2.5), lambda: moved), moved)
+    monkeypatch.setattr(cache, "_code_digest", lambda: "other code")
+    assert_equal(stored("box", ("20", 1.5), lambda: moved), moved)
+
+
+def test_a_damaged_entry_is_made_again(folder, built):
+    stored("box", 1, lambda: built)
+    (entry,) = folder.glob("box-*.npz")
+    whole = entry.read_bytes()
+    entry.write_bytes(whole[: len(whole) // 2])
+    assert_equal(stored("box", 1, lambda: built), built)
+    assert entry.read_bytes() == whole
+
+
+def test_nothing_is_needed_of_the_disk(tmp_path, monkeypatch, built):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "file" / "cache")
+    assert_equal(stored("box", 1, lambda: built), built)
+
+
+def test_any_change_of_code_is_other_code(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
+    modules = {name: tmp_path / f"{name}.py" for name in ("cache", "mesh")}
+    for path in modules.values():
+        path.write_text("a = 1")
+    before = cache._code_digest.__wrapped__()
+    assert cache._code_digest.__wrapped__() == before
+    modules["mesh"].write_text("a = 2")
+    assert cache._code_digest.__wrapped__() != before
