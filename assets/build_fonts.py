@@ -2,9 +2,9 @@
 
     python assets/build_fonts.py
 
-Needs Pillow and scipy. A tile is 64 x 64 and covers a square of 1.6 cap heights: the ink centred
-across it, the baseline 0.3 cap heights above its bottom; 0.5 lies on the outline and 0.15 cap
-heights make up the distance to 0 or 1.
+Needs fastgen, Pillow and scipy. A tile is 64 x 64 and covers a square of 1.6 cap heights: the ink
+centred across it, the baseline 0.3 cap heights above its bottom; 0.5 lies on the outline and 0.15
+cap heights make up the distance to 0 or 1.
 """
 
 import json
@@ -14,10 +14,12 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import distance_transform_edt
 
+from fastgen.artwork import GLYPH_TILE_SIZE as TILE
+from fastgen.lettering import TILE_BASELINE_CAPS, TILE_CAPS, TILE_RANGE_CAPS
+
 FOLDER = Path(__file__).parent / "fonts"
 CHARS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-./:,&'()+"
-TILE, OVERSAMPLING = 64, 12
-TILE_CAPS, BASELINE_CAPS, RANGE_CAPS = 1.6, 0.3, 0.3
+OVERSAMPLING = 12
 COLUMNS = 16
 
 
@@ -34,11 +36,11 @@ def bake(path: Path) -> dict[str, tuple[np.ndarray, float, float, float]]:
         image = Image.new("L", (side, side))
         pen = side / 2 - (left + right) / 2
         ImageDraw.Draw(image).text(
-            (pen, side - BASELINE_CAPS * cap_px), char, fill=255, font=font, anchor="ls"
+            (pen, side - TILE_BASELINE_CAPS * cap_px), char, fill=255, font=font, anchor="ls"
         )
         ink = np.asarray(image) > 127
         distance = distance_transform_edt(ink) - distance_transform_edt(~ink)
-        value = 0.5 + distance / cap_px / RANGE_CAPS
+        value = 0.5 + distance / cap_px / TILE_RANGE_CAPS
         tile = value.reshape(TILE, OVERSAMPLING, TILE, OVERSAMPLING).mean(axis=(1, 3))
         pixels = np.rint(np.clip(tile, 0, 1) * 255).astype(np.uint8)
         baked[char] = (pixels, left / cap_px, right / cap_px, font.getlength(char) / cap_px)

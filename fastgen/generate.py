@@ -35,6 +35,7 @@ from fastgen.shards import (
     Task,
     digest,
     manifest_path,
+    shard_of,
     stem_of,
 )
 from fastgen.storage import Folder, Remote, storage_of
@@ -247,9 +248,9 @@ def _check_alike(
                 f"({_difference(key, old.get(key), value)}); "
                 f"repeat {them} to resume, or give another folder"
             )
-    beyond = manifest_path(job.shard_count)
-    made = sorted(path for path in storage.sizes() if path.startswith("shards/"))
-    if (made and made[-1] >= beyond) or old.get("images", 0) > job.images:
+    made = (shard_of(path) for path in storage.sizes())
+    beyond = any(shard is not None and shard >= job.shard_count for shard in made)
+    if beyond or old.get("images", 0) > job.images:
         raise OutputError(
             f"{job.out}: holds more than {job.images} images; give --images as before or more"
         )

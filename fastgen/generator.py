@@ -348,7 +348,7 @@ def _whole_size(size: Any) -> tuple[int, int]:
         width, height = (whole("size", side, MIN_SIZE, MAX_SIZE) for side in pair)
     except ConfigError:
         raise ConfigError(
-            f"size: {pair[0]}x{pair[1]} is out of range; "
-            f"each side takes {MIN_SIZE} to {MAX_SIZE} pixels"
+            f"size: {pair[0]}x{pair[1]} cannot be; "
+            f"each side takes {MIN_SIZE} to {MAX_SIZE} whole pixels"
         ) from None
     return width, height

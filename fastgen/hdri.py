@@ -32,6 +32,8 @@ def find_hdris(folder: str | Path) -> list[Path]:
     Hidden files, such as those that macOS leaves beside others on foreign disks, do not count.
     Raises AssetError where the folder does not exist, holds none or has one that no UTF-8 names.
     """
+    if not str(folder):  # Path takes it for the current folder
+        raise AssetError("'': names no folder; give one that holds .hdr or .exr files")
     folder = Path(folder)
     if not folder.is_dir():
         raise AssetError(f"{folder}: no such folder; give one that holds .hdr or .exr files")

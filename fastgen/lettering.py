@@ -12,6 +12,9 @@ TILE_CAPS = 1.6
 TILE_BASELINE_CAPS = 0.3
 """The baseline lies this far above the tile's bottom, in cap heights."""
 
+TILE_RANGE_CAPS = 0.3
+"""Distance in cap heights over which a tile's values go from 0 to 1."""
+
 LINE_PITCH_CAPS = 1.5
 COLUMN_PITCH_CAPS = 1.6
 GLYPH_PITCH_CAPS = 1.35

@@ -14,7 +14,7 @@ from fastgen import damage as fields
 from fastgen import environment, tone
 from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
 from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
-from fastgen.lettering import TILE_CAPS
+from fastgen.lettering import TILE_CAPS, TILE_RANGE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, noise_tiles
 from fastgen.reflectance import MIN_ROUGHNESS
@@ -40,7 +40,8 @@ PIXEL_CLASSES = {
     "cable": (),
 }
 """Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near;
-cables that cover part of the sky."""
+cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
+"""
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 
@@ -85,6 +86,13 @@ GUTTER_STEPS = 17
 
 INSIDE_ALBEDO = {"wood": (0.22, 0.14, 0.08), "primer": (0.30, 0.31, 0.29)}
 """Linear albedo of what a hole shows: the floor, and all else."""
+
+INSIDE_LIGHT = 0.1
+"""Share of the light around that reaches the inside through a hole; chosen by eye."""
+
+DIELECTRIC_F0 = 0.04
+"""Reflectance of what is no metal, head on: that of a refractive index of 1.5 (Fresnel's equations,
+((n - 1) / (n + 1))^2), usual for paints and plastics."""
 
 _NOISE_LEVELS = NOISE_SIZE.bit_length()
 
@@ -206,8 +214,8 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "SPREADER_ID": f"{SPREADER_ID}u",
         "SPREADER_CHART": f"{SPREADER_CHART}u",
         "MIN_ROUGHNESS": MIN_ROUGHNESS,
-        "DIELECTRIC_F0": "0.04",
-        "INSIDE_LIGHT": "0.10",
+        "DIELECTRIC_F0": DIELECTRIC_F0,
+        "INSIDE_LIGHT": INSIDE_LIGHT,
         "TONE_FRESNEL": tone.FRESNEL,
         "TONE_SHOULDER": tone.SHOULDER,
         "TONE_DESATURATION": tone.DESATURATION,
@@ -223,7 +231,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ART_SIZE": f"{ART_SIZE:.1f}",
         "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
         "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
-        "GLYPH_RANGE_CAPS": "0.3",
+        "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
         **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
         **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},

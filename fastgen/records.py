@@ -52,7 +52,8 @@ LENGTH = bounds(0.0, 20000.0, "mm")
 def nearest(word: Any, choices: typing.Iterable[str]) -> str:
     """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
     names = sorted(choices)
-    close = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
+    alike = [name for name in names if name.casefold() == str(word).casefold()]
+    close = alike or difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     if close:
         return f" (did you mean {close[0]}?)"
     return f" (choose from {', '.join(names)})"

@@ -5,6 +5,7 @@ from collections import Counter
 from typing import Any
 
 from fastgen.artwork import art_images, glyph_tiles
+from fastgen.camera import MM, NEAR_M
 from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import LOBES
@@ -77,10 +78,16 @@ def _check_camera(camera: Camera, path: str, container: Container) -> None:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is where the camera itself stands")
     length, width, height = KINDS[container.kind].size_mm
     x, y, z = camera.position_mm
-    if abs(x) < length / 2 and abs(y) < width / 2 and 0 < z < height:
+    outside = abs(x) - length / 2, abs(y) - width / 2, abs(z - height / 2) - height / 2
+    if max(outside) < 0:
         raise ConfigError(
             f"{path}.position_mm: {camera.position_mm} is inside the container, of which only the "
             "outside is drawn"
+        )
+    if math.hypot(*(max(away, 0.0) for away in outside)) < NEAR_M / MM:
+        raise ConfigError(
+            f"{path}.position_mm: {camera.position_mm} is nearer to the container than "
+            f"{NEAR_M / MM:g} mm, before which nothing is drawn; move it away"
         )
     if camera.sensor is not None and camera.sensor.stamp is not None:
         check_known(f"{path}.sensor.stamp.corner", camera.sensor.stamp.corner, CORNERS)

@@ -115,6 +115,12 @@ def manifest_path(shard: int) -> str:
     return f"shards/{shard:06d}.json"
 
 
+def shard_of(path: str) -> int | None:
+    """Which shard's manifest lies at `path`, None where none does."""
+    name = path.removeprefix("shards/").removesuffix(".json")
+    return int(name) if name.isdecimal() and manifest_path(int(name)) == path else None
+
+
 def digest(data: bytes) -> str:
     """Content hash, SHA-256 in hexadecimal."""
     return hashlib.sha256(data).hexdigest()

@@ -166,6 +166,23 @@ def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
     assert images.items() <= content(out).items()
 
 
+def test_a_file_astray_is_no_shard(dataset, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(dataset, out, symlinks=True)
+    (out / "shards/notes.txt").write_text("mine")
+    assert run(out) == 0
+    assert (out / "shards/notes.txt").read_text() == "mine"
+    for number in (0, 7, 999_999, 1_000_000):
+        assert shards.shard_of(shards.manifest_path(number)) == number
+    for astray in (
+        "shards/notes.txt",
+        "shards/7.json",
+        "shards/0000007.json",
+        "images/000007.json",
+    ):
+        assert shards.shard_of(astray) is None
+
+
 def test_more_images_extend_a_dataset(dataset, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(dataset, out, symlinks=True)
@@ -339,6 +356,7 @@ def test_split_option_puts_all_in_one(tmp_path):
         (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
+        (["generate", "{out}", "--images", "2", "--hdri", ""], "'': names no folder"),
         (["generate", "{out}", "--images", "2", "--shard", "0"], "shard: 0 is out of range"),
         (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),
         (["generate", "{out}", "--images", "2", "--hdri", "{broken}"], "photo.hdr"),

@@ -50,6 +50,7 @@ def test_a_mapping_replaces_the_bases_and_namesakes_inherit():
     ("data", "message"),
     [
         ({"name": "x", "cuont": 1}, r"cuont: unknown key \(did you mean count\?\)"),
+        ({"name": "x", "NAME": "y"}, r"NAME: unknown key \(did you mean name\?\)"),
         ({}, "missing name"),
         ({"name": 3}, "name: expected text, got 3"),
         ({"name": "x", "count": 1.5}, "count: expected a whole number"),

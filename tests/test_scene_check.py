@@ -153,7 +153,10 @@ def test_a_camera_inside_the_container_is_refused(full, inside):
     camera = Camera("c", inside, (9000, 0, 1000), 20)
     with pytest.raises(ConfigError, match=r"^camera.position_mm: .* is inside the container"):
         check_camera(camera, full.container)
-    check_camera(replace(camera, position_mm=(inside[0], inside[1], -1)), full.container)
+    check_camera(replace(camera, position_mm=(inside[0], inside[1], -101)), full.container)
+    for near in (-1, -99):
+        with pytest.raises(ConfigError, match=r"^camera.position_mm: .* nearer .* than 100 mm"):
+            check_camera(replace(camera, position_mm=(inside[0], inside[1], near)), full.container)
     with pytest.raises(ConfigError, match=r"^scene.cameras\[0\].position_mm"):
         check_scene(replace(full, cameras=(camera,)))
 
