@@ -8,6 +8,7 @@ import numpy as np
 
 from fastgen.mesh import FACE_AXES, FACES, Mesh
 from fastgen.openness import open_sky
+from fastgen.textures import data_texture
 
 _SLACK_MM = 120.0
 """Frames stand back from the castings' plane (mesh.GROUP_SLACK_MM), and sheets may sag a little."""
@@ -124,6 +125,4 @@ def chart_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.T
             FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
             for chart in mesh.charts
         ]
-    texture = ctx.texture((count, 2), 4, table.tobytes(), dtype="f4")
-    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-    return texture
+    return data_texture(ctx, table)

@@ -17,7 +17,7 @@ from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.damage import corners_mm, seen_damages, variant
-from fastgen.decal_tables import DECAL_TEXELS, GLYPH_COLUMNS, DecalTables, pack_decals
+from fastgen.decal_tables import DecalTables, pack_decals
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.exposure import metered_exposure
 from fastgen.gl import GLContext
@@ -45,7 +45,7 @@ from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
-from fastgen.textures import art_texture, mipmapped_array, noise_texture
+from fastgen.textures import art_texture, data_texture, mipmapped_array, noise_texture
 from fastgen.uniforms import Block
 
 _BOW_STEPS = 17
@@ -56,14 +56,9 @@ class _SceneDecals:
     """Decal tables of one scene as textures."""
 
     def __init__(self, ctx: moderngl.Context, tables: DecalTables) -> None:
-        rows, columns = tables.grid.shape[:2]
-        self.grid = ctx.texture((columns, rows), 4, tables.grid.tobytes(), dtype="u4")
-        count = len(tables.table)
-        self.table = ctx.texture((DECAL_TEXELS, count), 4, tables.table.tobytes(), dtype="f4")
-        rows = len(tables.glyphs)
-        self.glyphs = ctx.texture((GLYPH_COLUMNS, rows), 4, tables.glyphs.tobytes(), dtype="f4")
-        for texture in (self.grid, self.table, self.glyphs):
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.grid = data_texture(ctx, tables.grid)
+        self.table = data_texture(ctx, tables.table)
+        self.glyphs = data_texture(ctx, tables.glyphs)
 
     def release(self) -> None:
         for texture in (self.grid, self.table, self.glyphs):

@@ -39,6 +39,22 @@ def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.Textu
     return _clamped(texture)
 
 
+def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:
+    """Numbers [H, W, C], float32 or uint32, for shaders to fetch by row and column.
+
+    Filled up with zeros to powers of two: llvmpipe compiles its shaders anew, which takes seconds,
+    where a texture's sides stop or start being such.
+    """
+    height, width, channels = values.shape
+    rows, columns = (1 << (side - 1).bit_length() for side in (height, width))
+    filled = np.zeros((rows, columns, channels), values.dtype)
+    filled[:height, :width] = values
+    dtype = {"f": "f4", "u": "u4"}[values.dtype.kind]
+    texture = ctx.texture((columns, rows), channels, filled.tobytes(), dtype=dtype)
+    texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+    return texture
+
+
 def _clamped(texture: moderngl.TextureArray) -> moderngl.TextureArray:
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False

@@ -102,7 +102,7 @@ runpy.run_module("fastgen", run_name="__main__")
 """
 
 
-@pytest.mark.parametrize("module", ["numpy", "fastgen.config", "scipy", "argparse"])
+@pytest.mark.parametrize("module", ["numpy", "fastgen.config", "cv2", "argparse"])
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_modules_load_ends_in_one_line(module, number):
     code, error = loading(module, number, "signal.default_int_handler")
