@@ -5,13 +5,14 @@ import fcntl
 import functools
 import hashlib
 import os
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fastgen.whole_file import whole_file
 
 T = TypeVar("T")
 
@@ -40,20 +41,11 @@ def read(entry: Path) -> dict[str, NDArray[np.generic]]:
 
 def write(entry: Path, arrays: Mapping[str, Any], compress: bool = False) -> None:
     """Keep arrays by name as an entry, whole or not at all; none without a writable folder."""
-    temporary = None
-    try:
+    with contextlib.suppress(OSError):
         entry.parent.mkdir(parents=True, exist_ok=True)
-        # several workers may write the same entry: each its own file, and the last rename wins
-        with tempfile.NamedTemporaryFile(
-            dir=entry.parent, prefix=entry.stem, suffix=".part", delete=False
-        ) as file:
-            temporary = Path(file.name)
+        with whole_file(entry, durable=False) as file:
             (np.savez_compressed if compress else np.savez)(file, **arrays)
-        temporary.replace(entry)
         _trim(entry.parent)
-    except OSError:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
 
 
 def once(entry: Path, read: Callable[[], T | None], make: Callable[[], T]) -> T:

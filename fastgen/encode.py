@@ -1,7 +1,5 @@
 """Pixels to bytes, and bytes to disk so that a file is there whole or not at all."""
 
-import contextlib
-import os
 import struct
 import zlib
 from pathlib import Path
@@ -13,6 +11,7 @@ from numpy.typing import NDArray
 from zlib_ng import zlib_ng
 
 from fastgen.errors import OutputError
+from fastgen.whole_file import whole_file
 
 JPEG_QUALITY = 92
 
@@ -73,11 +72,8 @@ def write(path: Path, data: bytes | str) -> None:
 
     Raises OutputError where that fails.
     """
-    aside = path.with_name(f".{path.name}.part")
     try:
-        aside.write_bytes(data.encode() if isinstance(data, str) else data)
-        os.replace(aside, path)
+        with whole_file(path) as stream:
+            stream.write(data.encode() if isinstance(data, str) else data)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            aside.unlink(missing_ok=True)
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from None

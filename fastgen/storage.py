@@ -15,6 +15,7 @@ from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Files, Same
+from fastgen.whole_file import ASIDE_FILES, whole_file
 
 ASIDE = ".aside"
 """Prefix of folders where files wait until all of their shard are on the disk."""
@@ -57,20 +58,10 @@ class Folder:
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
         """Written aside, flushed, renamed."""
         target = self.root / path
-        # two processes may write the same file where one was given up but lives on
-        aside = target.with_name(f".{target.name}.{uuid.uuid4().hex}.part")
-        try:
+        with _told(target, "written"):
             target.parent.mkdir(parents=True, exist_ok=True)
-            with aside.open("wb") as stream:
-                for piece in pieces:
-                    stream.write(piece)
-                stream.flush()
-                os.fsync(stream.fileno())
-            os.replace(aside, target)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                aside.unlink(missing_ok=True)
-            raise OutputError(f"{target}: cannot be written ({error.strerror})") from None
+            with whole_file(target) as stream:
+                stream.writelines(pieces)
 
     def make_folders(self, paths: Iterable[str]) -> None:
         """Have these folders even where nothing is in them."""
@@ -133,7 +124,7 @@ class Folder:
     def _clear(self) -> None:
         for left in self.root.glob(f"{ASIDE}*"):
             shutil.rmtree(left, ignore_errors=True)
-        for left in self.root.rglob(".*.part"):
+        for left in self.root.rglob(ASIDE_FILES):
             left.unlink(missing_ok=True)
 
 

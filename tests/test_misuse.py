@@ -77,7 +77,7 @@ def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     elif others == "workers":
         arguments[-1] = "0"
     else:
-        (copy / "shards/zebra.json").write_text("{}")
+        (copy / "shards/000099.json").write_text("{}")
     before = content(copy)
     assert main(arguments) == 2
     assert content(copy) == before
