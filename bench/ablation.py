@@ -1,14 +1,15 @@
 """What is each modelled element worth, and what does it cost?
 
-    python bench/ablation.py [--cases 16] [--only WORD] [--repeats 5]
+    python bench/ablation.py [--cases 16] [--only WORD] [--repeats 6]
 
 Takes one element at a time out of the scenes of bench/references (ablation_elements.py says how)
 and draws them again. Printed are the FLIP that this changes over the pixels of container and
 spreader at 640x640, mean over the cases and worst case; the share of those pixels that change
 visibly, by more than VISIBLE; by how much the image without it is farther from Cycles' reference at
 320x320 (negative: nearer); and the processor time of a draw that is saved, a mean with its standard
-error. Elements that a case does not have count as no change. Leaves its
-table in docs/accuracy.md and bench/results/ablation.json; with --only, neither.
+error. Elements that a case does not have count as no change. The row "nothing" says what two
+equal draws differ by. Leaves its table in docs/accuracy.md and bench/results/ablation.json; with
+--only, neither.
 """
 
 import argparse
@@ -33,6 +34,7 @@ from fastgen import Config, Generator
 from fastgen.sample import Frame
 from fastgen.scene import Scene
 
+NOTHING = Element("", "nothing")
 QUALITY = "balanced"
 VISIBLE = 0.1
 MARGIN_PX = 32
@@ -136,11 +138,12 @@ def without(
             visible.append(float((change > VISIBLE).mean()))
             small = less.frame(case, scene, SIZE)
             farther.append(error_to(whole.reference, whole.exposure, small) - whole.error)
-            pairs = [
-                [drawer.seconds(case, scene, size) for drawer in (full, less)]
-                for _ in range(repeats)
-            ]
-            saved.append(float(np.median(np.subtract(*np.transpose(pairs)))) * 1e3)
+            spent: dict[Drawer, list[float]] = {full: [], less: []}
+            for turn in range(repeats):
+                # who comes second finds more at hand: they take turns
+                for drawer in (full, less) if turn % 2 else (less, full):
+                    spent[drawer].append(drawer.seconds(case, scene, size))
+            saved.append(1e3 * float(np.median(spent[full]) - np.median(spent[less])))
     absence.check()
     return {
         "group": element.group,
@@ -158,7 +161,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=16)
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--repeats", type=int, default=6)
     parser.add_argument("--only", default="", help="elements whose group or name holds this")
     options = parser.parse_args()
     size = parse_size(options.size)
@@ -172,9 +175,9 @@ def main() -> None:
         "| --- | --- | --- | --- | --- |",
     ]
     rows: dict[str, Any] = {}
-    with Drawer(Absence(Element("", "nothing"))) as full:
+    with Drawer(Absence(NOTHING)) as full:
         wholes = [Whole.of(case, full, size) for case in chosen]
-        for element in ELEMENTS:
+        for element in (NOTHING, *ELEMENTS):
             if options.only not in f"{element.group} {element.name}":
                 continue
             row = rows[element.name] = without(element, wholes, full, size, options.repeats)
