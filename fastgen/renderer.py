@@ -126,7 +126,6 @@ class Renderer:
         self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
     ) -> Targets:
         """As `render`, without reading back: the targets keep the image until the next draw."""
-        ctx = self._ctx
         view = view_of(camera, size)
         damages = seen_damages(scene.damages, camera.position_mm)
         damage = variant(damages)
@@ -135,7 +134,9 @@ class Renderer:
         )
         light = self._light(scene.environment.name)
         mesh, spreader = self._shapes.of(scene, camera.lens is not None, light.ambient)
-        shading = self._shading.get(layer, lambda: Shading(ctx, self._samples_per_axis, layer))
+        shading = self._shading.get(
+            layer, lambda: Shading(self._ctx, self._samples_per_axis, layer)
+        )
         shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
         sunny = sun_values(light.ambient.sun, shadow, view.position_m)
@@ -145,37 +146,8 @@ class Renderer:
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
-
-        holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
-        targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
-        ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._lobes.use(UNITS["lobe_masks"])
-        ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
-        # a dent may tilt a face into view that the rest mesh turns away
-        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
-        bent = {face for place in tilted for face in place.split(".")}
-        if spreader is not None:
-            spreader.draw(camera.position_mm, damage, hollow=False)
-        mesh.draw(camera.position_mm, damage, bent)
-        targets.end_samples()
-
-        textures: dict[str, Any] = {
-            "surface_keys": targets.keys,
-            "sheet_points": targets.points,
-            "sheet_depths": targets.depths,
-            "openness_points": targets.openness,
-            "mirror_points": targets.mirror,
-            "specular_light": light.specular,
-            "irradiance_light": light.irradiance,
-            "background_light": light.background,
-            "dfg_table": self._dfg,
-        }
-        if targets.rest is not None:
-            textures["rest_points"] = targets.rest
-        if shadow is not None:
-            textures["sun_shadow"] = shadow.depth
-        for name, texture in textures.items():
-            texture.use(UNITS[name])
+        self._sample(targets, view, camera, damages, mesh, spreader)
+        self._bind_light(targets, light, shadow)
         self._bind_surface(scene, mesh, spreader)
         near = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
@@ -195,6 +167,50 @@ class Renderer:
             bent=camera.lens is not None,
         )
         return targets
+
+    def _sample(
+        self,
+        targets: Targets,
+        view: View,
+        camera: Camera,
+        damages: tuple[Damage, ...],
+        mesh: GpuMesh,
+        spreader: GpuMesh | None,
+    ) -> None:
+        """Draw the geometry into the sample targets."""
+        damage = variant(damages)
+        holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
+        targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
+        self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._lobes.use(UNITS["lobe_masks"])
+        self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
+        # a dent may tilt a face into view that the rest mesh turns away
+        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
+        bent = {face for place in tilted for face in place.split(".")}
+        if spreader is not None:
+            spreader.draw(camera.position_mm, damage, hollow=False)
+        mesh.draw(camera.position_mm, damage, bent)
+        targets.end_samples()
+
+    def _bind_light(self, targets: Targets, light: GpuLight, shadow: ShadowMap | None) -> None:
+        """Bind the samples and what lights them."""
+        textures: dict[str, Any] = {
+            "surface_keys": targets.keys,
+            "sheet_points": targets.points,
+            "sheet_depths": targets.depths,
+            "openness_points": targets.openness,
+            "mirror_points": targets.mirror,
+            "specular_light": light.specular,
+            "irradiance_light": light.irradiance,
+            "background_light": light.background,
+            "dfg_table": self._dfg,
+        }
+        if targets.rest is not None:
+            textures["rest_points"] = targets.rest
+        if shadow is not None:
+            textures["sun_shadow"] = shadow.depth
+        for name, texture in textures.items():
+            texture.use(UNITS[name])
 
     def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
