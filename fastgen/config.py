@@ -260,7 +260,7 @@ class Config:
         Raises ConfigError naming the file and the key or value that does not fit.
         """
         try:
-            data = yaml.load(Path(path).read_text(encoding="utf-8"), _UniqueKeys)
+            data = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
         except (OSError, TypeError) as error:
             words = error.strerror if isinstance(error, OSError) else "give a path"
             raise ConfigError(f"{path}: cannot be read ({words})") from None
@@ -277,19 +277,29 @@ class Config:
         return plain
 
 
-class _UniqueKeys(yaml.SafeLoader):
-    """Refuses a key that stands twice, of which PyYAML would drop the first without a word; YAML
-    1.2.2, section 3.2.1.1: the keys of a mapping are unique."""
+class _Loader(yaml.SafeLoader):
+    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses a key that
+    stands twice, of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2
+    and 3.2.1.1)."""
 
     def compose_mapping_node(self, anchor: dict[Any, Any]) -> yaml.MappingNode:
         node = super().compose_mapping_node(anchor)
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            if key.value in seen:
-                words = f"the key {key.value!r} stands twice in one mapping"
+            merge = key.tag == "tag:yaml.org,2002:merge"
+            name = key.value if merge else str(self.construct_object(key))  # 010 is 8
+            if name in seen:
+                words = f"the key {name!r} stands twice in one mapping"
                 raise yaml.composer.ComposerError(None, None, words, key.start_mark)
-            seen.add(key.value)
+            seen.add(name)
         return node
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
 
 
 PRESETS: dict[str, dict[str, Any]] = {

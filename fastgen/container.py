@@ -9,15 +9,16 @@ pixel is 36 / f * distance / 640: 12.5 mm for f = 45 mm at 10 m (the ends), 20 m
   distance; ridges are cut by max_edge_mm only to bend later.
 - Locking bars, 34 mm, under 3 px: 8 sides. Hinge knuckles, 28 mm: 6. Casting apertures, 51 to
   124 mm, 4 to 10 px: 12 points. Cams, jaws, brackets, handles, lugs: blocks, 2 to 8 px.
-- Members under the floor are seen from far below or not at all: C sections cut every 800 mm.
+- Members under the floor are seen from far below or not at all: C sections cut every 400 mm,
+  for a lens bends corners only.
 
 With the usual profiles and max_edge_mm = 150:
 
     kind   triangles  vertices  charts  atlas in m    filled
-    20        25,252    28,850     118  11.6 x 11.2     84 %
-    40        40,154    44,540     138  14.5 x 14.2     92 %
-    40HC      42,464    46,918     138  14.9 x 14.6     92 %
-    45HC      46,388    51,046     143  15.8 x 15.4     91 %
+    20        26,036    29,656     118  11.6 x 11.2     84 %
+    40        41,936    46,368     138  14.5 x 14.2     92 %
+    40HC      44,246    48,746     138  14.9 x 14.6     92 %
+    45HC      48,406    53,116     143  15.8 x 15.4     91 %
 """
 
 from functools import lru_cache

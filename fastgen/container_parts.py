@@ -35,6 +35,9 @@ DOOR_FACE_MM = 50.0
 
 _MEMBER_SPACING_MM = 300.0
 
+_FLOOR_CUT_MM, _MEMBER_CUT_MM = 280.0, 400.0
+"""The floor and the members below it are cut across so often: a lens bends corners only."""
+
 
 def frame(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
     """Posts, rails, headers and sills. Their stations are those of the walls beside them."""
@@ -193,12 +196,12 @@ def base(layout: Layout) -> list[Sheet]:
     start = -half_length + layout.end_inner_mm
     end = half_length - layout.door_post_mm[0]
     floor = sweep(
-        [(x, 0.0, FLOOR_MM) for x in breaks(start - OVERLAP_MM, end + OVERLAP_MM, 600.0)],
-        breaks(-reach_y, reach_y, 600.0),
+        [(x, 0.0, FLOOR_MM) for x in breaks(start - OVERLAP_MM, end + OVERLAP_MM, _FLOOR_CUT_MM)],
+        breaks(-reach_y, reach_y, _FLOOR_CUT_MM),
         FACE_AXES["underside"].up,
     )
     sheets = [Sheet("underside", "underside", "underside", "underside", floor)]
-    rows = breaks(-reach_y, reach_y, 800.0)
+    rows = breaks(-reach_y, reach_y, _MEMBER_CUT_MM)
     pockets = _fork_centers(layout)
     bays = max(round((end - start) / _MEMBER_SPACING_MM), 2)
     for i, x in enumerate(np.linspace(start, end, bays + 1)[1:-1]):

@@ -160,7 +160,7 @@ def _container(shot: Shot) -> Object:
     larger than rails and sheets: its visible fraction is true to half a percent.
     """
     frame, view = shot.frame, shot.view
-    shown = (frame.ids > 0) & (frame.ids != SPREADER_ID)
+    shown = frame.damage > 0  # what is seen through two holes is the container's, though void
     area = int(np.count_nonzero(shown))
     points = _container_points(shot.scene, shot.mesh, view.distortion is not None)
     pixels, depth = view.project(points)

@@ -26,8 +26,11 @@ _MARGIN = 1.3
 _WIDEST_DEG = 78.0
 """Off the axis at the corners; wider, what is drawn would meet the plane through the camera."""
 
-_ROUNDS = 12
-"""Of the fixed-point iteration for tangential distortion; each gains two digits or more."""
+_ROUNDS = 6
+"""Of Newton's iteration for tangential distortion; each doubles the digits."""
+
+_NUDGE = 1e-5
+"""Of ideal points, to either side, for slopes."""
 
 _FIT_TERMS = 8
 
@@ -41,6 +44,11 @@ PINHOLE: Mapping[str, ArrayLike] = MappingProxyType(
     }
 )
 """What shaders/lens.glsl needs where there is no lens, see Distortion.shader_values."""
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Third component of the cross products of vectors [..., 2]."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], np.float64)
 
 
 class Distortion:
@@ -72,6 +80,10 @@ class Distortion:
         self._table, self._bent = table[: last + 1], bent[: last + 1]
         self._end, self._end_bent = float(table[last]), float(bent[last])
         self._end_slope = float(self._slope(table[last]))
+        if self._folds(radius):
+            raise ConfigError(
+                "lens: its tangential distortion folds the image over; give p1 and p2 nearer to 0"
+            )
         corner = float(np.interp(need, bent, table))
         widest = np.degrees(corner if self._fisheye else np.arctan(corner))
         if widest > _WIDEST_DEG:
@@ -96,8 +108,39 @@ class Distortion:
         ideal = self._straight(points)
         if any(self._p):
             for _ in range(_ROUNDS):
-                ideal = self._straight(points - self._shift(ideal))
+                along, across = self._slopes(ideal)
+                off = self.apply(ideal) - points
+                area = _cross(along, across)
+                area = np.where(np.abs(area) < _LEAST_SLOPE**2, 1.0, area)  # at a fold
+                step = np.stack([_cross(off, across), _cross(along, off)], axis=-1)
+                ideal = ideal - step / area[..., None]
         return ideal
+
+    def _slopes(self, ideal: Array) -> tuple[Array, Array]:
+        """Derivatives [..., 2] of `apply` by an ideal point's x and y."""
+        x, y = (
+            (self.apply(ideal + nudge) - self.apply(ideal - nudge)) / (2 * _NUDGE)
+            for nudge in np.eye(2) * _NUDGE
+        )
+        return x, y
+
+    def _folds(self, radius: float) -> bool:
+        """Whether two ideal points are seen at one place of an image with such corners."""
+        t = self._table[1:]
+        # radial distortion stretches by its slope along a radius, by curve / t across it, and
+        # tangential distortion's derivatives are no more than 8 |p| r: short of that, none fold
+        if 8 * np.hypot(*self._p) * self._end < min(
+            self._slope(t).min(), (self._curve(t) / t).min()
+        ):
+            return False
+        turn = np.linspace(0, 2 * np.pi, 128, endpoint=False)
+        ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        ideal = np.linspace(0, self._end, 65)[1:, None, None] * ring
+        seen = self.apply(ideal)
+        ideal = ideal[np.hypot(*np.moveaxis(seen, -1, 0)) <= radius]
+        if (_cross(*self._slopes(ideal)) < _LEAST_SLOPE**2).any():
+            return True
+        return bool(np.abs(self.remove(self.apply(ideal)) - ideal).max() > 1e-6)
 
     @cached_property
     def shader_values(self) -> Mapping[str, ArrayLike]:

@@ -38,7 +38,11 @@ class _Counts:
     def add(self, record: Record) -> None:
         """Count one image."""
         image_width, image_height = record["size"]
-        damages, markers = record["facts"]["damage"], record["facts"]["imdg"]
+        # what is ignored is in no label file but COCO's, as a crowd
+        damages, markers = (
+            [item for item in record["facts"][task] if not item["iscrowd"]]
+            for task in ("damage", "imdg")
+        )
         self.images += 1
         self.damaged += any(item["category_id"] > 1 for item in damages)
         for item in damages:
@@ -48,11 +52,10 @@ class _Counts:
                 self.damage_sizes.append((width / image_width, height / image_height))
         for item in markers:
             number = item["category_id"] - 1
-            if not item["iscrowd"]:  # ignored: no label file of this task has it
-                self.markers[DETECTION_CLASSES[number]] += 1
-                if number >= _FIRST_MARKER:
-                    _, _, width, height = item["bbox"]
-                    self.marker_sizes.append((width / image_width, height / image_height))
+            self.markers[DETECTION_CLASSES[number]] += 1
+            if number >= _FIRST_MARKER:
+                _, _, width, height = item["bbox"]
+                self.marker_sizes.append((width / image_width, height / image_height))
 
 
 def report(out: str | Path) -> str:

@@ -121,6 +121,8 @@ def test_errors_about_names_name_the_file(tmp_path):
         ("damage: {count: 2}", "damage.count: expected a list of 2 values, got 2"),
         ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
         ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),
+        ("cameras: {010: {face: front}, 8: {face: back}}", ".*'8' stands twice"),
+        ("weather: {shutter_s: ['1e-3', 0.1]}", "weather.shutter_s.* write 0.001 without quotes"),
         ("cameras: {no: {face: front}}", "cameras: expected a name, got False; put it in quotes"),
     ):
         path = tmp_path / "port.yaml"
@@ -151,3 +153,17 @@ def test_possible_shapes_are_just_what_scenes_draw():
     possible = {shape(*pair) for pair in possible_shapes(config)}
     scenes = [sample_scene(config, 5, index, environments) for index in range(800)]
     assert {shape(scene.container, scene.spreader) for scene in scenes} == possible
+
+
+@pytest.mark.parametrize("number", ["1e-05", "1E-3", "2.5e-4", "1.0e-05", ".5e-3", "+1e-4"])
+def test_numbers_are_read_as_json_and_yaml_write_them(tmp_path, number):
+    path = tmp_path / "weather.yaml"
+    path.write_text(f"weather: {{shutter_s: [{number}, 1e-1]}}")
+    assert Config.load(path).weather.shutter_s == (float(number), 0.1)
+
+
+def test_a_configuration_comes_back_from_json(tmp_path):
+    config = Config.from_values({"weather": {"shutter_s": [1e-5, 1e-3]}}, Config.preset("crane"))
+    path = tmp_path / "config.json"
+    path.write_text(json.dumps(config.to_plain()))
+    assert Config.load(path) == config

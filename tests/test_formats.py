@@ -210,6 +210,7 @@ def test_bop_poses_take_the_model_to_its_pixels(out):
             mask = cv2.imread(str(folder / f"mask_visib/{name}_000000.png"), -1) > 0
             assert mask.sum() == info["px_count_visib"]
             depth = cv2.imread(str(folder / f"depth/{name}.png"), -1)
+            assert info["px_count_valid"] == (depth[mask] > 0).sum()
             assert ((depth > 0) >= mask).all()
             assert depth[mask].min() * cameras[key]["depth_scale"] > points[:, 2].min() - 50
             assert (folder / f"rgb/{name}.jpg").is_file()

@@ -7,21 +7,24 @@ from itertools import combinations, product
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from fastgen import damage as fields
 from fastgen.camera import View, view_of
 from fastgen.config import Config
-from fastgen.container import KINDS
+from fastgen.container import KINDS, build_container
 from fastgen.divided_mesh import divided
 from fastgen.errors import ConfigError
 from fastgen.formats import view_values
 from fastgen.generator import Generator
 from fastgen.labels import decal_of
+from fastgen.lens import Distortion
 from fastgen.renderer import _region
 from fastgen.scene import Camera, Scene
 from fastgen.sensor.parts import Lens
 from fastgen.spreader import build_spreader
 from tests import oracle
+from tests.mesh_probe import caster
 from tests.test_coverage import all_hits, dense
 
 SIZE = (320, 240)
@@ -281,12 +284,46 @@ def test_bad_lenses_are_named(lens, words):
     ("lens", "focal_mm", "words"),
     [
         (Lens("brown_conrady", (-0.9, 0, 0, 0, 0)), 20.0, "cameras.T.lens: its distortion folds"),
+        (Lens("brown_conrady", (-0.25, 0.03, 0, -0.1, 0)), 20.0, "tangential distortion folds"),
         (Lens("fisheye", (0, 0, 0, 0)), 10.0, "look 90 degrees off the axis|look .* degrees off"),
     ],
 )
 def test_lenses_that_cannot_be_drawn_are_refused(lens, focal_mm, words):
     with pytest.raises(ConfigError, match=words):
         view_of(camera(lens, focal_mm), SIZE)
+
+
+@pytest.mark.parametrize("p", [(0.0, -0.01), (0.02, 0.02), (0.05, 0.0)])
+def test_strong_tangential_distortion_is_undone(p):
+    distortion = Distortion(Lens("brown_conrady", (-0.2, 0.05, *p, 0.0)), 0.6)
+    ideal = np.random.default_rng(2).uniform(-0.4, 0.4, (500, 2))
+    np.testing.assert_allclose(distortion.remove(distortion.apply(ideal)), ideal, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("position", "off_px"),
+    [((300, -6800, 1400), 0.1), ((300, 200, -5600), 1 / 3), ((300, 200, 8400), 1 / 3)],
+)
+def test_corners_lie_closely_enough_for_a_lens_to_bend(position, off_px):
+    """What a pixel shows lies within a straight triangle between bent corners, as drawn; where
+    Embree meets it, bent by itself, is where it should be."""
+    box = build_container("40HC")
+    target = (300, 200, 1300)
+    wide = camera(LENSES["wide fisheye"][0], 22.0, position_mm=position, target_mm=target)
+    view = view_of(wide, (640, 640))
+    start, rays = view.rays()
+    rays = rays.reshape(-1, 3)[::7]
+    at, _, triangle = caster(box).intersects_location(
+        np.tile(start, (len(rays), 1)), rays, multiple_hits=False
+    )
+    corners = box.positions_mm[box.triangles[triangle]].astype(float)
+    weight = trimesh.triangles.points_to_barycentric(corners, at)
+    pixels, depth = view.project(corners)
+    weight = weight * depth
+    drawn = (weight[..., None] * pixels).sum(axis=1) / weight.sum(axis=1)[:, None]
+    off = np.linalg.norm(drawn - view.project(at)[0], axis=1)
+    assert len(off) > 5000
+    assert np.quantile(off, 0.99) < off_px
 
 
 def test_a_lens_without_distortion_is_a_pinhole():

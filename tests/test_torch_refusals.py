@@ -11,6 +11,18 @@ from fastgen.errors import ConfigError
 from fastgen.torch import ContainerDataset, Loader, ShardSampler
 from tests.test_torch import SMALL, dataset, stream
 
+SLANTED = Config.from_values({"cameras": {"Cr": {"azimuth_deg": [40, 80]}, "Cl": {}}})
+
+
+def test_the_door_task_takes_the_cameras_that_always_see_an_end():
+    assert ContainerDataset("door", SLANTED, length=2, size=SMALL).cameras == ("Cl",)
+
+
+@pytest.mark.parametrize("position", [-1, 1.5, "a"])
+def test_positions_are_whole_numbers(position):
+    with pytest.raises(ConfigError, match=r"position: .* is not a whole number of 0 or more"):
+        dataset().locate(position)
+
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
@@ -19,11 +31,13 @@ from tests.test_torch import SMALL, dataset, stream
         ({"length": 0}, "length: 0 is not a whole number of 1 to"),
         ({"cameras": ["A", "D"]}, "cameras: 'D' is none of the imdg task's"),
         ({"task": "door", "cameras": ["A"]}, "cameras: 'A' is none of the door task's"),
+        ({"task": ["door"]}, r"task: \['door'\] is unknown"),
+        ({"task": "door", "config": SLANTED, "cameras": ["Cr"]}, "cameras: 'Cr' .* 45 degrees"),
         ({"cameras": []}, "cameras: name at least one"),
         ({"split": "trian"}, r"split: 'trian' is unknown \(did you mean train\?\)"),
         ({"form": "coco"}, "form: 'coco' is unknown"),
         ({"task": "door", "form": "yolo"}, "form: 'yolo' holds boxes"),
-        ({"size": (10, 10)}, "size: 10x10 is out of range"),
+        ({"size": (10, 10)}, "size: 10x10 cannot be"),
         ({"curriculum": lambda epoch: 3}, "curriculum: epoch 0 gives 3"),
         ({"curriculum": lambda epoch: {"damge": {}}}, "curriculum: epoch 0: damge: unknown key"),
         ({"config": {}}, "config: dict is no Config"),

@@ -2,7 +2,7 @@
 
 Format: bop_toolkit, docs/bop_datasets_format.md. One BOP scene a split; image ids count the images
 of the whole dataset. Full silhouettes (`mask`) are not written, `scene_gt_info.json` has their
-boxes and pixel counts.
+boxes and pixel counts; `px_count_valid` is of the visible part alone.
 """
 
 import json
@@ -54,7 +54,7 @@ class _Bop(Format):
             "bbox_obj": _corner_and_size(thing.amodal_bbox),
             "bbox_visib": _corner_and_size(thing.bbox),
             "px_count_all": round(thing.area / thing.visible_fraction),
-            "px_count_valid": int(np.count_nonzero(visible)),
+            "px_count_valid": int(np.count_nonzero(visible[sample.depth > 0])),
             "px_count_visib": thing.area,
             "visib_fract": thing.visible_fraction,
         }

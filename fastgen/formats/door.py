@@ -1,10 +1,13 @@
 """Door or no door: images of the two ends in folders named for their class, as an ImageFolder."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from fastgen.config import CameraConfig
+from fastgen.errors import ConfigError
 from fastgen.formats import Files, Format, Item, Same
 from fastgen.scene import Camera
 
@@ -22,6 +25,25 @@ def door_class(camera: Camera) -> str | None:
     if abs(along) < _MOST_SLANT:
         return None
     return DOOR_CLASSES[int(along > 0)]
+
+
+def door_number(camera: Camera) -> int:
+    """Position of `door_class` in DOOR_CLASSES. Raises ConfigError that names the camera where it
+    looks at no end."""
+    found = door_class(camera)
+    if found is None:
+        raise ConfigError(
+            f"cameras.{camera.name}: looks at no end of the container, but along a side; keep "
+            "azimuth_deg and elevation_deg nearer to 0"
+        )
+    return DOOR_CLASSES.index(found)
+
+
+def always_at_an_end(rig: CameraConfig) -> bool:
+    """Whether every camera that is drawn from `rig` has a `door_class`."""
+    slant = [max(map(abs, angles)) for angles in (rig.azimuth_deg, rig.elevation_deg)]
+    along = math.prod(math.cos(math.radians(angle)) for angle in slant)
+    return rig.face in DOOR_CLASSES and along > _MOST_SLANT + 1e-3  # places are rounded to the mm
 
 
 class _Door(Format):

@@ -14,7 +14,7 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.damage import may_be_seen
 from fastgen.errors import ConfigError
-from fastgen.formats.door import DOOR_CLASSES, door_class
+from fastgen.formats.door import door_number
 from fastgen.generator import Generator
 from fastgen.labels import outlines_mm
 from fastgen.records import whole
@@ -52,7 +52,7 @@ def class_counts(
         for name in chosen:
             camera = scene.camera(name)
             if task == "door":
-                counts[DOOR_CLASSES.index(str(door_class(camera)))] += 1
+                counts[door_number(camera)] += 1
                 continue
             counts[0] += 1  # the container, of both other tasks
             view = view_of(camera, size)

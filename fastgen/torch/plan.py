@@ -8,7 +8,7 @@ import torch
 
 from fastgen.config import Config
 from fastgen.errors import ConfigError
-from fastgen.formats.door import DOOR_CLASSES
+from fastgen.formats.door import always_at_an_end
 from fastgen.records import check_known, nearest, whole
 from fastgen.sampling import SPLITS, split_of
 from fastgen.torch.targets import class_names
@@ -52,6 +52,7 @@ class Plan:
 
     def locate(self, epoch: int, position: int) -> tuple[int, str]:
         """Scene index and camera name of one position, 0 or more, of an epoch."""
+        position = whole("position", position)
         camera = self.cameras[position % len(self.cameras)]
         number = position // len(self.cameras) if self._all_views else position
         first = 0 if self._fixed else epoch * EPOCH_SCENES
@@ -82,11 +83,16 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     rig = config.cameras
     if isinstance(cameras, str):
         raise ConfigError(f"cameras: {cameras!r} is no list; give [{cameras!r}]")
-    usable = [name for name in rig if task != "door" or rig[name].face in DOOR_CLASSES]
+    usable = [name for name in rig if task != "door" or always_at_an_end(rig[name])]
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
         if name not in usable:
-            why = nearest(name, usable) if usable else " (it takes cameras at the container's ends)"
+            why = nearest(name, usable)
+            if task == "door" and name in rig:
+                why = (
+                    "; it takes those at the container's ends whose azimuth_deg and elevation_deg "
+                    "keep them within 45 degrees of its length"
+                )
             raise ConfigError(f"cameras: {name!r} is none of the {task} task's{why}")
     if not chosen or len(set(chosen)) != len(chosen):
         raise ConfigError("cameras: name at least one, and each only once")

@@ -17,7 +17,7 @@ from fastgen.crops import text_crops
 from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
-from fastgen.formats.door import DOOR_CLASSES, door_class
+from fastgen.formats.door import DOOR_CLASSES, door_number
 from fastgen.records import check_known
 from fastgen.sample import Box, Sample
 
@@ -77,7 +77,7 @@ def item_of(
         return _text_item(sample, labels, image_id, as_float)
     image = image_tensor(sample.image, as_float)
     if task == "door":
-        return image, DOOR_CLASSES.index(str(door_class(sample.camera)))
+        return image, door_number(sample.camera)
     found = _damages(sample) if task == "damage" else _markers(sample)
     if form == "yolo":
         size = sample.view.size
