@@ -2,13 +2,14 @@
 
 import contextlib
 import fcntl
-import functools
 import hashlib
+import importlib.metadata
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -69,7 +70,7 @@ def computed(
 
     inputs: all that it hangs on but for the package's own code, told apart by its repr.
     """
-    key = hashlib.sha256(f"{_code_digest()} {inputs!r}".encode()).hexdigest()
+    key = hashlib.sha256(f"{_CODE} {inputs!r}".encode()).hexdigest()
     entry = default_folder() / f"{name}-{key[:32]}.npz"
 
     def made() -> dict[str, NDArray[Any]]:
@@ -80,13 +81,18 @@ def computed(
     return once(entry, lambda: read(entry) or None, made)
 
 
-@functools.cache
-def _code_digest() -> str:
-    """Of the package's modules and of numpy's version: nobody forgets to raise this number."""
-    digest = hashlib.sha256(np.__version__.encode())
-    for module in sorted(Path(__file__).parent.glob("*.py")):
+def _code_digest(folder: Path) -> str:
+    """Of the modules in a folder, and of the versions of what they compute with: a number that
+    somebody must raise would be forgotten."""
+    versions = np.__version__, cv2.__version__, importlib.metadata.version("scipy")
+    digest = hashlib.sha256(repr(versions).encode())
+    for module in sorted(folder.glob("*.py")):
         digest.update(module.read_bytes())
     return digest.hexdigest()
+
+
+_CODE = _code_digest(Path(__file__).parent)
+"""Read with the modules: files that change later are not the code that runs."""
 
 
 @contextlib.contextmanager

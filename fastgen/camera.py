@@ -6,7 +6,6 @@ along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 20
 lens's distortion comes between the division by depth and the camera matrix, see lens.py.
 """
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -155,7 +154,7 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     distortion = None
     if camera.lens is not None:
         try:
-            distortion = _distortion(camera.lens, math.hypot(*size) / 2 / focal_px)
+            distortion = _distortion(camera.lens, (size[0] / 2 / focal_px, size[1] / 2 / focal_px))
         except ConfigError as error:
             raise ConfigError(f"cameras.{camera.name}.{error}") from None
     rotation = np.stack([rolled_right, rolled_down, forward])
@@ -163,5 +162,5 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
 
 
 @lru_cache(maxsize=64)
-def _distortion(lens: Lens, radius: float) -> Distortion:
-    return Distortion(lens, radius)
+def _distortion(lens: Lens, half_size: tuple[float, float]) -> Distortion:
+    return Distortion(lens, half_size)

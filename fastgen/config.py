@@ -286,8 +286,8 @@ class _Loader(yaml.SafeLoader):
         node = super().compose_mapping_node(anchor)
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            merge = key.tag == "tag:yaml.org,2002:merge"
-            name = key.value if merge else str(self.construct_object(key))  # 010 is 8
+            number = key.tag.endswith((":int", ":float"))
+            name = str(self.construct_object(key)) if number else key.value  # 010 is 8
             if name in seen:
                 words = f"the key {name!r} stands twice in one mapping"
                 raise yaml.composer.ComposerError(None, None, words, key.start_mark)

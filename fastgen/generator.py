@@ -15,6 +15,7 @@ from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.cuda import CudaFrame, cuda_reason
+from fastgen.damage import seen_damages, variant
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.errors import ConfigError
 from fastgen.gl import BACKENDS, open_context
@@ -287,8 +288,15 @@ class Generator:
                 replace(config, container=box.container), self.seed, 0, self.environments
             )
             drawn = replace(drawn, environment=EnvironmentView(name, 0.0))
-            # cameras that draw alike share what they draw with
-            for camera in {camera.lens is None: camera for camera in drawn.cameras}.values():
+            # what a camera does not see of the damage makes no difference to how it draws
+            alike = {
+                (
+                    camera.lens is None,
+                    variant(seen_damages(drawn.damages, camera.position_mm)),
+                ): camera
+                for camera in drawn.cameras
+            }
+            for camera in alike.values():
                 self.render(scene=drawn, camera=camera)
 
     def close(self) -> None:

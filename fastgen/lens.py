@@ -52,14 +52,15 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 class Distortion:
-    """A lens on an image whose corners lie `radius` focal lengths from its middle.
+    """A lens on an image of half_size (width, height), in focal lengths from its middle.
 
     Raises ConfigError where the lens folds the image over, or sees farther to the side than can be
     drawn.
     """
 
-    def __init__(self, lens: Lens, radius: float) -> None:
+    def __init__(self, lens: Lens, half_size: tuple[float, float]) -> None:
         self.lens = lens
+        radius = float(np.hypot(*half_size))
         self._fisheye = lens.model == "fisheye"
         c = lens.coefficients
         self._k = np.array(c if self._fisheye else (c[0], c[1], c[4], 0.0), np.float64)
@@ -80,7 +81,7 @@ class Distortion:
         self._table, self._bent = table[: last + 1], bent[: last + 1]
         self._end, self._end_bent = float(table[last]), float(bent[last])
         self._end_slope = float(self._slope(table[last]))
-        if self._folds(radius):
+        if self._folds(half_size):
             raise ConfigError(
                 "lens: its tangential distortion folds the image over; give p1 and p2 nearer to 0"
             )
@@ -124,8 +125,8 @@ class Distortion:
         )
         return x, y
 
-    def _folds(self, radius: float) -> bool:
-        """Whether two ideal points are seen at one place of an image with such corners."""
+    def _folds(self, half_size: tuple[float, float]) -> bool:
+        """Whether two ideal points are seen at one place of the image."""
         t = self._table[1:]
         # radial distortion stretches by its slope along a radius, by curve / t across it, and
         # tangential distortion's derivatives are no more than 8 |p| r: short of that, none fold
@@ -137,7 +138,7 @@ class Distortion:
         ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         ideal = np.linspace(0, self._end, 65)[1:, None, None] * ring
         seen = self.apply(ideal)
-        ideal = ideal[np.hypot(*np.moveaxis(seen, -1, 0)) <= radius]
+        ideal = ideal[(np.abs(seen) <= half_size).all(axis=-1)]
         if (_cross(*self._slopes(ideal)) < _LEAST_SLOPE**2).any():
             return True
         return bool(np.abs(self.remove(self.apply(ideal)) - ideal).max() > 1e-6)

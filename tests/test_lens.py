@@ -295,7 +295,7 @@ def test_lenses_that_cannot_be_drawn_are_refused(lens, focal_mm, words):
 
 @pytest.mark.parametrize("p", [(0.0, -0.01), (0.02, 0.02), (0.05, 0.0)])
 def test_strong_tangential_distortion_is_undone(p):
-    distortion = Distortion(Lens("brown_conrady", (-0.2, 0.05, *p, 0.0)), 0.6)
+    distortion = Distortion(Lens("brown_conrady", (-0.2, 0.05, *p, 0.0)), (0.48, 0.36))
     ideal = np.random.default_rng(2).uniform(-0.4, 0.4, (500, 2))
     np.testing.assert_allclose(distortion.remove(distortion.apply(ideal)), ideal, atol=1e-9)
 
@@ -324,6 +324,12 @@ def test_corners_lie_closely_enough_for_a_lens_to_bend(position, off_px):
     off = np.linalg.norm(drawn - view.project(at)[0], axis=1)
     assert len(off) > 5000
     assert np.quantile(off, 0.99) < off_px
+
+
+def test_a_lens_that_folds_beside_the_image_alone_is_drawn():
+    Distortion(Lens("brown_conrady", (-0.25, 0.03, 0.012, 0, 0)), (0.64, 0.48))
+    with pytest.raises(ConfigError, match="folds"):
+        Distortion(Lens("brown_conrady", (-0.25, 0.03, 0.02, 0, 0)), (0.64, 0.48))
 
 
 def test_a_lens_without_distortion_is_a_pinhole():

@@ -50,7 +50,7 @@ def test_what_differs_is_built_anew(folder, built, monkeypatch):
     moved = replace(built, positions_mm=built.positions_mm + np.float32(1))
     stored("box", ("20", 1.5), lambda: built)
     assert_equal(stored("box", ("20", 2.5), lambda: moved), moved)
-    monkeypatch.setattr(cache, "_code_digest", lambda: "other code")
+    monkeypatch.setattr(cache, "_CODE", "other code")
     assert_equal(stored("box", ("20", 1.5), lambda: moved), moved)
 
 
@@ -70,11 +70,13 @@ def test_nothing_is_needed_of_the_disk(tmp_path, monkeypatch, built):
 
 
 def test_any_change_of_code_is_other_code(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
     modules = {name: tmp_path / f"{name}.py" for name in ("cache", "mesh")}
     for path in modules.values():
         path.write_text("a = 1")
-    before = cache._code_digest.__wrapped__()
-    assert cache._code_digest.__wrapped__() == before
+    before = cache._code_digest(tmp_path)
+    assert cache._code_digest(tmp_path) == before
     modules["mesh"].write_text("a = 2")
-    assert cache._code_digest.__wrapped__() != before
+    assert cache._code_digest(tmp_path) != before
+    modules["mesh"].write_text("a = 1")
+    monkeypatch.setattr(cache.cv2, "__version__", "99")
+    assert cache._code_digest(tmp_path) != before

@@ -43,7 +43,7 @@ def always_at_an_end(rig: CameraConfig) -> bool:
     """Whether every camera that is drawn from `rig` has a `door_class`."""
     slant = [max(map(abs, angles)) for angles in (rig.azimuth_deg, rig.elevation_deg)]
     along = math.prod(math.cos(math.radians(angle)) for angle in slant)
-    return rig.face in DOOR_CLASSES and along > _MOST_SLANT + 1e-3  # places are rounded to the mm
+    return rig.face in DOOR_CLASSES and along > _MOST_SLANT + 1e-3  # places are rounded
 
 
 class _Door(Format):
