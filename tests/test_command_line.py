@@ -1,0 +1,79 @@
+"""The command line: what it refuses, and that `show` writes every layer."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen.cli import main
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["generate", "{out}", "--images", "0"], "images: 0 is out of range"),
+        (["generate", "{out}", "--images", "2", "--size", "10x10"], "size: 10x10 cannot be"),
+        (["generate", "{out}", "--images", "2", "--size", "huge"], "size: 'huge' is no size"),
+        (["generate", "{out}", "--images", "2", "--workers", "0"], "workers: 0 is out of range"),
+        (["generate", "{out}", "--images", "2", "--preset", "seafornt"], "did you mean seafront"),
+        (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
+        (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
+        (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
+        (["generate", "{out}", "--images", "2", "--hdri", ""], "'': names no folder"),
+        (["generate", "{out}", "--images", "2", "--shard", "0"], "shard: 0 is out of range"),
+        (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),
+        (["generate", "{out}", "--images", "2", "--hdri", "{broken}"], "photo.hdr"),
+        (["generate", "{out}", "--images", "2", "--config", "{bad}"], "did you mean rust_coverage"),
+        (["generate", "{full}", "--images", "2"], "holds something else"),
+        (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
+        (["show", "--index", "0", "--layer", "rusty", "-o", "{out}.png"], "did you mean rust"),
+        (["show", "--index", "0", "-o", "{out}.gif"], "ends in .png or .jpg"),
+        (["verify", "{empty}"], "no readable dataset.json"),
+        (["stats", "{empty}"], "no dataset.json"),
+    ],
+)
+def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, capsys):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/notes.txt").write_text("mine")
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken/photo.hdr").write_text("no radiance here")
+    (tmp_path / "bad.yaml").write_text("surface: {rust_coverag: [0, 1]}\n")
+    places = {name: str(tmp_path / name) for name in ("out", "empty", "full", "broken")}
+    filled = [a.format(**places, bad=tmp_path / "bad.yaml") for a in arguments]
+    assert main(filled) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: ")
+    assert error.count("\n") == 1
+    assert message in error
+    assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["generate", "x", "--images", "many"],
+        ["generate", "x"],
+        ["show", "--index", "1.5", "-o", "x.png"],
+        ["paint"],
+    ],
+)
+def test_a_bad_command_line_gets_one_line_too(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: ")
+    assert error.count("\n") == 1
+
+
+def test_show_writes_every_layer(tmp_path):
+    seen = set()
+    for layer in ("all", "base", "tone", "ageing", "dirt", "rust", "decals", "normals", "ids"):
+        path = tmp_path / f"{layer}.png"
+        arguments = ["--index", "1", "--camera", "Cr", "--size", "128x128", "--layer", layer]
+        assert main(["show", *arguments, "--overlay", "-o", str(path)]) == 0
+        image = cv2.imread(str(path))
+        assert image.shape == (128, 128, 3)
+        assert np.ptp(image) > 0
+        seen.add(path.read_bytes())
+    assert len(seen) == 9
