@@ -123,6 +123,13 @@ class Measured:
     balanced: float
 
 
+def spent(generator: Generator, scene: Scene, camera: Camera) -> float:
+    """Core-seconds of a labelled image."""
+    began = time.process_time()
+    generator.render(scene=scene, camera=camera)
+    return time.process_time() - began
+
+
 def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats: int) -> Measured:
     """A variant over all cases, in turns with a Generator of nothing but presets."""
     errors, seconds = [], []
@@ -130,23 +137,17 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
         for case in chosen:
             reference = load(case.number)
             scene, camera = reference.scene, reference.scene.camera(case.camera)
-
-            def spent(generator: Generator, scene: Scene = scene, camera: Camera = camera) -> float:
-                began = time.process_time()
-                generator.render(scene=scene, camera=camera)
-                return time.process_time() - began
-
             with variant.entered():
                 image = generator.render(scene=scene, camera=camera).image / 255.0
                 exposure = generator.exposure(scene, camera)
             expected = displayed(reference.radiance[FILTERS[variant.quality]], exposure)
             errors.append(float(flip(expected, image)[reference.inside].mean()))
-            spent(balanced)  # what it makes but once
+            spent(balanced, scene, camera)  # what it makes but once
             turns = []
             for _ in range(repeats):
-                beside = spent(balanced)
+                beside = spent(balanced, scene, camera)
                 with variant.entered():
-                    turns.append((spent(generator), beside))
+                    turns.append((spent(generator, scene, camera), beside))
             seconds.append([statistics.median(each) for each in zip(*turns, strict=True)])
     means = [statistics.fmean(each) for each in zip(*seconds, strict=True)]
     return Measured(variant.name, statistics.fmean(errors), *means)

@@ -66,7 +66,7 @@ def once(entry: Path, read: Callable[[], T | None], make: Callable[[], T]) -> T:
 def computed(
     name: str, inputs: object, make: Callable[[], Mapping[str, NDArray[Any]]]
 ) -> dict[str, NDArray[Any]]:
-    """What `make` gives, arrays by name; read where the same code gave it before.
+    """What `make` gives, arrays by name, read-only; read where the same code gave it before.
 
     inputs: all that it hangs on but for the package's own code, told apart by its repr.
     """
@@ -78,7 +78,10 @@ def computed(
         write(entry, arrays)
         return arrays
 
-    return once(entry, lambda: read(entry) or None, made)
+    arrays = once(entry, lambda: read(entry) or None, made)
+    for array in arrays.values():  # callers keep and share them
+        array.flags.writeable = False
+    return arrays
 
 
 def _code_digest(folder: Path) -> str:

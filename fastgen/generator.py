@@ -268,8 +268,8 @@ class Generator:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
         later."""
         scene = self.scene(0)
-        weighty = [name for name, weight in self._weights.items() if weight > 0]
-        names = self.config.environment.names or weighty
+        drawn = [name for name, weight in self._weights.items() if weight > 0]
+        names = self.config.environment.names or drawn
         lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
         shaped = (
             replace(scene, container=container, spreader=spreader)
@@ -281,23 +281,21 @@ class Generator:
             sunny = {renderer.ambient(name).sun is not None: name for name in names}
         # programs and targets, and what labels ask of meshes: every way to draw, every container
         ways = list(product(one_damage_each(self.config), sunny.values()))
-        boxes = list(one_container_each(self.config))
+        boxes = list(one_container_each(self.config.container))
         for i in range(max(len(ways), len(boxes))):
             (config, name), box = ways[i % len(ways)], boxes[i % len(boxes)]
-            drawn = sample_scene(
-                replace(config, container=box.container), self.seed, 0, self.environments
-            )
-            drawn = replace(drawn, environment=EnvironmentView(name, 0.0))
+            shown = sample_scene(replace(config, container=box), self.seed, 0, self.environments)
+            shown = replace(shown, environment=EnvironmentView(name, 0.0))
             # what a camera does not see of the damage makes no difference to how it draws
             alike = {
                 (
                     camera.lens is None,
-                    variant(seen_damages(drawn.damages, camera.position_mm)),
+                    variant(seen_damages(shown.damages, camera.position_mm)),
                 ): camera
-                for camera in drawn.cameras
+                for camera in shown.cameras
             }
             for camera in alike.values():
-                self.render(scene=drawn, camera=camera)
+                self.render(scene=shown, camera=camera)
 
     def close(self) -> None:
         """Free the renderer and its GL context; a later render opens them again."""

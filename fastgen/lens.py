@@ -138,10 +138,11 @@ class Distortion:
         ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         ideal = np.linspace(0, self._end, 65)[1:, None, None] * ring
         seen = self.apply(ideal)
-        ideal = ideal[(np.abs(seen) <= half_size).all(axis=-1)]
+        inside = (np.abs(seen) <= half_size).all(axis=-1)
+        ideal, seen = ideal[inside], seen[inside]
         if (_cross(*self._slopes(ideal)) < _LEAST_SLOPE**2).any():
             return True
-        return bool(np.abs(self.remove(self.apply(ideal)) - ideal).max() > 1e-6)
+        return bool(np.abs(self.remove(seen) - ideal).max() > 1e-6)
 
     @cached_property
     def shader_values(self) -> Mapping[str, ArrayLike]:

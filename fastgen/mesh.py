@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastgen import cache
 from fastgen.distinct import distinct_rows
 from fastgen.errors import ConfigError
 
@@ -160,9 +161,13 @@ class Mesh:
     @cached_property
     def hull(self) -> NDArray[np.int64]:
         """Which of points_mm are corners of their convex hull."""
-        from scipy.spatial import ConvexHull  # takes 0.3 s, and stored_mesh.py knows most hulls
 
-        return np.asarray(ConvexHull(self.points_mm).vertices, np.int64)
+        def found() -> dict[str, NDArray[np.int64]]:
+            from scipy.spatial import ConvexHull  # takes 0.3 s, and hulls are kept on disk
+
+            return {"hull": np.asarray(ConvexHull(self.points_mm).vertices, np.int64)}
+
+        return cache.computed("hull", self.shape_digest, found)["hull"]
 
     @cached_property
     def shape_digest(self) -> str:

@@ -26,9 +26,7 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
     Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
     mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
     """
-    table = cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
-    table.flags.writeable = False
-    return table
+    return cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
 
 
 def _integrated(size: int) -> NDArray[np.float32]:

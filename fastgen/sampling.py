@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from fastgen.camera import view_of
-from fastgen.config import CameraConfig, Config, SpreaderConfig, linear_color
+from fastgen.config import CameraConfig, Config, ContainerConfig, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
@@ -173,18 +173,17 @@ def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
     ]
     bare = replace(spreaders[0], present=False)
     held = spreaders * (c.probability > 0) + [bare] * (c.probability < 1)
-    for one in one_container_each(config):
-        (kind,), (scale,) = one.container.kinds, one.container.depth_scale
+    for one in one_container_each(config.container):
+        (kind,), (scale,) = one.kinds, one.depth_scale
         container = Container(kind, config.container.profiles.deepened(scale))
         yield from ((container, spreader) for spreader in held)
 
 
-def one_container_each(config: Config) -> Iterator[Config]:
-    """For every container of `config` one that has only that."""
-    c = config.container
+def one_container_each(c: ContainerConfig) -> Iterator[ContainerConfig]:
+    """For every container of a distribution one that has only that."""
     for kind, weight in c.kinds.items():
         for scale in c.depth_scale * (weight > 0):
-            yield replace(config, container=replace(c, kinds={kind: 1.0}, depth_scale=(scale,)))
+            yield replace(c, kinds={kind: 1.0}, depth_scale=(scale,))
 
 
 def one_damage_each(config: Config) -> Iterator[Config]:

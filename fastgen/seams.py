@@ -37,6 +37,8 @@ def junctions(
     point: int [V], equal for vertices that coincide. Returns, by triangle and edge (0 from its
     first corner to its second, and so on), vertices in order along the edge.
     """
+    from scipy.spatial import cKDTree  # takes 0.3 s, and finished meshes are kept on disk
+
     corners = point[triangles]
     edges = np.concatenate([corners, np.roll(corners, -1, axis=1)]).reshape(2, -1).T
     places = np.arange(edges.shape[0])
@@ -47,8 +49,6 @@ def junctions(
         return {}
     vertex_of = np.zeros(point.max() + 1, np.int64)
     vertex_of[point] = np.arange(len(point))
-    from scipy.spatial import cKDTree  # takes 0.3 s, and finished meshes are kept on disk
-
     starts, ends = (positions_mm[vertex_of[edges[loose, side]]] for side in (0, 1))
     length = np.linalg.norm(ends - starts, axis=1)
     candidates = vertex_of[np.unique(edges[loose])]

@@ -13,11 +13,10 @@ _ARRAYS = ("positions_mm", "normals", "atlas_mm", "chart", "triangles")
 
 
 def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
-    """What `build` gives for `inputs`, its hull known and its arrays read-only; see
-    cache.computed."""
+    """What `build` gives for `inputs`, its arrays read-only; see cache.computed."""
     arrays = cache.computed(name, inputs, lambda: _packed(build()))
     about = json.loads(arrays["about"].tobytes())
-    mesh = Mesh(
+    return Mesh(
         **{key: arrays[key] for key in _ARRAYS},
         charts=tuple(
             Chart(part, face, material, (x, y, width, height))
@@ -30,10 +29,6 @@ def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
             for face, flats in about["flats"].items()
         },
     )
-    vars(mesh)["hull"] = arrays["hull"]  # where its cached_property looks first
-    for array in arrays.values():  # meshes are shared, so nobody may write into them
-        array.flags.writeable = False
-    return mesh
 
 
 def _packed(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
@@ -45,6 +40,5 @@ def _packed(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     }
     return {
         **{key: getattr(mesh, key) for key in _ARRAYS},
-        "hull": mesh.hull,
         "about": np.frombuffer(json.dumps(about).encode(), np.uint8),
     }

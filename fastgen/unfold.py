@@ -251,7 +251,7 @@ def assemble(
     order = np.argsort(group, kind="stable")
     ends = np.searchsorted(group[order], np.arange(len(FACES) + 2))
     names = (*FACES, "frame")
-    mesh = Mesh(
+    return Mesh(
         positions_mm=positions.astype(np.float32),
         normals=values[:, :3].astype(np.float32),
         atlas_mm=values[:, 3:5].astype(np.float32),
@@ -265,10 +265,6 @@ def assemble(
         groups={n: slice(int(ends[i]), int(ends[i + 1])) for i, n in enumerate(names)},
         flats=flats or {},
     )
-    # meshes are cached and shared, so nobody may write into them
-    for array in (mesh.positions_mm, mesh.normals, mesh.atlas_mm, mesh.chart, mesh.triangles):
-        array.flags.writeable = False
-    return mesh
 
 
 def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> NDArray[np.int64]:
