@@ -79,7 +79,7 @@ def _cover(
     return Cover(mask, (int(low[0]), int(low[1])), beyond), bounds
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
     """The cameras of a scene share them."""
     return damage_facets(scene, mesh, damage, 0)

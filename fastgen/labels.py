@@ -213,9 +213,9 @@ def _spreader(shot: Shot) -> list[Object]:
     ]
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=2)
 def _all_facets(mesh: Mesh) -> Facets:
-    """Of a mesh that nothing damages; scenes share them."""
+    """Of a mesh that nothing damages; the cameras of a scene share them."""
     return mesh_facets(None, mesh, list(mesh.groups), 0)
 
 
@@ -300,8 +300,9 @@ def _behind(
     return np.asarray(met.any(axis=1), bool)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=2)
 def _spanned(mesh: Mesh) -> tuple[NDArray[np.float64], ...]:
-    """Of each triangle [T, 3]: its first corner, the edges to the others, and their product."""
+    """Of each triangle [T, 3]: its first corner, the edges to the others, and their product. The
+    cameras of a scene share them."""
     a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
     return a, b - a, c - a, np.cross(c - a, b - a)

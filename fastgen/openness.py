@@ -52,7 +52,7 @@ _LOBE = 4
 path-traced containers are farther off."""
 
 _CAPACITY = 128
-_LIT_CAPACITY = 8  # a scene asks for two, once a camera
+_LIT_CAPACITY = 2  # a scene asks for two, once a camera
 _DARK = 1e-20  # instead of no light at all, which has no ratios
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
