@@ -68,7 +68,8 @@ class Generator:
 
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
-    in place of the bundled ones. quality: draft (one sample a pixel), balanced or high.
+    in place of the bundled ones. quality: draft (one sample a pixel), balanced (four, filtered
+    with the neighbours'), or high (nine, and materials from five points or more).
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
     first that works. Use it from one thread, and make one in each process. Where a driver's
     textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a height of

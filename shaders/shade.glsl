@@ -84,6 +84,8 @@ struct Part {
     uint id;
     uint damage;
     float depth;
+    float footprint_mm;   // on the sheet, of a lookup of the layers
+    float scar;
 #if WITH_DAMAGE
     mat3 bend;
 #endif
@@ -95,18 +97,21 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     Part p;
     p.damage = SOUND_CONTAINER;
     p.depth = texelFetch(sheet_depths, sample_at, 0).r;
-    float scar = 0.0;
+    p.scar = 0.0;
 #if WITH_DAMAGE
     Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
     if (d.value != 0u) p.damage = d.value;
-    scar = d.scar;
+    p.scar = d.scar;
     p.bend = d.bend;
     normal = bent_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
-    float footprint_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(key_chart(key), sheet_mm, footprint_mm, scar);
+    p.footprint_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+#if FINE_LAYERS
+    p.footprint_mm *= FINE_FOOTPRINT;
+#endif
+    p.surface = surface_at(key_chart(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (key_chart(key) >= SPREADER_CHART) {
         p.id = SPREADER_ID;
@@ -114,6 +119,18 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     }
     return p;
 }
+
+#if FINE_LAYERS
+// the material of `p` at another point of its sheet goes into `sum`
+void add_layers(inout Material sum, Part p, uint chart, vec2 sheet_mm) {
+    Material m = surface_at(chart, sheet_mm, p.footprint_mm, p.scar).material;
+    sum = Material(sum.albedo + m.albedo, sum.roughness + m.roughness, sum.metallic + m.metallic);
+}
+
+Material mean_of(Material sum, float count) {
+    return Material(sum.albedo / count, sum.roughness / count, sum.metallic / count);
+}
+#endif
 
 vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec3 normal = key_normal(key);
@@ -140,6 +157,17 @@ Shaded single_surface(ivec2 pixel) {
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
+#if FINE_LAYERS
+    // and at Gauss's points of the pixel, between its middle and the samples in its corners
+    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 corner = ivec2((i & 1) * 2 - 1, (i & 2) - 1);
+        vec2 corner_mm = texelFetch(sheet_points, middle + corner, 0).xy;
+        add_layers(p.surface.material, p, key_chart(key),
+                   mix(sheet_mm, corner_mm, 0.28867513 * float(SAMPLES_PER_AXIS)));
+    }
+    p.surface.material = mean_of(p.surface.material, 5.0);
+#endif
     return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
 }
 

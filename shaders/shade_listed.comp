@@ -49,6 +49,16 @@ void main() {
         vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
+#if FINE_LAYERS
+        float count = 1.0;
+        for (int i = 0; i < TENT_SAMPLES; ++i)
+            if ((of_part & 1u << i) != 0u && TENT_OFFSET[i] != offset) {
+                vec2 sheet_mm = texelFetch(sheet_points, middle + TENT_OFFSET[i], 0).xy;
+                add_layers(p.surface.material, p, chart, sheet_mm);
+                count += 1.0;
+            }
+        p.surface.material = mean_of(p.surface.material, count);
+#endif
         bool at_center = part == 0 && !sees_sky;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth, 1.0);
         int side = 0;

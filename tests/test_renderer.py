@@ -84,6 +84,23 @@ def test_antialiasing_approaches_a_fine_render_averaged_down():
     assert errors[2] < 0.8 * errors[1]
 
 
+def test_the_layers_of_high_approach_a_fine_render_averaged_down():
+    """Likewise away from edges, where a pixel sees one surface; others look its layers up once."""
+    rusty = Config.from_values({"surface": {"rust_coverage": 0.2}, "damage": {"probability": 0}})
+    fine = (5 * SIZE[0], 5 * SIZE[1])
+    with Generator(rusty, seed=5, size=fine, quality="draft") as generator:
+        scene = replace(generator.scene(1), spreader=Spreader())
+        albedo = light_of(generator.render(scene=scene, camera="A", layer="rust").image)
+    reference = albedo.reshape(SIZE[1], 5, SIZE[0], 5, 3).mean(axis=(1, 3))
+    errors = []
+    for quality in ("draft", "high"):
+        with Generator(rusty, seed=5, size=SIZE, quality=quality) as generator:
+            sample = generator.render(scene=scene, camera="A", layer="rust")
+        inside = cv2.erode((sample.ids > 0).astype(np.uint8), np.ones((3, 3))) > 0
+        errors.append(np.abs(light_of(sample.image) - reference)[inside].mean())
+    assert errors[1] < 0.7 * errors[0]
+
+
 @pytest.mark.parametrize("quality", ["balanced", "high"])
 def test_cover_is_the_share_of_a_pixel_that_is_no_sky(quality):
     """That of the ids of 12 x 12 as many pixels, under the tent or the box of the quality.
