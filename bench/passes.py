@@ -40,6 +40,7 @@ class PassTimer:
     def __enter__(self) -> "PassTimer":
         self._wrap(Targets, "begin_samples", lambda *_: "clear")
         self._wrap(GpuMesh, "draw", lambda *_: "geometry")
+        self._wrap(GpuMesh, "draw_inside", lambda *_: "inside")
         self._wrap(Shading, "_run", lambda stage, name, *_: name if stage == "shade" else stage)
         self._wrap(Shading, "_dispatch", lambda name, *_: name)
         return self

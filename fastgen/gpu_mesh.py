@@ -1,11 +1,12 @@
 """Meshes on the GPU, each drawn with one indirect call that leaves out faces turned away."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from fastgen.clusters import Clusters
 from fastgen.mesh import FACE_AXES, FACES, Mesh
 from fastgen.openness import open_sky
 from fastgen.textures import data_texture
@@ -38,8 +39,9 @@ _COMMAND = np.dtype(
 class GpuMesh:
     """Vertex, index and chart data of one Mesh. Owned by the renderer, which releases it.
 
-    programs: the geometry program of each of programs.DAMAGE_VARIANTS. first_chart: what the
-    numbers of the mesh's charts begin with in the chart table.
+    programs: the geometry program of each of programs.DAMAGE_VARIANTS; that of 'holed' draws what
+    shows through holes. first_chart: what the numbers of the mesh's charts begin with in the chart
+    table.
     """
 
     def __init__(
@@ -58,16 +60,14 @@ class GpuMesh:
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
         self._open_sky = open_sky(mesh.normals).tobytes()
         self._openness = ctx.buffer(self._open_sky)
-        self._commands = ctx.buffer(reserve=_COMMAND.itemsize * 2 * len(mesh.groups))
-        self._views = ctx.buffer(np.arange(2, dtype=np.uint32).tobytes())
+        self.clusters = Clusters(mesh)
+        most = max(len(mesh.groups), self.clusters.most_runs)
+        self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
         contents = [content, (self._openness, "4f1 3u", "in_openness", "in_open_to")]
-        views = (self._views, "1u/i", "in_inner")
         self._arrays = {
-            damage: ctx.vertex_array(
-                program, contents + [views] * ("in_inner" in program), self._indices
-            )
+            damage: ctx.vertex_array(program, contents, self._indices)
             for damage, program in programs.items()
         }
 
@@ -77,34 +77,32 @@ class GpuMesh:
             self._openness.write(values)
             self._open_sky = values
 
-    def draw(
-        self,
-        position_mm: Iterable[float],
-        damage: str,
-        bent: Collection[str] = (),
-        hollow: bool = True,
-    ) -> None:
-        """Draw what a camera at `position_mm` may see, in one call.
+    def draw(self, position_mm: Iterable[float], damage: str, bent: Collection[str] = ()) -> None:
+        """Draw what a camera at `position_mm` may see from outside.
 
-        damage: one of programs.DAMAGE_VARIANTS. 'holed' draws what is hollow a second time, as the
-        instance that shows insides through holes. bent: faces to draw even if turned away.
+        damage: one of programs.DAMAGE_VARIANTS. bent: faces to draw even if turned away.
         """
         names = {*facing_groups(self.mesh, position_mm), *bent}
         seen = [triangles for name, triangles in self.mesh.groups.items() if name in names]
-        draws = [(0, triangles) for triangles in seen]
-        if damage == "holed" and hollow:
-            draws += [(1, triangles) for triangles in self.mesh.groups.values()]
-        commands = np.zeros(len(draws), _COMMAND)
-        for row, (instance, triangles) in zip(commands, draws, strict=True):
-            row["count"] = 3 * (triangles.stop - triangles.start)
-            row["first"] = 3 * triangles.start
-            row["instances"], row["instance"] = 1, instance
+        self._draw("sound" if damage == "sound" else "damaged", seen)
+
+    def draw_inside(self, triangles: Sequence[slice]) -> None:
+        """Draw the insides of some triangles into the inner view, but for what holes tore away."""
+        if triangles:
+            self._draw("holed", triangles)
+
+    def _draw(self, program: str, parts: Sequence[slice]) -> None:
+        """All in one call."""
+        commands = np.zeros(len(parts), _COMMAND)
+        commands["instances"] = 1
+        commands["count"] = [3 * (part.stop - part.start) for part in parts]
+        commands["first"] = [3 * part.start for part in parts]
         self._commands.write(commands.tobytes())
-        self._arrays[damage].render_indirect(self._commands, moderngl.TRIANGLES, len(draws))
+        self._arrays[program].render_indirect(self._commands, moderngl.TRIANGLES, len(parts))
 
     def release(self) -> None:
         """Free all GL objects."""
-        buffers = (self._vertices, self._indices, self._openness, self._commands, self._views)
+        buffers = (self._vertices, self._indices, self._openness, self._commands)
         items: list[Any] = [*self._arrays.values(), *buffers]
         for item in items:
             item.release()

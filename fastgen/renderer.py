@@ -180,7 +180,7 @@ class Renderer:
         """Draw the geometry into the sample targets."""
         damage = variant(damages)
         holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
-        targets.begin_samples(_region(view, np.concatenate(holes)) if holes else None)
+        targets.begin_samples()
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._lobes.use(UNITS["lobe_masks"])
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
@@ -188,8 +188,13 @@ class Renderer:
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}
         if spreader is not None:
-            spreader.draw(camera.position_mm, damage, hollow=False)
+            spreader.draw(camera.position_mm, damage)
         mesh.draw(camera.position_mm, damage, bent)
+        moved_mm = sum(abs(d.depth_mm) for d in damages)
+        for hole in holes:
+            region = _region(view, hole)
+            targets.limit_inside(region)
+            mesh.draw_inside(mesh.clusters.seen_in(view, region, moved_mm))
         targets.end_samples()
 
     def _bind_light(self, targets: Targets, light: GpuLight, shadow: ShadowMap | None) -> None:

@@ -115,27 +115,27 @@ class Targets:
             "glClearBufferfv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
         )
 
-    def begin_samples(self, inner_region: Region | None = None) -> None:
-        """Bind the sample framebuffer, emptied: key 0 is the void.
-
-        inner_region: the pixels of the image that need the inner view, None for all.
-        """
+    def begin_samples(self) -> None:
+        """Bind the sample framebuffer, emptied: key 0 is the void."""
         self.samples.use()
         # moderngl's clear is undefined on integer attachments (moderngl issue 686)
         self._clear_uint(_GL_COLOR, 0, _NOTHING)
         self._clear_float(_GL_DEPTH, 0, _FAR)
         width, height = self._fine
         self.samples.viewport = (0, 0, width, height)
-        if self.samples.height > height:
-            x, y, w, h = inner_region or (0, 0, *self.size)
-            scale = width / self.size[0]
-            left, right = int((x - 1) * scale), int((x + w + 1) * scale)
-            top, bottom = max(int((y - 1) * scale), 0), int((y + h + 1) * scale)
-            first = self.inner_row
-            self._viewport(1, 0.0, first, width, height)
-            # the inner view is mirrored; it begins below the outer one
-            self._scissor(1, width - right, first + top, right - left, bottom - top)
-            self._enable(_GL_SCISSOR_TEST, 1)
+
+    def limit_inside(self, region: Region | None) -> None:
+        """Restrict the inner view to what holes in `region` of the image show, None for all."""
+        width, height = self._fine
+        x, y, w, h = region or (0, 0, *self.size)
+        scale = width / self.size[0]
+        left, right = int((x - 1) * scale), int((x + w + 1) * scale)
+        top, bottom = max(int((y - 1) * scale), 0), int((y + h + 1) * scale)
+        first = self.inner_row
+        self._viewport(1, 0.0, first, width, height)
+        # the inner view is mirrored; it begins below the outer one
+        self._scissor(1, width - right, first + top, right - left, bottom - top)
+        self._enable(_GL_SCISSOR_TEST, 1)
 
     def end_samples(self) -> None:
         """Lift the restriction of the inner view."""

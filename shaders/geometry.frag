@@ -15,9 +15,6 @@ layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
 layout(location = 2) out float out_depth;  // m
 layout(location = 3) out vec4 out_openness;   // as openness.py encodes it
 layout(location = 4) out float out_mirror;   // share of open sky about the mirrored ray
-#if HOLED
-flat in uint inner;
-#endif
 #if DAMAGED
 in vec3 rest_mm;
 
@@ -26,8 +23,8 @@ layout(location = 5) out vec4 out_rest;    // rest position in mm, -
 
 void main() {
 #if HOLED
-    // in the outer view torn sheet marks the hole, in the inner one it is not there
-    if (inner == 1u && hole_at(rest_mm) >= 0) discard;
+    // seen from outside torn sheet marks the hole, from inside it is not there
+    if (hole_at(rest_mm) >= 0) discard;
 #endif
     out_key = surface_key;
     out_sheet = atlas_mm;

@@ -13,9 +13,6 @@ layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_chart;
 layout(location = 5) in vec4 in_openness;
 layout(location = 6) in uvec3 in_open_to;   // a bit for each of openness.py's directions
-#if HOLED
-layout(location = 4) in uint in_inner;   // one an instance: 0 the outer view, 1 what holes show
-#endif
 
 out vec2 atlas_mm;
 out vec4 openness;
@@ -23,9 +20,6 @@ out float mirror_open;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
-#endif
-#if HOLED
-flat out uint inner;
 #endif
 
 uniform usampler2D lobe_masks;   // as openness.py makes them
@@ -59,9 +53,8 @@ void main() {
     mirror_open = open_about_mirror(position_mm * MM, in_normal);
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
-    // seen in a mirror, the sheets' backs pass for fronts: face culling keeps the insides
-    inner = in_inner;
-    gl_ViewportIndex = int(in_inner);
-    if (in_inner == 1u) gl_Position.x = -gl_Position.x;
+    // what holes show; in a mirror the sheets' backs pass for fronts: face culling keeps the insides
+    gl_ViewportIndex = 1;
+    gl_Position.x = -gl_Position.x;
 #endif
 }

@@ -1,0 +1,73 @@
+"""Runs of triangles around parts of an image against all triangles projected one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.camera import view_of
+from fastgen.clusters import Clusters
+from fastgen.config import Config
+from fastgen.container import build_container
+from fastgen.generator import Generator
+from fastgen.lens import Lens
+
+SIZE = (320, 240)
+REGIONS = [(150, 100, 20, 30), (0, 0, 40, 40), (300, 200, 20, 40), (10, 120, 300, 2)]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return Generator(Config.preset(), seed=2, size=SIZE).scene(3)
+
+
+def within(mesh, view, region, moved_mm):
+    """Which triangles have a corner box in view space whose projection meets the region."""
+    shifts = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * moved_mm
+    corners = mesh.positions_mm[mesh.triangles].astype(float)[:, :, None] + shifts
+    eye = (corners.reshape(len(corners), -1, 3) / 1000 - view.position_m) @ view.rotation.T
+    pixels = eye[..., :2] / eye[..., 2:] * view.focal_px + np.array(SIZE) / 2
+    x, y, w, h = region
+    low, high = pixels.min(axis=1), pixels.max(axis=1)
+    return (high > (x, y)).all(axis=1) & (low < (x + w, y + h)).all(axis=1)
+
+
+@pytest.mark.parametrize("region", REGIONS)
+@pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
+@pytest.mark.parametrize("moved_mm", [0.0, 150.0])
+def test_runs_hold_every_triangle_that_a_region_shows(scene, camera, region, moved_mm):
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    view = view_of(scene.camera(camera), SIZE)
+    chosen = np.zeros(len(mesh.triangles), bool)
+    runs = Clusters(mesh).seen_in(view, region, moved_mm)
+    for run in runs:
+        assert not chosen[run].any()
+        chosen[run] = True
+    shown = within(mesh, view, region, moved_mm)
+    assert not (shown & ~chosen).any()
+    assert len(runs) <= Clusters(mesh).most_runs
+    if max(region[2:]) < 100:
+        assert chosen.mean() < 0.7
+
+
+def test_the_whole_image_and_what_a_lens_bends_take_all(scene):
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    whole = [slice(0, len(mesh.triangles))]
+    camera = scene.camera("A")
+    assert Clusters(mesh).seen_in(view_of(camera, SIZE), None, 0.0) == whole
+    bent = replace(camera, lens=Lens("brown_conrady", (-0.01, 0.0, 0.0, 0.0, 0.0)))
+    assert Clusters(mesh).seen_in(view_of(bent, SIZE), REGIONS[0], 0.0) == whole
+
+
+def test_near_the_eye_nothing_is_left_out(scene):
+    """A box that reaches behind the camera has no outline in the image."""
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    camera = scene.camera("A")
+    inside = view_of(replace(camera, position_mm=(0.0, 0.0, 1200.0)), SIZE)
+    chosen = np.zeros(len(mesh.triangles), bool)
+    for run in Clusters(mesh).seen_in(inside, REGIONS[0], 0.0):
+        chosen[run] = True
+    eye = (mesh.positions_mm[mesh.triangles] / 1000 - inside.position_m) @ inside.rotation.T
+    crosses = (eye[..., 2].min(axis=1) < 0.1) & (eye[..., 2].max(axis=1) > 0.1)
+    assert crosses.any()
+    assert chosen[crosses].all()
