@@ -1,9 +1,10 @@
 """Renderer: Scene -> Frame, the owner of all GL objects that this takes.
 
 Two indirect draws, of the container and of the spreader that holds it, write for each sample which
-surface it sees and where on the unfolded sheet. Passes over the image then shade each pixel once
-for each different surface among its samples and write colour, ids, damage and depth at the pixel
-centre. Ids are never filtered: a sample lies exactly on each pixel centre.
+surface it sees and where on the unfolded sheet; one more a hole, what shows through it. Passes over
+the image then shade each pixel once for each different surface among its samples and write colour,
+ids, damage and depth at the pixel centre. Ids are never filtered: a sample lies exactly on each
+pixel centre.
 """
 
 from collections.abc import Callable, Iterable, Mapping
