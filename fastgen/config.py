@@ -119,7 +119,7 @@ class CameraConfig:
 
     face: str
     focal_mm: float = field(metadata=bounds(1.0, 2000.0, "mm"))
-    distance_mm: Range = field(metadata=bounds(100.0, 1.5e5, "mm"))  # camera.FAR_M ends sight
+    distance_mm: Range = field(metadata=bounds(300.0, 1.5e5, "mm"))  # camera.FAR_M ends sight
     azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
     elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
     roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))

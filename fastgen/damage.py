@@ -121,23 +121,25 @@ def variant(damages: tuple[Damage, ...]) -> str:
     return "holed" if any(damage.kind == "perforation" for damage in damages) else "damaged"
 
 
-def may_be_seen(damage: Damage, position_mm: Vec3) -> bool:
+def may_be_seen(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) -> bool:
     """Whether a camera outside at `position_mm` may see what the damage did from outside.
 
-    A sheet pushed in is hidden from behind its plane; an edge from behind both of its faces.
+    A sheet pushed in is hidden from behind its plane; an edge from behind both of its faces. What
+    bulges of the damages `beside` it may push out with it.
     """
     if damage.depth_mm < 0:
         return True
     toward = np.array(position_mm) - np.array(damage.origin_mm)
     # an edge's inward axis lies between two coordinate axes, a sheet's on one
     outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
-    return max(outward) > -SLACK_MM
+    pushed_mm = sum(max(-other.depth_mm, 0.0) for other in beside)
+    return max(outward) > -SLACK_MM - pushed_mm
 
 
 def seen_damages(damages: tuple[Damage, ...], position_mm: Vec3) -> tuple[Damage, ...]:
     """The damages that a frame from `position_mm` must draw; all of them where a hole shows the
     inside, which every damage may have moved."""
-    seen = tuple(damage for damage in damages if may_be_seen(damage, position_mm))
+    seen = tuple(damage for damage in damages if may_be_seen(damage, position_mm, damages))
     return damages if variant(seen) == "holed" else seen
 
 

@@ -49,8 +49,9 @@ def _cover(
 ) -> tuple[Cover, NDArray[np.float64]]:
     """What the damage would cover alone, and the bounds of that, infinite where it is nothing."""
     unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
-    camera_mm = shot.view.position_m / MM
-    if not may_be_seen(damage, (camera_mm[0], camera_mm[1], camera_mm[2])):
+    x, y, z = shot.view.position_m / MM
+    # where a hole is in view all damages are drawn, and more of them are seen than one might think
+    if not may_be_seen(damage, (x, y, z), shot.scene.damages) and not shown.any():
         return NOTHING, unbounded
     size = shot.view.size
     points = surface_points(project(_facets(shot.scene, shot.mesh, damage), shot.view), size)
@@ -69,7 +70,8 @@ def _cover(
     within = np.append(within[~known][part], np.ones(len(rows), bool))
     ends = covered + np.where(within, 1, points.step)[:, None]
     bounds = np.concatenate([covered.min(axis=0), ends.max(axis=0)]).astype(np.float64)
-    beyond = len(np.unique(covered[~within], axis=0)) * points.step**2
+    columns, rows = (covered[~within] - covered.min(axis=0)).T
+    beyond = len(np.unique(columns + rows * (columns.max(initial=0) + 1))) * points.step**2
     inside = covered[within]
     if not len(inside):
         return Cover(NOTHING.mask, (0, 0), beyond), bounds

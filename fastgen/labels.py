@@ -176,6 +176,10 @@ def _container(shot: Shot) -> Object:
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
     (alone,) = covers(box.pixels, box.owner, 1, view.size)
     castings, polygon = _castings(shot, corners)
+    # what is void within the box is known: nothing hides there
+    told = visibility(shot, alone, frame.ids == SPREADER_ID, False, area)
+    if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
+        told["truncated"] = True  # damage bulges out of the box
     return Object(
         id=CONTAINER_ID,
         class_name="container",
@@ -185,8 +189,7 @@ def _container(shot: Shot) -> Object:
         area=area,
         polygon=polygon,
         keypoints=castings,
-        # what is void within the box is known: nothing hides there
-        **visibility(shot, alone, frame.ids == SPREADER_ID, False, area),
+        **told,
     )
 
 

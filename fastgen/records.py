@@ -61,7 +61,7 @@ def nearest(word: Any, choices: typing.Iterable[str]) -> str:
 
 def check_known(name: str, value: Any, choices: Collection[str]) -> None:
     """Raise ConfigError that calls it `name` where `value` is none of `choices`."""
-    if value not in tuple(choices):  # a list is in no set, but may be asked for
+    if not isinstance(value, str) or value not in choices:
         raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, choices)}")
 
 

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from fastgen.camera import view_of
+from fastgen.camera import MM, NEAR_M, view_of
 from fastgen.config import CameraConfig, Config, ContainerConfig, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
@@ -35,6 +35,7 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
+from fastgen.scene_check import mm_away
 from fastgen.sensor.sampling import sample_lens, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
@@ -236,6 +237,12 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     shift = rig.target_shift_mm.draw(rng) * right + rig.target_shift_mm.draw(rng) * up
     target = np.array(middle) + shift
     position = target + direction * rig.distance_mm.draw(rng)
+    if mm_away(_rounded(position), kind) < NEAR_M / MM:
+        raise ConfigError(
+            f"cameras.{name}: may come nearer to the container than {NEAR_M / MM:g} mm, before "
+            "which nothing is drawn; give a larger distance_mm, or azimuth_deg and elevation_deg "
+            "nearer to 0"
+        )
     roll = rig.roll_deg.draw(rng)
     camera = Camera(
         name=name,

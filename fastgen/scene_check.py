@@ -14,7 +14,7 @@ from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
 from fastgen.programs import DECAL_KINDS, MAX_DAMAGES
 from fastgen.records import check_fields, check_known
-from fastgen.scene import Camera, Container, Damage, Decal, Scene
+from fastgen.scene import Camera, Container, Damage, Decal, Scene, Vec3
 from fastgen.sensor_config import CORNERS
 
 MAX_DECALS = 4096
@@ -73,18 +73,24 @@ def check_camera(camera: Any, container: Container) -> Camera:
     return camera
 
 
+def mm_away(position_mm: Vec3, kind: str) -> float:
+    """How far a point is from the box around a container of a kind, below 0 inside of it."""
+    length, width, height = KINDS[kind].size_mm
+    x, y, z = position_mm
+    outside = abs(x) - length / 2, abs(y) - width / 2, abs(z - height / 2) - height / 2
+    return max(outside) if max(outside) < 0 else math.hypot(*(max(away, 0.0) for away in outside))
+
+
 def _check_camera(camera: Camera, path: str, container: Container) -> None:
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is where the camera itself stands")
-    length, width, height = KINDS[container.kind].size_mm
-    x, y, z = camera.position_mm
-    outside = abs(x) - length / 2, abs(y) - width / 2, abs(z - height / 2) - height / 2
-    if max(outside) < 0:
+    away_mm = mm_away(camera.position_mm, container.kind)
+    if away_mm < 0:
         raise ConfigError(
             f"{path}.position_mm: {camera.position_mm} is inside the container, of which only the "
             "outside is drawn"
         )
-    if math.hypot(*(max(away, 0.0) for away in outside)) < NEAR_M / MM:
+    if away_mm < NEAR_M / MM:
         raise ConfigError(
             f"{path}.position_mm: {camera.position_mm} is nearer to the container than "
             f"{NEAR_M / MM:g} mm, before which nothing is drawn; move it away"

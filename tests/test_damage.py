@@ -49,6 +49,19 @@ def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, ind
         assert (error_m <= allowed_m).mean() > 0.999
 
 
+def test_what_one_damage_pushes_out_of_its_plane_shows_the_others():
+    """A camera behind the plane of a sheet sees what stands on a bulge of it."""
+    bulging = {"probability": 1, "kinds": ["concave", "dented"], "count": [4, 4]}
+    with Generator(Config.from_values({"damage": bulging}), seed=0, size=(256, 192)) as generator:
+        for index, camera in ((1463, "Cr"), (1103, "Cr"), (373, "Cl")):
+            sample = generator.render(index=index, camera=camera)
+            mesh = build_container(sample.scene.container.kind, sample.scene.container.profiles)
+            ids = oracle.object_ids(
+                sample.scene, mesh, oracle.cast(mesh, sample.view, sample.scene)
+            )
+            assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
+
+
 def close_up(scene: Scene, kind: str) -> Scene:
     """The scene with only its first damage of `kind`, and a camera right before it."""
     damage = next(d for d in scene.damages if d.kind == kind)

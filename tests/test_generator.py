@@ -39,6 +39,7 @@ RIG = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
         ({"size": (math.nan, 64)}, "size: nanx64 cannot be"),
         ({"quality": 3}, "quality: 3 is unknown"),
         ({"quality": []}, r"quality: \[\] is unknown"),
+        ({"quality": np.array(["high", "high"])}, r"quality: array.* is unknown"),
         ({"backend": "elg"}, r"backend: 'elg' is unknown \(did you mean egl"),
         ({"hdri_dir": 3}, "hdri_dir: 3 is no path"),
         ({"device_index": -1}, "device_index: -1 is not"),
@@ -304,3 +305,14 @@ def test_a_render_that_was_stopped_anywhere_spoils_none_after_it(monkeypatch):
         np.testing.assert_array_equal(sample.ids, wanted.ids)
         assert sample.objects == wanted.objects
     assert stopped == 2
+
+
+def test_a_rig_that_comes_too_near_is_refused_by_its_key():
+    beside = {"face": "front", "focal_mm": 20, "distance_mm": 3000, "azimuth_deg": [89, 89]}
+    beside |= {"elevation_deg": 0, "target_shift_mm": 0}
+    config = Config.from_values({"cameras": {"N": beside}})
+    with (
+        Generator(config, seed=0, size=(96, 64)) as generator,
+        pytest.raises(ConfigError, match=r"^cameras.N: may come nearer .* than 100 mm"),
+    ):
+        generator.render(index=0, camera="N")

@@ -10,7 +10,7 @@ from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
-from fastgen.scene import Camera, Container, Decal, Spreader
+from fastgen.scene import Camera, Container, Damage, Decal, Spreader
 from tests import oracle
 
 
@@ -130,6 +130,26 @@ def test_a_dent_that_comes_out_on_the_other_side_leaves_no_pixel_undrawn(camera)
         assert np.isin(sample.ids, [0, *(item.id for item in sample.objects)]).all()
         np.testing.assert_array_equal(np.isinf(sample.depth), sample.ids == 0)
         assert (sample.depth > 0).all()
+
+
+def test_a_container_whose_bulge_leaves_the_image_is_truncated():
+    with Generator(Config.preset(), size=(192, 256)) as generator:
+        scene = bare(generator, kind="20")
+        bulge = Damage(
+            kind="concave",
+            face="front",
+            origin_mm=(2000.0, -1204.0, 1300.0),
+            along=(1.0, 0.0, 0.0),
+            across=(0.0, 0.0, 1.0),
+            inward=(0.0, 1.0, 0.0),
+            size_mm=(2000.0, 1800.0),
+            depth_mm=-250.0,
+        )
+        camera = Camera("e", (100000.0, 0.0, 1300.0), (0.0, 0.0, 1300.0), 1384.0)
+        scene = replace(scene, damages=(bulge,), cameras=(camera,))
+        container = generator.render(scene=scene).objects[0]
+    assert container.amodal_bbox[0] < -5
+    assert container.truncated
 
 
 def test_a_marker_on_the_border_is_truncated_and_one_within_is_not():
