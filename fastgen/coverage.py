@@ -201,7 +201,7 @@ def spans(pixels: Array, rows: int | None = None) -> Runs:
     return polygon[some], row[some], left[some], right[some]
 
 
-_MOST_POINTS = 4_000_000
+_MOST_POINTS = 1_000_000
 """Of things that cover more, what lies outside the image is looked at on a coarser grid."""
 
 

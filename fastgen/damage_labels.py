@@ -70,8 +70,7 @@ def _cover(
     within = np.append(within[~known][part], np.ones(len(rows), bool))
     ends = covered + np.where(within, 1, points.step)[:, None]
     bounds = np.concatenate([covered.min(axis=0), ends.max(axis=0)]).astype(np.float64)
-    columns, rows = (covered[~within] - covered.min(axis=0)).T
-    beyond = len(np.unique(columns + rows * (columns.max(initial=0) + 1))) * points.step**2
+    beyond = _distinct(covered[~within] // points.step) * points.step**2
     inside = covered[within]
     if not len(inside):
         return Cover(NOTHING.mask, (0, 0), beyond), bounds
@@ -79,6 +78,17 @@ def _cover(
     mask = np.zeros((inside.max(axis=0) - low + 1)[::-1], bool)
     mask[*(inside - low).T[::-1]] = True
     return Cover(mask, (int(low[0]), int(low[1])), beyond), bounds
+
+
+def _distinct(cells: NDArray[np.int64]) -> int:
+    """How many of cells [P, 2] of a grid differ: coverage.surface_points bounds their number, and
+    sorting them takes ten times as long."""
+    if not len(cells):
+        return 0
+    columns, rows = (cells - cells.min(axis=0)).T
+    met = np.zeros((rows.max() + 1, columns.max() + 1), bool)
+    met[rows, columns] = True
+    return int(np.count_nonzero(met))
 
 
 @lru_cache(maxsize=16)
