@@ -51,7 +51,9 @@ Openness openness_at(ivec2 sample_at) {
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
 vec3 developed(vec3 color) {
-#if LAYER == LAYER_ALL
+#if LAYER == LAYER_NORMALS
+    return color;
+#elif LAYER == LAYER_ALL
     color = neutral_tone(color);
 #endif
     return srgb_encode(color);
@@ -61,7 +63,7 @@ vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 #if LAYER == LAYER_ALL
     return exposure * lit(s.material, normal, view, sky);
 #elif LAYER == LAYER_NORMALS
-    return srgb_decode(normal * 0.5 + 0.5);
+    return normal * 0.5 + 0.5;
 #elif LAYER == LAYER_REFLECTION
     return srgb_decode(vec3(s.material.roughness));
 #else
@@ -72,6 +74,8 @@ vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
 Shaded sky(vec3 ray) {
 #if LAYER == LAYER_ALL
     vec3 color = exposure * background(ray);
+#elif LAYER == LAYER_NORMALS
+    vec3 color = vec3(0.5);   // no direction
 #else
     vec3 color = vec3(1.0);
 #endif
@@ -182,7 +186,7 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     if (inner_key != 0u) {
         vec3 normal = -key_normal(inner_key);   // sheets are seen from behind
 #if LAYER == LAYER_NORMALS
-        vec3 seen = srgb_decode(bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5);
+        vec3 seen = bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5;
 #else
         vec3 seen = inside(normal, rest_mm);
 #endif

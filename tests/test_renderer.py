@@ -205,3 +205,16 @@ def test_normals_are_those_of_the_triangles_seen():
             error = np.linalg.norm(sample.normals - truth, axis=-1)[both]
             assert np.quantile(error, 0.99) < 0.03
             assert not sample.normals[sample.ids == 0].any()
+
+
+@pytest.mark.parametrize("quality", ["balanced", "high"])
+def test_normals_at_edges_face_the_camera(quality):
+    """What a pixel sees of the sky has no direction to average in."""
+    with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:
+        for camera in CAMERAS:
+            sample = generator.render(index=1, camera=camera, normals=True)
+            edges = (sample.ids > 0) & (sample.cover < 255)
+            _, rays = sample.view.rays()
+            toward = np.einsum("hwc,hwc->hw", sample.normals, rays @ sample.view.rotation.T)
+            assert edges.sum() > 100
+            assert (toward[edges] > 0.1).mean() < 0.01
