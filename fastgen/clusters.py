@@ -1,10 +1,12 @@
 """Which triangles of a mesh may be seen in a part of an image, by boxes around runs of them."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import NEAR_M, View
-from fastgen.mesh import Mesh
+from fastgen.mesh import UNIT_CUBE, Mesh
 from fastgen.targets import Region
 
 _SIZE = 64
@@ -13,14 +15,9 @@ _SIZE = 64
 _MARGIN_PX = 2.0
 """Filters read samples beyond a region's border."""
 
-_SIGNS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-
 
 class Clusters:
-    """Runs of a mesh's triangles, each with the box around it.
-
-    most_runs: the longest list that `seen_in` may give.
-    """
+    """Runs of a mesh's triangles, each with the box around it."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._count = len(mesh.triangles)
@@ -28,7 +25,11 @@ class Clusters:
         corners = mesh.positions_mm[mesh.triangles.ravel()]
         self._low = np.minimum.reduceat(corners, 3 * first)
         self._high = np.maximum.reduceat(corners, 3 * first)
-        self.most_runs = (len(first) + 1) // 2
+
+    @staticmethod
+    def most_runs(mesh: Mesh) -> int:
+        """The longest list that `seen_in` may give."""
+        return (math.ceil(len(mesh.triangles) / _SIZE) + 1) // 2
 
     def seen_in(self, view: View, region: Region | None, moved_mm: float) -> list[slice]:
         """Triangles, as slices of their array, among them all that `region` of the image shows.
@@ -39,7 +40,7 @@ class Clusters:
         if view.distortion or region is None:
             return [slice(0, self._count)]
         low, high = self._low - moved_mm, self._high + moved_mm
-        corners = low[:, None] + _SIGNS * (high - low)[:, None]
+        corners = low[:, None] + UNIT_CUBE * (high - low)[:, None]
         pixels, depth = view.project(corners)
         x, y, width, height = region
         right_of = pixels.max(axis=1) > (x - _MARGIN_PX, y - _MARGIN_PX)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, SEGMENTATION_CLASSES
+from fastgen.mesh import UNIT_CUBE
 from fastgen.scene import Damage, Vec3
 
 Array = NDArray[np.floating]
@@ -109,8 +110,7 @@ def corners_mm(damage: Damage) -> NDArray[np.float64]:
     if damage.kind == "axis":
         low, high = -v, v + depth
     axes = np.array([damage.along, damage.across, damage.inward])
-    signs = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    inside = np.array([-u, -v, low]) + signs * np.array([2 * u, 2 * v, high - low])
+    inside = np.array([-u, -v, low]) + UNIT_CUBE * np.array([2 * u, 2 * v, high - low])
     return np.array(damage.origin_mm) + inside @ axes
 
 

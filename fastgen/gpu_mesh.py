@@ -1,6 +1,7 @@
 """Meshes on the GPU, each drawn with one indirect call that leaves out faces turned away."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import moderngl
@@ -60,8 +61,7 @@ class GpuMesh:
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
         self._open_sky = open_sky(mesh.normals).tobytes()
         self._openness = ctx.buffer(self._open_sky)
-        self.clusters = Clusters(mesh)
-        most = max(len(mesh.groups), self.clusters.most_runs)
+        most = max(len(mesh.groups), Clusters.most_runs(mesh))
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
@@ -70,6 +70,11 @@ class GpuMesh:
             damage: ctx.vertex_array(program, contents, self._indices)
             for damage, program in programs.items()
         }
+
+    @cached_property
+    def clusters(self) -> Clusters:
+        """What of the mesh may be behind a hole: few scenes ask, and only of containers."""
+        return Clusters(self.mesh)
 
     def set_openness(self, values: bytes) -> None:
         """Let the next draws have `values`, of openness.SkyProbe; until then all sky is open."""

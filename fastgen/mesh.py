@@ -28,6 +28,9 @@ MATERIALS = (
     *("spreader", "cable"),
 )
 
+UNIT_CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+"""Corners of a cube from 0 to 1, int [8, 3]."""
+
 MAX_CHARTS = 500
 """Of one mesh: the renderer keeps chart + 1 of a container and of its spreader in ten bits."""
 

@@ -25,7 +25,7 @@ from fastgen.gl import GLContext
 from fastgen.gpu_light import GpuLight
 from fastgen.gpu_mesh import GpuMesh
 from fastgen.kept import Kept
-from fastgen.mesh import Mesh
+from fastgen.mesh import UNIT_CUBE, Mesh
 from fastgen.openness import lobe_masks
 from fastgen.programs import (
     DAMAGE_BLOCK,
@@ -343,8 +343,7 @@ def _box_corners(
     low, high = bounds_mm
     inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
     bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    return low - bulge + corners * (high - low + 2 * bulge)
+    return low - bulge + UNIT_CUBE * (high - low + 2 * bulge)
 
 
 def _view_values(

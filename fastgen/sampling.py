@@ -236,8 +236,8 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     direction += np.sin(elevation) * up
     shift = rig.target_shift_mm.draw(rng) * right + rig.target_shift_mm.draw(rng) * up
     target = np.array(middle) + shift
-    position = target + direction * rig.distance_mm.draw(rng)
-    if mm_away(_rounded(position), kind) < NEAR_M / MM:
+    position = _rounded(target + direction * rig.distance_mm.draw(rng))
+    if mm_away(position, kind) < NEAR_M / MM:
         raise ConfigError(
             f"cameras.{name}: may come nearer to the container than {NEAR_M / MM:g} mm, before "
             "which nothing is drawn; give a larger distance_mm, or azimuth_deg and elevation_deg "
@@ -246,7 +246,7 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     roll = rig.roll_deg.draw(rng)
     camera = Camera(
         name=name,
-        position_mm=_rounded(position),
+        position_mm=position,
         target_mm=_rounded(target),
         focal_mm=rig.focal_mm,
         roll_deg=round(roll, 3),

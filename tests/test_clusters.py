@@ -45,7 +45,7 @@ def test_runs_hold_every_triangle_that_a_region_shows(scene, camera, region, mov
         chosen[run] = True
     shown = within(mesh, view, region, moved_mm)
     assert not (shown & ~chosen).any()
-    assert len(runs) <= Clusters(mesh).most_runs
+    assert len(runs) <= Clusters.most_runs(mesh)
     if max(region[2:]) < 100:
         assert chosen.mean() < 0.7
 
