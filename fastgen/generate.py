@@ -7,7 +7,6 @@ running again on the same place makes only what is missing.
 import hashlib
 import json
 import os
-import reprlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, replace
@@ -17,6 +16,7 @@ from typing import Any
 from fastgen import workers
 from fastgen.config import Config, SplitConfig
 from fastgen.contact_sheet import contact_sheet
+from fastgen.dataset_json import MANIFEST, check_alike, known, sealed, unsealed
 from fastgen.encode import png
 from fastgen.environment import load_environment
 from fastgen.errors import ConfigError, OutputError
@@ -29,25 +29,21 @@ from fastgen.records import check_known, nearest
 from fastgen.sampling import SPLITS
 from fastgen.shards import (
     FORMATS,
+    MADE_BY,
     Job,
     Maker,
     Strikes,
     Task,
     digest,
     manifest_path,
-    shard_of,
     stem_of,
 )
 from fastgen.storage import Folder, Remote, storage_of
 
-MANIFEST = "dataset.json"
 CONTACT_SHEET = "contact_sheet.png"
 
 _MOST = 10**9
 """Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
-
-_words = reprlib.Repr()
-_words.maxlist = 100  # all formats, cameras or HDRIs: what differs may be the last
 
 Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
 """Makes the shards of `tasks` and reports on the way; see `run_here`."""
@@ -62,6 +58,7 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     """
     job = _checked(job, worker_count)
     settings = _settings(job)
+    job = replace(job, settings_digest=digest(unsealed(settings)))
     storage = storage_of(job.out)
     if isinstance(storage, Folder):
         _make_folder(storage.root)
@@ -70,8 +67,13 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             f"{job.out}: is the memory of this process, which the workers do not share; "
             "give a folder or a store"
         )
+    known(storage, job)  # a lock would be a change to what is not ours
     with storage.locked():
-        old = _claim(storage, job, settings)
+        old = known(storage, job)
+        check_alike(storage, job, settings, settings if old is None else old)
+        if old is None:
+            storage.write(MANIFEST, [unsealed(settings)])
+            old = {}
         present = storage.sizes()
         sums = old.get("shards", {})
         tasks = [
@@ -79,8 +81,6 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             for i in range(job.shard_count)
             if not _is_made(job, storage, present, i, sums.get(str(i)))
         ]
-        names = ("backend", "renderer")
-        made_by: dict[str, str] = {key: old[key] for key in names if key in old}
         if tasks:
             todo = sum(len(job.wanted(task.shard)) for task in tasks)
             progress = Progress(job.images, job.images - todo)
@@ -88,16 +88,12 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             def on_report(kind: str, value: Any) -> None:
                 if kind == "images":
                     progress.add(value)
-                elif kind == "made by":
-                    if not made_by:  # whoever finishes a killed run may have nothing left to make
-                        storage.write(MANIFEST, [_unsealed({**settings, **value})])
-                    made_by.update(value)
 
             try:
                 (runner or run_here(worker_count))(job, tasks, on_report)
             finally:
                 progress.close()
-        return _finish(job, storage, settings, made_by)
+        return _finish(job, storage, settings)
 
 
 def check_goes_on(job: Job, worker_count: int, manifest: Mapping[str, Any]) -> None:
@@ -107,7 +103,7 @@ def check_goes_on(job: Job, worker_count: int, manifest: Mapping[str, Any]) -> N
     the dataset and for values that cannot be.
     """
     job = _checked(job, worker_count)
-    _check_alike(storage_of(job.out), job, _settings(job), manifest)
+    check_alike(storage_of(job.out), job, _settings(job), manifest)
 
 
 def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Maker) -> Runner:
@@ -199,12 +195,6 @@ def _settings(job: Job) -> dict[str, Any]:
 def _make_folder(root: Path) -> None:
     try:
         root.mkdir(parents=True, exist_ok=True)
-        if not (root / MANIFEST).exists() and any(root.iterdir()):
-            left = [path.name for path in root.iterdir() if not path.name.startswith(".")]
-            if left:
-                raise OutputError(
-                    f"{root}: holds something else (no {MANIFEST}); give an empty or new folder"
-                )
     except FileExistsError:
         # mkdir says so of a link to nowhere too
         astray = [path for path in (root, *root.parents) if path.is_symlink() and not path.exists()]
@@ -215,54 +205,6 @@ def _make_folder(root: Path) -> None:
         raise OutputError(f"{root}: {what}") from None
     except OSError as error:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
-
-
-def _claim(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Make the place ours, or see that it is and was made alike; what dataset.json said before."""
-    where = f"{job.out}/{MANIFEST}"
-    try:
-        old: dict[str, Any] = json.loads(storage.read(MANIFEST))
-    except FileNotFoundError:
-        if storage.sizes():
-            raise OutputError(
-                f"{job.out}: holds something else (no {MANIFEST}); give an empty or new place"
-            ) from None
-        storage.write(MANIFEST, [_unsealed(settings)])
-        return {}
-    except ValueError:
-        raise OutputError(f"{where}: is damaged; remove the dataset or give another") from None
-    if not isinstance(old, dict):
-        raise OutputError(f"{where}: is damaged; remove the dataset or give another")
-    _check_alike(storage, job, settings, old)
-    return old
-
-
-def _check_alike(
-    storage: Folder | Remote, job: Job, settings: Mapping[str, Any], old: Mapping[str, Any]
-) -> None:
-    for key, value in settings.items():
-        if old.get(key) != value:
-            them = "them, --hdri too," if key == "environments" else "them"
-            raise OutputError(
-                f"{job.out}: was made with other settings "
-                f"({_difference(key, old.get(key), value)}); "
-                f"repeat {them} to resume, or give another folder"
-            )
-    made = (shard_of(path) for path in storage.sizes())
-    beyond = any(shard is not None and shard >= job.shard_count for shard in made)
-    if beyond or old.get("images", 0) > job.images:
-        raise OutputError(
-            f"{job.out}: holds more than {job.images} images; give --images as before or more"
-        )
-
-
-def _difference(name: str, old: Any, new: Any) -> str:
-    """The first setting that differs, with both of its values."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        key = min(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
-        return _difference(f"{name}.{key}", old.get(key), new.get(key))
-    said = ["missing" if value is None else _words.repr(value) for value in (old, new)]
-    return f"{name} was {said[0]}, is now {said[1]}"
 
 
 def _is_made(
@@ -280,16 +222,16 @@ def _is_made(
         wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
-        return whole and manifest["images"] == wanted
+        alike = manifest["settings"] == job.settings_digest
+        return whole and alike and manifest["images"] == wanted
     except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 
-def _finish(
-    job: Job, storage: Folder | Remote, settings: dict[str, Any], made_by: dict[str, str]
-) -> dict[str, Any]:
+def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dict[str, Any]:
     """Write the files over all samples, and dataset.json, which seals everything, last."""
     shards: dict[str, str] = {}
+    made_by: dict[str, str] = {}
     failed: list[dict[str, Any]] = []
     images: list[tuple[str, str]] = []
     counts = {
@@ -299,6 +241,7 @@ def _finish(
         data = storage.read(manifest_path(shard))
         shards[str(shard)] = digest(data)
         manifest = json.loads(data)
+        made_by = made_by or {name: manifest[name] for name in MADE_BY}
         failed += manifest["failed"]
         for record in manifest["records"]:
             counts[record["split"]].update(_counts(record))
@@ -347,16 +290,6 @@ class _Sums:
 
     def entry(self) -> list[Any]:
         return [self._size, self._hash.hexdigest()]
-
-
-def _unsealed(manifest: Mapping[str, Any]) -> bytes:
-    return json.dumps(manifest, indent=1).encode()
-
-
-def sealed(manifest: Mapping[str, Any]) -> bytes:
-    """dataset.json with a hash of itself as its last line."""
-    text = _unsealed(manifest).decode()
-    return f'{text[:-2]},\n "digest": "{digest(text.encode())}"\n}}'.encode()
 
 
 def _records(job: Job, storage: Folder | Remote, split: str) -> Callable[[], Iterator[Record]]:

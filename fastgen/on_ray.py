@@ -5,7 +5,6 @@ that the scene which ended an actor is known after its death. Files go straight 
 job.out; Ray carries shard numbers and reports alone.
 """
 
-import json
 import logging
 import os
 import signal
@@ -18,8 +17,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import fastgen
+from fastgen.dataset_json import MANIFEST
 from fastgen.errors import OutputError
-from fastgen.generate import MANIFEST, Runner
+from fastgen.generate import Runner
 from fastgen.shards import ATTEMPTS, Job, Maker, Strikes, Task, digest
 from fastgen.storage import storage_of
 from fastgen.workers import HANG_S, in_words
@@ -140,10 +140,8 @@ class _Board:
 
 
 def _mark(job: Job) -> str:
-    """Of dataset.json, the same before and after the first worker says what it renders with."""
-    said = json.loads(storage_of(job.out).read(MANIFEST))
-    settings = {name: said[name] for name in said if name not in ("backend", "renderer")}
-    return digest(json.dumps(settings).encode())
+    """Of dataset.json, by which a node knows the place that the driver sees."""
+    return digest(storage_of(job.out).read(MANIFEST))
 
 
 class _Actor:

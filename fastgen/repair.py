@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from fastgen.config import Config
+from fastgen.dataset_json import MANIFEST
 from fastgen.errors import OutputError
-from fastgen.generate import MANIFEST, check_goes_on, generate
+from fastgen.generate import check_goes_on, generate
 from fastgen.shards import Job
 from fastgen.storage import storage_of
 from fastgen.verify import examine

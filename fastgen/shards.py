@@ -31,18 +31,22 @@ _PRELOAD_IMAGES = 1000
 """A run of more meets every light anyway; from the start, its memory does not grow later."""
 
 FORMATS = tuple(SHARD_SCENES)
+MADE_BY = ("backend", "renderer")
+"""What manifests say of the process that made them."""
+
 ATTEMPTS = 3
 """A scene that failed so often is given up."""
 
 Report = Callable[[str, Any], None]
-"""Tells the parent process: 'at' a scene's index, 'images' made, 'made by' whom."""
+"""Tells the parent process: 'at' a scene's index, 'images' made."""
 
 
 @dataclass(frozen=True)
 class Job:
     """What to generate. out: a folder or an fsspec address. images counts images, not scenes; size
     is (width, height). fmt: one of FORMATS; formats: names of what is written of each sample.
-    shard_scenes: scenes that are committed together."""
+    shard_scenes: scenes that are committed together. settings_digest: of all that makes the samples
+    what they are, so that shards can tell whose they are; '' before `generate` has filled it in."""
 
     out: str
     images: int
@@ -56,6 +60,7 @@ class Job:
     formats: tuple[str, ...] = ()
     quality: str = "balanced"
     shard_scenes: int = 4
+    settings_digest: str = ""
 
     @property
     def shard_count(self) -> int:
@@ -151,7 +156,7 @@ class Maker:
         if job.images > _PRELOAD_IMAGES:
             self._generator.preload()
         names = (self._generator.used_backend, self._generator.renderer_name)
-        report("made by", dict(zip(("backend", "renderer"), names, strict=True)))
+        self._made_by = dict(zip(MADE_BY, names, strict=True))
 
     def __call__(self, task: Task) -> None:
         """Render, encode and commit one shard."""
@@ -170,6 +175,8 @@ class Maker:
         self._storage.commit(files, f"{task.shard:06d}")
         manifest = {
             "shard": task.shard,
+            "settings": self._job.settings_digest,
+            **self._made_by,
             "images": [record["stem"] for _, record in made],
             "failed": [{"scene": i, "seed": self._job.seed, "error": skip[i]} for i in skip],
             "files": {path: _entry(files, path) for path in files},

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.dataset_json import MANIFEST
 from fastgen.errors import OutputError
 from fastgen.formats import Record
-from fastgen.generate import MANIFEST
 from fastgen.sampling import SPLITS
 from fastgen.shards import manifest_path
 from fastgen.storage import storage_of

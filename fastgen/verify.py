@@ -1,7 +1,9 @@
 """`fastgen verify`: every file of a dataset present, unchanged, and consistent with its labels."""
 
 import json
+import re
 from dataclasses import dataclass, field
+from pathlib import PurePosixPath
 from typing import Any
 
 import cv2
@@ -11,14 +13,14 @@ from numpy.typing import NDArray
 
 from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.dataset_json import MANIFEST, is_sealed
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record
 from fastgen.formats.yolo import pixel_box
-from fastgen.generate import MANIFEST
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene
-from fastgen.shards import digest, manifest_path
+from fastgen.shards import digest, manifest_path, shard_of
 from fastgen.storage import Folder, Remote, storage_of
 
 Place = Folder | Remote
@@ -45,10 +47,12 @@ def examine(out: str) -> Findings:
         manifest = json.loads(text)
         manifest["config"], manifest["shard_scenes"]
     except (OSError, ValueError, KeyError, TypeError):
-        raise OutputError(f"{out}: no readable {MANIFEST}; give a dataset's folder") from None
+        some = any(shard_of(path) is not None for path in storage.sizes())
+        what = "run generate again with the same settings" if some else "give a dataset's folder"
+        raise OutputError(f"{out}: no readable {MANIFEST}; {what}") from None
     if "digest" not in manifest:
         return Findings([f"{MANIFEST}: the dataset is not finished; run generate again"])
-    if not _is_sealed(text):
+    if not is_sealed(text):
         again = "run generate again with the same settings"
         return Findings([f"{MANIFEST}: was changed after it was written; {again}"])
     faults = [
@@ -58,31 +62,26 @@ def examine(out: str) -> Findings:
     present = dict(storage.sizes())
     present.pop(MANIFEST, None)
     shards = []
-    broken: set[str] = set()
+    untold: set[int] = set()  # shards whose files nothing lists
     for number, hashed in manifest["shards"].items():
-        path = manifest_path(int(number))
-        data = _intact(storage, present, path, None, hashed, faults)
+        data = _intact(storage, present, manifest_path(int(number)), None, hashed, faults)
         if data is None:
-            broken.add(path)
+            untold.add(int(number))
         else:
             shards.append(json.loads(data))
+    broken = {manifest_path(number) for number in untold}
     listed = [manifest["files"], *(shard["files"] for shard in shards)]
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
         if _intact(storage, present, path, size, hashed, faults) is None:
             broken.add(path)
-    if len(shards) == len(manifest["shards"]):
-        faults += [f"{path}: does not belong here" for path in sorted(present)]
+    astray = (path for path in sorted(present) if _shard_by_name(path, manifest) not in untold)
+    faults += [f"{path}: does not belong here" for path in astray]
     if manifest["format"] == "seafront":
         records = [record for shard in shards for record in shard["records"]]
-        faults += _consistency(storage, records, broken)
+        faults += _samples(storage, records, broken)
+        if not untold:
+            faults += _lists(storage, records, broken)
     return Findings(faults, broken, manifest)
-
-
-def _is_sealed(text: bytes) -> bool:
-    """Whether the hash in the last line of dataset.json is that of the rest."""
-    head, _, tail = text.rpartition(b',\n "digest": "')
-    wanted = digest(head + b"\n}")
-    return tail.decode(errors="replace") == f'{wanted}"\n}}'
 
 
 def _intact(
@@ -108,8 +107,24 @@ def _intact(
     return data
 
 
-def _consistency(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
-    """Whether labels agree with one another, among files that are as they were written."""
+def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
+    """Which shard a sample's file is of, None where its name tells of none."""
+    found = re.match(r"(?:[a-z]+-)?(\d{6,})\D", PurePosixPath(path).name)
+    if found is None:
+        return None
+    scenes: int = manifest["shard_scenes"]
+    if path.endswith(".tar"):
+        numbered = 1
+    elif path.startswith("bop/"):
+        numbered = scenes * len(manifest["cameras"])
+    else:
+        numbered = scenes
+    return int(found[1]) // numbered
+
+
+def _samples(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
+    """Whether a sample's labels agree with one another, among files that are as they were
+    written."""
     faults = []
     for record in records:
         split, stem = record["split"], record["stem"]
@@ -123,18 +138,24 @@ def _consistency(storage: Place, records: list[Record], broken: set[str]) -> lis
         if broken.isdisjoint(names.values()):
             data = {key: storage.read(path) for key, path in names.items()}
             faults += [f"{names[key]}: {fault}" for key, fault in _sample(data, record)]
+    return faults
+
+
+def _lists(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
+    """Whether the COCO files say what the records of all shards say."""
+    faults = []
     for split in SPLITS:
         name = f"damage/coco_{split}.json"
         wanted = [
             item for record in records if record["split"] == split
             for item in record["facts"]["damage"]
         ]  # fmt: skip
-        if name not in broken and not _lists(storage.read(name), wanted):
+        if name not in broken and not _annotates(storage.read(name), wanted):
             faults.append(f"{name}: differs from the shards' records")
     return faults
 
 
-def _lists(text: bytes, wanted: list[dict[str, Any]]) -> bool:
+def _annotates(text: bytes, wanted: list[dict[str, Any]]) -> bool:
     found = json.loads(text)["annotations"]
     return [{k: v for k, v in item.items() if k not in ("id", "image_id")} for item in found] == (
         wanted

@@ -33,7 +33,7 @@ class QuickMaker(Maker):
     def __init__(self, job, whole_machine, report):
         self._job, self._report, self._formats = job, report, ()
         self._storage = storage_of(job.out)
-        report("made by", {"backend": "none", "renderer": "none"})
+        self._made_by = {"backend": "none", "renderer": "none"}
 
     def _image(self, index, camera):
         if index == FAULTY_SCENE and os.environ.get("FAULT") == "crash":
