@@ -4,7 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from fastgen.classes import SOUND_CONTAINER, SPREADER_ID
 from fastgen.cli import main
+from fastgen.overlay import label_colors
 
 
 @pytest.mark.parametrize(
@@ -77,3 +79,16 @@ def test_show_writes_every_layer(tmp_path):
         assert np.ptp(image) > 0
         seen.add(path.read_bytes())
     assert len(seen) == 9
+
+
+@pytest.mark.parametrize(
+    "labels",
+    [
+        [*range(70), SPREADER_ID],
+        [0, SOUND_CONTAINER, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 7))],
+    ],
+)
+def test_shown_labels_can_be_told_from_one_another(labels):
+    shown = label_colors(np.array([labels], np.uint16))[0].astype(float)
+    apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
+    assert apart[~np.eye(len(labels), dtype=bool)].min() > 20
