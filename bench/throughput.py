@@ -31,7 +31,7 @@ from fastgen.camera import view_of
 from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
 from fastgen.labels import label
 from fastgen.sample import Sample
-from fastgen.shapes import spreader_mesh
+from fastgen.shapes import spreader_outline
 from fastgen.storage import Folder
 from fastgen.visibility import Shot
 
@@ -71,7 +71,7 @@ def stages(backend: str, size: tuple[int, int], scenes: int) -> tuple[str, dict[
                 t2 = clock()
                 view = view_of(camera, size)
                 mesh = renderer.mesh(scene.container)
-                held = spreader_mesh(scene)
+                held = spreader_outline(scene, camera.lens is not None)
                 objects = label(Shot(frame, scene, view, mesh, held, config))
                 t3 = clock()
                 sample = Sample(

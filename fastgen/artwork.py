@@ -34,9 +34,9 @@ class Glyph:
     advance: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Font:
-    """A font's glyphs by character."""
+    """A font's glyphs by character; fonts are told apart by identity."""
 
     name: str
     glyphs: Mapping[str, Glyph]

@@ -89,7 +89,7 @@ def pack_decals(
                 f"decals[{i}] ({decal.kind} on {decal.face} at {decal.center_mm}): more than "
                 f"{CELL_SLOTS} decals meet within {DECAL_CELL_MM:g} mm; spread them"
             )
-        np.put_along_axis(cells, used[..., None], np.uint32(i + 1), axis=-1)
+        cells[np.arange(len(used))[:, None], np.arange(used.shape[1]), used] = i + 1
     grid = slots[..., 0::2] | (slots[..., 1::2] << np.uint32(16))
     glyph_rows = max(-(-len(glyphs) // GLYPH_COLUMNS), 1)
     glyph_table = np.zeros((glyph_rows * GLYPH_COLUMNS, 4), np.float32)

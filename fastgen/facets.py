@@ -113,6 +113,25 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
     distances, kept where not negative. Returns what is left, [K', M + 1 or fewer, C], and bool [K]:
     which polygons something is left of.
     """
+    keep = inside >= 0
+    left: NDArray[np.bool_] = np.asarray(keep.any(axis=1))
+    crossed = left & ~keep.all(axis=1)
+    kept = corners[left]
+    if crossed.any():  # most polygons lie on one side
+        pieces = _cut(corners[crossed], inside[crossed])
+        kept, pieces = _padded(kept, pieces.shape[1]), _padded(pieces, kept.shape[1])
+        kept[crossed[left]] = pieces
+    return kept, left
+
+
+def _padded(corners: Array, most: int) -> Array:
+    """Polygons [K, M, C] with at least `most` corners, the last one repeated."""
+    more = max(most - corners.shape[1], 0)
+    return np.concatenate([corners, *[corners[:, -1:]] * more], axis=1)
+
+
+def _cut(corners: Array, inside: Array) -> Array:
+    """As `clip`, of polygons with corners on both sides."""
     following = np.roll(corners, -1, axis=1)
     ahead = np.roll(inside, -1, axis=1)
     span = inside - ahead
@@ -130,12 +149,10 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
     order = np.zeros(valid.shape, np.int64)
     row, slot = np.nonzero(valid)
     order[row, place[row, slot] - 1] = slot
-    left = used > 0
-    slots, order, used = slots[left], order[left], used[left]
-    width = max(int(used.max(initial=0)), 3)
+    width = max(int(used.max()), 3)
     column = np.minimum(np.arange(width), used[:, None] - 1)
-    kept = np.take_along_axis(slots, np.take_along_axis(order, column, 1)[..., None], axis=1)
-    return kept, left
+    rows = np.arange(count)[:, None]
+    return slots[rows, order[rows, column]]
 
 
 def lowest(values: NDArray[Number]) -> NDArray[Number]:

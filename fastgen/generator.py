@@ -36,7 +36,7 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
-from fastgen.shapes import spreader_mesh
+from fastgen.shapes import spreader_outline
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -187,9 +187,10 @@ class Generator:
             if layer == "all" and is_needed(camera, scene.weather):
                 airlight = self._airlight(scene, camera)
                 frame = develop(frame, view, camera, scene.weather, airlight)
-            mesh, spreader = renderer.mesh(scene.container), spreader_mesh(scene)
+            mesh = renderer.mesh(scene.container)
             seen_normals = self._normals(frame, scene, camera, view) if normals else None
         config = self.config if labels is None else replace(self.config, labels=labels)
+        spreader = spreader_outline(scene, camera.lens is not None)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
         return Sample(
             image=frame.image,
@@ -272,10 +273,12 @@ class Generator:
         drawn = [name for name, weight in self._weights.items() if weight > 0]
         names = self.config.environment.names or drawn
         lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
-        shaped = (
+        shaped = [
             replace(scene, container=container, spreader=spreader)
             for container, spreader in possible_shapes(self.config)
-        )
+        ]
+        for shape in shaped:
+            spreader_outline(shape, bent=False)
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)

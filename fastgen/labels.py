@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.camera import MM, NEAR_M
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
@@ -142,15 +142,19 @@ def _outline(decal: Decal) -> NDArray[np.float64]:
     counter-clockwise from outside.
     """
     half = np.array(decal.size_mm) / 2
-    if decal.kind == "marker":
-        corners = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]) * half
-    else:
-        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-    steps = np.arange(_EDGE_POINTS)[:, None] / _EDGE_POINTS
-    edge = np.concatenate(
-        [a + steps * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]
-    )
+    edge = (_DIAMOND if decal.kind == "marker" else _RECTANGLE) * half
     return np.asarray(edge @ decal.turn.T + np.array(decal.center_mm), np.float64)
+
+
+def _along_edges(corners: ArrayLike) -> NDArray[np.float64]:
+    """Points [_EDGE_POINTS * K, 2] along the polygon of `corners` [K, 2]."""
+    begin = np.array(corners, np.float64)[:, None]
+    steps = np.arange(_EDGE_POINTS)[:, None] / _EDGE_POINTS
+    return (begin + steps * (np.roll(begin, -1, axis=0) - begin)).reshape(-1, 2)
+
+
+_DIAMOND = _along_edges([[0, -1], [1, 0], [0, 1], [-1, 0]])
+_RECTANGLE = _along_edges([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 def _container(shot: Shot) -> Object:

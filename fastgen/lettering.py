@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from fastgen.artwork import Font
 from fastgen.errors import AssetError
@@ -40,7 +41,8 @@ class Lettering:
     glyphs: tuple[PlacedGlyph, ...]
 
 
-def layout(lines: Sequence[str], font: Font, cap_mm: float, vertical: bool = False) -> Lettering:
+@lru_cache(maxsize=64)  # who chooses a text, who draws it and who crops it ask alike
+def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = False) -> Lettering:
     """Set `lines` in `font` with capitals `cap_mm` high.
 
     Horizontal lines run to the right, one below the other, all starting at the left. Vertical

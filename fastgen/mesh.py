@@ -259,7 +259,8 @@ class _Locator:
         self, points: NDArray[np.float64], listed: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The listed triangle that each point is most inside of, and its least weight there."""
-        least = self._weights(points[:, None], listed).min(axis=-1)
+        first, second, third = np.moveaxis(self._weights(points[:, None], listed), -1, 0)
+        least = np.minimum(np.minimum(first, second), third)  # far quicker than along the axis
         least[listed < 0] = -np.inf
         chosen = least.argmax(axis=1)
         rows = np.arange(len(points))
@@ -273,4 +274,4 @@ class _Locator:
             row[triangle, 0] * x + row[triangle, 1] * y + row[triangle, 2]
             for row in self.to_weights.transpose(1, 0, 2)
         )
-        return np.stack([1 - (second + third), second, third], axis=-1)
+        return np.moveaxis(np.array([1 - (second + third), second, third]), 0, -1)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import moderngl
+import numpy as np
 
 from fastgen.container import build_container
 from fastgen.divided_mesh import as_drawn
@@ -83,6 +84,15 @@ def spreader_mesh(scene: Scene) -> Mesh | None:
     if not held.present:
         return None
     return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
+
+
+def spreader_outline(scene: Scene, bent: bool) -> Mesh | None:
+    """The surface of a scene's spreader as it is drawn, of as few triangles as can be, for labels;
+    bent: whether a lens bends what is drawn, which takes small ones."""
+    held = scene.spreader
+    if bent or not held.present:
+        return spreader_mesh(scene)
+    return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm, np.inf)
 
 
 def _shading_spreader(scene: Scene) -> Mesh | None:

@@ -16,6 +16,7 @@ from fastgen.errors import ConfigError
 from fastgen.mesh import Mesh
 from fastgen.records import check_known
 from fastgen.spreader_parts import (
+    CUT_MM,
     LOCKS_CHARTS,
     TIERS,
     Hang,
@@ -37,20 +38,24 @@ GAP_LIMITS_MM = (0.0, 200.0)
 
 
 def build_spreader(
-    kind: str, flippers_down: tuple[bool, bool] = (True, True), gap_mm: float = 15.0
+    kind: str,
+    flippers_down: tuple[bool, bool] = (True, True),
+    gap_mm: float = 15.0,
+    cut_mm: float = CUT_MM,
 ) -> Mesh:
     """The mesh of a spreader that holds a container, in the container's frame; see Mesh.
 
     kind: one of KINDS. flippers_down: whether the gather guides of the front (-y) and of the back
     (+y) side hang beside the container or are swung up. gap_mm: from the castings' upper plane to
-    the spreader's lower one. All triangles are in the group "frame". Calls with equal arguments
-    return the same object. Raises ConfigError for an unknown kind or a gap out of range.
+    the spreader's lower one. cut_mm: how often members are cut across, for what light the vertices
+    bear; the surface stays the same. All triangles are in the group "frame". Calls with equal
+    arguments return the same object. Raises ConfigError for an unknown kind or a gap out of range.
     """
     check_known("container kind", kind, KINDS)
     low, high = GAP_LIMITS_MM
     if not low <= gap_mm <= high:
         raise ConfigError(f"spreader gap_mm: {gap_mm:g} is outside {low:g} to {high:g} mm")
-    return _lifted(kind, flippers_down, gap_mm)
+    return _lifted(kind, flippers_down, gap_mm, cut_mm)
 
 
 def tier_of_vertices(mesh: Mesh) -> NDArray[np.intp]:
@@ -66,10 +71,11 @@ def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
     return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
 
 
-@lru_cache(maxsize=128)
-def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float) -> Mesh:
+@lru_cache(maxsize=256)
+def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: float) -> Mesh:
     """The same at any gap but for where it is: only the twistlocks stay in their castings."""
-    touching = stored("spreader", (kind, flippers_down), lambda: _touching(kind, flippers_down))
+    inputs = kind, flippers_down, cut_mm
+    touching = stored("spreader", inputs, lambda: _touching(*inputs))
     locks = [touching.chart_index(name) for name in LOCKS_CHARTS.values()]
     positions = touching.positions_mm.copy()
     positions[~np.isin(touching.chart, locks), 2] += gap_mm
@@ -77,9 +83,9 @@ def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float) -> Mesh:
     return replace(touching, positions_mm=positions)
 
 
-def _touching(kind: str, flippers_down: tuple[bool, bool]) -> Mesh:
+def _touching(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:
     """A spreader without a gap below it."""
-    hang = Hang(KINDS[kind], 0.0)
+    hang = Hang(KINDS[kind], 0.0, cut_mm)
     sheets = [
         *frame(hang),
         *ends(hang),

@@ -36,7 +36,7 @@ _BEAM_Y_MM = 520.0
 _FRAME_HALF_MM = 2650.0
 """Half the main frame's length: what a spreader drawn in to 20 feet leaves room for."""
 
-_CUT_MM = 150.0
+CUT_MM = 150.0
 """Members are cut across so often: light is interpolated between vertices, and they hide it from
 each other where they meet."""
 
@@ -65,10 +65,14 @@ CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
 
 @dataclass(frozen=True)
 class Hang:
-    """Where a spreader hangs: over which container, gap_mm above its upper castings."""
+    """Where a spreader hangs: over which container, gap_mm above its upper castings.
+
+    cut_mm: how often members are cut across.
+    """
 
     kind: ContainerKind
     gap_mm: float
+    cut_mm: float = CUT_MM
 
     @property
     def base(self) -> float:
@@ -80,7 +84,7 @@ class Hang:
     ) -> Patch:
         """A box; x and y in either order."""
         low, high = (min(x), min(y), self.base + above[0]), (max(x), max(y), self.base + above[1])
-        return box(low, high, _CUT_MM)
+        return box(low, high, self.cut_mm)
 
 
 def frame(hang: Hang) -> list[Sheet]:

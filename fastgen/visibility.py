@@ -21,8 +21,8 @@ rounding, before something is said to hide it."""
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One image and all that explains it. mesh: the scene's container at rest; spreader: its
-    spreader as built, None where it has none."""
+    """One image and all that explains it. mesh: the scene's container at rest; spreader: as of
+    shapes.spreader_outline."""
 
     frame: Frame
     scene: Scene

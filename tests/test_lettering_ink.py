@@ -24,7 +24,7 @@ BODY = (
 def text():
     """A line of letters: its glyphs, and its ink on a grid of 1 mm, [H, W] from the lower left."""
     tiles, fonts = glyph_tiles()
-    glyphs = layout(["CSQU 305438"], next(iter(fonts.values())), CAP_MM).glyphs
+    glyphs = layout(("CSQU 305438",), next(iter(fonts.values())), CAP_MM).glyphs
     side = round(glyphs[0].x1 - glyphs[0].x0)
     left, low = min(g.x0 for g in glyphs), glyphs[0].y0
     ink = np.zeros((side, round(max(g.x1 for g in glyphs) - left) + 1))
