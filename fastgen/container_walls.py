@@ -39,7 +39,8 @@ def wave_knots(wave: Wave, low: float, high: float, margin: float) -> tuple[Arra
     count = int((high - low + wave.outer_mm - 2 * margin) // wave.pitch_mm)
     if count < 1:
         raise ConfigError(
-            f"pitch_mm: {wave.pitch_mm:g} is longer than a wall of {high - low:.0f} mm takes"
+            f"pitch_mm: no wave of {wave.pitch_mm:g} mm, outer_mm {wave.outer_mm:g}, fits a wall "
+            f"of {high - low:.0f} mm; make them smaller"
         )
     start = (low + high - (count * wave.pitch_mm - wave.outer_mm)) / 2
     steps = np.cumsum([0.0, wave.slope_mm, wave.inner_mm, wave.slope_mm])

@@ -15,6 +15,7 @@ from typing import Any
 
 import orjson
 
+from fastgen import coco
 from fastgen.camera import View
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.config import LabelConfig
@@ -22,6 +23,7 @@ from fastgen.encode import jpeg
 from fastgen.records import check_known
 from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene
+from fastgen.visibility import window
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
 """The formats that `--format seafront` always writes: the paper's tasks, and the container."""
@@ -71,6 +73,15 @@ class Item:
     def detections(self) -> Iterator[tuple[Object, Box]]:
         """As `detections`, of the sample's objects."""
         return detections(self.sample.objects)
+
+    @cached_property
+    def container_annotation(self) -> dict[str, Any] | None:
+        """The container as COCO has it, category 1 of every task; None where it is not seen."""
+        thing, sample = self.container, self.sample
+        if thing.bbox is None:
+            return None
+        part = window(sample.damage, thing.bbox) > 0
+        return coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored)
 
     @cached_property
     def jpeg(self) -> bytes:

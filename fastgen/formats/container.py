@@ -5,7 +5,6 @@ from typing import Any
 from fastgen import coco
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, view_values
 from fastgen.labels import CASTINGS
-from fastgen.visibility import window
 
 _EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
 
@@ -18,12 +17,11 @@ class _Container(Format):
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample = item.sample
         thing = item.container
-        if thing.bbox is None:
+        if item.container_annotation is None:
             return {}, []
         pose = view_values(sample.view)
-        part = window(sample.damage, thing.bbox) > 0
         found = {
-            **coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored),
+            **item.container_annotation,
             "keypoints": [value for point in thing.keypoints for value in point],
             "num_keypoints": sum(flag > 0 for *_, flag in thing.keypoints),
             "kind": sample.scene.container.kind,

@@ -51,7 +51,9 @@ class _Damage(Format):
             f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
         }
         return files, [
-            coco.annotation(category, box, window(mask, box), (width, height), ignored)
+            item.container_annotation
+            if category == 1
+            else coco.annotation(category, box, window(mask, box), (width, height), ignored)
             for category, box, mask, ignored in found
         ]
 

@@ -25,11 +25,12 @@ class _Imdg(Format):
             f"imdg/images/{split}/{stem}.jpg": Same(item.image_path),
             f"imdg/labels/{split}/{stem}.txt": labels.encode(),
         }
-        found = []
+        found: list[dict[str, Any] | None] = []
         for thing, box in item.detections:
-            on_top = thing.id == CONTAINER_ID
-            target = window(sample.damage if on_top else sample.ids, box)
-            part = target > 0 if on_top else target == thing.id
+            if thing.id == CONTAINER_ID:
+                found.append(item.container_annotation)
+                continue
+            part = window(sample.ids, box) == thing.id
             category = DETECTION_CLASSES.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
             found.append(
