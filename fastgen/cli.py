@@ -24,7 +24,7 @@ from fastgen.generate import CONTACT_SHEET, generate, parse_split
 from fastgen.generator import QUALITY, Generator, find_camera
 from fastgen.gl import BACKENDS
 from fastgen.on_ray import run_on_ray
-from fastgen.overlay import label_colors, overlay
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
 from fastgen.programs import LAYERS
 from fastgen.records import check_known
 from fastgen.repair import repair
@@ -271,7 +271,11 @@ def _show(options: argparse.Namespace) -> int:
         sample = generator.render(index=options.index, camera=options.camera, layer=drawn)
     image = sample.image
     if layer in ("ids", "damage"):
-        image = label_colors(sample.ids if layer == "ids" else sample.damage)
+        image = (
+            label_colors(sample.ids, ID_GREYS)
+            if layer == "ids"
+            else label_colors(sample.damage, DAMAGE_GREYS)
+        )
     if options.overlay:
         image = overlay(sample, image)
     write(options.file, encode(image))

@@ -1,4 +1,7 @@
-"""dataset.json: what a dataset was made with, and once it is finished the hashes of all of it."""
+"""dataset.json: what a dataset was made with, and once it is finished the hashes of all of it.
+
+Shards' manifests bear a hash of these settings too, so they can tell whose they are without it.
+"""
 
 import json
 import reprlib
@@ -6,13 +9,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from fastgen.errors import OutputError
-from fastgen.shards import Job, digest, shard_of
+from fastgen.seal import digest, is_sealed
+from fastgen.shards import Job, manifest_path, shard_of
 from fastgen.storage import Folder, Remote
 
 MANIFEST = "dataset.json"
 
 _words = reprlib.Repr()
-_words.maxlist = 100  # all formats, cameras or HDRIs: what differs may be the last
+_words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: what differs may be the last
 
 
 def unsealed(manifest: Mapping[str, Any]) -> bytes:
@@ -20,24 +24,11 @@ def unsealed(manifest: Mapping[str, Any]) -> bytes:
     return json.dumps(manifest, indent=1).encode()
 
 
-def sealed(manifest: Mapping[str, Any]) -> bytes:
-    """dataset.json with a hash of itself as its last line."""
-    text = unsealed(manifest).decode()
-    return f'{text[:-2]},\n "digest": "{digest(text.encode())}"\n}}'.encode()
+def known(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What dataset.json says of a dataset that a job with `settings` goes on with; None where it
+    says nothing to go by, and the place is empty or its shards say that they are the job's.
 
-
-def is_sealed(text: bytes) -> bool:
-    """Whether the hash in the last line of dataset.json is that of the rest."""
-    head, _, tail = text.rpartition(b',\n "digest": "')
-    wanted = digest(head + b"\n}")
-    return tail.decode(errors="replace") == f'{wanted}"\n}}'
-
-
-def known(storage: Folder | Remote, job: Job) -> dict[str, Any] | None:
-    """What dataset.json says; None where there is none to go by, and the place is empty or its
-    shards say that they are of this job.
-
-    Raises OutputError where the place holds something else, or nothing tells what it holds.
+    Raises OutputError where the place holds something else, or was made otherwise.
     """
     try:
         text = storage.read(MANIFEST)
@@ -45,66 +36,82 @@ def known(storage: Folder | Remote, job: Job) -> dict[str, Any] | None:
     except FileNotFoundError:
         text, lack = b"", f"no {MANIFEST}"
     told = _told_by(text)
-    if told is not None:
+    if told is not None and _same({key: told.get(key) for key in settings}, settings):
         return told
-    present = storage.sizes()
-    shards = (path for path in present if shard_of(path) is not None)
-    made_with = {_made_with(storage.read(path)) for path in shards} - {None}
-    if not made_with <= {job.settings_digest}:
+    if told is not None and "digest" in told:
+        raise OutputError(_otherwise(job, settings, told))
+    # neither a finished dataset's nor this job's: the shards know better than what may be edited
+    manifests = (read_manifest(storage, number) for number in shard_numbers(storage))
+    made_with = {manifest["settings"] for manifest in manifests if manifest is not None}
+    if made_with == {job.settings_digest}:
+        return None
+    if told is not None and told.keys() >= settings.keys():
+        raise OutputError(_otherwise(job, settings, told))
+    if made_with:
         raise OutputError(
             f"{job.out}: {lack}, and its shards were made with other settings; "
             "repeat them, --hdri too, to resume, or give another folder"
         )
-    if not made_with and any(not path.startswith(".") for path in present):
+    if any(not name.startswith(".") for name in storage.names()):
         raise OutputError(f"{job.out}: holds something else ({lack}); give an empty or new place")
     return None
+
+
+def shard_numbers(storage: Folder | Remote) -> list[int]:
+    """Of the shards that have a manifest, damaged or not."""
+    numbers = (shard_of(f"shards/{name}") for name in storage.names("shards"))
+    return sorted(number for number in numbers if number is not None)
+
+
+def read_manifest(
+    storage: Folder | Remote, shard: int, hashed: str | None = None
+) -> dict[str, Any] | None:
+    """A shard's manifest, None where it is missing or not as it was written.
+
+    hashed: what dataset.json says of its content, None where that is not known.
+    """
+    try:
+        text = storage.read(manifest_path(shard))
+    except FileNotFoundError:
+        return None
+    known = is_sealed(text) and hashed in (None, digest(text))
+    return json.loads(text) if known else None
 
 
 def _told_by(text: bytes) -> dict[str, Any] | None:
     """What a dataset.json says, None where it is damaged."""
     try:
         told = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return None
     whole = isinstance(told, dict) and ("digest" not in told or is_sealed(text))
     return told if whole else None
 
 
-def _made_with(manifest: bytes) -> str | None:
-    """The settings' digest that a shard's manifest bears, None where it is damaged."""
-    try:
-        return str(json.loads(manifest)["settings"])
-    except (ValueError, KeyError, TypeError):
-        return None
+def _same(old: Any, new: Any) -> bool:
+    """Whether two settings are the same in the same order, which decides what is drawn."""
+    return json.dumps(old) == json.dumps(new)
 
 
-def check_alike(
-    storage: Folder | Remote, job: Job, settings: Mapping[str, Any], old: Mapping[str, Any]
-) -> None:
-    """Raise OutputError where a run with `settings` would not go on with what is in the place.
-
-    old: what its dataset.json says.
-    """
-    for key, value in settings.items():
-        if old.get(key) != value:
-            them = "them, --hdri too," if key == "environments" else "them"
-            raise OutputError(
-                f"{job.out}: was made with other settings "
-                f"({_difference(key, old.get(key), value)}); "
-                f"repeat {them} to resume, or give another folder"
-            )
-    made = (shard_of(path) for path in storage.sizes())
-    beyond = any(shard is not None and shard >= job.shard_count for shard in made)
-    if beyond or old.get("images", 0) > job.images:
-        raise OutputError(
-            f"{job.out}: holds more than {job.images} images; give --images as before or more"
-        )
+def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -> str:
+    """In words, what of a dataset differs from what the job asks for."""
+    key = next(key for key in settings if not _same(told.get(key), settings[key]))
+    them = "them, --hdri too," if key == "environments" else "them"
+    return (
+        f"{job.out}: was made with other settings "
+        f"({_difference(key, told.get(key), settings[key])}); "
+        f"repeat {them} to resume, or give another folder"
+    )
 
 
 def _difference(name: str, old: Any, new: Any) -> str:
     """The first setting that differs, with both of its values."""
     if isinstance(old, dict) and isinstance(new, dict):
-        key = min(key for key in old.keys() | new.keys() if old.get(key) != new.get(key))
-        return _difference(f"{name}.{key}", old.get(key), new.get(key))
+        if list(old) != list(new) and old.keys() == new.keys():
+            old, new = list(old), list(new)
+        else:
+            keys = sorted(old.keys() | new.keys())
+            key = next(key for key in keys if not _same(old.get(key), new.get(key)))
+            return _difference(f"{name}.{key}", old.get(key), new.get(key))
     said = ["missing" if value is None else _words.repr(value) for value in (old, new)]
     return f"{name} was {said[0]}, is now {said[1]}"

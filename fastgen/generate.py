@@ -16,7 +16,7 @@ from typing import Any
 from fastgen import workers
 from fastgen.config import Config, SplitConfig
 from fastgen.contact_sheet import contact_sheet
-from fastgen.dataset_json import MANIFEST, check_alike, known, sealed, unsealed
+from fastgen.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
 from fastgen.encode import png
 from fastgen.environment import load_environment
 from fastgen.errors import ConfigError, OutputError
@@ -27,6 +27,7 @@ from fastgen.hdri import find_hdris
 from fastgen.progress import Progress
 from fastgen.records import check_known, nearest
 from fastgen.sampling import SPLITS
+from fastgen.seal import digest, seal
 from fastgen.shards import (
     FORMATS,
     MADE_BY,
@@ -34,7 +35,6 @@ from fastgen.shards import (
     Maker,
     Strikes,
     Task,
-    digest,
     manifest_path,
     stem_of,
 )
@@ -56,9 +56,7 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     Raises OutputError when the place holds something else, was made with other settings, cannot be
     written or is another run's; ConfigError for values that cannot be.
     """
-    job = _checked(job, worker_count)
-    settings = _settings(job)
-    job = replace(job, settings_digest=digest(unsealed(settings)))
+    job, settings = _settled(job, worker_count)
     storage = storage_of(job.out)
     if isinstance(storage, Folder):
         _make_folder(storage.root)
@@ -67,20 +65,12 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             f"{job.out}: is the memory of this process, which the workers do not share; "
             "give a folder or a store"
         )
-    known(storage, job)  # a lock would be a change to what is not ours
+    known(storage, job, settings)  # a lock would be a change to what is not ours
     with storage.locked():
-        old = known(storage, job)
-        check_alike(storage, job, settings, settings if old is None else old)
+        old = known(storage, job, settings)
+        tasks = _left_to_make(job, storage, old or {})
         if old is None:
             storage.write(MANIFEST, [unsealed(settings)])
-            old = {}
-        present = storage.sizes()
-        sums = old.get("shards", {})
-        tasks = [
-            Task(i)
-            for i in range(job.shard_count)
-            if not _is_made(job, storage, present, i, sums.get(str(i)))
-        ]
         if tasks:
             todo = sum(len(job.wanted(task.shard)) for task in tasks)
             progress = Progress(job.images, job.images - todo)
@@ -96,14 +86,15 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
         return _finish(job, storage, settings)
 
 
-def check_goes_on(job: Job, worker_count: int, manifest: Mapping[str, Any]) -> None:
+def check_goes_on(job: Job, worker_count: int) -> None:
     """See, without a change to the place, that `generate` would go on with what is there.
 
-    manifest: what dataset.json says. Raises what `generate` raises for other settings than those of
-    the dataset and for values that cannot be.
+    Raises what `generate` raises for other settings than those of the dataset and for values that
+    cannot be.
     """
-    job = _checked(job, worker_count)
-    check_alike(storage_of(job.out), job, _settings(job), manifest)
+    job, settings = _settled(job, worker_count)
+    storage = storage_of(job.out)
+    _left_to_make(job, storage, known(storage, job, settings) or {})
 
 
 def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Maker) -> Runner:
@@ -138,6 +129,13 @@ def parse_split(text: str | None, config: Config) -> Config:
         shares = dict(zip(SPLITS, values, strict=True))
     plain = config.to_plain()
     return Config.from_values({**plain, "split": asdict(SplitConfig(**shares))})
+
+
+def _settled(job: Job, worker_count: int) -> tuple[Job, dict[str, Any]]:
+    """The job, checked and complete, and the settings that make its samples what they are."""
+    job = _checked(job, worker_count)
+    settings = _settings(job)
+    return replace(job, settings_digest=digest(unsealed(settings))), settings
 
 
 def _checked(job: Job, worker_count: int) -> Job:
@@ -207,25 +205,37 @@ def _make_folder(root: Path) -> None:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
 
 
-def _is_made(
-    job: Job, storage: Folder | Remote, present: Mapping[str, int], shard: int, hashed: str | None
-) -> bool:
-    """Whether a shard is there with all that is wanted of it, and none of it has gone since.
+def _left_to_make(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> list[Task]:
+    """The shards that are not there with all that is wanted of them, or of which a part has gone.
 
-    hashed: of its manifest as dataset.json knows it, None where that was not sealed yet.
+    old: what dataset.json says. Raises OutputError where there are more images than the job's, or
+    shards that were made with other settings.
     """
-    try:
-        data = storage.read(manifest_path(shard))
-        if hashed is not None and digest(data) != hashed:
-            return False
-        manifest = json.loads(data)
+    beyond = any(number >= job.shard_count for number in shard_numbers(storage))
+    present = storage.sizes()
+    sums = old.get("shards", {})
+    tasks = []
+    for shard in range(job.shard_count):
+        manifest = read_manifest(storage, shard, sums.get(str(shard)))
         wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
+        if manifest is None:
+            tasks.append(Task(shard))
+            continue
+        if manifest["settings"] != job.settings_digest:
+            raise OutputError(
+                f"{job.out}: {manifest_path(shard)} was made with other settings; give another "
+                "folder, or remove that file to have its images made again"
+            )
+        beyond = beyond or not set(manifest["images"]) <= set(wanted)
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
-        alike = manifest["settings"] == job.settings_digest
-        return whole and alike and manifest["images"] == wanted
-    except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError):
-        return False
+        if not whole or manifest["images"] != wanted:
+            tasks.append(Task(shard))
+    if beyond or (old.get("digest") and old["images"] > job.images):
+        raise OutputError(
+            f"{job.out}: holds more than {job.images} images; give --images as before or more"
+        )
+    return tasks
 
 
 def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dict[str, Any]:
@@ -272,7 +282,7 @@ def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dic
         "files": files,
         "shards": shards,
     }
-    storage.write(MANIFEST, [sealed(result)])
+    storage.write(MANIFEST, [seal(unsealed(result))])
     return result
 
 

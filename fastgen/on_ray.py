@@ -20,7 +20,8 @@ import fastgen
 from fastgen.dataset_json import MANIFEST
 from fastgen.errors import OutputError
 from fastgen.generate import Runner
-from fastgen.shards import ATTEMPTS, Job, Maker, Strikes, Task, digest
+from fastgen.seal import digest
+from fastgen.shards import ATTEMPTS, Job, Maker, Strikes, Task
 from fastgen.storage import storage_of
 from fastgen.workers import HANG_S, in_words
 

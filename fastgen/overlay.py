@@ -2,6 +2,8 @@
 
 import colorsys
 import hashlib
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import cv2
 import numpy as np
@@ -15,7 +17,9 @@ Image = NDArray[np.uint8]
 _LINE_PX = 1000
 """Side of an image for each pixel of a line's width."""
 
-_GREYS = {0: 0, CONTAINER_ID: 200, SOUND_CONTAINER: 200, SPREADER_ID: 110}
+ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
+DAMAGE_GREYS = MappingProxyType({SOUND_CONTAINER: 200})
+
 _GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -44,18 +48,21 @@ def draw_box(image: Image, box: tuple[float, float, float, float], name: str) ->
     cv2.putText(image, name, (left, top + height), font, scale, (0, 0, 0), line, cv2.LINE_AA)
 
 
-def label_colors(labels: NDArray[np.uint16]) -> Image:
-    """Labels [H, W] as distinct colours, uint8 [H, W, 3], the same for a label in every image: 0 is
-    black, container and spreader are grey."""
+def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
+    """Labels [H, W] as colours, uint8 [H, W, 3], the same for a label in every image; those of a
+    few dozen numbers in a row can be told apart. 0 is black.
+
+    greys: of labels that shall be grey, how bright; ID_GREYS or DAMAGE_GREYS.
+    """
     values, inverse = np.unique(labels, return_inverse=True)
-    palette = np.array([_label_color(int(value)) for value in values], np.uint8)
+    palette = np.array([_label_color(int(value), greys) for value in values], np.uint8)
     return palette[inverse.reshape(labels.shape)]
 
 
-def _label_color(value: int) -> tuple[int, ...]:
+def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
     """Hues a golden ratio apart, which no run of numbers repeats, at nine tones in turn."""
-    if value in _GREYS:
-        return (_GREYS[value],) * 3
+    if value == 0 or value in greys:
+        return (greys.get(value, 0),) * 3
     saturation, brightness = (0.75, 0.45, 0.95)[value % 3], (1.0, 0.8, 0.6)[value // 3 % 3]
     color = colorsys.hsv_to_rgb(value * _GOLDEN % 1, saturation, brightness)
     return tuple(round(255 * part) for part in color)
@@ -66,7 +73,7 @@ def overlay(sample: Sample, image: Image | None = None) -> Image:
     drawn = (sample.image if image is None else image).copy()
     damaged = sample.damage >= DAMAGE_VALUES.start
     if damaged.any():
-        tint = label_colors(sample.damage)[damaged]
+        tint = label_colors(sample.damage, DAMAGE_GREYS)[damaged]
         drawn[damaged] = (0.55 * drawn[damaged] + 0.45 * tint).astype(np.uint8)
     for item in sample.objects:
         if item.bbox is not None:

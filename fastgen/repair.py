@@ -25,7 +25,7 @@ def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> l
     if not found.broken and not found.manifest["failed"]:
         return found.faults
     job = _job(out, found.manifest, hdri_dir)
-    check_goes_on(job, worker_count, found.manifest)  # before anything is removed
+    check_goes_on(job, worker_count)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():
         for path in found.broken:

@@ -4,7 +4,6 @@ Its manifest, written last, lists each of its files with size and content hash, 
 that files over the whole dataset are made from. What has no manifest was never made.
 """
 
-import hashlib
 import io
 import os
 import tarfile
@@ -22,6 +21,7 @@ from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
 from fastgen.generator import Generator
 from fastgen.sampling import SPLITS, split_of
+from fastgen.seal import digest, seal
 from fastgen.storage import storage_of
 
 SHARD_SCENES = {"seafront": 4, "webdataset": 64}
@@ -126,11 +126,6 @@ def shard_of(path: str) -> int | None:
     return int(name) if name.isdecimal() and manifest_path(int(name)) == path else None
 
 
-def digest(data: bytes) -> str:
-    """Content hash, SHA-256 in hexadecimal."""
-    return hashlib.sha256(data).hexdigest()
-
-
 class Maker:
     """Makes shards of one job in one process; opens GL when it is made.
 
@@ -182,7 +177,7 @@ class Maker:
             "files": {path: _entry(files, path) for path in files},
             "records": [record for _, record in made],
         }
-        self._storage.write(manifest_path(task.shard), [orjson.dumps(manifest)])
+        self._storage.write(manifest_path(task.shard), [seal(orjson.dumps(manifest))])
 
     def _patiently(
         self, index: int, camera: str, skip: dict[int, str]

@@ -71,7 +71,7 @@ def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
     return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=256)  # all of the preset, cut and uncut
 def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: float) -> Mesh:
     """The same at any gap but for where it is: only the twistlocks stay in their castings."""
     inputs = kind, flippers_down, cut_mm

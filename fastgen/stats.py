@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset_json import MANIFEST
+from fastgen.dataset_json import MANIFEST, shard_numbers
 from fastgen.errors import OutputError
 from fastgen.formats import Record
 from fastgen.sampling import SPLITS
@@ -102,9 +102,9 @@ def _records(out: str | Path) -> Iterator[Record]:
     try:
         manifest = json.loads(storage.read(MANIFEST))
     except FileNotFoundError:
-        raise OutputError(
-            f"{out}: no {MANIFEST}; give a folder that `fastgen generate` made"
-        ) from None
+        some = "run generate again with the same settings"
+        what = some if shard_numbers(storage) else "give a dataset's folder"
+        raise OutputError(f"{out}: no {MANIFEST}; {what}") from None
     if "shards" not in manifest:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")
     for number in manifest["shards"]:

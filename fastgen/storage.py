@@ -84,6 +84,15 @@ class Folder:
         with _told(self.root, "listed"):
             return dict(self._walk(self.root, ""))
 
+    def names(self, folder: str = "") -> list[str]:
+        """What lies in the place itself, or in one of its folders; nothing where that is none."""
+        try:
+            return os.listdir(self.root / folder)
+        except (FileNotFoundError, NotADirectoryError):
+            return []
+        except OSError as error:
+            raise OutputError(f"{self.root}: cannot be listed ({error.strerror})") from None
+
     def _walk(self, folder: Path, prefix: str) -> Iterator[tuple[str, int]]:
         for entry in os.scandir(folder):
             if not prefix and (entry.name.startswith(ASIDE) or entry.name == LOCK):
@@ -195,6 +204,17 @@ class Remote:
             found: dict[str, dict[str, Any]] = self._system.find(self._base, detail=True)
         skip = len(self._base.rstrip("/")) + 1
         return {path[skip:]: int(entry["size"]) for path, entry in found.items()}
+
+    def names(self, folder: str = "") -> list[str]:
+        """What lies in the place itself, or in one of its folders; nothing where that is none."""
+        with self._told("", "listed"):
+            self._system.invalidate_cache()
+            path = self._path(folder).rstrip("/")
+            try:
+                found: list[str] = self._system.ls(path, detail=False)
+            except (FileNotFoundError, NotADirectoryError):
+                return []
+        return [name.rstrip("/").rpartition("/")[2] for name in found]
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

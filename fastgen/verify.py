@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import dataclass, field
-from pathlib import PurePosixPath
 from typing import Any
 
 import cv2
@@ -13,14 +12,15 @@ from numpy.typing import NDArray
 
 from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset_json import MANIFEST, is_sealed
+from fastgen.dataset_json import MANIFEST, shard_numbers
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record
 from fastgen.formats.yolo import pixel_box
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene
-from fastgen.shards import digest, manifest_path, shard_of
+from fastgen.seal import digest, is_sealed
+from fastgen.shards import manifest_path
 from fastgen.storage import Folder, Remote, storage_of
 
 Place = Folder | Remote
@@ -46,9 +46,9 @@ def examine(out: str) -> Findings:
         text = storage.read(MANIFEST)
         manifest = json.loads(text)
         manifest["config"], manifest["shard_scenes"]
-    except (OSError, ValueError, KeyError, TypeError):
-        some = any(shard_of(path) is not None for path in storage.sizes())
-        what = "run generate again with the same settings" if some else "give a dataset's folder"
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        some = "run generate again with the same settings"
+        what = some if shard_numbers(storage) else "give a dataset's folder"
         raise OutputError(f"{out}: no readable {MANIFEST}; {what}") from None
     if "digest" not in manifest:
         return Findings([f"{MANIFEST}: the dataset is not finished; run generate again"])
@@ -109,17 +109,17 @@ def _intact(
 
 def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
     """Which shard a sample's file is of, None where its name tells of none."""
-    found = re.match(r"(?:[a-z]+-)?(\d{6,})\D", PurePosixPath(path).name)
-    if found is None:
-        return None
     scenes: int = manifest["shard_scenes"]
-    if path.endswith(".tar"):
-        numbered = 1
+    cameras = manifest["cameras"]
+    if manifest["format"] == "webdataset":
+        pattern, numbered = rf"(?:{'|'.join(SPLITS)})-(\d{{6,}})\.tar", 1
     elif path.startswith("bop/"):
-        numbered = scenes * len(manifest["cameras"])
+        pattern, numbered = r"bop/.*/(\d{6,})(?:_\d+)?\.\w+", scenes * len(cameras)
     else:
-        numbered = scenes
-    return int(found[1]) // numbered
+        names = "|".join(map(re.escape, cameras))
+        pattern, numbered = rf".*/(\d{{6,}})_(?:{names})(?:_\d+)?\.\w+", scenes
+    found = re.fullmatch(pattern, path)
+    return None if found is None else int(found[1]) // numbered
 
 
 def _samples(storage: Place, records: list[Record], broken: set[str]) -> list[str]:

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.classes import SOUND_CONTAINER, SPREADER_ID
+from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
 from fastgen.cli import main
-from fastgen.overlay import label_colors
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,9 @@ from fastgen.overlay import label_colors
         (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
         (["show", "--index", "0", "--layer", "rusty", "-o", "{out}.png"], "did you mean rust"),
         (["show", "--index", "0", "-o", "{out}.gif"], "ends in .png or .jpg"),
-        (["verify", "{empty}"], "no readable dataset.json"),
+        (["verify", "{empty}"], "no readable dataset.json; give a dataset's folder"),
+        (["verify", "{out}"], "no readable dataset.json; give a dataset's folder"),
+        (["verify", "{full}/notes.txt"], "no readable dataset.json; give a dataset's folder"),
         (["stats", "{empty}"], "no dataset.json"),
     ],
 )
@@ -82,13 +84,17 @@ def test_show_writes_every_layer(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "labels",
+    ("labels", "greys"),
     [
-        [*range(70), SPREADER_ID],
-        [0, SOUND_CONTAINER, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 7))],
+        ([*range(70), SPREADER_ID], ID_GREYS),
+        ([0, 101, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 10))], DAMAGE_GREYS),
+        (
+            [CONTAINER_ID, SOUND_CONTAINER],
+            ID_GREYS,
+        ),  # the number of a damage value, here of a decal
     ],
 )
-def test_shown_labels_can_be_told_from_one_another(labels):
-    shown = label_colors(np.array([labels], np.uint16))[0].astype(float)
+def test_shown_labels_can_be_told_from_one_another(labels, greys):
+    shown = label_colors(np.array([labels], np.uint16), greys)[0].astype(float)
     apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
     assert apart[~np.eye(len(labels), dtype=bool)].min() > 20

@@ -66,62 +66,6 @@ def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys)
     assert "dataset.json: was changed after it was written" in capsys.readouterr().err
 
 
-def without(path):
-    path.unlink()
-
-
-def cut_short(path):
-    path.write_bytes(path.read_bytes()[:100])
-
-
-def with_another_seed(path):
-    path.write_text(path.read_text().replace('"seed": 3', '"seed": 4'))
-
-
-@pytest.mark.parametrize("spoil", [without, cut_short, with_another_seed])
-def test_shards_know_whose_they_are_when_dataset_json_does_not(dataset, copy, capsys, spoil):
-    spoil(copy / "dataset.json")
-    written = {path: path.stat().st_mtime_ns for path in copy.glob("images/*/*.jpg")}
-    before = content(copy)
-    others = [*ARGUMENTS[:-1], "4"]
-    assert main(["generate", str(copy), *others, "--workers", "1"]) == 2
-    assert "its shards were made with other settings" in capsys.readouterr().err
-    assert main(["generate", str(copy), *ARGUMENTS[2:], "--images", "4", "--shard", "1"]) == 2
-    assert content(copy) == before
-    assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
-    assert content(copy) == content(dataset)
-    assert {path: path.stat().st_mtime_ns for path in written} == written
-
-
-@pytest.mark.parametrize("manifest", ["{}", "no json", "[1]"])
-def test_a_folder_that_only_looks_like_a_dataset_is_left_alone(tmp_path, capsys, manifest):
-    (tmp_path / "shards").mkdir()
-    (tmp_path / "shards/000000.json").write_text(manifest)
-    before = content(tmp_path)
-    assert main(["generate", str(tmp_path), *ARGUMENTS]) == 2
-    assert "holds something else" in capsys.readouterr().err
-    assert content(tmp_path) == before
-
-
-@pytest.mark.parametrize("also", [[], ["--also", "bop,kitti"], ["--format", "webdataset"]])
-def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
-    out = tmp_path / "out"
-    arguments = [*ARGUMENTS, *also, "--shard", "1", "--workers", "1"]
-    assert main(["generate", str(out), *arguments]) == 0
-    whole = content(out)
-    (out / "shards/000001.json").unlink()
-    (out / "000099_A.jpg").write_bytes(b"of no shard")
-    (out / "notes.txt").write_text("mine")
-    capsys.readouterr()
-    assert main(["verify", str(out)]) == 1
-    faults = [line for line in capsys.readouterr().out.splitlines() if ": " in line]
-    assert [line.split(":")[0] for line in faults if "--repair" not in line] == [
-        "shards/000001.json", "000099_A.jpg", "notes.txt",
-    ]  # fmt: skip
-    assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # strays are not ours
-    assert whole.items() <= content(out).items()
-
-
 @pytest.mark.parametrize("others", ["lights", "workers", "shards"])
 def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     flip(next(copy.glob("images/*/*.jpg")))

@@ -1,0 +1,140 @@
+"""dataset.json lost, damaged or edited, and shards that know whose they are without it."""
+
+import json
+import shutil
+
+import pytest
+
+from fastgen.cli import main
+from tests.folders import content
+
+ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
+ONE_BY_ONE = ["--shard", "1", "--workers", "1"]
+
+
+def run(out, *more):
+    return main(["generate", str(out), *ARGUMENTS, *ONE_BY_ONE, *more])
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "dataset"
+    assert run(out) == 0
+    return out
+
+
+@pytest.fixture
+def copy(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "out")
+    return tmp_path / "out"
+
+
+def without(path):
+    path.unlink()
+
+
+def cut_short(path):
+    path.write_bytes(path.read_bytes()[:100])
+
+
+def emptied(path):
+    path.write_text("{}")
+
+
+def nested(path):
+    path.write_text("[" * 100_000)
+
+
+def with_another_seed(path):
+    path.write_text(path.read_text().replace('"seed": 3', '"seed": 4'))
+
+
+def unfinished_with_another_seed(path):
+    late = ("backend", "renderer", "images", "counts", "failed", "files", "shards", "digest")
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps({k: v for k, v in said.items() if k not in late} | {"seed": 4}))
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [without, cut_short, emptied, nested, with_another_seed, unfinished_with_another_seed],
+)
+def test_shards_know_whose_they_are_when_dataset_json_does_not(dataset, copy, capsys, spoil):
+    spoil(copy / "dataset.json")
+    written = {path: path.stat().st_mtime_ns for path in copy.glob("images/*/*.jpg")}
+    before = content(copy)
+    assert run(copy, "--seed", "4") == 2
+    assert "made with other settings" in capsys.readouterr().err
+    assert run(copy, "--images", "5") == 2
+    assert "holds more than 5 images" in capsys.readouterr().err
+    assert content(copy) == before
+    assert run(copy) == 0
+    assert content(copy) == content(dataset)
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+
+
+@pytest.mark.parametrize("shard", ["1", "2", "4"])
+def test_fewer_images_are_refused_without_dataset_json_too(tmp_path, capsys, shard):
+    assert run(tmp_path, "--shard", shard) == 0
+    (tmp_path / "dataset.json").unlink()
+    before = content(tmp_path)
+    assert run(tmp_path, "--shard", shard, "--images", "3") == 2
+    assert "holds more than 3 images" in capsys.readouterr().err
+    assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize("manifest", ["{}", "no json", "[1]", '{"settings": "x"}'])
+def test_a_folder_that_only_looks_like_a_dataset_is_left_alone(tmp_path, capsys, manifest):
+    (tmp_path / "shards").mkdir()
+    (tmp_path / "shards/000000.json").write_text(manifest)
+    (tmp_path / "link").symlink_to("nowhere")
+    before = content(tmp_path / "shards")
+    assert run(tmp_path) == 2
+    assert "holds something else" in capsys.readouterr().err
+    assert content(tmp_path / "shards") == before
+
+
+def test_another_order_of_what_is_drawn_from_is_another_setting(tmp_path, capsys):
+    kinds = {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1}
+    for name, order in (("one", kinds), ("other", dict(reversed(kinds.items())))):
+        (tmp_path / f"{name}.yaml").write_text(json.dumps({"container": {"kinds": order}}))
+    out = tmp_path / "out"
+    assert run(out, "--config", str(tmp_path / "one.yaml")) == 0
+    before = content(out)
+    for lost in (False, True):
+        if lost:
+            before.pop("dataset.json")
+            (out / "dataset.json").unlink()
+        assert run(out, "--config", str(tmp_path / "other.yaml")) == 2
+        assert content(out) == before
+    assert "container.kinds was ['20', '40', " in capsys.readouterr().err
+
+
+def test_a_manifest_that_was_changed_is_made_again(dataset, copy):
+    (copy / "dataset.json").unlink()
+    path = copy / "shards/000001.json"
+    path.write_text(path.read_text().replace('"backend":"egl",', ""))
+    other = copy / "shards/000000.json"
+    other.write_text(other.read_text().replace('"category_id":1', '"category_id":2'))
+    assert run(copy) == 0
+    assert content(copy) == content(dataset)
+
+
+@pytest.mark.parametrize("also", [[], ["--also", "bop,kitti"], ["--format", "webdataset"]])
+def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
+    out = tmp_path / "out"
+    assert run(out, *also) == 0
+    whole = content(out)
+    (out / "shards/000001.json").unlink()
+    astray = ["000001_A.jpg", "notes.txt", "shards/000001.txt", "shards/000009.json"]
+    for name in astray:
+        (out / name).write_text("mine")
+    capsys.readouterr()
+    assert main(["verify", str(out)]) == 1
+    faults = [line for line in capsys.readouterr().out.splitlines() if ": " in line]
+    assert [line.split(":")[0] for line in faults if "--repair" not in line] == [
+        "shards/000001.json", *astray,
+    ]  # fmt: skip
+    (out / "shards/000009.json").unlink()
+    assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # strays are not ours
+    assert whole.items() <= content(out).items()
