@@ -88,10 +88,7 @@ def test_show_writes_every_layer(tmp_path):
     [
         ([*range(70), SPREADER_ID], ID_GREYS),
         ([0, 101, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 10))], DAMAGE_GREYS),
-        (
-            [CONTAINER_ID, SOUND_CONTAINER],
-            ID_GREYS,
-        ),  # the number of a damage value, here of a decal
+        ([CONTAINER_ID, SOUND_CONTAINER], ID_GREYS),  # among ids 101 is a decal
     ],
 )
 def test_shown_labels_can_be_told_from_one_another(labels, greys):
