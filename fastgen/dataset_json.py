@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fastgen.errors import OutputError
-from fastgen.seal import digest, is_sealed
+from fastgen.seal import is_sealed
 from fastgen.shards import Job, manifest_path, shard_of
 from fastgen.storage import Folder, Remote
 
@@ -17,6 +17,8 @@ MANIFEST = "dataset.json"
 
 _words = reprlib.Repr()
 _words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: what differs may be the last
+
+_MISSING = object()
 
 
 def unsealed(manifest: Mapping[str, Any]) -> bytes:
@@ -35,7 +37,7 @@ def known(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> di
         lack = f"{MANIFEST} is damaged"
     except FileNotFoundError:
         text, lack = b"", f"no {MANIFEST}"
-    told = _told_by(text)
+    told = told_by(text)
     if told is not None and _same({key: told.get(key) for key in settings}, settings):
         return told
     if told is not None and "digest" in told:
@@ -63,29 +65,31 @@ def shard_numbers(storage: Folder | Remote) -> list[int]:
     return sorted(number for number in numbers if number is not None)
 
 
-def read_manifest(
-    storage: Folder | Remote, shard: int, hashed: str | None = None
-) -> dict[str, Any] | None:
-    """A shard's manifest, None where it is missing or not as it was written.
-
-    hashed: what dataset.json says of its content, None where that is not known.
-    """
+def read_manifest(storage: Folder | Remote, shard: int) -> dict[str, Any] | None:
+    """A shard's manifest, None where it is missing, not as it was written, or another shard's."""
     try:
         text = storage.read(manifest_path(shard))
     except FileNotFoundError:
         return None
-    known = is_sealed(text) and hashed in (None, digest(text))
-    return json.loads(text) if known else None
+    manifest = json.loads(text) if is_sealed(text) else {}
+    return manifest if manifest.get("shard") == shard else None
 
 
-def _told_by(text: bytes) -> dict[str, Any] | None:
-    """What a dataset.json says, None where it is damaged."""
+def told_by(text: bytes) -> dict[str, Any] | None:
+    """What a dataset.json says, None where it is damaged. A finished one has a "digest"."""
     try:
         told = json.loads(text)
     except (ValueError, RecursionError):
         return None
     whole = isinstance(told, dict) and ("digest" not in told or is_sealed(text))
     return told if whole else None
+
+
+def without_manifest(storage: Folder | Remote, out: str) -> OutputError:
+    """What to say where `out` has no dataset.json that could be read."""
+    again, other = "run generate again with the same settings", "give a dataset's folder"
+    what = again if shard_numbers(storage) else other
+    return OutputError(f"{out}: no readable {MANIFEST}; {what}")
 
 
 def _same(old: Any, new: Any) -> bool:
@@ -99,7 +103,7 @@ def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -
     them = "them, --hdri too," if key == "environments" else "them"
     return (
         f"{job.out}: was made with other settings "
-        f"({_difference(key, told.get(key), settings[key])}); "
+        f"({_difference(key, told.get(key, _MISSING), settings[key])}); "
         f"repeat {them} to resume, or give another folder"
     )
 
@@ -111,7 +115,8 @@ def _difference(name: str, old: Any, new: Any) -> str:
             old, new = list(old), list(new)
         else:
             keys = sorted(old.keys() | new.keys())
-            key = next(key for key in keys if not _same(old.get(key), new.get(key)))
-            return _difference(f"{name}.{key}", old.get(key), new.get(key))
-    said = ["missing" if value is None else _words.repr(value) for value in (old, new)]
+            unlike = (k for k in keys if (k in old) != (k in new) or not _same(old[k], new[k]))
+            key = next(unlike)
+            return _difference(f"{name}.{key}", old.get(key, _MISSING), new.get(key, _MISSING))
+    said = ["missing" if value is _MISSING else _words.repr(value) for value in (old, new)]
     return f"{name} was {said[0]}, is now {said[1]}"

@@ -69,7 +69,7 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     with storage.locked():
         old = known(storage, job, settings)
         tasks = _left_to_make(job, storage, old or {})
-        if old is None:
+        if tasks or old is None:  # until the end nothing says that it is finished
             storage.write(MANIFEST, [unsealed(settings)])
         if tasks:
             todo = sum(len(job.wanted(task.shard)) for task in tasks)
@@ -211,27 +211,27 @@ def _left_to_make(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) ->
     old: what dataset.json says. Raises OutputError where there are more images than the job's, or
     shards that were made with other settings.
     """
-    beyond = any(number >= job.shard_count for number in shard_numbers(storage))
+    beyond = "digest" in old and old["images"] > job.images
     present = storage.sizes()
-    sums = old.get("shards", {})
     tasks = []
-    for shard in range(job.shard_count):
-        manifest = read_manifest(storage, shard, sums.get(str(shard)))
+    numbers = {*range(job.shard_count), *shard_numbers(storage)}
+    for shard in sorted(numbers):
+        manifest = read_manifest(storage, shard)
         wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
         if manifest is None:
-            tasks.append(Task(shard))
+            tasks += [Task(shard)] * bool(wanted)
             continue
         if manifest["settings"] != job.settings_digest:
             raise OutputError(
                 f"{job.out}: {manifest_path(shard)} was made with other settings; give another "
                 "folder, or remove that file to have its images made again"
             )
-        beyond = beyond or not set(manifest["images"]) <= set(wanted)
+        beyond = beyond or not wanted or not set(manifest["images"]) <= set(wanted)
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
         if not whole or manifest["images"] != wanted:
             tasks.append(Task(shard))
-    if beyond or (old.get("digest") and old["images"] > job.images):
+    if beyond:
         raise OutputError(
             f"{job.out}: holds more than {job.images} images; give --images as before or more"
         )

@@ -4,7 +4,6 @@ Counted from the records in the shards' manifests, which the label files are mad
 works for every format and place.
 """
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset_json import MANIFEST, shard_numbers
+from fastgen.dataset_json import MANIFEST, read_manifest, told_by, without_manifest
 from fastgen.errors import OutputError
 from fastgen.formats import Record
 from fastgen.sampling import SPLITS
-from fastgen.shards import manifest_path
 from fastgen.storage import storage_of
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -64,11 +62,8 @@ def report(out: str | Path) -> str:
     Raises OutputError when `out` is no finished dataset.
     """
     counts = {split: _Counts() for split in SPLITS}
-    try:
-        for record in _records(out):
-            counts[record["split"]].add(record)
-    except (FileNotFoundError, ValueError, KeyError, TypeError, AttributeError, IndexError):
-        raise OutputError(f"{out}: is damaged; run fastgen verify {out}") from None
+    for record in _records(str(out)):
+        counts[record["split"]].add(record)
     images = sum(each.images for each in counts.values())
     visible = sum((each.markers for each in counts.values()), Counter())
     per_image = (visible.total() - visible["container"] - visible["text"]) / max(images, 1)
@@ -96,19 +91,23 @@ def report(out: str | Path) -> str:
     return "\n\n".join(parts)
 
 
-def _records(out: str | Path) -> Iterator[Record]:
+def _records(out: str) -> Iterator[Record]:
     """One of each image, shard by shard."""
     storage = storage_of(out)
     try:
-        manifest = json.loads(storage.read(MANIFEST))
+        told = told_by(storage.read(MANIFEST))
     except FileNotFoundError:
-        some = "run generate again with the same settings"
-        what = some if shard_numbers(storage) else "give a dataset's folder"
-        raise OutputError(f"{out}: no {MANIFEST}; {what}") from None
-    if "shards" not in manifest:
+        raise without_manifest(storage, out) from None
+    damaged = OutputError(f"{out}: is damaged; run fastgen verify {out}")
+    if told is None:
+        raise damaged
+    if "digest" not in told:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")
-    for number in manifest["shards"]:
-        yield from json.loads(storage.read(manifest_path(int(number))))["records"]
+    for number in told["shards"]:
+        manifest = read_manifest(storage, int(number))
+        if manifest is None:
+            raise damaged
+        yield from manifest["records"]
 
 
 def _table(rows: dict[str, list[int]]) -> str:

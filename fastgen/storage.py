@@ -100,7 +100,8 @@ class Folder:
             if entry.is_dir(follow_symlinks=False):
                 yield from self._walk(Path(entry.path), f"{prefix}{entry.name}/")
             else:
-                yield f"{prefix}{entry.name}", entry.stat().st_size
+                broken = entry.is_symlink() and not os.path.exists(entry.path)
+                yield f"{prefix}{entry.name}", 0 if broken else entry.stat().st_size
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -230,8 +231,8 @@ class Remote:
 
 
 def storage_of(out: str | Path) -> Folder | Remote:
-    """The storage at a path or an address with '://'."""
-    text = str(out)
+    """The storage at a path or an address with '://'; files of this machine are a folder's."""
+    text = str(out).removeprefix("file://")
     return Remote(text) if "://" in text else Folder(Path(text))
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset_json import MANIFEST, shard_numbers
-from fastgen.errors import FastgenError, OutputError
+from fastgen.dataset_json import MANIFEST, without_manifest
+from fastgen.errors import FastgenError
 from fastgen.formats import Record
 from fastgen.formats.yolo import pixel_box
 from fastgen.records import from_plain
@@ -47,9 +47,7 @@ def examine(out: str) -> Findings:
         manifest = json.loads(text)
         manifest["config"], manifest["shard_scenes"]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        some = "run generate again with the same settings"
-        what = some if shard_numbers(storage) else "give a dataset's folder"
-        raise OutputError(f"{out}: no readable {MANIFEST}; {what}") from None
+        raise without_manifest(storage, out) from None
     if "digest" not in manifest:
         return Findings([f"{MANIFEST}: the dataset is not finished; run generate again"])
     if not is_sealed(text):

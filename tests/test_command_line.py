@@ -32,7 +32,7 @@ from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
         (["verify", "{empty}"], "no readable dataset.json; give a dataset's folder"),
         (["verify", "{out}"], "no readable dataset.json; give a dataset's folder"),
         (["verify", "{full}/notes.txt"], "no readable dataset.json; give a dataset's folder"),
-        (["stats", "{empty}"], "no dataset.json"),
+        (["stats", "{empty}"], "no readable dataset.json"),
     ],
 )
 def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, capsys):

@@ -45,19 +45,30 @@ def nested(path):
     path.write_text("[" * 100_000)
 
 
+def unfinished(path, **more):
+    late = ("backend", "renderer", "images", "counts", "failed", "files", "shards", "digest")
+    said = json.loads(path.read_text())
+    path.write_text(json.dumps({k: v for k, v in said.items() if k not in late} | more))
+
+
+def with_odd_shards(path):
+    unfinished(path, shards=None)
+
+
 def with_another_seed(path):
     path.write_text(path.read_text().replace('"seed": 3', '"seed": 4'))
 
 
 def unfinished_with_another_seed(path):
-    late = ("backend", "renderer", "images", "counts", "failed", "files", "shards", "digest")
-    said = json.loads(path.read_text())
-    path.write_text(json.dumps({k: v for k, v in said.items() if k not in late} | {"seed": 4}))
+    unfinished(path, seed=4)
 
 
 @pytest.mark.parametrize(
     "spoil",
-    [without, cut_short, emptied, nested, with_another_seed, unfinished_with_another_seed],
+    [
+        *(without, cut_short, emptied, nested),
+        *(with_another_seed, unfinished_with_another_seed, with_odd_shards),
+    ],
 )
 def test_shards_know_whose_they_are_when_dataset_json_does_not(dataset, copy, capsys, spoil):
     spoil(copy / "dataset.json")
@@ -112,10 +123,9 @@ def test_another_order_of_what_is_drawn_from_is_another_setting(tmp_path, capsys
 
 def test_a_manifest_that_was_changed_is_made_again(dataset, copy):
     (copy / "dataset.json").unlink()
-    path = copy / "shards/000001.json"
-    path.write_text(path.read_text().replace('"backend":"egl",', ""))
-    other = copy / "shards/000000.json"
-    other.write_text(other.read_text().replace('"category_id":1', '"category_id":2'))
+    shutil.copy(copy / "shards/000002.json", copy / "shards/000001.json")
+    path = copy / "shards/000000.json"
+    path.write_text(path.read_text().replace('"category_id":1', '"category_id":2'))
     assert run(copy) == 0
     assert content(copy) == content(dataset)
 
@@ -135,6 +145,54 @@ def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
     assert [line.split(":")[0] for line in faults if "--repair" not in line] == [
         "shards/000001.json", *astray,
     ]  # fmt: skip
-    (out / "shards/000009.json").unlink()
     assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # strays are not ours
     assert whole.items() <= content(out).items()
+
+
+def test_a_difference_of_a_missing_key_is_told(copy, capsys):
+    said = json.loads((copy / "dataset.json").read_text())
+    said["config"]["cameras"]["A"].pop("lens")
+    (copy / "dataset.json").write_text(json.dumps(said))
+    unfinished(copy / "dataset.json")
+    shutil.rmtree(copy / "shards")
+    assert run(copy) == 2
+    assert "(config.cameras.A.lens was missing, is now None)" in capsys.readouterr().err
+
+
+def test_an_extension_that_was_killed_is_not_finished(dataset, copy, tmp_path, capsys):
+    assert main(["generate", str(tmp_path / "more"), *ARGUMENTS[2:], "--images", "8"]) == 0
+
+    def fall(*_):
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fastgen.workers.run", fall)
+        assert run(copy, "--images", "8") == 130
+    capsys.readouterr()
+    assert main(["verify", str(copy)]) == 1
+    assert "dataset.json: the dataset is not finished" in capsys.readouterr().out
+    assert main(["stats", str(copy)]) == 2
+    written = {path: path.stat().st_mtime_ns for path in copy.glob("images/*/*.jpg")}
+    assert run(copy, "--images", "8") == 0
+    assert {path: path.stat().st_mtime_ns for path in written} == written
+    images = {k: v for k, v in content(tmp_path / "more").items() if k.startswith("images")}
+    assert {k: v for k, v in content(copy).items() if k.startswith("images")} == images
+
+
+def test_a_dangling_link_does_not_belong(copy, capsys):
+    (copy / "images/link").symlink_to("nowhere")
+    assert main(["verify", str(copy)]) == 1
+    assert "images/link: does not belong here" in capsys.readouterr().out
+    assert run(copy) == 0
+
+
+def test_stats_refuse_what_was_changed(copy, capsys):
+    path = copy / "shards/000001.json"
+    path.write_text(path.read_text().replace('"split":"', '"split":"te'))
+    assert main(["stats", str(copy)]) == 2
+    assert "is damaged; run fastgen verify" in capsys.readouterr().err
+
+
+def test_a_file_address_is_a_folder(dataset, tmp_path):
+    assert run(f"file://{tmp_path}/out") == 0
+    assert content(tmp_path / "out") == content(dataset)

@@ -66,7 +66,7 @@ def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys)
     assert "dataset.json: was changed after it was written" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("others", ["lights", "workers", "shards"])
+@pytest.mark.parametrize("others", ["lights", "workers"])
 def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     flip(next(copy.glob("images/*/*.jpg")))
     flip(next(copy.glob("scenes/*/*.json")))
@@ -74,10 +74,8 @@ def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     if others == "lights":  # as of a dataset made with --hdri, repaired without
         shutil.copy(bundled_hdris()["sky"], tmp_path / "mine.exr")
         arguments += ["--hdri", str(tmp_path)]
-    elif others == "workers":
-        arguments[-1] = "0"
     else:
-        (copy / "shards/000099.json").write_text("{}")
+        arguments[-1] = "0"
     before = content(copy)
     assert main(arguments) == 2
     assert content(copy) == before
@@ -154,7 +152,7 @@ def test_stats_equal_a_foreign_readers_count(dataset, capsys):
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [
-        (lambda p: (p / "dataset.json").unlink(), "no dataset.json"),
+        (lambda p: (p / "dataset.json").unlink(), "no readable dataset.json"),
         (lambda p: (p / "dataset.json").write_text("{}"), "the dataset is not finished"),
         (lambda p: (p / "dataset.json").write_text("{"), "is damaged; run fastgen verify"),
         (lambda p: (p / "shards/000000.json").unlink(), "is damaged; run fastgen verify"),
