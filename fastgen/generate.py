@@ -214,12 +214,12 @@ def _left_to_make(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) ->
     beyond = "digest" in old and old["images"] > job.images
     present = storage.sizes()
     tasks = []
-    numbers = {*range(job.shard_count), *shard_numbers(storage)}
-    for shard in sorted(numbers):
+    for shard in sorted({*range(job.shard_count), *shard_numbers(storage)}):
         manifest = read_manifest(storage, shard)
         wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
         if manifest is None:
-            tasks += [Task(shard)] * bool(wanted)
+            if wanted:  # else it is a stray, which `verify` names
+                tasks.append(Task(shard))
             continue
         if manifest["settings"] != job.settings_digest:
             raise OutputError(
