@@ -201,7 +201,8 @@ def _add_hdri(command: argparse.ArgumentParser) -> None:
 
 def _place(text: str) -> str:
     """OUT without slashes at its end, which would double in what is printed."""
-    place = text if text.endswith("://") else text.rstrip("/") or text[:1]
+    scheme, colon, path = text.rpartition("://")
+    place = scheme + colon + (path.rstrip("/") or path[:1])
     if not place:
         raise argparse.ArgumentTypeError("is empty; give a folder or an address")
     return place

@@ -26,6 +26,8 @@ from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
         (["generate", "{out}", "--images", "2", "--hdri", "{broken}"], "photo.hdr"),
         (["generate", "{out}", "--images", "2", "--config", "{bad}"], "did you mean rust_coverage"),
         (["generate", "{full}", "--images", "2"], "holds something else"),
+        (["generate", "file://{full}/", "--images", "2"], "holds something else"),
+        (["generate", "memory:///", "--images", "2"], "memory:///: is the memory of this process"),
         (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
         (["show", "--index", "0", "--layer", "rusty", "-o", "{out}.png"], "did you mean rust"),
         (["show", "--index", "0", "-o", "{out}.gif"], "ends in .png or .jpg"),
