@@ -7,7 +7,7 @@ the bottom castings, +x the door end.
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 from types import MappingProxyType
 
 import numpy as np
@@ -253,14 +253,13 @@ class _Locator:
                 np.arange(len(self.triangles)), (lost.size, len(self.triangles))
             )
             best[lost], _ = self._best(points[lost], everything)
-        return self.triangles[best], self._weights(points, best)
+        return self.triangles[best], np.stack(self._weights(points, best), axis=-1)
 
     def _best(
         self, points: NDArray[np.float64], listed: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """The listed triangle that each point is most inside of, and its least weight there."""
-        first, second, third = np.moveaxis(self._weights(points[:, None], listed), -1, 0)
-        least = np.minimum(np.minimum(first, second), third)  # far quicker than along the axis
+        least = reduce(np.minimum, self._weights(points[:, None], listed))
         least[listed < 0] = -np.inf
         chosen = least.argmax(axis=1)
         rows = np.arange(len(points))
@@ -268,10 +267,10 @@ class _Locator:
 
     def _weights(
         self, points: NDArray[np.float64], triangle: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         x, y = points[..., 0], points[..., 1]
         second, third = (
             row[triangle, 0] * x + row[triangle, 1] * y + row[triangle, 2]
             for row in self.to_weights.transpose(1, 0, 2)
         )
-        return np.moveaxis(np.array([1 - (second + third), second, third]), 0, -1)
+        return 1 - (second + third), second, third

@@ -15,6 +15,7 @@ from fastgen.openness import Sky, SkyProbe
 from fastgen.programs import SPREADER_CHART
 from fastgen.scene import Container, Scene
 from fastgen.spreader import build_spreader
+from fastgen.spreader_parts import CUT_MM
 
 
 class Shapes:
@@ -78,21 +79,18 @@ class Shapes:
             kept.release()
 
 
-def spreader_mesh(scene: Scene) -> Mesh | None:
-    """A scene's spreader as it is built, None where it has none."""
+def spreader_mesh(scene: Scene, cut_mm: float = CUT_MM) -> Mesh | None:
+    """A scene's spreader as it is built, None where it has none; cut_mm: as of build_spreader."""
     held = scene.spreader
     if not held.present:
         return None
-    return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
+    return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm, cut_mm)
 
 
 def spreader_outline(scene: Scene, bent: bool) -> Mesh | None:
     """The surface of a scene's spreader as it is drawn, of as few triangles as can be, for labels;
     bent: whether a lens bends what is drawn, which takes small ones."""
-    held = scene.spreader
-    if bent or not held.present:
-        return spreader_mesh(scene)
-    return build_spreader(scene.container.kind, held.flippers_down, held.gap_mm, np.inf)
+    return spreader_mesh(scene, CUT_MM if bent else np.inf)
 
 
 def _shading_spreader(scene: Scene) -> Mesh | None:

@@ -86,12 +86,11 @@ class Folder:
 
     def names(self, folder: str = "") -> list[str]:
         """What lies in the place itself, or in one of its folders; nothing where that is none."""
-        try:
-            return os.listdir(self.root / folder)
-        except (FileNotFoundError, NotADirectoryError):
-            return []
-        except OSError as error:
-            raise OutputError(f"{self.root}: cannot be listed ({error.strerror})") from None
+        with _told(self.root, "listed"):
+            try:
+                return os.listdir(self.root / folder)
+            except (FileNotFoundError, NotADirectoryError):
+                return []
 
     def _walk(self, folder: Path, prefix: str) -> Iterator[tuple[str, int]]:
         for entry in os.scandir(folder):

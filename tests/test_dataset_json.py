@@ -23,12 +23,6 @@ def dataset(tmp_path_factory):
     return out
 
 
-@pytest.fixture
-def copy(dataset, tmp_path):
-    shutil.copytree(dataset, tmp_path / "out")
-    return tmp_path / "out"
-
-
 def without(path):
     path.unlink()
 

@@ -26,12 +26,6 @@ def dataset(tmp_path_factory):
     return out
 
 
-@pytest.fixture
-def copy(dataset, tmp_path):
-    shutil.copytree(dataset, tmp_path / "out")
-    return tmp_path / "out"
-
-
 def flip(path):
     """Change one byte, and nothing that a listing of the folder shows."""
     data = bytearray(path.read_bytes())
