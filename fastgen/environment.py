@@ -21,7 +21,7 @@ from fastgen.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
 from fastgen.sun import Sun, split_sun
 
-PREFILTER_VERSION = 8
+PREFILTER_VERSION = 9
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)

@@ -180,10 +180,11 @@ def _read_hdr(path: Path) -> NDArray[np.float32]:
 
 def _sanitized(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
     """The radiance, changed in place, without NaN, infinity and negative values."""
-    unknown = np.empty(radiance.shape[:2], bool)
+    unknown = np.zeros(radiance.shape[:2], bool)
     for flags, values in zip(unknown, radiance, strict=True):  # by rows: small masks at 16k
-        flags[:] = np.isnan(values).any(axis=-1)
-        np.nan_to_num(values, copy=False, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+        if not np.isfinite(values).all():
+            flags[:] = np.isnan(values).any(axis=-1)
+            np.nan_to_num(values, copy=False, nan=0.0, posinf=HALF_MAX, neginf=0.0)
         np.clip(values, 0.0, _MAX_RADIANCE, out=values)
     for row in np.flatnonzero(unknown.any(axis=1)):
         around = slice(max(row - 1, 0), row + 2)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 BORDER = 1
 
 _BAND_SAMPLES = 1 << 17  # samples gathered at a time, as a core's cache holds them
-_CHUNK_ROWS = 16
+_CHUNK_ROWS = 8
 
 
 def octahedral_encode(direction: ArrayLike) -> NDArray[np.float64]:
@@ -106,33 +106,44 @@ def resample_octahedral(
 ) -> NDArray[np.float32]:
     """Equirectangular radiance [H, 2H, 3] as a bordered octahedral map [size, size, 3].
 
-    samples: each texel is the mean of samples x samples bilinear lookups spread over it; choose it
-    so that they lie no further apart than a texel of the source.
+    size: even. samples: each texel is the mean of samples x samples bilinear lookups spread over
+    it; choose it so that they lie no further apart than a texel of the source.
     """
     height, width = radiance.shape[:2]
+    padded = np.empty((height + 2, width + 2, 3), np.float32)
+    padded[1:-1, 1:-1] = radiance
     # beyond a pole the sphere continues on the opposite meridian
-    over = [np.roll(radiance[row], width // 2, axis=0)[None] for row in (0, -1)]
-    padded = np.concatenate([over[0], radiance, over[1]])
-    padded = np.concatenate([padded[:, -1:], padded, padded[:, :1]], axis=1)
+    padded[0, 1:-1] = np.roll(radiance[0], width // 2, axis=0)
+    padded[-1, 1:-1] = np.roll(radiance[-1], width // 2, axis=0)
+    padded[:, 0], padded[:, -1] = padded[:, -2], padded[:, 1]
 
-    inner = size - 2 * BORDER
+    # a quarter of the map holds the angles of all: the others mirror it
+    half = size // 2 - BORDER
     result = np.empty((size, size, 3), np.float32)
-    along = np.linspace(-1.0, 1.0, 2 * inner * samples + 1, dtype=np.float32)[1::2]
-    band = max(_BAND_SAMPLES // (inner * samples * samples), 1)
-    for first in range(0, inner, band):
-        last = min(first + band, inner)
+    inside = result[BORDER:-BORDER, BORDER:-BORDER]
+    along = np.linspace(0.0, 1.0, 2 * half * samples + 1, dtype=np.float32)[1::2]
+    band = max(_BAND_SAMPLES // (2 * half * samples * samples), 1)
+    # texel centres lie at half integers, and the padding shifts by one
+    ahead, behind = np.float32(width / 2 + 0.5), np.float32(width + 0.5)
+    for first in range(0, half, band):
+        last = min(first + band, half)
         across = along[first * samples : last * samples, None]
         # octahedral_decode, without the unit length that no angle needs
-        z = 1.0 - np.abs(along) - np.abs(across)
+        z = 1.0 - along - across
         folded = np.maximum(-z, 0.0)
-        dx, dy = along - np.copysign(folded, along), across - np.copysign(folded, across)
-        # texel centres lie at half integers, and the padding shifts by one; arctan2 gives acos(z),
-        # exact at the poles
-        x = np.arctan2(dy, dx) * np.float32(-width / (2 * np.pi)) + np.float32(width / 2 + 0.5)
+        dx, dy = along - folded, across - folded
+        turn = np.arctan2(dy, dx) * np.float32(width / (2 * np.pi))
+        # arctan2 gives acos(z), exact at the poles
         y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
-        taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        mean = _resize(np.asarray(taken, np.float32), last - first, inner)
-        result[BORDER + first : BORDER + last, BORDER:-BORDER] = mean
+        y = np.concatenate([y[:, ::-1], y], axis=1)
+        over, under = inside[half + first : half + last], inside[half - last : half - first][::-1]
+        for rows, left, right in (
+            (over, np.float32(0.5) + turn, ahead - turn),
+            (under, behind - turn, ahead + turn),
+        ):
+            x = np.concatenate([left[:, ::-1], right], axis=1)
+            taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            rows[:] = _resize(np.asarray(taken, np.float32), last - first, 2 * half)
     fill_border(result)
     return result
 
