@@ -35,7 +35,14 @@ from fastgen.records import check_known
 from fastgen.stored_mesh import stored
 from fastgen.unfold import assemble
 
-__all__ = ["KINDS", "ContainerKind", "WallProfiles", "Wave", "build_container"]
+__all__ = [
+    "KINDS",
+    "ContainerKind",
+    "WallProfiles",
+    "Wave",
+    "build_container",
+    "container_outline",
+]
 
 _USUAL = WallProfiles()
 
@@ -57,7 +64,12 @@ def build_container(kind: str, profiles: WallProfiles = _USUAL, max_edge_mm: flo
     return _built(kind, profiles, max_edge_mm)
 
 
-@lru_cache(maxsize=32)
+def container_outline(kind: str, profiles: WallProfiles = _USUAL) -> Mesh:
+    """The same surface of as few triangles as can be, for what asks where it is at rest."""
+    return build_container(kind, profiles, _EDGE_LIMITS_MM[1])
+
+
+@lru_cache(maxsize=64)
 def _built(kind: str, profiles: WallProfiles, max_edge_mm: float) -> Mesh:
     return stored(
         "container",

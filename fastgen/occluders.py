@@ -6,6 +6,7 @@ then no occluder of itself.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import moderngl
 import numpy as np
@@ -25,7 +26,19 @@ class Body:
     positions_mm: NDArray[np.float32]
     triangles: NDArray[np.uint32]
 
+    @cached_property
+    def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Lowest and highest coordinates [3] of all vertices."""
+        return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
 
+
+@lru_cache(maxsize=64)
+def at_rest(container: Mesh) -> Body:
+    """The whole of an undamaged container."""
+    return Body(container.positions_mm, container.triangles)
+
+
+@lru_cache(maxsize=256)  # as many as there are spreaders
 def without_cables(spreader: Mesh) -> Body:
     """What of a spreader throws shade; its cables are too thin for the maps."""
     solid = tier_of_vertices(spreader) != CABLE_TIER

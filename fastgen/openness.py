@@ -18,7 +18,14 @@ from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, map_matrix, without_cables
+from fastgen.occluders import (
+    Body,
+    DepthMap,
+    DrawnBody,
+    at_rest,
+    map_matrix,
+    without_cables,
+)
 from fastgen.prefilter import octahedral_decode
 from fastgen.programs import LIGHT_STEPS, link
 
@@ -269,13 +276,14 @@ class SkyProbe:
         # its faces are long and run into one another: their ends stand for nothing
         points = probe_points(spreader, np.inf)
         own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
-        below = self._kept(Body(container.positions_mm, container.triangles), points, _COARSE_SIZE)
+        below = self._kept(at_rest(container), points, _COARSE_SIZE)
         return own & below
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
-        body = Body(container.positions_mm, container.triangles)
-        open_to = self._own.get(container, lambda: self._kept(body, points, _MAP_SIZE))
+        open_to = self._own.get(
+            container, lambda: self._kept(at_rest(container), points, _MAP_SIZE)
+        )
         if spreader is not None:
             open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
         return open_to

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
+from fastgen.container import build_container, container_outline
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DecalTables, pack_decals
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
@@ -41,7 +42,7 @@ from fastgen.reflectance import dfg_table
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes
+from fastgen.shapes import Shapes, spreader_outline
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
@@ -138,7 +139,7 @@ class Renderer:
         shading = self._shading.get(
             layer, lambda: Shading(self._ctx, self._samples_per_axis, layer)
         )
-        shadow = self._shadow(scene, mesh.mesh, spreader.mesh if spreader else None)
+        shadow = self._shadow(scene)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
         sunny = sun_values(light.ambient.sun, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
@@ -218,12 +219,15 @@ class Renderer:
         for name, texture in textures.items():
             texture.use(UNITS[name])
 
-    def _shadow(self, scene: Scene, container: Mesh, spreader: Mesh | None) -> ShadowMap | None:
+    def _shadow(self, scene: Scene) -> ShadowMap | None:
         """What the sun of a scene leaves in the shade, None without a sun."""
         sun = self.ambient(scene.environment.name).sun
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
+        box = scene.container
+        shape = build_container if scene.damages else container_outline
+        container, spreader = shape(box.kind, box.profiles), spreader_outline(scene, bent=False)
         self._sun_shadow.cast(container, spreader, toward, scene.damages)
         return self._sun_shadow
 

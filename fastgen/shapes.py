@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import moderngl
 import numpy as np
 
-from fastgen.container import build_container
+from fastgen.container import build_container, container_outline
 from fastgen.divided_mesh import as_drawn
 from fastgen.environment import Ambient
 from fastgen.gpu_mesh import GpuMesh, chart_table
@@ -42,7 +42,7 @@ class Shapes:
         sky = Sky(light, scene.environment.yaw_deg)
         mesh.set_openness(self._probe.openness(mesh.mesh, usual, sky))
         if spreader is not None and usual is not None:
-            held = build_container(scene.container.kind)
+            held = container_outline(scene.container.kind)
             shape = spreader.mesh if bent else usual  # with vertices of its own
             spreader.set_openness(self._probe.openness_of_spreader(shape, held, sky))
         return mesh, spreader

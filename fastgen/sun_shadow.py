@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, map_matrix, without_cables
+from fastgen.occluders import Body, DepthMap, DrawnBody, at_rest, map_matrix, without_cables
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
@@ -54,11 +54,11 @@ class ShadowMap:
         if shown == self._shown:
             return
         self._shown = shown
-        bodies = [Body(_bent(container.positions_mm, damages), container.triangles)]
+        bodies = [_bent(container, damages)]
         if spreader is not None:
             bodies.append(without_cables(spreader))
-        low = np.min([body.positions_mm.min(axis=0) for body in bodies], axis=0)
-        high = np.max([body.positions_mm.max(axis=0) for body in bodies], axis=0)
+        low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
+        high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
         self.toward = toward
         self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
         drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
@@ -79,15 +79,18 @@ class ShadowMap:
         self._map.release()
 
 
-def _bent(positions_mm: NDArray[np.float32], damages: tuple[Damage, ...]) -> NDArray[np.float32]:
-    """Rest positions [V, 3] as the damages move them."""
+def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Body:
+    """A container as the damages move it."""
+    if not damages:
+        return at_rest(container)
+    positions_mm = container.positions_mm
     moved = positions_mm.copy()
     for damage in damages:
         box = corners_mm(damage)
         near = ((positions_mm >= box.min(axis=0)) & (positions_mm <= box.max(axis=0))).all(axis=1)
         rest = positions_mm[near].astype(np.float64)
         moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
-    return moved
+    return Body(moved, container.triangles)
 
 
 def sun_values(sun: Sun | None, shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
