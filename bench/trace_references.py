@@ -4,7 +4,8 @@
 
 PYTHON is a Python 3.11 with bpy==4.5.15. What is there already is not traced again, so a run that
 was stopped goes on where it was; as is, it takes 45 minutes of two cores. What Cycles writes goes
-to --raw; `bench/pack_references.py` makes bench/references from it. `--twice`: so many cases are
+to --raw; `bench/pack_references.py` makes bench/references from it. A case that bench/references
+holds shows the scene that is kept there. `--twice`: so many cases are
 traced a second time with another seed, to know Cycles' own noise. `--series`: of so many, images at
 1 to 256 samples follow, and denoised ones.
 """
@@ -18,7 +19,7 @@ from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
-from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases
+from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases, load, traced
 
 from fastgen import Generator
 from fastgen.export import export_glb
@@ -88,7 +89,7 @@ class Tracer:
         """The GLB file, beside it the scene that it was made from."""
         glb = self._folder / f"{case.number:02d}.glb"
         if not glb.exists():
-            scene = case.drawn()
+            scene = load(case.number).scene if case in traced(len(cases())) else case.drawn()
             aside = glb.with_suffix(".part")
             with Generator(case.config, SEED, SIZE) as generator:
                 export_glb(generator, scene, aside, [scene.camera(case.camera)], TEXEL_MM)

@@ -1,10 +1,12 @@
 """Tileable noise for the material layers, baked once per process and mip-mapped.
 
 Channels hold values whose distribution is uniform on 0..1, so that `noise > 1 - c` covers the
-fraction c of the surface. Averaging in a mip level narrows that distribution; `lost_deviation`
-says by how much, and the shader widens its thresholds accordingly, so that near and far views
-agree on how much is rusty and nothing shimmers (the idea of Olano and Baker 2010, LEAN mapping:
-variance that filtering removes comes back as softness).
+fraction c of the surface. That of rust is normal instead: NORMAL_REACH deviations to either side of
+its mean fill 0..1. Averaging in a mip level narrows those distributions; `lost_deviation` says by
+how much, and the shader widens its thresholds accordingly, so that near and far views agree on how
+much is rusty and nothing shimmers (the idea of Olano and Baker 2010, LEAN mapping: variance that
+filtering removes comes back as softness). Of a normal field that is exact: where its mean over a
+footprint is m and deviates by s within it, Phi((m - t) / s) of that lies above t.
 """
 
 from dataclasses import dataclass
@@ -18,6 +20,10 @@ from numpy.typing import NDArray
 from fastgen import cache
 
 NOISE_SIZE = 1024
+
+NORMAL_REACH = 3.2
+"""Deviations from the mean that a normal channel holds; one value in 700 lies beyond."""
+
 _SEED = 20261
 _BINS = 8191
 
@@ -27,7 +33,8 @@ class NoiseTiles:
     """levels: uint8 [2, S, S, 4] for S = NOISE_SIZE, NOISE_SIZE / 2, ... 1; row 0 is v = 0.
 
     Layer 0: tone, rust, stain, grain. Layer 1: scratches, wear, dirt, fine grain.
-    lost_deviation: float32 [2, levels, 4], standard deviation that a level lost against level 0.
+    lost_deviation: float32 [2, levels, 4], standard deviation that bilinear lookups in a level have
+    lost against those in level 0.
     """
 
     levels: tuple[NDArray[np.uint8], ...]
@@ -40,6 +47,26 @@ def _uniform(values: NDArray[np.floating]) -> NDArray[np.float32]:
     bins = ((values - low) * (_BINS / (high - low))).astype(np.int32)
     share = np.cumsum(np.bincount(bins.ravel(), minlength=_BINS + 1), dtype=np.float64)
     return (share / values.size)[bins].astype(np.float32)
+
+
+def _looked_up_variance(channel: NDArray[np.floating]) -> float:
+    """Variance of bilinear lookups anywhere in texels [S, S], which repeat."""
+    apart = channel - channel.mean(dtype=np.float64)
+    # between two texels the mean of a weight's square is 1/3, that of both weights' product 1/6
+    smooth = apart
+    for axis in (0, 1):
+        smooth = 2 / 3 * smooth + 1 / 3 * np.roll(smooth, 1, axis=axis)
+    return float((apart * smooth).mean())
+
+
+def _normal(ranks: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Ranks [S, S] in 0..1 as values that are normal where they are looked up, about a mean of 0.5;
+    see NORMAL_REACH."""
+    from scipy.special import ndtri  # takes 0.1 s, and noise is kept on disk
+
+    deviations = np.clip(ndtri(ranks.astype(np.float64)), -NORMAL_REACH, NORMAL_REACH)
+    deviations /= np.sqrt(_looked_up_variance(deviations))
+    return np.clip(0.5 + deviations / (2 * NORMAL_REACH), 0, 1).astype(np.float32)
 
 
 def _spectral(
@@ -115,14 +142,19 @@ def _baked() -> dict[str, NDArray[Any]]:
     fine = _uniform(_spectral(rng, 0.3, 90.0, 500.0))
     layers = np.stack(
         [
-            np.stack([tone, rust, _stain(rust), grain], axis=-1),
+            np.stack([tone, _normal(rust), _stain(rust), grain], axis=-1),
             np.stack([_scratches(rng), wear, dirt, fine], axis=-1),
         ]
     )
     levels = [layers]
     while levels[-1].shape[1] > 1:
         levels.append(_halved(levels[-1]))
-    variance = np.stack([level.var(axis=(1, 2)) for level in levels], axis=1)
+    variance = np.array(
+        [
+            [[_looked_up_variance(layer[..., c]) for c in range(4)] for layer in level]
+            for level in levels
+        ]
+    ).swapaxes(0, 1)
     lost = np.sqrt(np.maximum(variance[:, :1] - variance, 0)).astype(np.float32)
     encoded = (np.rint(np.clip(level, 0, 1) * 255).astype(np.uint8) for level in levels)
     return {"lost_deviation": lost, **{f"level{i}": level for i, level in enumerate(encoded)}}

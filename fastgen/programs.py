@@ -16,7 +16,7 @@ from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
 from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS, TILE_RANGE_CAPS
 from fastgen.mesh import MATERIALS, MAX_CHARTS
-from fastgen.noise import NOISE_SIZE, noise_tiles
+from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.resources import shader_path
 from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
@@ -230,6 +230,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "SPECULAR_LAYERS": f"{len(levels):.1f}",
         "IRRADIANCE_SIZE": f"{environment.IRRADIANCE_SIZE:.1f}",
         "NOISE_SIZE": f"{NOISE_SIZE:.1f}",
+        "NORMAL_REACH": f"{NORMAL_REACH}",
         "NOISE_LEVELS": f"{_NOISE_LEVELS:.1f}",
         "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
         "ART_SIZE": f"{ART_SIZE:.1f}",

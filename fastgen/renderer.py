@@ -107,7 +107,7 @@ class Renderer:
         self._art = art_texture(gl, art)
         texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
         self._tiles = mipmapped_array(self._ctx, texels)
-        self._noise = noise_texture(self._ctx)
+        self._noise = noise_texture(gl)
         table = dfg_table()
         self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         self._dfg.repeat_x = self._dfg.repeat_y = False

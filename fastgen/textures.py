@@ -1,6 +1,7 @@
 """Textures of a GL context made from arrays."""
 
 import ctypes
+from collections.abc import Iterable
 
 import moderngl
 import numpy as np
@@ -16,18 +17,22 @@ _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 def art_texture(gl: GLContext, images: np.ndarray) -> moderngl.TextureArray:
     """Artwork uint8 [K, N, N, 4] as a mip-mapped texture array, clamped at the borders. The driver
     would average sRGB as if it were light, so the levels are `smaller`'s."""
-    count, side = images.shape[:2]
-    data = np.ascontiguousarray(images).tobytes()
-    texture = gl.ctx.texture_array((side, side, count), 4, data, alignment=1)
+    levels = zip(*map(smaller, images), strict=True)
+    return _clamped(_levelled(gl, [images, *map(np.stack, levels)]))
+
+
+def _levelled(gl: GLContext, levels: Iterable[np.ndarray]) -> moderngl.TextureArray:
+    """A texture array of `levels` uint8 [K, N, N, 4], each half as wide as the one before."""
+    first, *others = map(np.ascontiguousarray, levels)
+    count, side = first.shape[:2]
+    texture = gl.ctx.texture_array((side, side, count), 4, first.tobytes(), alignment=1)
     texture.use()
     define = gl.function("glTexImage3D", None, _ENUM, *(_INT,) * 6, _ENUM, _ENUM, ctypes.c_void_p)
-    levels = zip(*map(smaller, images), strict=True)
-    for level, layers in enumerate(levels, start=1):
-        texels = np.stack(layers)
-        size = (len(texels[0]), len(texels[0]), count)
+    for level, texels in enumerate(others, start=1):
+        size = (texels.shape[2], texels.shape[1], count)
         address = texels.ctypes.data
         define(_TEXTURE_2D_ARRAY, level, _RGBA8, *size, 0, _RGBA, _UNSIGNED_BYTE, address)
-    return _clamped(texture)
+    return texture
 
 
 def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
@@ -61,11 +66,9 @@ def _clamped(texture: moderngl.TextureArray) -> moderngl.TextureArray:
     return texture
 
 
-def noise_texture(ctx: moderngl.Context) -> moderngl.TextureArray:
-    """The noise tiles, repeating; GL's box-filtered mip chain is the one they were measured on."""
-    base = noise_tiles().levels[0]
-    size = base.shape[1]
-    texture = ctx.texture_array((size, size, len(base)), 4, base.tobytes())
-    texture.build_mipmaps()
+def noise_texture(gl: GLContext) -> moderngl.TextureArray:
+    """The noise tiles, repeating. A driver may round up at every level of a chain of its own, which
+    adds up to three steps of 255."""
+    texture = _levelled(gl, noise_tiles().levels)
     texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
     return texture

@@ -67,7 +67,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 #if WITH_DAMAGE
     // worked steel shows: dulled paint, then rust where the noise is rustiest
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
-    rusty = max(rusty, covered(coarse.value.y, 1.0 - scar, coarse.lost.y, 0.15) * step(0.01, scar));
+    rusty = max(rusty, normal_covered(coarse.value.y, scar, coarse.lost.y, 0.3) * step(0.01, scar));
 #endif
     vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x);
     albedo = mix(albedo, ochre, rusty);

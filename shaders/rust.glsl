@@ -3,7 +3,7 @@
 float rust(float edge_mm, NoiseSample noise, float proneness) {
     // water stands along edges, so rust starts there
     float share = min(rust_coverage * proneness * (0.6 + 3.0 * exp(-edge_mm / 90.0)), 0.9);
-    return covered(noise.value.y, 1.0 - share, noise.lost.y, 0.012) * step(1e-4, share);
+    return normal_covered(noise.value.y, share, noise.lost.y, 0.03) * step(1e-4, share);
 }
 
 float rust_stain(NoiseSample noise) {

@@ -5,10 +5,11 @@ import pytest
 
 from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
 from fastgen.gl import open_context
-from fastgen.noise import NOISE_SIZE, noise_tiles
+from fastgen.noise import noise_tiles
 from fastgen.programs import SCENE_BLOCK, VIEW_BLOCK, expand
 from fastgen.reflectance import dfg_table
 from fastgen.resources import shader_path
+from fastgen.textures import noise_texture
 
 HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'
 
@@ -169,20 +170,41 @@ def test_tone_curve_keeps_order_and_range(gl):
 @pytest.mark.parametrize("coverage", [0.05, 0.2, 0.5])
 def test_a_noise_threshold_covers_the_same_share_at_every_distance(gl, coverage):
     """What is rusty near by is as rusty from afar: no layer fades in or out, or shimmers."""
-    tiles = noise_tiles()
-    texture = gl.ctx.texture_array((NOISE_SIZE, NOISE_SIZE, 2), 4, tiles.levels[0].tobytes())
-    texture.build_mipmaps()
-    texture.filter = (gl.ctx.LINEAR_MIPMAP_LINEAR, gl.ctx.LINEAR)
-    kept = blocks(gl, noise_lost=tiles.lost_deviation.reshape(-1, 4))
-    points = np.random.default_rng(3).uniform(0, 1000, (4000, 2))
+    steps = 1000 * (np.arange(128) + 0.37) / 128
+    points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    shares = [
+        rusty_share(gl, points, footprint, coverage).mean()
+        for footprint in (0.5, 2.0, 8.0, 32.0, 128.0)
+    ]
+    np.testing.assert_allclose(shares, coverage, atol=0.012)
+
+
+@pytest.mark.parametrize("coverage", [0.05, 0.2, 0.5])
+def test_a_wide_lookup_covers_what_lookups_within_it_do(gl, coverage):
+    """A spot of rust is as dark from afar as it is, neither washed out nor hardened."""
+    side = 16.0
+    points = np.random.default_rng(5).uniform(0, 1000, (300, 2))
+    steps = (np.arange(16) + 0.5) / 16 - 0.5
+    within = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * side
+    near = rusty_share(gl, (points[:, None] + within).reshape(-1, 2), 1.0, coverage)
+    truth = near.reshape(len(points), -1).mean(axis=1)
+    wide = rusty_share(gl, points, side, coverage)
+    assert np.sqrt(((wide - truth) ** 2).mean()) < 0.35 * truth.std()
+    assert np.polyfit(truth, wide, 1)[0] == pytest.approx(1.0, abs=0.15)
+
+
+def rusty_share(gl, points, footprint, coverage):
+    """Share [N] of pixels of a width, at points [N, 2] on the sheet, that is rusty; both in mm."""
+    texture = noise_texture(gl)
+    kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4))
     body = (
         '#include "layers.glsl"\n'
         "vec4 f(vec4 x) { NoiseSample n = read_noise(0, x.xy, 1000.0, x.z);"
-        " return vec4(covered(n.value.y, 1.0 - x.w, n.lost.y, 0.012), 0.0, 0.0, 0.0); }"
+        " return vec4(normal_covered(n.value.y, x.w, n.lost.y, 0.03), 0.0, 0.0, 0.0); }"
     )
-    shares = []
-    for footprint in (0.5, 2.0, 8.0, 32.0, 128.0):
-        rows = np.c_[points, np.full(4000, footprint), np.full(4000, coverage)]
-        shares.append(run(gl, body, rows, {"noise_tiles": texture})[:, 0].mean())
-    np.testing.assert_allclose(shares, coverage, atol=0.05)
+    count = len(points)
+    rows = np.c_[points, np.full(count, footprint), np.full(count, coverage)]
+    found = [run(gl, body, part, {"noise_tiles": texture}) for part in np.array_split(rows, 8)]
     del kept
+    texture.release()
+    return np.concatenate(found)[:, 0]
