@@ -53,7 +53,8 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
                glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
 }
 
-void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float grain) {
+// worn: share of the ink that is gone where all of it wears
+void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float worn) {
     vec4 place = decal_texel(decal, 1);
     vec4 turn = decal_texel(decal, 0);
     vec2 d = sheet_mm - place.xy;
@@ -80,19 +81,20 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
         albedo = kind.x == DECAL_EMBLEM ? ink.rgb : srgb_decode(texel.rgb);
         if (kind.x != DECAL_MARKER) alpha *= texel.a;
     }
-    alpha *= 1.0 - ink.a * smoothstep(0.45, 0.75, grain);
+    alpha *= 1.0 - ink.a * worn;
     hit.albedo = mix(hit.albedo, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(uint chart, vec3 paint, vec2 sheet_mm, float footprint_mm, float grain) {
+DecalHit decals_at(uint chart, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
+    float worn = covered(noise.value.w, 0.6, noise.lost.w, 0.15);
     uvec4 cell = cell_at(chart, sheet_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;
     do {
-        if (decal != 0u) add_decal(hit, decal, sheet_mm, footprint_mm, grain);
+        if (decal != 0u) add_decal(hit, decal, sheet_mm, footprint_mm, worn);
         ++i;
         uint pair = cell[(i & 7) >> 1];
         decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;

@@ -17,9 +17,10 @@ NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_
     return NoiseSample(value, noise_lost[layer * int(NOISE_LEVELS) + int(lod)]);
 }
 
-// A linear ramp with the spread of what was filtered away (uniform: half-width = sqrt(3) deviations).
+// A linear ramp, softer by the spread of what was filtered away: an even spread over a half-width h has
+// a variance of h * h / 3, and variances add.
 float covered(float value, float threshold, float lost, float softness) {
-    float half_width = softness + 1.732 * lost;
+    float half_width = sqrt(softness * softness + 3.0 * lost * lost);
     return clamp(0.5 + 0.5 * (value - threshold) / half_width, 0.0, 1.0);
 }
 

@@ -36,7 +36,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
-    DecalHit decal = decals_at(chart, albedo, sheet_mm, footprint_mm, coarse.value.w);
+    DecalHit decal = decals_at(chart, albedo, sheet_mm, footprint_mm, coarse);
     s.decal_id = decal.id;
 #if SHOWN(DECALS)
     albedo = decal.albedo;
