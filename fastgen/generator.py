@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
+from fastgen.container import build_container, container_outline
 from fastgen.cuda import CudaFrame, cuda_reason
 from fastgen.damage import seen_damages, variant
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
@@ -277,13 +278,17 @@ class Generator:
             replace(scene, container=container, spreader=spreader)
             for container, spreader in possible_shapes(self.config)
         ]
-        for shape in shaped:
+        for shape in shaped:  # what shadows and labels ask of meshes
+            box = shape.container
             spreader_outline(shape, bent=False)
+            container_outline(box.kind, box.profiles)
+            if self.config.damage.probability > 0:
+                _ = build_container(box.kind, box.profiles).triangle_bounds_mm
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)
             sunny = {renderer.ambient(name).sun is not None: name for name in names}
-        # programs and targets, and what labels ask of meshes: every way to draw, every container
+        # programs and targets: every way to draw, every container
         ways = list(product(one_damage_each(self.config), sunny.values()))
         boxes = list(one_container_each(self.config.container))
         for i in range(max(len(ways), len(boxes))):

@@ -78,9 +78,10 @@ of it than the surface does, hence up to twice as much."""
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""
 
-FINE_FOOTPRINT = 0.45
-"""Of the pixel's, where its layers are the mean of five lookups or more. Narrower or wider,
-path-traced containers are farther off."""
+LOOKUP_PX = {1: 1.0, 2: 1.3, 3: 0.45}
+"""Width of a lookup of the layers by samples along each axis of a pixel: of one lookup the pixel's
+square, or about the tent that reaches into the neighbours; less where the layers are the mean of
+five lookups or more. Narrower or wider, finer renders averaged down are farther off."""
 
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
@@ -266,7 +267,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,
         "FINE_LAYERS": int(samples_per_axis > 2),
-        "FINE_FOOTPRINT": f"{FINE_FOOTPRINT}",
+        "LOOKUP_PX": f"{LOOKUP_PX[samples_per_axis]}",
     }
     # lets the vertex stage send an instance to the inner view
     lines = ["#extension GL_ARB_shader_viewport_layer_array : enable"] if damage == "holed" else []

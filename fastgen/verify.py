@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset_json import MANIFEST, without_manifest
-from fastgen.errors import FastgenError
+from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record
 from fastgen.formats.yolo import pixel_box
 from fastgen.records import from_plain
@@ -98,7 +98,11 @@ def _intact(
     if size is not None and found != size:
         faults.append(f"{path}: changed ({found} bytes, {size} were written)")
         return None
-    data = storage.read(path)
+    try:
+        data = storage.read(path)
+    except OutputError as error:  # one that cannot be read must not hide other faults
+        faults.append(str(error))
+        return None
     if digest(data) != hashed:
         faults.append(f"{path}: changed")
         return None

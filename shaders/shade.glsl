@@ -111,10 +111,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
-    p.footprint_mm = p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-#if FINE_LAYERS
-    p.footprint_mm *= FINE_FOOTPRINT;
-#endif
+    p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
     p.surface = surface_at(key_chart(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (key_chart(key) >= SPREADER_CHART) {

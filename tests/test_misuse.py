@@ -49,6 +49,17 @@ def test_repair_makes_again_what_resuming_cannot_see(dataset, copy, capsys, name
     assert content(copy) == content(dataset)
 
 
+def test_verify_goes_on_past_a_file_that_cannot_be_read(copy, capsys):
+    unreadable = copy / "shards" / "000000.json"
+    unreadable.unlink()
+    unreadable.symlink_to(copy)  # a folder, which no read takes, not even root's
+    (copy / "stray.txt").write_text("?")
+    assert main(["verify", str(copy)]) == 1
+    said = capsys.readouterr()
+    assert f"{unreadable}: cannot be read" in said.out + said.err
+    assert "stray.txt: does not belong here" in said.out + said.err
+
+
 def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys):
     (copy / "images/notes.txt").write_text("mine")
     assert main(["verify", str(copy), "--repair"]) == 1
