@@ -61,7 +61,8 @@ class Absence:
         if element.text:
             yield programs, "expand", self._edited(programs.expand)
         if element.container:
-            yield shapes, "build_container", _built(shapes.build_container, element.container)
+            for name in ("build_container", "container_outline"):  # drawn, and the sun's shadow
+                yield shapes, name, _built(getattr(shapes, name), element.container)
         if element.spreader:
             yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
         probe = openness.SkyProbe

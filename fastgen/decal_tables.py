@@ -22,8 +22,9 @@ DECAL_TEXELS = 5
 CELL_SLOTS = 8
 GLYPH_COLUMNS = 256
 
-_MARGIN_MM = 24.0
-"""Antialiasing reaches this far beyond a decal's edge: half a footprint of the coarsest view."""
+_MARGIN_MM = 26.0
+"""Antialiasing reaches this far beyond a decal's edge: half a lookup, of programs.LOOKUP_PX, in the
+coarsest usual view, which has 39 mm a pixel at 640 pixels across."""
 
 
 class SceneError(FastgenError):

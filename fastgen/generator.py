@@ -279,11 +279,11 @@ class Generator:
             for container, spreader in possible_shapes(self.config)
         ]
         for shape in shaped:  # what shadows and labels ask of meshes
-            box = shape.container
+            container = shape.container
             spreader_outline(shape, bent=False)
-            container_outline(box.kind, box.profiles)
+            container_outline(container.kind, container.profiles)
             if self.config.damage.probability > 0:
-                _ = build_container(box.kind, box.profiles).triangle_bounds_mm
+                _ = build_container(container.kind, container.profiles).triangle_bounds_mm
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)

@@ -22,7 +22,7 @@ from fastgen import cache
 NOISE_SIZE = 1024
 
 NORMAL_REACH = 3.2
-"""Deviations from the mean that a normal channel holds; one value in 700 lies beyond."""
+"""Deviations from the mean that a normal channel holds; one value in 600 lies beyond."""
 
 _SEED = 20261
 _BINS = 8191
@@ -123,7 +123,7 @@ def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def noise_tiles() -> NoiseTiles:
-    """Both layers and their mip chain; always the same. Baking them takes half a second, once."""
+    """Both layers and their mip chain; always the same. Baking them takes a second or two, once."""
     arrays = cache.computed("noise", _SEED, _baked)
     return NoiseTiles(
         tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1)), arrays["lost_deviation"]

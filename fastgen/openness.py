@@ -303,7 +303,7 @@ class SkyProbe:
     def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
         shape = DrawnBody(self._ctx, self._program, body)
         depths = DepthMap(self._ctx, self._program, size)
-        low, high = body.positions_mm.min(axis=0), body.positions_mm.max(axis=0)
+        low, high = body.bounds_mm
         # what is probed outside of the box of occluders may be hidden too
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
         found = np.empty((len(points_mm), DIRECTIONS), bool)

@@ -109,6 +109,7 @@ def resample_octahedral(
     size: even. samples: each texel is the mean of samples x samples bilinear lookups spread over
     it; choose it so that they lie no further apart than a texel of the source.
     """
+    assert size % 2 == 0, "the quarters of a map are alike"
     height, width = radiance.shape[:2]
     padded = np.empty((height + 2, width + 2, 3), np.float32)
     padded[1:-1, 1:-1] = radiance

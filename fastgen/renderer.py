@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
-from fastgen.container import build_container, container_outline
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.decal_tables import DecalTables, pack_decals
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
@@ -42,7 +41,7 @@ from fastgen.reflectance import dfg_table
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes, spreader_outline
+from fastgen.shapes import Shapes, shadow_meshes
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
@@ -225,10 +224,7 @@ class Renderer:
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        box = scene.container
-        shape = build_container if scene.damages else container_outline
-        container, spreader = shape(box.kind, box.profiles), spreader_outline(scene, bent=False)
-        self._sun_shadow.cast(container, spreader, toward, scene.damages)
+        self._sun_shadow.cast(*shadow_meshes(scene), toward, scene.damages)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:

@@ -93,6 +93,14 @@ def spreader_outline(scene: Scene, bent: bool) -> Mesh | None:
     return spreader_mesh(scene, CUT_MM if bent else np.inf)
 
 
+def shadow_meshes(scene: Scene) -> tuple[Mesh, Mesh | None]:
+    """A scene's container at rest, and its spreader if it has one, of as few triangles as their
+    shadow can be drawn from: damage bends fine ones only."""
+    box = scene.container
+    shape = build_container if scene.damages else container_outline
+    return shape(box.kind, box.profiles), spreader_outline(scene, bent=False)
+
+
 def _shading_spreader(scene: Scene) -> Mesh | None:
     """What hides the sky from the container. At its usual gap: a centimetre more or less cannot be
     seen in the shade, and every other shape costs half a second once."""

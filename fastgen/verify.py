@@ -103,6 +103,9 @@ def _intact(
     except OutputError as error:  # one that cannot be read must not hide other faults
         faults.append(str(error))
         return None
+    except FileNotFoundError:  # a link to nowhere
+        faults.append(f"{path}: missing")
+        return None
     if digest(data) != hashed:
         faults.append(f"{path}: changed")
         return None

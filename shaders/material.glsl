@@ -9,7 +9,7 @@ struct SurfacePoint {
     vec3 outward;   // as in the chart table
 };
 
-// footprint_mm: width of the pixel on the sheet; scar: how much damage has worked the steel, 0..1
+// footprint_mm: width of the lookup on the sheet; scar: how much damage has worked the steel, 0..1
 SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float scar) {
     vec4 rect = texelFetch(chart_table, ivec2(int(chart), 0), 0);
     vec4 part = texelFetch(chart_table, ivec2(int(chart), 1), 0);

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from fastgen.container import KINDS, WallProfiles, Wave, build_container
+from fastgen.container import (
+    KINDS,
+    WallProfiles,
+    Wave,
+    build_container,
+    container_outline,
+)
 from fastgen.errors import ConfigError
 from fastgen.mesh import FACES, GROUP_SLACK_MM
 from tests.mesh_probe import (
@@ -227,6 +233,23 @@ def test_cross_members_hang_below_the_floor_about_every_300_mm():
 )
 def test_triangle_count_stays_within_its_budget(kind, limit):
     assert len(build_container(kind).triangles) < limit
+
+
+@pytest.mark.parametrize("kind", ["20", "45HC"])
+def test_the_outline_is_the_same_surface_of_fewer_triangles(kind):
+    fine, outline = build_container(kind), container_outline(kind)
+    assert len(outline.triangles) < 0.4 * len(fine.triangles)
+    rng = np.random.default_rng(2)
+    toward = rng.normal(size=(4000, 3))
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    low, high = fine.bounds_mm
+    eyes = rng.uniform(low, high, (4000, 3)) - 20_000 * toward
+    (hit, far), (as_well, as_far) = (first_hits(mesh, eyes, toward) for mesh in (fine, outline))
+    both = (hit >= 0) & (as_well >= 0)
+    assert both.mean() > 0.9
+    # a ray may slip past an edge on one of them
+    assert (both == ((hit >= 0) | (as_well >= 0))).mean() > 0.999
+    assert np.isclose(far[both], as_far[both], rtol=0, atol=0.05).mean() > 0.999
 
 
 def test_equal_calls_share_one_mesh_that_cannot_be_written():
