@@ -204,7 +204,7 @@ def test_a_soft_threshold_keeps_its_share_from_afar(gl, layer, channel, softness
     truth = near.reshape(len(points), -1).mean(axis=1)
     wide = noise_share(gl, layer, ramp, points, side, threshold)
     assert abs((wide - truth).mean()) < 0.015
-    assert np.sqrt(((wide - truth) ** 2).mean()) < 0.06
+    assert np.sqrt(((wide - truth) ** 2).mean()) < 0.4 * truth.std() + 0.03
 
 
 def points_and_steps(side):
