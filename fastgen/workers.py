@@ -28,6 +28,27 @@ _POLL_S = 1.0
 _STOPS = {signal.SIGINT, signal.SIGTERM}
 
 
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Stops that come meanwhile wait until the end: a process left half started says so loudly.
+
+    A mask does not keep them off. The system may give a signal to any thread, a matrix library's
+    too, and Python then runs its handler in the main one.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield  # no handler runs here
+        return
+    held: list[int] = []
+    before = {each: signal.signal(each, lambda number, _: held.append(number)) for each in _STOPS}
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, signal.SIG_DFL if handler is None else handler)
+        if held:
+            signal.raise_signal(held[0])
+
+
 class _Worker:
     """One process, what it is at and when it last said something."""
 
@@ -39,11 +60,12 @@ class _Worker:
         # a signal may reach the whole group, and the parent decides: a worker that is not ready
         # yet takes this mask over and stays quiet. The tracker's own start would lift the mask
         resource_tracker.ensure_running()
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
-        try:
-            self.process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with undisturbed():
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
+            try:
+                self.process.start()
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
         self.task: Any = None
         self.place: Any = None

@@ -1,14 +1,17 @@
 """Runs that are stopped from without: quietly, at once, and to be gone on with."""
 
+import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import psutil
 import pytest
 
 from fastgen.cli import main
+from fastgen.workers import undisturbed
 
 ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]
 STOPPED = "fastgen: stopped; run the same command again to go on"
@@ -62,6 +65,25 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
     assert error.splitlines()[-1] == STOPPED
     assert not [p for p in out.iterdir() if p.name.startswith(".")]
     wait_for(lambda: gone(family))
+
+
+def test_a_stop_waits_until_a_process_has_started():
+    """Even where another thread than the one that starts it gets the signal."""
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda *_: heard.append("late" if over else "early"))
+    over, done = False, threading.Event()
+    threading.Thread(target=done.wait, daemon=True).start()  # it masks nothing
+    try:
+        with undisturbed():
+            masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.2)
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+            over = True
+    finally:
+        done.set()
+        signal.signal(signal.SIGTERM, before)
+    assert heard == ["late"]
 
 
 def test_workers_whose_parent_was_killed_end_without_a_word(tmp_path):
