@@ -86,7 +86,7 @@ def _light_maps(scale: float) -> Callable[[], Patches]:
 
     def patches() -> Patches:
         sizes = [
-            (environment, name, int(getattr(environment, name) * scale))
+            (environment, name, 2 * int(getattr(environment, name) * scale / 2))  # even
             for name in ("SPECULAR_SIZE", "IRRADIANCE_SIZE")
         ]
         return [*sizes, (sys.modules["fastgen.generator"], "load_environment", load_anew)]
