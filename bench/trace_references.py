@@ -5,9 +5,9 @@
 PYTHON is a Python 3.11 with bpy==4.5.15. What is there already is not traced again, so a run that
 was stopped goes on where it was; as is, it takes 45 minutes of two cores. What Cycles writes goes
 to --raw; `bench/pack_references.py` makes bench/references from it. A case that bench/references
-holds shows the scene that is kept there. `--twice`: so many cases are
-traced a second time with another seed, to know Cycles' own noise. `--series`: of so many, images at
-1 to 256 samples follow, and denoised ones.
+holds shows the scene that is kept there. `--twice`: so many cases are traced a second time with
+another seed, to know Cycles' own noise. `--series`: of so many, images at 1 to 256 samples follow,
+and denoised ones.
 """
 
 import argparse

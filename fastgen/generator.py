@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
-from fastgen.container import build_container, container_outline
+from fastgen.container import build_container
 from fastgen.cuda import CudaFrame, cuda_reason
 from fastgen.damage import seen_damages, variant
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
@@ -37,7 +37,7 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
-from fastgen.shapes import spreader_outline
+from fastgen.shapes import shadow_meshes, spreader_outline
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -275,15 +275,14 @@ class Generator:
         names = self.config.environment.names or drawn
         lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
         shaped = [
-            replace(scene, container=container, spreader=spreader)
+            replace(scene, container=container, spreader=spreader, damages=())
             for container, spreader in possible_shapes(self.config)
         ]
         for shape in shaped:  # what shadows and labels ask of meshes
-            container = shape.container
-            spreader_outline(shape, bent=False)
-            container_outline(container.kind, container.profiles)
+            shadow_meshes(shape)
             if self.config.damage.probability > 0:
-                _ = build_container(container.kind, container.profiles).triangle_bounds_mm
+                made = shape.container
+                _ = build_container(made.kind, made.profiles).triangle_bounds_mm
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)

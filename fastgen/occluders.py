@@ -32,10 +32,8 @@ class Body:
         return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
 
 
-@lru_cache(maxsize=64)
-def at_rest(container: Mesh) -> Body:
-    """The whole of an undamaged container."""
-    return Body(container.positions_mm, container.triangles)
+Solid = Body | Mesh
+"""A mesh stands in the way as it is."""
 
 
 @lru_cache(maxsize=256)  # as many as there are spreaders
@@ -62,9 +60,9 @@ def map_matrix(toward: Array, low: Array, high: Array) -> Array:
 
 
 class DrawnBody:
-    """A Body on the GPU. program: of occluder.vert."""
+    """A Solid on the GPU. program: of occluder.vert."""
 
-    def __init__(self, ctx: moderngl.Context, program: moderngl.Program, body: Body) -> None:
+    def __init__(self, ctx: moderngl.Context, program: moderngl.Program, body: Solid) -> None:
         self._vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(body.triangles, np.uint32).tobytes())
         content = [(self._vertices, "3f", "in_position_mm")]

@@ -18,14 +18,7 @@ from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_luminance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
-from fastgen.occluders import (
-    Body,
-    DepthMap,
-    DrawnBody,
-    at_rest,
-    map_matrix,
-    without_cables,
-)
+from fastgen.occluders import DepthMap, DrawnBody, Solid, map_matrix, without_cables
 from fastgen.prefilter import octahedral_decode
 from fastgen.programs import LIGHT_STEPS, link
 
@@ -276,19 +269,17 @@ class SkyProbe:
         # its faces are long and run into one another: their ends stand for nothing
         points = probe_points(spreader, np.inf)
         own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
-        below = self._kept(at_rest(container), points, _COARSE_SIZE)
+        below = self._kept(container, points, _COARSE_SIZE)
         return own & below
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
-        open_to = self._own.get(
-            container, lambda: self._kept(at_rest(container), points, _MAP_SIZE)
-        )
+        open_to = self._own.get(container, lambda: self._kept(container, points, _MAP_SIZE))
         if spreader is not None:
             open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
         return open_to
 
-    def _kept(self, body: Body, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def _kept(self, body: Solid, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
@@ -300,7 +291,7 @@ class SkyProbe:
             lambda: np.packbits(self._open_to(body, points_mm, size), axis=1),
         )
 
-    def _open_to(self, body: Body, points_mm: Array, size: tuple[int, int]) -> Directions:
+    def _open_to(self, body: Solid, points_mm: Array, size: tuple[int, int]) -> Directions:
         shape = DrawnBody(self._ctx, self._program, body)
         depths = DepthMap(self._ctx, self._program, size)
         low, high = body.bounds_mm

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, at_rest, map_matrix, without_cables
+from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, map_matrix, without_cables
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
@@ -79,10 +79,10 @@ class ShadowMap:
         self._map.release()
 
 
-def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Body:
+def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Solid:
     """A container as the damages move it."""
     if not damages:
-        return at_rest(container)
+        return container
     positions_mm = container.positions_mm
     moved = positions_mm.copy()
     for damage in damages:

@@ -9,10 +9,9 @@ struct NoiseSample {
 };
 
 // tile_mm: length of a tile on the sheet; footprint_mm: width of the pixel on the sheet
-// Half a level finer than the footprint, for bilinear lookups widen a texel by about that.
+// The level of texels no wider than the footprint, for bilinear lookups widen them.
 NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
-    float lod = clamp(log2(footprint_mm * NOISE_SIZE / tile_mm) - 0.5, 0.0, NOISE_LEVELS - 1.0);
-    lod = floor(lod + 0.5);
+    float lod = clamp(floor(log2(footprint_mm * NOISE_SIZE / tile_mm)), 0.0, NOISE_LEVELS - 1.0);
     vec4 value = textureLod(noise_tiles, vec3(sheet_mm / tile_mm, layer), lod);
     return NoiseSample(value, noise_lost[layer * int(NOISE_LEVELS) + int(lod)]);
 }
