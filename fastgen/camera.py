@@ -100,15 +100,11 @@ class View:
             edge = float(np.linalg.norm(self.distortion.remove([-edge, 0.0])))
         return float(np.degrees(np.arctan(edge)))
 
-    def lens_values(self, scale: tuple[float, float]) -> dict[str, ArrayLike]:
-        """The uniforms of shaders/lens.glsl; scale: of the image in clip space, see Targets."""
-        width, height = self.size
+    def lens_values(self, to_samples: NDArray[np.floating]) -> dict[str, ArrayLike]:
+        """The uniforms of shaders/lens.glsl; to_samples [2, 2]: see SampleLattice.to_clip."""
         return {
             **(self.distortion.shader_values if self.distortion else PINHOLE),
-            "lens_scale": (
-                2 * self.focal_px / width * scale[0],
-                2 * self.focal_px / height * scale[1],
-            ),
+            "lens_to_clip": (to_samples * 2 * self.focal_px / self.size).T.ravel(),
             "lens_center": self.center_px,
             "lens_focal": self.focal_px,
         }

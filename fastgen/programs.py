@@ -19,6 +19,7 @@ from fastgen.mesh import MATERIALS, MAX_CHARTS
 from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.resources import shader_path
+from fastgen.sample_lattice import SampleLattice
 from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
 from fastgen.uniforms import Block
 
@@ -142,7 +143,7 @@ VIEW_BLOCK = Block(
         ("vec4", "lens_radial"),
         ("vec4", "lens_back", 2),
         ("vec2", "lens_tangential"),
-        ("vec2", "lens_scale"),  # of the ideal image plane in clip space
+        ("vec4", "lens_to_clip"),  # columns of the matrix that takes the image plane there
         ("vec2", "lens_center"),
         ("vec2", "lens_end"),  # where its formula ends, and the slope there
         ("float", "lens_focal"),
@@ -203,13 +204,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
         for a, b in itertools.pairwise(levels)
     )
-    if samples_per_axis == 2:  # a tent one pixel to each side
-        tent = {(x, y): (2 - abs(x)) * (2 - abs(y)) / 16 for x in (-1, 0, 1) for y in (-1, 0, 1)}
-    elif samples_per_axis == 3:  # a box: all samples of the pixel
-        tent = {(x, y): 1 / 9 for x in (-1, 0, 1) for y in (-1, 0, 1)}
-    else:
-        tent = {(0, 0): 1.0}
-    around = sorted(tent, key=lambda o: abs(o[0]) + abs(o[1]))  # the centre first
+    lattice = SampleLattice(samples_per_axis)
     shown = {name: int(layer in ("all", "normals", "reflection", name)) for name in LAYERS}
     defines: dict[str, object] = {
         "MM": "0.001",
@@ -266,6 +261,8 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,
+        "SAMPLE_SLANT": lattice.slant,
+        "SAMPLE_PAD": lattice.pad,
         "FINE_LAYERS": int(samples_per_axis > 2),
         "LOOKUP_PX": f"{LOOKUP_PX[samples_per_axis]}",
     }
@@ -274,11 +271,12 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
     lines += [f"#define {name} {value}" for name, value in defines.items()]
     lines.append("#define SHOWN(name) SHOWN_##name")
     lines.append(f"float specular_layer(float roughness) {{ return 0.0{steps}; }}")
-    offsets = ", ".join(f"ivec2({x}, {y})" for x, y in around)
-    weights = ", ".join(f"{tent[o]:.8f}" for o in around)
-    lines.append(f"#define TENT_SAMPLES {len(around)}")
-    lines.append(f"const ivec2 TENT_OFFSET[TENT_SAMPLES] = ivec2[TENT_SAMPLES]({offsets});")
-    lines.append(f"const float TENT_WEIGHT[TENT_SAMPLES] = float[TENT_SAMPLES]({weights});")
+    offsets = ", ".join(f"ivec2({x}, {y})" for x, y in lattice.filter)
+    weights = ", ".join(f"{weight:.8f}" for weight in lattice.filter.values())
+    lines.append(f"#define FILTER_NEAR {lattice.near}")
+    lines.append(f"#define FILTER_SAMPLES {len(lattice.filter)}")
+    lines.append(f"const ivec2 FILTER_OFFSET[FILTER_SAMPLES] = ivec2[FILTER_SAMPLES]({offsets});")
+    lines.append(f"const float FILTER_WEIGHT[FILTER_SAMPLES] = float[FILTER_SAMPLES]({weights});")
     return "\n".join(lines) + "\n"
 
 

@@ -350,7 +350,8 @@ def _view_values(
     scene: Scene, view: View, targets: Targets, exposure: float
 ) -> dict[str, ArrayLike]:
     """All members of VIEW_BLOCK."""
-    to_samples = np.diag([*targets.scale, 1.0, 1.0])
+    to_samples = np.eye(4)
+    to_samples[:2, :2] = targets.to_samples
     right, down, forward = view.rotation
     center_x, center_y = view.center_px
     yaw = np.deg2rad(scene.environment.yaw_deg)
@@ -363,5 +364,5 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
-        **view.lens_values(targets.scale),
+        **view.lens_values(targets.to_samples),
     }

@@ -14,6 +14,7 @@ from fastgen.gl import GLContext
 from fastgen.pixel_lists import PixelLists
 from fastgen.programs import listed_classes
 from fastgen.sample import Frame
+from fastgen.sample_lattice import SampleLattice
 
 Region = tuple[int, int, int, int]
 """x, y, width and height in pixels."""
@@ -62,9 +63,8 @@ class Targets:
     ) -> None:
         self.size = size
         ctx = gl.ctx
-        # an even number of samples has none at the pixel centre unless shifted by half a sample
-        border = int(samples_per_axis == 2)
-        fine = (size[0] * samples_per_axis + border, size[1] * samples_per_axis + border)
+        self._lattice = SampleLattice(samples_per_axis)
+        fine = self._lattice.texels(size)
         limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
         holed = damage == "holed"
         # at 4096 rows the two views of a holed scene overlap by two rows rather than not fit
@@ -78,7 +78,7 @@ class Targets:
                 f"textures of {max(stored)} texels for {what}, and this driver has {limit}; take a "
                 "lower quality or a smaller size"
             )
-        self.scale = (size[0] * samples_per_axis / fine[0], size[1] * samples_per_axis / fine[1])
+        self.to_samples = self._lattice.to_clip(size)
         self.keys = ctx.texture(stored, 1, dtype="u4")
         # two textures of two and one numbers are cheaper to draw to than one of four
         self.points = ctx.texture(stored, 2, dtype="f4")
@@ -127,10 +127,9 @@ class Targets:
     def limit_inside(self, region: Region | None) -> None:
         """Restrict the inner view to what holes in `region` of the image show, None for all."""
         width, height = self._fine
-        x, y, w, h = region or (0, 0, *self.size)
-        scale = width / self.size[0]
-        left, right = int((x - 1) * scale), int((x + w + 1) * scale)
-        top, bottom = max(int((y - 1) * scale), 0), int((y + h + 1) * scale)
+        region = region or (0, 0, *self.size)
+        left, right = self._lattice.columns(region)
+        top, bottom = self._lattice.rows(region)
         first = self.inner_row
         self._viewport(1, 0.0, first, width, height)
         # the inner view is mirrored; it begins below the outer one

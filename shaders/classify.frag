@@ -4,6 +4,7 @@
 #include "blocks.glsl"
 #include "octahedral.glsl"
 #include "decal_cell.glsl"
+#include "samples.glsl"
 #include "keys_around.glsl"
 #if DAMAGED
 #include "damage.glsl"
@@ -13,11 +14,11 @@ uniform sampler2D sheet_points;
 uniform sampler2D rest_points;
 
 void main() {
-    ivec2 middle = ivec2(gl_FragCoord.xy) * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    ivec2 middle = middle_of(ivec2(gl_FragCoord.xy));
     bool mixed = false;
-    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint keys[FILTER_NEAR] = keys_near(middle);
     uint key = keys[0];
-    for (int i = 1; i < TENT_SAMPLES; ++i) mixed = mixed || keys[i] != key;
+    for (int i = 1; i < FILTER_NEAR; ++i) mixed = mixed || keys[i] != key;
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
     bool decal = key != 0u && cell_at(key_chart(key), sheet_mm).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;

@@ -8,7 +8,8 @@ vec2 tangential(vec2 p) {
 
 vec4 bent(vec4 clip) {
     if (lens_model == 0.0) return clip;
-    vec2 ideal = clip.xy / (lens_scale * clip.w);
+    mat2 to_clip = mat2(lens_to_clip.xy, lens_to_clip.zw);
+    vec2 ideal = inverse(to_clip) * clip.xy / clip.w;
     float radius = max(length(ideal), 1e-6);
     float t = lens_model == 2.0 ? atan(radius) : radius;
     float inner = min(t, lens_end.x);
@@ -16,7 +17,7 @@ vec4 bent(vec4 clip) {
     float curve = 1.0 + q * (lens_radial.x + q * (lens_radial.y + q * (lens_radial.z + q * lens_radial.w)));
     float seen = inner * curve + lens_end.y * (t - inner);
     vec2 moved = ideal * (seen / radius) + tangential(ideal * min(1.0, lens_end.x / radius));
-    return vec4(moved * lens_scale * clip.w, clip.zw);
+    return vec4(to_clip * moved * clip.w, clip.zw);
 }
 
 // ideal over seen radius is the fit's reciprocal

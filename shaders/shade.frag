@@ -27,7 +27,7 @@ Shaded cable(ivec2 pixel) {
     Shaded s = sky(ray);
     s.cover = cables_cover(center);
     s.color = mix(s.color, color, s.cover);
-    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    ivec2 middle = middle_of(pixel);
     if (key_at(middle) != 0u) {
         s.id = SPREADER_ID;
         s.depth = texelFetch(sheet_depths, middle, 0).r;

@@ -1,6 +1,7 @@
 // Shaded sky(ray), Part part_at(...), vec3 part_color(...): what shading a pixel of any class is made of.
 
 #include "octahedral.glsl"
+#include "samples.glsl"
 #include "keys_around.glsl"
 #include "lens.glsl"
 #include "view_ray.glsl"
@@ -143,7 +144,7 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec3 color = layer_color(p.surface, normal, view, sky);
 #if SUN && LAYER == LAYER_ALL
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
-    vec2 place = vec2(sample_at - SAMPLES_PER_AXIS / 2) / float(SAMPLES_PER_AXIS) + 0.5;
+    vec2 place = place_of(sample_at);
     float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
     // before a sun behind the wall stands the whole container, too close to a groove for the map
     if (dot(p.surface.outward, sun_direction) < 0.0) share = 0.0;
@@ -154,18 +155,20 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 
 // a pixel all of whose samples see the same surface
 Shaded single_surface(ivec2 pixel) {
-    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
+    ivec2 middle = middle_of(pixel);
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
 #if FINE_LAYERS
-    // and at Gauss's points of the pixel, between its middle and the samples in its corners
+    // and at Gauss's points of the pixel; the sheet is all but flat between two of its samples
+    const mat2 pixels = mat2(from_center(vec2(1.0, 1.0)), from_center(vec2(1.0, -1.0)));
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
+    mat2 moved_mm = mat2(texelFetch(sheet_points, middle + ivec2(1, 1), 0).xy - sheet_mm,
+                         texelFetch(sheet_points, middle + ivec2(1, -1), 0).xy - sheet_mm);
+    mat2 mm_of_pixel = moved_mm * inverse(pixels);
     for (int i = 0; i < 4; ++i) {
-        ivec2 corner = ivec2((i & 1) * 2 - 1, (i & 2) - 1);
-        vec2 corner_mm = texelFetch(sheet_points, middle + corner, 0).xy;
-        add_layers(p.surface.material, p, key_chart(key),
-                   mix(sheet_mm, corner_mm, 0.28867513 * float(SAMPLES_PER_AXIS)));
+        vec2 place = 0.28867513 * vec2(ivec2((i & 1) * 2 - 1, (i & 2) - 1));
+        add_layers(p.surface.material, p, key_chart(key), sheet_mm + mm_of_pixel * place);
     }
     p.surface.material = mean_of(p.surface.material, 5.0);
 #endif

@@ -15,17 +15,17 @@ void main() {
     ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
-    ivec2 middle = pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2;
-    // a tent filter over the samples on and between the neighbouring pixel centres: the layers once
+    ivec2 middle = middle_of(pixel);
+    // the filter's samples, on and about the pixel's centre: the layers once
     // for each part of the container seen, the light once for each of its orientations
-    uint keys[TENT_SAMPLES] = keys_around(middle);
+    uint keys[FILTER_SAMPLES] = keys_around(middle);
     uint left = 0u;   // a bit for each sample that is still to be shaded
     float sky_weight = 0.0;
-    for (int i = 0; i < TENT_SAMPLES; ++i) {
-        if (keys[i] == 0u) sky_weight += TENT_WEIGHT[i];
+    for (int i = 0; i < FILTER_SAMPLES; ++i) {
+        if (keys[i] == 0u) sky_weight += FILTER_WEIGHT[i];
         else left |= 1u << i;
 #if WITH_HOLES
-        int hole = hole_at(texelFetch(rest_points, middle + TENT_OFFSET[i], 0).xyz);
+        int hole = hole_at(texelFetch(rest_points, middle + FILTER_OFFSET[i], 0).xyz);
         if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
 #endif
     }
@@ -39,21 +39,21 @@ void main() {
     do {
         uint first_key = 0u;
         ivec2 offset = ivec2(0);
-        for (int i = TENT_SAMPLES - 1; i >= 0; --i)
-            if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = TENT_OFFSET[i]; }
+        for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
+            if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = FILTER_OFFSET[i]; }
         uint chart = key_chart(first_key);
         uint of_part = 0u;
-        for (int i = 0; i < TENT_SAMPLES; ++i)
+        for (int i = 0; i < FILTER_SAMPLES; ++i)
             if (key_chart(keys[i]) == chart) of_part |= 1u << i;
         of_part &= left;
-        vec3 ray = view_ray(center + vec2(offset) / float(SAMPLES_PER_AXIS));
+        vec3 ray = view_ray(center + from_center(vec2(offset)));
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
 #if FINE_LAYERS
         float count = 1.0;
-        for (int i = 0; i < TENT_SAMPLES; ++i)
-            if ((of_part & 1u << i) != 0u && TENT_OFFSET[i] != offset) {
-                vec2 sheet_mm = texelFetch(sheet_points, middle + TENT_OFFSET[i], 0).xy;
+        for (int i = 0; i < FILTER_SAMPLES; ++i)
+            if ((of_part & 1u << i) != 0u && FILTER_OFFSET[i] != offset) {
+                vec2 sheet_mm = texelFetch(sheet_points, middle + FILTER_OFFSET[i], 0).xy;
                 add_layers(p.surface.material, p, chart, sheet_mm);
                 count += 1.0;
             }
@@ -65,12 +65,12 @@ void main() {
         do {
             uint key = 0u;
             ivec2 side_offset = offset;
-            for (int i = TENT_SAMPLES - 1; i >= 0; --i)
-                if ((of_part & 1u << i) != 0u) { key = keys[i]; side_offset = TENT_OFFSET[i]; }
+            for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
+                if ((of_part & 1u << i) != 0u) { key = keys[i]; side_offset = FILTER_OFFSET[i]; }
             float weight = 0.0;
             uint of_side = 0u;
-            for (int i = 0; i < TENT_SAMPLES; ++i)
-                if (keys[i] == key) { weight += TENT_WEIGHT[i]; of_side |= 1u << i; }
+            for (int i = 0; i < FILTER_SAMPLES; ++i)
+                if (keys[i] == key) { weight += FILTER_WEIGHT[i]; of_side |= 1u << i; }
             of_part &= ~of_side;
             left &= ~of_side;
             vec3 lit_color = part_color(p, middle + side_offset, key, view);

@@ -165,7 +165,7 @@ def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeyp
     assert (usual.depth > 3.5).sum() > 50
     for name in ("image", "ids", "damage"):
         np.testing.assert_array_equal(getattr(short, name), getattr(usual, name))
-    np.testing.assert_allclose(short.depth, usual.depth, rtol=2e-6)
+    np.testing.assert_allclose(short.depth, usual.depth, rtol=4e-6)
 
 
 def test_a_hole_torn_through_rods_and_handles_shows_no_sky():

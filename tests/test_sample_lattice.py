@@ -1,0 +1,91 @@
+"""Where samples lie, against what OpenGL makes of clip space and against shares of pixels."""
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen.config import Config
+from fastgen.generator import Generator
+from fastgen.sample_lattice import SampleLattice
+
+
+def texels_of(lattice, places, size):
+    """Where places [..., 2] of an image lie in its targets, by way of clip space, [..., 2]."""
+    clip = 2 * np.asarray(places) / size - 1
+    slanted = clip @ lattice.to_clip(size).T
+    return (slanted + 1) / 2 * lattice.texels(size)
+
+
+@pytest.mark.parametrize("per_axis", [1, 2, 3])
+@pytest.mark.parametrize("size", [(7, 5), (64, 90), (641, 480)])
+def test_samples_of_the_filter_are_centres_of_texels_within_the_targets(per_axis, size):
+    lattice = SampleLattice(per_axis)
+    columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
+    pixels = np.stack([columns, rows], axis=-1)
+    middle = texels_of(lattice, pixels + 0.5, size)
+    for offset in lattice.filter:
+        places = pixels + 0.5 + np.array(lattice.from_center(offset))
+        found = texels_of(lattice, places, size)
+        np.testing.assert_allclose(found - middle, np.broadcast_to(offset, found.shape), atol=1e-9)
+        np.testing.assert_allclose(found - np.floor(found), 0.5, atol=1e-9)
+        assert found.min() > 0
+        assert (found < lattice.texels(size)).all()
+
+
+@pytest.mark.parametrize("per_axis", [2, 3])
+def test_samples_of_a_pixel_stand_in_columns_of_their_own(per_axis):
+    lattice = SampleLattice(per_axis)
+    offsets = [(right, down) for down in range(per_axis) for right in range(per_axis)]
+    across = sorted(lattice.from_center(offset)[0] for offset in offsets)
+    np.testing.assert_allclose(np.diff(across), 1 / per_axis**2)
+
+
+def test_filters_add_up_and_are_centred():
+    for per_axis in (1, 2, 3):
+        lattice = SampleLattice(per_axis)
+        places = np.array([lattice.from_center(offset) for offset in lattice.filter])
+        weights = np.array(list(lattice.filter.values()))
+        assert weights.sum() == pytest.approx(1)
+        np.testing.assert_allclose(weights @ places, 0, atol=1e-12)
+        assert next(iter(lattice.filter)) == (0, 0)
+
+
+@pytest.mark.parametrize("per_axis", [2, 3])
+def test_a_region_s_columns_and_rows_hold_its_samples(per_axis):
+    lattice, size = SampleLattice(per_axis), (40, 30)
+    region = (11, 9, 6, 4)
+    left, right = lattice.columns(region)
+    top, bottom = lattice.rows(region)
+    x, y = np.meshgrid(np.arange(11, 17), np.arange(9, 13))
+    for offset in lattice.filter:
+        places = np.stack([x, y], axis=-1) + 0.5 + np.array(lattice.from_center(offset))
+        u, v = np.moveaxis(texels_of(lattice, places, size), -1, 0)
+        assert left < u.min()
+        assert u.max() < right
+        assert top < v.min()
+        assert v.max() < bottom
+    assert right - left < (6 + 4 + 4) * (per_axis + 1)
+
+
+@pytest.mark.parametrize(("quality", "most"), [("balanced", 0.17), ("high", 0.11)])
+def test_upright_edges_come_in_many_shades(quality, most):
+    """The share of a pixel that an all but upright edge leaves, beside that of 12 x 12 ids.
+
+    Samples in columns above one another would be off by a quarter and a sixth."""
+    size, times = (160, 120), 12
+    upright = {"roll_deg": 1.0, "elevation_deg": 0.0, "azimuth_deg": 0.0, "distance_mm": 9000}
+    config = Config.from_values({"damage": {"probability": 0}, "cameras": {"Cl": upright}})
+    with Generator(config, 5, (size[0] * times, size[1] * times), quality="draft") as generator:
+        scene = generator.scene(2)
+        seen = (generator.render(scene=scene, camera="Cl").ids > 0).astype(np.float32)
+    if quality == "balanced":
+        seen = cv2.blur(seen, (times + 1, times + 1))  # a box on a box is a tent
+    half = times // 2
+    share = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
+    with Generator(config, 5, size, quality=quality) as generator:
+        cover = generator.render(scene=scene, camera="Cl").cover / 255
+    # beside edges that run from row to row alike
+    rows = slice(60, 90)
+    edge = (share[rows] > 0.02) & (share[rows] < 0.98)
+    assert edge.sum() > 40
+    assert np.abs(cover - share)[rows][edge].max() < most
