@@ -58,7 +58,7 @@ class Ambient:
     sun: Sun | None
     """The one strong compact light, None where there is none."""
     sky: NDArray[np.float32]
-    """[42, 42] octahedral without a border, mean luminance of each cell, without the sun."""
+    """[42, 42, 3] octahedral without a border, mean radiance of each cell, without the sun."""
 
     @staticmethod
     def of(light: "Ambient") -> "Ambient":
@@ -142,13 +142,13 @@ def _light(
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
         sun=sun,
-        sky=_sky_cells(specular[0].astype(np.float32) @ REC_709.astype(np.float32)),
+        sky=_sky_cells(specular[0].astype(np.float32)),
     )
 
 
-def _sky_cells(luminance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means over cells of an octahedral map [N, N] with a border."""
-    inner = luminance[prefilter.BORDER : -prefilter.BORDER, prefilter.BORDER : -prefilter.BORDER]
+def _sky_cells(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over cells of an octahedral map [N, N, 3] with a border."""
+    inner = radiance[prefilter.BORDER : -prefilter.BORDER, prefilter.BORDER : -prefilter.BORDER]
     cells = cv2.resize(inner, (_SKY_CELLS, _SKY_CELLS), interpolation=cv2.INTER_AREA)
     return np.asarray(cells, np.float32)
 
@@ -257,16 +257,14 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """Luminance [K] of `irradiance_at` without the sun: of what ibl.glsl's diffuse_radiance is."""
-    luminance = env.irradiance @ REC_709.astype(np.float32)
-    toward = to_map_frame(normals, yaw_deg)
-    return prefilter.sample_octahedral(luminance[..., None], toward)[:, 0]
+    """`irradiance_at` without the sun, [K, 3]: what ibl.glsl's diffuse_radiance is."""
+    return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 
 
-def sky_luminance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """Mean luminance, without the sun, of what lies nearest to each of world directions [K, 3].
+def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
+    """Mean radiance [K, 3], without the sun, of what lies nearest to each of world directions.
 
-    The directions are spread over the whole sphere; each holds several cells of `env.sky`.
+    The directions [K, 3] are spread over the whole sphere; each holds several cells of `env.sky`.
     """
     cells, solid_angle = _sky_geometry(env.sky.shape[0])
     toward = to_map_frame(directions, yaw_deg).astype(np.float32)
@@ -276,8 +274,9 @@ def sky_luminance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArra
         nearness += np.outer(along, to)
     nearest = nearness.argmax(axis=1)
     count = len(toward)
-    total = np.bincount(nearest, solid_angle * env.sky.ravel(), minlength=count)
-    return (total / np.bincount(nearest, solid_angle, minlength=count)).astype(np.float32)
+    weighted = solid_angle * env.sky.reshape(-1, 3).T
+    total = np.stack([np.bincount(nearest, channel, count) for channel in weighted], axis=1)
+    return (total / np.bincount(nearest, solid_angle, count)[:, None]).astype(np.float32)
 
 
 @functools.cache

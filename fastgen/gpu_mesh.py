@@ -65,7 +65,8 @@ class GpuMesh:
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
-        contents = [content, (self._openness, "4f1 3u", "in_openness", "in_open_to")]
+        seen = ("in_cone", "in_light", "in_open_to")
+        contents = [content, (self._openness, "3f1 1x 3f1 1x 3u", *seen)]
         self._arrays = {
             damage: ctx.vertex_array(program, contents, self._indices)
             for damage, program in programs.items()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fastgen import cache
 from fastgen.distinct import distinct_rows
-from fastgen.environment import Ambient, sky_irradiance, sky_luminance
+from fastgen.environment import Ambient, sky_irradiance, sky_radiance
 from fastgen.kept import Recent
 from fastgen.mesh import Mesh
 from fastgen.occluders import DepthMap, DrawnBody, Solid, map_matrix, without_cables
@@ -25,8 +25,9 @@ from fastgen.programs import LIGHT_STEPS, link
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface; a multiple of 8."""
 
-VERTEX_BYTES = 4 + DIRECTIONS // 8
-"""What the shader reads of a vertex: a cone, the light from it, and a bit for each direction."""
+VERTEX_BYTES = 8 + DIRECTIONS // 8
+"""What the shader reads of a vertex: a cone, the light from it, each filled up to four bytes, and a
+bit for each direction."""
 
 _VERSION = 3
 """Part of the disk cache's key: count up whenever the openness changes."""
@@ -54,6 +55,9 @@ path-traced containers are farther off."""
 _CAPACITY = 128
 _LIT_CAPACITY = 2  # a scene asks for two, once a camera
 _DARK = 1e-20  # instead of no light at all, which has no ratios
+_FIELD_BITS = np.uint64(21)  # of a channel, three of which share a number
+_FIELD = np.uint64((1 << 21) - 1)
+_WHOLE = 1 << 20  # what all directions add up to; half of what a field holds
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]
@@ -90,7 +94,7 @@ def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
     as `encoded` and `Openness.under` have it."""
     found = np.full((len(normals), VERTEX_BYTES), 255, np.uint8)
     found[:, :3] = np.rint(128 + 127 * normals)
-    found[:, 3] = LIGHT_STEPS
+    found[:, 4:7] = LIGHT_STEPS
     return found
 
 
@@ -173,27 +177,37 @@ class Openness:
         """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
         comes in, and open_to.
 
-        Of light there is, as LIGHT_STEPS r, the ratio r of two irradiances' luminances: of
+        Of light there is, as LIGHT_STEPS r, the ratio r of two irradiances in each channel: of
         what reaches a vertex from where the sky is open, to that of a whole sky about the cone's
         direction, which is what the shader looks up. The first is a part of the irradiance about
         the normal: that of the open ones in sums over all directions. Of such sums over eight
         directions at a time there are 256 for each normal: a byte of open_to finds its own.
         """
         toward = sky_directions()
-        luminance = np.maximum(sky_luminance(sky.light, toward, sky.yaw_deg), _DARK)
-        weight = np.maximum(self._normals @ toward.T.astype(np.float32), 0) * luminance
-        whole = self._irradiance(sky, _directions(open_sky(self._normals)[:, :3]))
-        weight *= (LIGHT_STEPS * whole / weight.sum(axis=1))[:, None]
-        sums = _sums_of_eight(weight.reshape(len(weight), -1, 8))
-        light = np.zeros(len(self._number), np.float32)
-        row = 256 * self._number.astype(np.int32)
+        radiance = np.maximum(sky_radiance(sky.light, toward, sky.yaw_deg), _DARK)
+        cosine = np.maximum(self._normals @ toward.T.astype(np.float32), 0)
+        weight = cosine[:, None] * radiance.T
+        weight *= _WHOLE / weight.sum(axis=2, keepdims=True)
+        # the three channels side by side in one number: adding one takes a third of the time
+        red, green, blue = np.rint(weight).astype(np.uint64).transpose(1, 0, 2)
+        together = (blue << _FIELD_BITS | green) << _FIELD_BITS | red
+        sums = _sums_of_eight(together.reshape(len(together), -1, 8))
+        total = np.zeros(len(self._number), np.uint64)
+        row = 256 * self._number.astype(np.intp)
         for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
-            light += np.take(table, row + bits)
-        light /= np.take(self._irradiance(sky, _directions(self._cones)), self._which)
-        found = np.empty((len(light), VERTEX_BYTES), np.uint8)
-        found[:, :3] = self._cones[self._which]
-        found[:, 3] = np.minimum(light + 0.5, 255)  # rounds
-        found[:, 4:] = self._open_to.T
+            total += np.take(table, row + bits)
+        about_normal = _directions(open_sky(self._normals)[:, :3])
+        step = LIGHT_STEPS / _WHOLE * self._irradiance(sky, about_normal)
+        about_cone = self._irradiance(sky, _directions(self._cones))
+        found = np.full((len(total), VERTEX_BYTES), 255, np.uint8)
+        found[:, :3] = np.take(self._cones, self._which, axis=0)
+        for channel in range(3):
+            share = (total & _FIELD).astype(np.float32)
+            total >>= _FIELD_BITS
+            share *= np.take(step[:, channel], self._number)
+            share /= np.take(about_cone[:, channel], self._which)
+            found[:, 4 + channel] = np.minimum(share + 0.5, 255)  # rounds
+        found[:, 8:] = self._open_to.T
         return found
 
     @staticmethod
@@ -212,10 +226,10 @@ def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
     return toward / np.linalg.norm(toward, axis=1, keepdims=True)
 
 
-def _sums_of_eight(weight: NDArray[np.float32]) -> NDArray[np.float32]:
+def _sums_of_eight(weight: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Sums [..., 256] of those of eight weights [..., 8] whose bits are set in each byte, in the
     order of np.packbits: the first has the highest."""
-    sums = np.zeros((*weight.shape[:-1], 1), np.float32)
+    sums = np.zeros((*weight.shape[:-1], 1), np.uint64)
     for bit in range(7, -1, -1):
         sums = np.concatenate([sums, sums + weight[..., bit : bit + 1]], axis=-1)
     return sums

@@ -24,12 +24,15 @@ _CHUNK_ROWS = 8
 
 def octahedral_encode(direction: ArrayLike) -> NDArray[np.float64]:
     """Directions [..., 3] (any length above 0) to octahedral uv [..., 2] in [0, 1]."""
-    n = np.asarray(direction, np.float64)
-    n = n / np.abs(n).sum(-1, keepdims=True)
-    xy = n[..., :2]
-    sign = np.where(xy < 0, -1.0, 1.0)
-    folded = (1.0 - np.abs(xy[..., ::-1])) * sign
-    return np.where(n[..., 2:] < 0, folded, xy) * 0.5 + 0.5
+    # by column: along the last axis, of two or three, NumPy takes six times as long
+    x, y, z = np.moveaxis(np.asarray(direction, np.float64), -1, 0)
+    total = np.abs(x) + np.abs(y) + np.abs(z)
+    x, y = x / total, y / total
+    folded = (1.0 - np.abs(y)) * np.where(x < 0, -1.0, 1.0)
+    folded_y = (1.0 - np.abs(x)) * np.where(y < 0, -1.0, 1.0)
+    below = z < 0
+    uv = [np.where(below, folded, x), np.where(below, folded_y, y)]
+    return np.stack(uv, axis=-1) * 0.5 + 0.5
 
 
 def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
@@ -166,10 +169,12 @@ def sample_octahedral(
     """Bilinear lookup, as GL does it, of a bordered map [N, N, C] by directions [K, 3]: [K, C]."""
     size = octahedral.shape[0]
     x = BORDER + octahedral_encode(direction) * (size - 2 * BORDER) - 0.5
-    low = np.clip(np.floor(x).astype(int), 0, size - 2)
-    (fx, fy), (c, r) = (x - low).astype(np.float32).T[..., None], low.T
-    top = octahedral[r, c] * (1 - fx) + octahedral[r, c + 1] * fx
-    bottom = octahedral[r + 1, c] * (1 - fx) + octahedral[r + 1, c + 1] * fx
+    low = np.clip(np.floor(x).astype(np.intp), 0, size - 2)
+    fx, fy = (x - low).astype(np.float32).T[..., None]
+    texels, first = octahedral.reshape(size * size, -1), low[:, 1] * size + low[:, 0]
+    top = texels.take(first, axis=0) * (1 - fx) + texels.take(first + 1, axis=0) * fx
+    first += size
+    bottom = texels.take(first, axis=0) * (1 - fx) + texels.take(first + 1, axis=0) * fx
     return top * (1 - fy) + bottom * fy
 
 

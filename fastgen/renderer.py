@@ -205,7 +205,7 @@ class Renderer:
             "sheet_points": targets.points,
             "sheet_depths": targets.depths,
             "openness_points": targets.openness,
-            "mirror_points": targets.mirror,
+            "light_points": targets.light,
             "specular_light": light.specular,
             "irradiance_light": light.irradiance,
             "background_light": light.background,

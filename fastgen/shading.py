@@ -28,7 +28,7 @@ UNITS = {
     "openness_points": 15,
     "sun_shadow": 16,
     "lobe_masks": 17,
-    "mirror_points": 18,
+    "light_points": 18,
 }
 
 

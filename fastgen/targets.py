@@ -84,9 +84,9 @@ class Targets:
         self.points = ctx.texture(stored, 2, dtype="f4")
         self.depths = ctx.texture(stored, 1, dtype="f4")
         self.openness = ctx.texture(stored, 4)
-        self.mirror = ctx.texture(stored, 1)
+        self.light = ctx.texture(stored, 4)
         self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        always = [self.keys, self.points, self.depths, self.openness, self.mirror]
+        always = [self.keys, self.points, self.depths, self.openness, self.light]
         attached = [*always, self.rest] if self.rest is not None else always
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)

@@ -7,14 +7,15 @@
 
 in vec2 atlas_mm;
 in vec4 openness;
-in float mirror_open;
+in vec3 sky_light;
 flat in uint surface_key;
 
 layout(location = 0) out uint out_key;
 layout(location = 1) out vec2 out_sheet;   // sheet x, y in mm
 layout(location = 2) out float out_depth;  // m
-layout(location = 3) out vec4 out_openness;   // as openness.py encodes it
-layout(location = 4) out float out_mirror;   // share of open sky about the mirrored ray
+layout(location = 3) out vec4 out_openness;   // a cone as openness.py encodes it, and the share of
+                                              // open sky about the mirrored ray
+layout(location = 4) out vec4 out_light;      // from the cone, as openness.py encodes it
 #if DAMAGED
 in vec3 rest_mm;
 
@@ -31,7 +32,7 @@ void main() {
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
     out_depth = 1.0 / gl_FragCoord.w;
     out_openness = openness;
-    out_mirror = mirror_open;
+    out_light = vec4(sky_light, 0.0);
 #if DAMAGED
     out_rest = vec4(rest_mm, 0.0);
 #endif

@@ -11,12 +11,13 @@ layout(location = 0) in vec3 in_position_mm;
 layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_chart;
-layout(location = 5) in vec4 in_openness;
-layout(location = 6) in uvec3 in_open_to;   // a bit for each of openness.py's directions
+layout(location = 5) in vec3 in_cone;
+layout(location = 6) in vec3 in_light;
+layout(location = 7) in uvec3 in_open_to;   // a bit for each of openness.py's directions
 
 out vec2 atlas_mm;
-out vec4 openness;
-out float mirror_open;
+out vec4 openness;   // cone, share of open sky about the mirrored ray
+out vec3 sky_light;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
@@ -39,7 +40,7 @@ float open_about_mirror(vec3 position_m, vec3 normal) {
 
 void main() {
     atlas_mm = in_atlas_mm;
-    openness = in_openness;
+    sky_light = in_light;
     surface_key = pack_surface_key(in_chart, in_normal);
     vec3 position_mm = in_position_mm;
 #if DAMAGED
@@ -50,7 +51,7 @@ void main() {
         position_mm = in_position_mm;
     }
 #endif
-    mirror_open = open_about_mirror(position_mm * MM, in_normal);
+    openness = vec4(in_cone, open_about_mirror(position_mm * MM, in_normal));
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // what holes show; in a mirror the sheets' backs pass for fronts: face culling keeps the insides

@@ -49,7 +49,7 @@ vec3 background(vec3 direction) {
 struct Openness {
     vec3 direction;
     float rim;
-    float light;
+    vec3 light;
     float mirrored;
 };
 

@@ -30,7 +30,7 @@ uniform sampler2D rest_points;
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 uniform sampler2D openness_points;
-uniform sampler2D mirror_points;
+uniform sampler2D light_points;
 
 struct Shaded {
     vec3 color;   // exposed radiance; of a single layer, what is displayed
@@ -45,9 +45,8 @@ Openness openness_at(ivec2 sample_at) {
     vec4 stored = texelFetch(openness_points, sample_at, 0);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    float light = stored.w * (255.0 / LIGHT_STEPS);
-    float mirrored = texelFetch(mirror_points, sample_at, 0).r;
-    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, mirrored);
+    vec3 light = texelFetch(light_points, sample_at, 0).rgb * (255.0 / LIGHT_STEPS);
+    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
