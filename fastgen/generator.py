@@ -74,7 +74,8 @@ class Generator:
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
     first that works. Use it from one thread, and make one in each process. Where a driver's
     textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a height of
-    2730 only.
+    2730 only. An image much taller than wide takes more memory than one lying, see
+    sample_lattice.py.
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that
     was dropped unclosed held is freed when the thread that used it next opens another.

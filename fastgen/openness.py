@@ -57,7 +57,7 @@ _LIT_CAPACITY = 2  # a scene asks for two, once a camera
 _DARK = 1e-20  # instead of no light at all, which has no ratios
 _FIELD_BITS = np.uint64(21)  # of a channel, three of which share a number
 _FIELD = np.uint64((1 << 21) - 1)
-_WHOLE = 1 << 20  # what all directions add up to; half of what a field holds
+_WHOLE = 1 << 20  # what all directions add up to, but for rounding; a field holds twice that
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]

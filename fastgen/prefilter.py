@@ -28,10 +28,10 @@ def octahedral_encode(direction: ArrayLike) -> NDArray[np.float64]:
     x, y, z = np.moveaxis(np.asarray(direction, np.float64), -1, 0)
     total = np.abs(x) + np.abs(y) + np.abs(z)
     x, y = x / total, y / total
-    folded = (1.0 - np.abs(y)) * np.where(x < 0, -1.0, 1.0)
+    folded_x = (1.0 - np.abs(y)) * np.where(x < 0, -1.0, 1.0)
     folded_y = (1.0 - np.abs(x)) * np.where(y < 0, -1.0, 1.0)
     below = z < 0
-    uv = [np.where(below, folded, x), np.where(below, folded_y, y)]
+    uv = [np.where(below, folded_x, x), np.where(below, folded_y, y)]
     return np.stack(uv, axis=-1) * 0.5 + 0.5
 
 

@@ -74,7 +74,7 @@ REACH_MARGIN_MM = 40.0
 
 LIGHT_STEPS = 127.0
 """What of 255 stands for all the light of an open sky, see openness.py; what is open may face more
-of it than the surface does, hence up to twice as much."""
+of it than the surface does, hence up to twice as much of a channel."""
 
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""

@@ -1,11 +1,15 @@
 """Where the samples of a frame lie on its image, and with what weight they count.
 
-Samples are texels of targets that are finer than the image by S along each axis, and the image is
-drawn into them slanted: each row of pixels begins a texel further right than the one above. Samples
-of one pixel are then all in columns of their own, S^2 across it instead of S, which is what upright
-edges ask for, and those of a container are nearly all upright; with S = 2 they interlock almost
-like a honeycomb's cells. One sample lies exactly on each pixel's centre. shaders/samples.glsl is
-the twin of this.
+Samples are texels of targets that are finer than the image by S along each axis. With more than one
+a pixel the image is drawn into them slanted: each row of pixels begins a texel further right than
+the one above. Samples of one pixel are then all in columns of their own, S^2 across it instead of
+S, which is what upright edges ask for, and those of a container are nearly all upright; with S = 2
+they interlock almost like a honeycomb's cells. One sample lies exactly on each pixel's centre.
+shaders/samples.glsl is the twin of this.
+
+Targets are wider by as many texels as the image has rows: half as many texels again for a square
+one with S = 2, a third with S = 3. What lies beside the slanted image is cleared, and seen by
+nobody.
 """
 
 import numpy as np
@@ -55,7 +59,7 @@ class SampleLattice:
         those beside it ask for; region: x, y, width and height."""
         x, y, w, h = region
         n, slant = self.per_axis, self.slant
-        start = self.pad + (self._border - slant * (1 - self._border)) / 2
+        start = self.pad + (self._border - slant) / 2
         left = n * (x - 1) + slant * (y - 1) + start
         right = n * (x + w + 1) + slant * (y + h + 1) + start
         return int(np.floor(left)), int(np.ceil(right))
@@ -87,6 +91,7 @@ class SampleLattice:
 
     @property
     def near(self) -> int:
-        """So many samples of `filter`, the first ones, decide whether a pixel sees a single
-        surface: the four others of a tent count for a thirty-second each."""
-        return {1: 1, 2: 7, 3: 9}[self.per_axis]
+        """So many samples of `filter`, the first ones and none more than a texel away, decide
+        whether a pixel sees a single surface. Each of a tent's four others counts for a
+        thirty-second only; they are asked where the nearer ones differ."""
+        return sum(weight > 1 / 32 for weight in self.filter.values())

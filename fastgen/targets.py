@@ -49,9 +49,9 @@ def bands(regions: Sequence[Region | None]) -> list[Region | None]:
 class Targets:
     """Framebuffers for (width, height) images with `samples_per_axis` squared samples a pixel.
 
-    damage: one of programs.DAMAGE_VARIANTS. Damaged scenes keep rest positions too; holed ones
-    have sample targets of twice the height, for the inner view that shows through holes and
-    begins at `inner_row`.
+    They lie where sample_lattice.py has them. damage: one of programs.DAMAGE_VARIANTS. Damaged
+    scenes keep rest positions too; holed ones have sample targets of twice the height, for the
+    inner view that shows through holes and begins at `inner_row`.
     """
 
     def __init__(

@@ -5,7 +5,7 @@ uniform usampler2D surface_keys;
 uint key_at(ivec2 middle) { return texelFetch(surface_keys, middle, 0).r; }
 
 #if SAMPLES_PER_AXIS > 1
-// of samples up to a texel away, three rows; two gathers bring most of them at half the cost of fetches
+// of the 3 x 3 samples up to a texel away; two gathers bring most at half the cost of fetches
 uint[9] keys_beside(ivec2 middle) {
     vec2 corner = 1.0 / vec2(textureSize(surface_keys, 0));
     uvec4 low = textureGather(surface_keys, vec2(middle) * corner);

@@ -16,8 +16,8 @@ void main() {
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
     ivec2 middle = middle_of(pixel);
-    // the filter's samples, on and about the pixel's centre: the layers once
-    // for each part of the container seen, the light once for each of its orientations
+    // the filter's samples, on and about the pixel's centre: the layers once for each part of the
+    // container seen, the light once for each of its orientations
     uint keys[FILTER_SAMPLES] = keys_around(middle);
     uint left = 0u;   // a bit for each sample that is still to be shaded
     float sky_weight = 0.0;

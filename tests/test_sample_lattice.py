@@ -47,7 +47,12 @@ def test_filters_add_up_and_are_centred():
         weights = np.array(list(lattice.filter.values()))
         assert weights.sum() == pytest.approx(1)
         np.testing.assert_allclose(weights @ places, 0, atol=1e-12)
-        assert next(iter(lattice.filter)) == (0, 0)
+        offsets = list(lattice.filter)
+        assert offsets[0] == (0, 0)
+        assert (
+            np.abs(offsets[: lattice.near]).max() <= 1
+        )  # shaders/keys_around.glsl asks no further
+        assert weights[: lattice.near].sum() >= 0.875
 
 
 @pytest.mark.parametrize("per_axis", [2, 3])
@@ -67,7 +72,7 @@ def test_a_region_s_columns_and_rows_hold_its_samples(per_axis):
     assert right - left < (6 + 4 + 4) * (per_axis + 1)
 
 
-@pytest.mark.parametrize(("quality", "most"), [("balanced", 0.17), ("high", 0.11)])
+@pytest.mark.parametrize(("quality", "most"), [("balanced", 0.145), ("high", 0.09)])
 def test_upright_edges_come_in_many_shades(quality, most):
     """The share of a pixel that an all but upright edge leaves, beside that of 12 x 12 ids.
 
@@ -88,4 +93,5 @@ def test_upright_edges_come_in_many_shades(quality, most):
     rows = slice(60, 90)
     edge = (share[rows] > 0.02) & (share[rows] < 0.98)
     assert edge.sum() > 40
-    assert np.abs(cover - share)[rows][edge].max() < most
+    error = np.abs(cover - share)[rows][edge]
+    assert error.max() < most

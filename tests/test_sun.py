@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import Generator
+from fastgen import Config, Generator
 from fastgen.container import KINDS, build_container
 from fastgen.damage import deform
 from fastgen.environment import irradiance_at, load_environment, prefilter_environment
@@ -185,3 +186,24 @@ def test_no_sunlight_leaks_through_a_wall(tmp_path):
     wall = sample.image[top:bottom, left:right].astype(float).mean(axis=-1)
     assert (sample.ids[top:bottom, left:right] == 1).all()
     assert wall.max() < 2 * np.median(wall)
+
+
+@pytest.mark.parametrize("quality", ["balanced", "high"])
+def test_shadows_fall_where_they_do_without_antialiasing(quality):
+    """Away from edges; looked up beside their place they would move by up to half the image."""
+    config = Config.from_values(
+        {
+            "environment": {"names": ["park"]},
+            "damage": {"probability": 0},
+            "surface": {"rust_coverage": 0.0},
+        }
+    )
+    soft = []
+    for name in ("draft", quality):
+        with Generator(config, 5, (320, 240), quality=name) as generator:
+            sample = generator.render(0, "A")
+        soft.append(cv2.GaussianBlur(sample.image.astype(np.float32), (0, 0), 2))
+    inside = cv2.erode((sample.ids == 1).astype(np.uint8), np.ones((7, 7))) > 0
+    assert inside.sum() > 5000
+    apart = np.abs(soft[0] - soft[1]).max(axis=2)[inside]
+    assert (apart > 20).mean() < 0.002
