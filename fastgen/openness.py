@@ -55,9 +55,10 @@ path-traced containers are farther off."""
 _CAPACITY = 128
 _LIT_CAPACITY = 2  # a scene asks for two, once a camera
 _DARK = 1e-20  # instead of no light at all, which has no ratios
-_FIELD_BITS = np.uint64(21)  # of a channel, three of which share a number
-_FIELD = np.uint64((1 << 21) - 1)
-_WHOLE = 1 << 20  # what all directions add up to, but for rounding; a field holds twice that
+_FIELD_BITS = 21  # of a channel, three of which share a number
+_WHOLE = 1 << (
+    _FIELD_BITS - 1
+)  # what all directions add up to, but for rounding; a field holds twice that
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]
@@ -202,7 +203,7 @@ class Openness:
         found = np.full((len(total), VERTEX_BYTES), 255, np.uint8)
         found[:, :3] = np.take(self._cones, self._which, axis=0)
         for channel in range(3):
-            share = (total & _FIELD).astype(np.float32)
+            share = (total & (2 * _WHOLE - 1)).astype(np.float32)
             total >>= _FIELD_BITS
             share *= np.take(step[:, channel], self._number)
             share /= np.take(about_cone[:, channel], self._which)

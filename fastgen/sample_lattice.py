@@ -12,6 +12,8 @@ one with S = 2, a third with S = 3. What lies beside the slanted image is cleare
 nobody.
 """
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -69,7 +71,7 @@ class SampleLattice:
         _, y, _, h = region
         return max(self.per_axis * (y - 1), 0), self.per_axis * (y + h + 1) + self._border
 
-    @property
+    @cached_property
     def filter(self) -> dict[Offset, float]:
         """Weights of the samples about a pixel's centre, which comes first; they add up to one.
 

@@ -49,9 +49,8 @@ def test_filters_add_up_and_are_centred():
         np.testing.assert_allclose(weights @ places, 0, atol=1e-12)
         offsets = list(lattice.filter)
         assert offsets[0] == (0, 0)
-        assert (
-            np.abs(offsets[: lattice.near]).max() <= 1
-        )  # shaders/keys_around.glsl asks no further
+        # shaders/keys_around.glsl asks no further
+        assert np.abs(offsets[: lattice.near]).max() <= 1
         assert weights[: lattice.near].sum() >= 0.875
 
 
