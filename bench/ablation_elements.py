@@ -8,12 +8,15 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastgen import openness, programs, shapes
 from fastgen.mesh import FACE_AXES, Mesh
 from fastgen.scene import Scene, Spreader
 
 MeshEdit = Callable[[Mesh], Mesh]
+Light = NDArray[np.uint8]
+"""As openness.Openness.under gives it."""
 
 
 @dataclass(frozen=True)
@@ -97,15 +100,15 @@ def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
 
 
 @lru_cache(maxsize=64)
-def _all_open(mesh: Mesh) -> bytes:
-    return openness.open_sky(mesh.normals).tobytes()
+def _all_open(mesh: Mesh) -> Light:
+    return openness.open_sky(mesh.normals)
 
 
-def _probe(measured: Callable[..., bytes], open_sky: bool) -> Callable[..., bytes]:
+def _probe(measured: Callable[..., Light], open_sky: bool) -> Callable[..., Light]:
     """In place of a method of SkyProbe that gives the first mesh's openness beside the second: what
     it finds for the unedited meshes, or no occlusion at all."""
 
-    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> bytes:
+    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> Light:
         if open_sky:
             return _all_open(mesh)
         return measured(

@@ -37,7 +37,7 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
-from fastgen.shapes import shadow_meshes, spreader_outline
+from fastgen.shapes import shadow_casters, spreader_outline
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -280,7 +280,7 @@ class Generator:
             for container, spreader in possible_shapes(self.config)
         ]
         for shape in shaped:  # what shadows and labels ask of meshes
-            shadow_meshes(shape)
+            shadow_casters(shape)
             if self.config.damage.probability > 0:
                 made = shape.container
                 _ = build_container(made.kind, made.profiles).triangle_bounds_mm

@@ -1,11 +1,13 @@
 """Meshes on the GPU, each drawn with one indirect call that leaves out faces turned away."""
 
+import weakref
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from fastgen.clusters import Clusters
 from fastgen.mesh import FACE_AXES, FACES, Mesh
@@ -59,8 +61,8 @@ class GpuMesh:
         vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart + first_chart
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
-        self._open_sky = open_sky(mesh.normals).tobytes()
-        self._openness = ctx.buffer(self._open_sky)
+        self._openness = ctx.buffer(open_sky(mesh.normals).tobytes())
+        self._shown: weakref.ref[NDArray[np.uint8]] | None = None
         most = max(len(mesh.groups), Clusters.most_runs(mesh))
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
@@ -77,11 +79,11 @@ class GpuMesh:
         """What of the mesh may be behind a hole: few scenes ask, and only of containers."""
         return Clusters(self.mesh)
 
-    def set_openness(self, values: bytes) -> None:
+    def set_openness(self, values: NDArray[np.uint8]) -> None:
         """Let the next draws have `values`, of openness.SkyProbe; until then all sky is open."""
-        if values is not self._open_sky:
+        if self._shown is None or self._shown() is not values:
             self._openness.write(values)
-            self._open_sky = values
+            self._shown = weakref.ref(values)  # many meshes wait for their turn
 
     def draw(self, position_mm: Iterable[float], damage: str, bent: Collection[str] = ()) -> None:
         """Draw what a camera at `position_mm` may see from outside.

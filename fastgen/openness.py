@@ -246,23 +246,24 @@ class SkyProbe:
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
         self._own: Recent[NDArray[np.uint8]] = Recent(_CAPACITY)
         self._found: Recent[Openness] = Recent(_CAPACITY)
-        self._lit: Recent[bytes] = Recent(_LIT_CAPACITY)
+        self._lit: Recent[NDArray[np.uint8]] = Recent(_LIT_CAPACITY)
 
-    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> bytes:
-        """`Openness.under` a sky of a container's vertices below the spreader that holds it."""
+    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> NDArray[np.uint8]:
+        """`Openness.under` a sky of a container's vertices below the spreader that holds it.
+        Asked again at once, it gives the same array."""
         key = (container, spreader)
         return self._under(sky, key, lambda: self._of_container(container, spreader))
 
-    def openness_of_spreader(self, spreader: Mesh, container: Mesh, sky: Sky) -> bytes:
+    def openness_of_spreader(self, spreader: Mesh, container: Mesh, sky: Sky) -> NDArray[np.uint8]:
         """As `openness`, of a spreader's vertices above the container that it holds."""
         key = (spreader, container)
         return self._under(sky, key, lambda: self._of_spreader(spreader, container))
 
     def _under(
         self, sky: Sky, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
-    ) -> bytes:
+    ) -> NDArray[np.uint8]:
         openness = self._found.get(key, lambda: self._stored(key, measure))
-        return self._lit.get((openness, sky), lambda: openness.under(sky).tobytes())
+        return self._lit.get((openness, sky), lambda: openness.under(sky))
 
     def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]

@@ -41,7 +41,7 @@ from fastgen.reflectance import dfg_table
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes, shadow_meshes
+from fastgen.shapes import Shapes, shadow_casters
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
@@ -224,7 +224,7 @@ class Renderer:
         if sun is None:
             return None
         toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
-        self._sun_shadow.cast(*shadow_meshes(scene), toward, scene.damages)
+        self._sun_shadow.cast(*shadow_casters(scene), toward, scene.damages)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:

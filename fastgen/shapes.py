@@ -11,6 +11,7 @@ from fastgen.environment import Ambient
 from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.kept import Kept
 from fastgen.mesh import Mesh
+from fastgen.occluders import Body, without_cables
 from fastgen.openness import Sky, SkyProbe
 from fastgen.programs import SPREADER_CHART
 from fastgen.scene import Container, Scene
@@ -93,12 +94,13 @@ def spreader_outline(scene: Scene, bent: bool) -> Mesh | None:
     return spreader_mesh(scene, CUT_MM if bent else np.inf)
 
 
-def shadow_meshes(scene: Scene) -> tuple[Mesh, Mesh | None]:
+def shadow_casters(scene: Scene) -> tuple[Mesh, Body | None]:
     """A scene's container at rest, and its spreader if it has one, of as few triangles as their
     shadow can be drawn from: damage bends fine ones only."""
     box = scene.container
     shape = build_container if scene.damages else container_outline
-    return shape(box.kind, box.profiles), spreader_outline(scene, bent=False)
+    spreader = spreader_outline(scene, bent=False)
+    return shape(box.kind, box.profiles), without_cables(spreader) if spreader else None
 
 
 def _shading_spreader(scene: Scene) -> Mesh | None:

@@ -74,8 +74,7 @@ def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
 @lru_cache(maxsize=256)  # all of the preset, cut and uncut
 def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: float) -> Mesh:
     """The same at any gap but for where it is: only the twistlocks stay in their castings."""
-    inputs = kind, flippers_down, cut_mm
-    touching = stored("spreader", inputs, lambda: _touching(*inputs))
+    touching = _touching(kind, flippers_down, cut_mm)
     locks = [touching.chart_index(name) for name in LOCKS_CHARTS.values()]
     positions = touching.positions_mm.copy()
     positions[~np.isin(touching.chart, locks), 2] += gap_mm
@@ -83,8 +82,14 @@ def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: 
     return replace(touching, positions_mm=positions)
 
 
+@lru_cache(maxsize=64)  # all there are: the lifted ones share all but their positions
 def _touching(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:
     """A spreader without a gap below it."""
+    inputs = kind, flippers_down, cut_mm
+    return stored("spreader", inputs, lambda: _built(*inputs))
+
+
+def _built(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:
     hang = Hang(KINDS[kind], 0.0, cut_mm)
     sheets = [
         *frame(hang),

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, map_matrix, without_cables
+from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, map_matrix
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
@@ -44,7 +44,7 @@ class ShadowMap:
     def cast(
         self,
         container: Mesh,
-        spreader: Mesh | None,
+        spreader: Solid | None,
         toward: Array,
         damages: tuple[Damage, ...] = (),
     ) -> None:
@@ -56,7 +56,7 @@ class ShadowMap:
         self._shown = shown
         bodies = [_bent(container, damages)]
         if spreader is not None:
-            bodies.append(without_cables(spreader))
+            bodies.append(spreader)
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
         self.toward = toward
