@@ -19,6 +19,7 @@ import orjson
 from fastgen.config import Config
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
+from fastgen.freed_memory import return_freed_memory
 from fastgen.generator import Generator
 from fastgen.sampling import SPLITS, split_of
 from fastgen.seal import digest, seal
@@ -155,6 +156,7 @@ class Maker:
 
     def __call__(self, task: Task) -> None:
         """Render, encode and commit one shard."""
+        return_freed_memory()  # of the shard before
         made: list[tuple[Files, Record]] = []
         skip = dict(task.skip)
         for index, camera in self._job.wanted(task.shard):

@@ -1,0 +1,28 @@
+"""Memory between blocks in use goes back to the system."""
+
+import subprocess
+import sys
+
+PROGRAM = """
+from fastgen.freed_memory import return_freed_memory
+
+def resident_kb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+
+before = resident_kb()
+blocks = [bytes([1]) * 20_000 for _ in range(4_000)]  # of a size that glibc does not map alone
+held = resident_kb()
+kept = blocks[::50]  # so that none of it lies at the heap's end
+del blocks
+return_freed_memory()
+print(held - before, resident_kb() - before, sum(map(len, kept)))
+"""
+
+
+def test_pages_between_blocks_in_use_are_returned() -> None:
+    out = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, check=True)
+    held, left, kept = map(int, out.stdout.split())
+    assert held > 70_000
+    assert left < held / 5
+    assert kept == 80 * 20_000
