@@ -1,0 +1,56 @@
+"""Light on objects, by what must stay the same whatever it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen import Config, Generator
+from tests.sky_samples import texel_grid
+from tests.test_sun import write_exr
+
+GREY = "#808080"
+
+
+@pytest.fixture(scope="module", params=["balanced", "high"])
+def generator(request, tmp_path_factory):
+    """Grey objects under three lamps, each of a colour of its own, and the colours permuted."""
+    folder = tmp_path_factory.mktemp("skies")
+    toward = np.array([[0.0, -1.0, 0.2], [0.8, 0.3, 0.5], [-0.5, 0.2, -0.8]])
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    sky = 0.02 + np.maximum(texel_grid(128)[0] @ toward.T, 0) ** 2
+    for order in ([0, 1, 2], [1, 2, 0], [2, 1, 0]):
+        name = "".join("rgb"[i] for i in order)
+        write_exr(folder / f"{name}.exr", np.ascontiguousarray(sky[..., order], np.float32))
+    plain = Config.from_values(
+        {
+            "surface": {"colors": {"grey": GREY}, "rust_coverage": [0, 0]},
+            "spreader": {"colors": [GREY]},
+            "damage": {"probability": 0},
+        }
+    )
+    with Generator(plain, 7, (160, 160), quality=request.param, hdri_dir=folder) as made:
+        yield made
+
+
+@pytest.mark.parametrize("camera", ["A", "Cl"])
+@pytest.mark.parametrize("order", [[1, 2, 0], [2, 1, 0]])
+def test_a_sky_of_other_colours_is_an_image_of_other_colours(generator, camera, order):
+    """No channel of the light has a part in another channel of the image."""
+    scene = replace(generator.scene(3), decals=())
+
+    def under(name: str, times: float) -> tuple[np.ndarray, float]:
+        shown = replace(scene, environment=replace(scene.environment, name=name))
+        taken = shown.camera(camera)
+        taken = replace(taken, exposure_ev=taken.exposure_ev + np.log2(times))
+        image = generator.render(scene=shown, camera=taken).image
+        return image.astype(int), generator.exposure(shown, taken)
+
+    first, exposure = under("rgb", 1.0)
+    name = "".join("rgb"[i] for i in order)
+    metered = under(name, 1.0)[1]  # by luminance, to which channels add unequally
+    image, same = under(name, exposure / metered)
+    assert same == pytest.approx(exposure)
+    assert np.abs(image - first).mean() > 10
+    # each of some steps rounds to 8 bits
+    assert np.abs(image - first[..., order]).max() <= 6
