@@ -17,8 +17,8 @@ from fastgen.records import check_known
 
 BACKENDS = ("auto", "egl", "osmesa")
 
-MIN_VERSION = 430
-"""Shader storage, indirect draws and explicit bindings: OpenGL 4.3 core."""
+MIN_VERSION = 440
+"""Textures cleared in part: OpenGL 4.4 core."""
 
 EGL_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 OSMESA_PACKAGES = "libosmesa6"
@@ -35,7 +35,7 @@ _EGL_PLATFORM_SURFACELESS = 0x31DD
 # EGL_SURFACE_TYPE: EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE: EGL_OPENGL_BIT
 _EGL_CONFIG = (0x3033, 0x0001, 0x3040, 0x0008, _EGL_NONE)
 # EGL_CONTEXT_MAJOR_VERSION, _MINOR_VERSION, _OPENGL_PROFILE_MASK: core
-_EGL_CONTEXT = (0x3098, 4, 0x30FB, 3, 0x30FD, 0x0001, _EGL_NONE)
+_EGL_CONTEXT = (0x3098, 4, 0x30FB, 4, 0x30FD, 0x0001, _EGL_NONE)
 _EGL_ERRORS = {  # EGL 1.5 section 3.1, those that creating a context gives
     0x3001: "EGL_NOT_INITIALIZED",
     0x3002: "EGL_BAD_ACCESS: the context is in use by another thread; open one in each",
@@ -81,7 +81,7 @@ class GLContext:
             )
         except (ValueError, moderngl.Error) as error:  # an old version, a missing function
             native.release()
-            raise ContextError(f"{backend}: OpenGL 4.3 core is needed ({error})") from None
+            raise ContextError(f"{backend}: OpenGL 4.4 core is needed ({error})") from None
         self.backend = backend
         self.renderer: str = self.ctx.info["GL_RENDERER"]
         self.vendor: str = self.ctx.info["GL_VENDOR"]
@@ -207,7 +207,7 @@ class _Egl:
         ]
 
     def create(self, device: EglDevice | None) -> tuple[int, int]:
-        """Display and a new 4.3 core context on `device`, or on no device: Mesa's surfaceless."""
+        """Display and a new 4.4 core context on `device`, or on no device: Mesa's surfaceless."""
         get = self._extension("eglGetPlatformDisplayEXT", _POINTER, _UINT, _POINTER, _POINTER)
         platform = _EGL_PLATFORM_DEVICE if device else _EGL_PLATFORM_SURFACELESS
         display = self._got("eglGetPlatformDisplayEXT", get(platform, device and device.handle, 0))
@@ -223,7 +223,7 @@ class _Egl:
         create = self._call("eglCreateContext", _POINTER, *[_POINTER] * 4)
         attributes = (_INT * len(_EGL_CONTEXT))(*_EGL_CONTEXT)
         context = create(display, config, None, attributes)
-        return display, self._got("eglCreateContext (OpenGL 4.3 core)", context)
+        return display, self._got("eglCreateContext (OpenGL 4.4 core)", context)
 
     def make_current(self, display: int, context: int | None) -> None:
         """Bind `context` to this thread without a surface; None binds no context."""
@@ -307,7 +307,7 @@ def _open_egl(device_index: int | None) -> GLContext:
         except ContextError as error:
             failures.append(f"{where}: {error}")
     raise ContextError(
-        f"egl: no context with OpenGL 4.3 core ({', '.join(failures)}); "
+        f"egl: no context with OpenGL 4.4 core ({', '.join(failures)}); "
         f"for Mesa's software driver on Debian or Ubuntu: apt-get install {EGL_PACKAGES}"
     )
 
@@ -325,14 +325,14 @@ class _OSMesaContext:
         self._library.OSMesaGetProcAddress.restype = _POINTER
         self._library.OSMesaDestroyContext.argtypes = [_POINTER]
         self._handle: int | None = None
-        for minor in (5, 3):
+        for minor in (5, 4):
             flat = (*_OSMESA_ATTRIBUTES, _OSMESA_MAJOR, 4, _OSMESA_MINOR, minor, 0)
             attributes = (_INT * len(flat))(*flat)
             self._handle = self._library.OSMesaCreateContextAttribs(attributes, None)
             if self._handle:
                 break
         else:
-            raise ContextError("osmesa: this Mesa gives no OpenGL 4.3 core context; update it")
+            raise ContextError("osmesa: this Mesa gives no OpenGL 4.4 core context; update it")
         # OSMesa binds no context without a buffer; nothing is ever drawn into this one
         self._pixels = ctypes.create_string_buffer(16 * 16 * 4)
         try:

@@ -7,7 +7,7 @@ ids, damage and depth at the pixel centre. Ids are never filtered: a sample lies
 pixel centre.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Self
 
 import moderngl
@@ -147,9 +147,6 @@ class Renderer:
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
-        self._sample(targets, view, camera, damages, mesh, spreader)
-        self._bind_light(targets, light, shadow)
-        self._bind_surface(scene, mesh, spreader)
         near = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
         cables: list[Region | None] = []
@@ -158,6 +155,9 @@ class Renderer:
             boxes = [np.concatenate([*boxes, frame]), *above]
             cables = [_region(view, above[-1])]
         regions = bands([_region(view, box) for box in boxes])
+        self._sample(targets, bands([*regions, *near]), view, camera, damages, mesh, spreader)
+        self._bind_light(targets, light, shadow)
+        self._bind_surface(scene, mesh, spreader)
         shading.draw(
             targets,
             regions,
@@ -172,16 +172,18 @@ class Renderer:
     def _sample(
         self,
         targets: Targets,
+        asked: Sequence[Region | None],
         view: View,
         camera: Camera,
         damages: tuple[Damage, ...],
         mesh: GpuMesh,
         spreader: GpuMesh | None,
     ) -> None:
-        """Draw the geometry into the sample targets."""
+        """Draw the geometry into the sample targets, for what will be asked of the regions `asked`
+        of the image."""
         damage = variant(damages)
-        holes = [corners_mm(d) for d in damages if d.kind == "perforation"]
-        targets.begin_samples()
+        holes = [_region(view, corners_mm(d)) for d in damages if d.kind == "perforation"]
+        targets.begin_samples(asked, holes)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._lobes.use(UNITS["lobe_masks"])
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
@@ -192,8 +194,7 @@ class Renderer:
             spreader.draw(camera.position_mm, damage)
         mesh.draw(camera.position_mm, damage, bent)
         moved_mm = sum(abs(d.depth_mm) for d in damages)
-        for hole in holes:
-            region = _region(view, hole)
+        for region in holes:
             targets.limit_inside(region)
             mesh.draw_inside(mesh.clusters.seen_in(view, region, moved_mm))
         targets.end_samples()

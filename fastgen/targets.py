@@ -19,9 +19,10 @@ from fastgen.sample_lattice import SampleLattice
 Region = tuple[int, int, int, int]
 """x, y, width and height in pixels."""
 
-_GL_COLOR, _GL_DEPTH, _GL_SCISSOR_TEST = 0x1800, 0x1801, 0x0C11
+_GL_DEPTH, _GL_SCISSOR_TEST = 0x1801, 0x0C11
 _FAR, _SKY = (ctypes.c_float * 1)(1.0), (ctypes.c_float * 1)(0.0)
-_NOTHING = (ctypes.c_uint * 4)()
+_KEYS_FORMAT, _DEPTH_FORMAT = (0x8D94, 0x1405), (0x1902, 0x1406)
+"""GL_RED_INTEGER of GL_UNSIGNED_INT, GL_DEPTH_COMPONENT of GL_FLOAT."""
 
 
 def bands(regions: Sequence[Region | None]) -> list[Region | None]:
@@ -90,7 +91,7 @@ class Targets:
         attached = [*always, self.rest] if self.rest is not None else always
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._depth = ctx.depth_renderbuffer(stored)
+        self._depth = ctx.depth_texture(stored)
         self.samples = ctx.framebuffer(attached, self._depth)
         self._fine = fine
         self._buffers = [*attached, self._depth]
@@ -108,33 +109,55 @@ class Targets:
         self._scissor = gl.function("glScissorIndexed", None, ctypes.c_uint, *[ctypes.c_int] * 4)
         self._enable = gl.function("glEnablei", None, ctypes.c_uint, ctypes.c_uint)
         self._disable = gl.function("glDisablei", None, ctypes.c_uint, ctypes.c_uint)
-        self._clear_uint = gl.function(
-            "glClearBufferuiv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
+        box = (ctypes.c_int,) * 7  # mip level, x, y, z, width, height, depth
+        self._clear_texture = gl.function(
+            "glClearTexSubImage", None, ctypes.c_uint, *box, *[ctypes.c_uint] * 2, ctypes.c_void_p
         )
         self._clear_float = gl.function(
             "glClearBufferfv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
         )
 
-    def begin_samples(self) -> None:
-        """Bind the sample framebuffer, emptied: key 0 is the void."""
+    def begin_samples(
+        self, seen: Sequence[Region | None], inside: Sequence[Region | None] = ()
+    ) -> None:
+        """Bind the sample framebuffer, emptied where it will be asked; key 0 is the void.
+
+        seen: regions of the image, None for all of it. inside: regions that `limit_inside` will
+        name.
+        """
+        for box in (*map(self._texels, seen), *map(self._texels_inside, inside)):
+            # llvmpipe takes six times as long to clear a whole framebuffer
+            self._empty(self.keys, box, _KEYS_FORMAT, None)
+            self._empty(self._depth, box, _DEPTH_FORMAT, _FAR)
         self.samples.use()
-        # moderngl's clear is undefined on integer attachments (moderngl issue 686)
-        self._clear_uint(_GL_COLOR, 0, _NOTHING)
-        self._clear_float(_GL_DEPTH, 0, _FAR)
         width, height = self._fine
         self.samples.viewport = (0, 0, width, height)
 
     def limit_inside(self, region: Region | None) -> None:
         """Restrict the inner view to what holes in `region` of the image show, None for all."""
         width, height = self._fine
-        region = region or (0, 0, *self.size)
-        left, right = self._lattice.columns(region)
-        top, bottom = self._lattice.rows(region)
-        first = self.inner_row
-        self._viewport(1, 0.0, first, width, height)
-        # the inner view is mirrored; it begins below the outer one
-        self._scissor(1, width - right, first + top, right - left, bottom - top)
+        self._viewport(1, 0.0, self.inner_row, width, height)
+        self._scissor(1, *self._texels_inside(region))
         self._enable(_GL_SCISSOR_TEST, 1)
+
+    def _texels(self, region: Region | None) -> Region:
+        """The texels that pixels of `region` of the image, None for all, ask for."""
+        region = region or (0, 0, *self.size)
+        left, right = np.clip(self._lattice.columns(region), 0, self._fine[0]).tolist()
+        top, bottom = np.clip(self._lattice.rows(region), 0, self._fine[1]).tolist()
+        return left, top, right - left, bottom - top
+
+    def _texels_inside(self, region: Region | None) -> Region:
+        """As `_texels`, of the inner view: it is mirrored, and begins below the outer one."""
+        left, top, width, height = self._texels(region)
+        return self._fine[0] - left - width, self.inner_row + top, width, height
+
+    def _empty(
+        self, texture: moderngl.Texture, box: Region, stored_as: tuple[int, int], value: Any
+    ) -> None:
+        """Fill the texels of `box` with a value, None for zeros."""
+        x, y, width, height = box
+        self._clear_texture(texture.glo, 0, x, y, 0, width, height, 1, *stored_as, value)
 
     def end_samples(self) -> None:
         """Lift the restriction of the inner view."""

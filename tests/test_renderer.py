@@ -130,6 +130,21 @@ def test_the_same_scene_renders_to_the_same_bytes(generator):
     np.testing.assert_array_equal(first.ids, again.ids)
 
 
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_what_was_drawn_before_leaves_no_trace(quality):
+    """Views of all kinds, in one order and in the other."""
+    damaged = Config.from_values({"damage": {"probability": 0.7}})
+    views = [(index, camera) for index in range(6) for camera in ("A", "Cl", "Cr")]
+    found = []
+    for order in (views, views[::-1]):
+        with Generator(damaged, 11, (128, 96), quality=quality) as made:
+            found.append({view: made.render(*view) for view in order})
+    for view in views:
+        first, second = (samples[view] for samples in found)
+        for name in ("image", "ids", "damage", "depth"):
+            np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
 def test_backends_agree_on_every_label():
     frames = []
     for backend in ("egl", "osmesa"):
