@@ -5,6 +5,7 @@ import fcntl
 import hashlib
 import importlib.metadata
 import os
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.whole_file import whole_file
+from fastgen.whole_file import ASIDE_FILES, whole_file
 
 T = TypeVar("T")
 
@@ -115,7 +116,14 @@ def _alone(entry: Path) -> Iterator[None]:
 
 
 def _trim(folder: Path) -> None:
-    """Remove entries, oldest first, until the rest is within LIMIT_BYTES."""
+    """Remove entries, oldest first, until the rest is within LIMIT_BYTES, and what killed processes
+    left."""
+    yesterday = time.time() - 24 * 3600
+    for pattern in (ASIDE_FILES, "*.lock"):
+        for left in folder.glob(pattern):
+            with contextlib.suppress(FileNotFoundError):
+                if left.stat().st_mtime < yesterday:
+                    left.unlink()
     found = [(entry, entry.stat()) for entry in folder.glob("*.npz")]
     spare = sum(about.st_size for _, about in found) - LIMIT_BYTES
     for entry, about in sorted(found, key=lambda one: one[1].st_mtime):

@@ -157,7 +157,7 @@ class Layout:
 
     @property
     def post_mm(self) -> float:
-        """Outer width of the square front posts' far faces, as an inset d and e."""
+        """Inset d and e of the square front posts' inner faces, which is their width."""
         return max(84.0, self.side_inner_mm, self.end_inner_mm)
 
     @property

@@ -18,14 +18,18 @@ Array = NDArray[np.floating]
 FADE_START_MM, FADE_END_MM = 260.0, 520.0
 """A field acts on what lies within this depth behind its face: not on the opposite wall."""
 
-HOLE_REACH = 1.95
-"""No outline strays farther than this many mean radii: the config holds 5 lobes to 0.19 each."""
 
 SLACK_MM = 150.0
 """Corrugation and castings let a face be seen from this little behind its plane."""
 
 LOBES = 5
 """Harmonics of a hole's outline; more would be finer than the mesh and most pixels."""
+
+LOBE_LIMIT = 0.19
+"""Of each harmonic, as a share of the mean radius: all together leave a hole about its centre."""
+
+HOLE_REACH = 1 + LOBES * LOBE_LIMIT
+"""No outline strays farther than this many mean radii."""
 
 
 def local_coordinates(damage: Damage, points_mm: Array) -> tuple[Array, Array, Array]:
@@ -106,7 +110,7 @@ def corners_mm(damage: Damage) -> NDArray[np.float64]:
     """Corners [8, 3] in mm of a box that holds all that a damage touches, before and after."""
     u, v, inward = reach_mm(damage)
     depth = abs(damage.depth_mm) + 60.0
-    low, high = -depth, inward
+    low, high = -depth, inward + max(damage.depth_mm, 0.0)
     if damage.kind == "axis":
         low, high = -v, v + depth
     axes = np.array([damage.along, damage.across, damage.inward])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from fastgen.classes import DAMAGE_CLASSES
+from fastgen.damage import LOBE_LIMIT
 from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
 from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_order
@@ -56,7 +57,7 @@ class PerforationConfig:
     diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
     rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
     depth_mm: Range = field(default=Range(35, 100), metadata=LENGTH)
-    lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, 0.19))
+    lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, LOBE_LIMIT))
 
 
 @dataclass(frozen=True)

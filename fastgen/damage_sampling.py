@@ -192,7 +192,7 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
     origin = middle + along * float(rng.uniform(-slack, slack))
     return Damage(
         kind="axis",
-        face=_edge_name(axis, others, signs),
+        face=_edge_name(others, signs),
         origin_mm=_vector(origin, 1),
         along=_vector(along),
         across=_vector(np.cross(inward, along)),
@@ -202,7 +202,7 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
     )
 
 
-def _edge_name(axis: int, others: list[int], signs: np.ndarray) -> str:
+def _edge_name(others: list[int], signs: np.ndarray) -> str:
     """The two faces that meet at an edge, such as 'front.door'."""
     names = (("no_door", "door"), ("front", "back"), ("underside", "roof"))
     return ".".join(names[i][int(sign > 0)] for i, sign in zip(others, signs, strict=True))

@@ -292,12 +292,12 @@ def _sky_geometry(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 def metered_luminance(
     env: Ambient, direction: ArrayLike, half_angle_deg: float, yaw_deg: float = 0.0
-) -> tuple[float, float]:
-    """Log average and average of the luminance within a cone around a world direction [3].
+) -> float:
+    """Log average of the luminance within a cone around a world direction [3].
 
     Cells of the luminance map, 11.25 degrees wide, fade out over their width at the rim, so that
-    the result moves smoothly with the direction; narrower cones are widened to one cell. The log
-    average counts luminance below 1e-6 as 1e-6.
+    the result moves smoothly with the direction; narrower cones are widened to one cell.
+    Luminance below 1e-6 counts as 1e-6.
     """
     cells, solid_angle = _meter_cells()
     cell = 2 * np.pi / _LUMINANCE_WIDTH
@@ -307,5 +307,4 @@ def metered_luminance(
     weight = solid_angle * np.clip((half_angle - angle) / cell + 0.5, 0.0, 1.0)
     weight /= weight.sum()
     luminance = env.luminance.ravel()
-    log_average = np.exp(weight @ np.log(np.maximum(luminance, _LUMINANCE_FLOOR)))
-    return float(log_average), float(weight @ luminance)
+    return float(np.exp(weight @ np.log(np.maximum(luminance, _LUMINANCE_FLOOR))))

@@ -30,7 +30,7 @@ def metered_exposure(
     toward_camera /= np.linalg.norm(toward_camera)
     falling = float(irradiance_at(light, toward_camera[None], yaw_deg)[0] @ REC_709)
     reflectance = float(np.sqrt(MIDDLE_GREY * max(float(np.array(paint) @ REC_709), 0.02)))
-    behind, _ = metered_luminance(light, forward, view.half_angle_deg, yaw_deg)
+    behind = metered_luminance(light, forward, view.half_angle_deg, yaw_deg)
     center = max(reflectance * falling, _MIN_LUMINANCE)
     behind = max(behind, _MIN_LUMINANCE)
     metered = np.exp(_CENTER_WEIGHT * np.log(center) + (1 - _CENTER_WEIGHT) * np.log(behind))

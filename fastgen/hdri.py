@@ -145,9 +145,11 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
 def _color_channels(path: Path, names: list[str]) -> tuple[str, str, str]:
     for red in sorted((n for n in names if n.split(".")[-1].upper() in ("R", "RED")), key=len):
         prefix = red.rpartition(".")[0]
-        by_last = {n.split(".")[-1][0].upper(): n for n in names if n.rpartition(".")[0] == prefix}
-        if {"R", "G", "B"} <= by_last.keys():
-            return by_last["R"], by_last["G"], by_last["B"]
+        layer = {n.split(".")[-1].upper(): n for n in names if n.rpartition(".")[0] == prefix}
+        for colors in (("R", "G", "B"), ("RED", "GREEN", "BLUE")):
+            if layer.keys() >= set(colors):
+                r, g, b = (layer[color] for color in colors)
+                return r, g, b
     if not {"RY", "BY"} & set(names):
         for grey in ("Y", "L"):
             if grey in names:

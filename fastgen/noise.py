@@ -11,6 +11,7 @@ footprint is m and deviates by s within it, Phi((m - t) / s) of that lies above 
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import cv2
@@ -33,11 +34,13 @@ class NoiseTiles:
     """levels: uint8 [2, S, S, 4] for S = NOISE_SIZE, NOISE_SIZE / 2, ... 1; row 0 is v = 0.
 
     Layer 0: tone, rust, stain, grain. Layer 1: scratches, wear, dirt, fine grain.
+    scratched: share of the tile that scratches cover.
     lost_deviation: float32 [2, levels, 4], standard deviation that bilinear lookups in a level have
     lost against those in level 0.
     """
 
     levels: tuple[NDArray[np.uint8], ...]
+    scratched: float
     lost_deviation: NDArray[np.float32]
 
 
@@ -99,7 +102,7 @@ def _stain(rust: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
-    """Straight thin lines, each with a rank in 0..1, on 0; mostly along x, as scrapes run."""
+    """Straight thin lines of 1 on 0, mostly along x, as scrapes run."""
     tile = np.zeros((NOISE_SIZE, NOISE_SIZE), np.float32)
     count = 900
     angles = rng.normal(0.0, 0.35, count) + np.where(rng.random(count) < 0.2, np.pi / 2, 0.0)
@@ -107,11 +110,10 @@ def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
     centers = rng.random((count, 2)) * NOISE_SIZE
     for i in range(count):
         step = np.array([np.cos(angles[i]), np.sin(angles[i])]) * lengths[i] / 2
-        for shift in np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) * NOISE_SIZE:
+        for shift in NOISE_SIZE * np.array(list(product((-1, 0, 1), repeat=2))):
             start, end = centers[i] - shift - step, centers[i] - shift + step
             points = [tuple(round(v * 16) for v in p) for p in (start, end)]
-            rank = float((i + 1) / count)
-            cv2.line(tile, points[0], points[1], rank, 1, cv2.LINE_8, shift=4)
+            cv2.line(tile, points[0], points[1], 1.0, 1, cv2.LINE_8, shift=4)
     return tile
 
 
@@ -125,9 +127,8 @@ def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
 def noise_tiles() -> NoiseTiles:
     """Both layers and their mip chain; always the same. Baking them takes a second or two, once."""
     arrays = cache.computed("noise", _SEED, _baked)
-    return NoiseTiles(
-        tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1)), arrays["lost_deviation"]
-    )
+    levels = tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1))
+    return NoiseTiles(levels, float((levels[0][1, ..., 0] > 0).mean()), arrays["lost_deviation"])
 
 
 def _baked() -> dict[str, NDArray[Any]]:

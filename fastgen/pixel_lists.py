@@ -18,7 +18,6 @@ class PixelLists:
     """
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int], names: Sequence[str]) -> None:
-        self._ctx = ctx
         self._bytes = -(-4 * (LIST_HEADER + size[0] * size[1]) // _ALIGNMENT) * _ALIGNMENT
         self._offsets = {name: i * self._bytes for i, name in enumerate(names)}
         self._buffer = ctx.buffer(reserve=self._bytes * len(names))

@@ -18,8 +18,9 @@ class Progress:
         self._live = self._stream.isatty()
 
     def add(self, images: int) -> None:
-        """Count `images` more and redraw when it is time."""
-        self._done += images
+        """Count `images` more and redraw when it is time. What a worker that died had done is made
+        again, and counts twice, but nothing beyond the total does."""
+        self._done = min(self._done + images, self._total)
         now = time.monotonic()
         if now - self._shown >= (0.1 if self._live else _QUIET_S):
             self._shown = now

@@ -46,10 +46,11 @@ class Object:
     lies beyond the image. occluded: some of it is seen and something hides more of it than a pixel
     or two of its edge. ignored: too little is seen to train on, see LabelConfig.
     text: what it reads, '' for other things. polygon: projected outline, x0, y0, x1, y1, ... of the
-    whole thing; empty for damages and where part of it lies behind the camera. quad: four corners
-    of a decal in the order upper left, upper right, lower right, lower left as it is read (of a
-    marker left, top, right, bottom). reading: 'horizontal', or 'vertical' for letters below one
-    another; '' without text. keypoints: the container's casting corners, see labels.CASTINGS.
+    whole thing; empty for the spreader, for damages and where part of it lies behind the camera.
+    quad: four corners of a decal in the order upper left, upper right, lower right, lower left as
+    it is read (of a marker left, top, right, bottom). reading: 'horizontal', or 'vertical' for
+    letters below one another; '' without text. keypoints: the container's casting corners, see
+    labels.CASTINGS.
     """
 
     id: int

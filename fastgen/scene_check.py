@@ -8,7 +8,7 @@ from fastgen.artwork import art_images, glyph_tiles
 from fastgen.camera import MM, NEAR_M
 from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.container_layout import KINDS
-from fastgen.damage import LOBES
+from fastgen.damage import LOBE_LIMIT, LOBES
 from fastgen.damage_config import MAX_INSTANCES
 from fastgen.errors import ConfigError
 from fastgen.mesh import SHEET_FACES
@@ -130,6 +130,13 @@ def _check_damage(damage: Damage, path: str) -> None:
         raise ConfigError(
             f"{path}.shape: a {damage.kind} has {wanted} numbers, not {len(damage.shape)}"
         )
+    if damage.kind == "perforation":
+        for i, lobe in enumerate(damage.shape[1::2]):
+            if abs(lobe) > LOBE_LIMIT:
+                raise ConfigError(
+                    f"{path}.shape[{1 + 2 * i}]: {lobe!r} is out of range; give a lobe of "
+                    f"{-LOBE_LIMIT:g} to {LOBE_LIMIT:g} of the radius"
+                )
     for i in _DIVISORS.get(damage.kind, ()):
         if not damage.shape[i] > 0:
             raise ConfigError(

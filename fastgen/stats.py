@@ -36,7 +36,7 @@ class _Counts:
     def add(self, record: Record) -> None:
         """Count one image."""
         image_width, image_height = record["size"]
-        # what is ignored is in no label file but COCO's, as a crowd
+        # what is ignored is nothing to train on: a crowd in COCO's files
         damages, markers = (
             [item for item in record["facts"][task] if not item["iscrowd"]]
             for task in ("damage", "imdg")

@@ -111,8 +111,12 @@ def run(
             for worker in busy:
                 ended = _listen(worker, on_report, hang_s)
                 if ended:
-                    waiting.appendleft(on_death(worker.task, worker.place, ended))
+                    if worker.task is not None:  # else it had just done its task
+                        waiting.appendleft(on_death(worker.task, worker.place, ended))
                     worker.stop()
+                    if not waiting:
+                        workers.remove(worker)
+                        continue
                     workers[workers.index(worker)] = worker = _Worker(setup, arguments)
                 if (ended or worker.task is None) and waiting:
                     worker.give(waiting.popleft())

@@ -140,6 +140,15 @@ def test_what_a_damages_formula_divides_by_is_above_zero(full):
                 check_scene(spoilt(full, path, 0.0))
 
 
+def test_a_hole_s_outline_goes_once_about_its_centre(full):
+    number = next(i for i, damage in enumerate(full.damages) if damage.kind == "perforation")
+    for i in (1, 3, 5, 7, 9):
+        path = ("damages", number, "shape", i)
+        assert check_scene(spoilt(full, path, -0.19))
+        with pytest.raises(ConfigError, match=rf"shape\[{i}\]: 0.2 is out of range"):
+            check_scene(spoilt(full, path, 0.2))
+
+
 def test_a_camera_given_by_itself_is_held_to_the_same(full):
     camera = Camera("c", (0, -9000, 1000), (0, 0, 1000), 20)
     assert check_camera(camera, full.container) is camera

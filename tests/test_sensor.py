@@ -15,7 +15,7 @@ from fastgen.sensor.blur import blur_radius_px, defocused, moved
 from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
 from fastgen.sensor.light import displayed, light_of
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
-from fastgen.sensor.weather import foggy, rained
+from fastgen.sensor.weather import _streaks, foggy, rained
 
 SIZE = (160, 120)
 
@@ -160,12 +160,23 @@ def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
     assert heavy.sum() > seen.sum()
 
 
+@pytest.mark.parametrize(("wide", "long"), [(0.3, 2.0), (0.3, 20.0), (1.05, 20.0), (2.1, 5.4)])
+def test_a_drop_hides_as_much_as_it_is_large(wide, long):
+    """Whatever pixels its streak begins and ends in: its width squared, over the exposure."""
+    ways = np.array([[0.0, long], [long * 0.6, long * 0.8]])
+    middle = np.array([[20.3, 40.6], [60.8, 41.1]])
+    depth = np.full((80, 100), np.inf, np.float32)
+    cover = _streaks(middle, ways, np.full(2, wide), np.ones(2), depth)
+    assert cover.max() < 1
+    assert cover.sum() == pytest.approx(2 * wide**2, rel=1e-5)
+
+
 @pytest.mark.parametrize(
     ("position", "roll", "ratio"),
     [
-        ((0, -9000, 0), 0.0, 8),
-        ((0, -9000, 0), 90.0, 8),
-        ((0, -9000, 0), -35.0, 8),
+        ((0, -9000, 0), 0.0, 7),
+        ((0, -9000, 0), 90.0, 7),
+        ((0, -9000, 0), -35.0, 7),
         ((0, -500, 9000), 0.0, 2),  # streaks are short about where they run to
     ],
 )

@@ -207,6 +207,16 @@ def test_a_soft_threshold_keeps_its_share_from_afar(gl, layer, channel, softness
     assert np.sqrt(((wide - truth) ** 2).mean()) < 0.4 * truth.std() + 0.03
 
 
+@pytest.mark.parametrize("coverage", [0.003, 0.01, 0.04])
+def test_scratches_cover_the_share_that_they_are_given(gl, coverage):
+    """Near by, and from afar where a pixel covers many."""
+    steps = 1000 * (np.arange(256) + 0.37) / 256
+    points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    for footprint in (0.5, 2.0, 8.0, 32.0):
+        share = noise_share(gl, 1, "scratches(n)", points, footprint, scratch_coverage=coverage)
+        assert share.mean() == pytest.approx(coverage, rel=0.25)
+
+
 def points_and_steps(side):
     """Points [300, 2] on the sheet, and steps [256, 2] over a square of a side around one, mm."""
     steps = (np.arange(16) + 0.5) / 16 - 0.5
@@ -220,12 +230,13 @@ def rusty_share(gl, points, footprint, coverage):
     return noise_share(gl, 0, rust, points, footprint, coverage)
 
 
-def noise_share(gl, layer, share, points, footprint, w):
-    """GLSL `share` [N] of the noise sample n under pixels of a width at points [N, 2], and x.w."""
+def noise_share(gl, layer, share, points, footprint, w=0.0, **scene):
+    """GLSL `share` [N] of the noise sample n under pixels of a width at points [N, 2], and x.w;
+    scene: of the uniform blocks."""
     texture = noise_texture(gl)
-    kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4))
+    kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4), **scene)
     body = (
-        '#include "layers.glsl"\n'
+        '#include "layers.glsl"\n#include "scratches.glsl"\n'
         f"vec4 f(vec4 x) {{ NoiseSample n = read_noise({layer}, x.xy, 1000.0, x.z);"
         f" return vec4({share}, 0.0, 0.0, 0.0); }}"
     )

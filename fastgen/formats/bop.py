@@ -54,7 +54,7 @@ class _Bop(Format):
             "bbox_obj": _corner_and_size(thing.amodal_bbox),
             "bbox_visib": _corner_and_size(thing.bbox),
             "px_count_all": round(thing.area / thing.visible_fraction),
-            "px_count_valid": int(np.count_nonzero(visible[sample.depth > 0])),
+            "px_count_valid": int(np.count_nonzero(visible[np.isfinite(sample.depth)])),
             "px_count_visib": thing.area,
             "visib_fract": thing.visible_fraction,
         }

@@ -14,7 +14,7 @@ from fastgen.scene import Camera
 DOOR_CLASSES = ("door", "no_door")
 """Folders of the task, named as the faces that their cameras look at."""
 
-_MOST_SLANT = 0.7
+_LEAST_COSINE = 0.7
 """Cosine to the container's length from which a camera counts as looking at an end."""
 
 
@@ -22,7 +22,7 @@ def door_class(camera: Camera) -> str | None:
     """Which end of the container a camera looks at, whatever its name; None for other views."""
     toward = np.subtract(camera.target_mm, camera.position_mm)
     along = toward[0] / max(float(np.linalg.norm(toward)), 1e-9)
-    if abs(along) < _MOST_SLANT:
+    if abs(along) < _LEAST_COSINE:
         return None
     return DOOR_CLASSES[int(along > 0)]
 
@@ -43,7 +43,7 @@ def always_at_an_end(rig: CameraConfig) -> bool:
     """Whether every camera that is drawn from `rig` has a `door_class`."""
     slant = [max(map(abs, angles)) for angles in (rig.azimuth_deg, rig.elevation_deg)]
     along = math.prod(math.cos(math.radians(angle)) for angle in slant)
-    return rig.face in DOOR_CLASSES and along > _MOST_SLANT + 1e-3  # places are rounded
+    return rig.face in DOOR_CLASSES and along > _LEAST_COSINE + 1e-3  # places are rounded
 
 
 class _Door(Format):

@@ -119,12 +119,11 @@ def _streaks(
 ) -> NDArray[np.float32]:
     """Share of the exposure that drops cover each pixel for, float32 [H, W] in 0..1.
 
-    middle, way_px: [N, 2] in pixels, of each streak. A streak adds to each pixel of its line, and
-    of its width where it is wider than one.
+    middle, way_px: [N, 2] in pixels, of each streak. A drop's area, over its way and width in
+    whole pixels, adds up to wide_px squared.
     """
     height, width = depth_m.shape
     length = np.abs(way_px).max(axis=1)
-    share = np.minimum(wide_px / np.maximum(np.hypot(*way_px.T), 1e-6), 1.0)
     steps = np.ceil(length).astype(np.int64) + 1
     drop = np.repeat(np.arange(len(z)), steps)
     along = np.arange(len(drop)) - np.repeat(np.cumsum(steps) - steps, steps)
@@ -132,7 +131,8 @@ def _streaks(
     # what is wider than a pixel is so across its way
     across = (np.abs(way_px[:, :1]) > np.abs(way_px[:, 1:])) == [False, True]
     cover = np.zeros(height * width)
-    thick = np.maximum(np.ceil(wide_px), 1).astype(int)
+    thick = np.maximum(np.rint(wide_px), 1).astype(int)
+    share = np.minimum(wide_px**2 / (steps * thick), 1.0)
     for side in range(int(thick.max(initial=1))):
         wide = thick[drop] > side
         which = drop[wide]
@@ -143,7 +143,5 @@ def _streaks(
         at, which = row[inside] * width + column[inside], which[inside]
         before = z[which] < depth_m.ravel()[at]
         at, which = at[before], which[before]
-        # a drop narrower than a pixel covers a part of it
-        weight = share[which] * np.minimum(wide_px[which], 1.0)
-        cover += np.bincount(at, weights=weight, minlength=height * width)
+        cover += np.bincount(at, weights=share[which], minlength=height * width)
     return np.minimum(cover, 1.0).reshape(height, width).astype(np.float32)

@@ -75,6 +75,7 @@ class ContainerDataset(Dataset[Item]):
         device_index: int | None = None,
     ) -> None:
         length = whole("length", length, 1, MAX_LENGTH)
+        seed = whole("seed", seed)
         self.config = Config.checked(config)
         if not (transforms is None or callable(transforms)):
             raise ConfigError(f"transforms: {transforms!r} is no function of image and target")

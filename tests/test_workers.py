@@ -1,0 +1,35 @@
+"""Worker processes that end when nobody expects it."""
+
+import os
+import threading
+import time
+
+import pytest
+
+from fastgen import workers
+
+
+class DiesAfterItsTask:
+    """Reports, does its task, and ends a little later."""
+
+    def __init__(self, _setup, report):
+        self._report = report
+
+    def __call__(self, task):
+        self._report("images", task)
+        threading.Timer(0.3, os._exit, (9,)).start()
+
+
+@pytest.mark.parametrize("tasks", [[1], [1, 2, 3]])
+def test_a_worker_that_dies_between_tasks_costs_none(tasks):
+    heard = []
+
+    def slow(_kind, value):
+        heard.append(value)
+        time.sleep(1.0)  # its end is there when it is listened to again
+
+    def on_death(task, place, ended):
+        raise AssertionError(f"{task} at {place}: {ended}")
+
+    workers.run(DiesAfterItsTask, ("setup",), tasks, 1, slow, on_death)
+    assert heard == tasks
