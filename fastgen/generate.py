@@ -313,9 +313,13 @@ def _records(job: Job, storage: Folder | Remote, split: str) -> Callable[[], Ite
 
 def _counts(record: Record) -> dict[str, int]:
     facts = record["facts"]
+    # what is ignored is nothing to train on
+    seen = {
+        task: [item for item in facts[task] if not item["iscrowd"]] for task in ("damage", "imdg")
+    }
     return {
         "images": 1,
-        "objects": len(facts["imdg"]),
-        "damages": sum(item["category_id"] > 1 for item in facts["damage"]),
+        "objects": len(seen["imdg"]),
+        "damages": sum(item["category_id"] > 1 for item in seen["damage"]),
         "crops": len(facts["text"]),
     }

@@ -186,11 +186,12 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
         vec3 normal = -key_normal(inner_key);   // sheets are seen from behind
 #if LAYER == LAYER_NORMALS
         vec3 seen = bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5;
+#elif LAYER == LAYER_ALL
+        vec3 seen = exposure * inside(normal, rest_mm);
+#elif LAYER == LAYER_REFLECTION
+        vec3 seen = vec3(1.0);   // as rough as can be
 #else
-        vec3 seen = inside(normal, rest_mm);
-#endif
-#if LAYER == LAYER_ALL
-        seen *= exposure;
+        vec3 seen = inside_albedo(normal, rest_mm);
 #endif
         s = Shaded(seen, CONTAINER_ID, 0u, depth, 1.0);
     }

@@ -91,7 +91,7 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
             if task == "door" and name in rig:
                 why = (
                     "; it takes those at the container's ends whose azimuth_deg and elevation_deg "
-                    "keep them within 45 degrees of its length"
+                    "keep them, taken together, within 45 degrees of its length"
                 )
             raise ConfigError(f"cameras: {name!r} is none of the {task} task's{why}")
     if not chosen or len(set(chosen)) != len(chosen):
