@@ -70,7 +70,7 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
         old = known(storage, job, settings)
         tasks = _left_to_make(job, storage, old or {})
         if tasks or old is None:  # until the end nothing says that it is finished
-            storage.write(MANIFEST, [unsealed(settings)])
+            storage.write(MANIFEST, [unsealed({**settings, "images": job.images})])
         if tasks:
             todo = sum(len(job.wanted(task.shard)) for task in tasks)
             progress = Progress(job.images, job.images - todo)

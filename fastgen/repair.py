@@ -13,7 +13,8 @@ from fastgen.verify import examine
 
 
 def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> list[str]:
-    """Make again every shard with a file that is not as it was written, and scenes that failed.
+    """Make again every shard with a file that is not as it was written, and scenes that failed, or
+    finish what was begun.
 
     hdri_dir: where the HDRIs are that the dataset was made with, None for the bundled ones.
     Returns the faults that are left. Raises OutputError where dataset.json does not tell what to
@@ -22,13 +23,14 @@ def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> l
     found = examine(out)
     if not found.manifest:
         raise OutputError(f"{out}: {found.faults[0]}")
-    if not found.broken and not found.manifest["failed"]:
+    finished = "digest" in found.manifest  # else this may be the rest of a repair
+    if finished and not found.broken and not found.manifest["failed"]:
         return found.faults
     job = _job(out, found.manifest, hdri_dir)
     check_goes_on(job, worker_count)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():
-        for path in found.broken:
+        for path in sorted(found.broken):
             storage.remove(path)  # `generate` makes what is missing, but reads no file's content
     generate(job, worker_count)
     return examine(out).faults

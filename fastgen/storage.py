@@ -71,16 +71,24 @@ class Folder:
 
     def read(self, path: str) -> bytes:
         """Content of a file. Raises FileNotFoundError."""
-        with _told(self.root / path, "read"):
-            return (self.root / path).read_bytes()
+        place = self.root / path
+        with _told(place, "read"):
+            if place.exists() and not (place.is_file() or place.is_dir()):  # a pipe has no end
+                raise OutputError(f"{place}: is no file")
+            return place.read_bytes()
 
     def remove(self, path: str) -> None:
-        """Be without a file, whether it was there or not."""
-        with _told(self.root / path, "removed"):
-            (self.root / path).unlink(missing_ok=True)
+        """Be without a file, or an empty folder in its place, whether it was there or not."""
+        place = self.root / path
+        with _told(place, "removed"), contextlib.suppress(NotADirectoryError):
+            try:
+                place.unlink(missing_ok=True)
+            except IsADirectoryError:
+                place.rmdir()
 
     def sizes(self) -> dict[str, int]:
-        """Every file with its size in bytes."""
+        """Every file with its size in bytes. Raises OutputError for a link to a folder: files could
+        not be renamed into one on another disk."""
         with _told(self.root, "listed"):
             return dict(self._walk(self.root, ""))
 
@@ -96,6 +104,12 @@ class Folder:
         for entry in os.scandir(folder):
             if not prefix and (entry.name.startswith(ASIDE) or entry.name == LOCK):
                 continue
+            linked = entry.is_symlink() and os.path.isdir(entry.path)
+            if linked and "." not in entry.name:  # our files have endings, and our folders none
+                raise OutputError(
+                    f"{entry.path}: is a link to a folder; put the folder itself there, or "
+                    "link the whole dataset"
+                )
             if entry.is_dir(follow_symlinks=False):
                 yield from self._walk(Path(entry.path), f"{prefix}{entry.name}/")
             else:
@@ -196,7 +210,8 @@ class Remote:
             self._system.rm_file(self._path(path))
 
     def sizes(self) -> dict[str, int]:
-        """Every file with its size in bytes."""
+        """Every file with its size in bytes. Raises OutputError for a link to a folder: files could
+        not be renamed into one on another disk."""
         with self._told("", "listed"):
             self._system.invalidate_cache()
             if not self._system.exists(self._base):

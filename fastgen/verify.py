@@ -29,7 +29,8 @@ Place = Folder | Remote
 @dataclass(frozen=True)
 class Findings:
     """faults: a line each that names a file. broken: paths of files that are not as they were
-    written, or missing. manifest: what dataset.json says, {} where it cannot be trusted."""
+    written, or missing. manifest: what dataset.json says, {} where it cannot be trusted; without a
+    "digest" where the dataset is not finished."""
 
     faults: list[str]
     broken: set[str] = field(default_factory=set)
@@ -49,7 +50,8 @@ def examine(out: str) -> Findings:
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise without_manifest(storage, out) from None
     if "digest" not in manifest:
-        return Findings([f"{MANIFEST}: the dataset is not finished; run generate again"])
+        unfinished = f"{MANIFEST}: the dataset is not finished; run generate again"
+        return Findings([unfinished], manifest=manifest)
     if not is_sealed(text):
         again = "run generate again with the same settings"
         return Findings([f"{MANIFEST}: was changed after it was written; {again}"])

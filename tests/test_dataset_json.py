@@ -1,6 +1,7 @@
 """dataset.json lost, damaged or edited, and shards that know whose they are without it."""
 
 import json
+import os
 import shutil
 
 import pytest
@@ -141,6 +142,47 @@ def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
     ]  # fmt: skip
     assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # strays are not ours
     assert whole.items() <= content(out).items()
+
+
+def test_a_repair_that_was_stopped_goes_on(dataset, copy, capsys):
+    shutil.rmtree(copy / "images")
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fastgen.workers.run", stop)
+        assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 130
+    assert main(["verify", str(copy)]) == 1
+    assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
+    assert content(copy) == content(dataset)
+
+
+@pytest.mark.parametrize("command", [["verify"], ["verify", "--repair", "--workers", "1"]])
+def test_a_linked_folder_is_left_as_it_is(copy, tmp_path, capsys, command):
+    """Files are renamed into place, which cannot cross to the disk where it may lie."""
+    shutil.move(copy / "images", tmp_path / "elsewhere")
+    (copy / "images").symlink_to(tmp_path / "elsewhere")
+    before = content(copy), content(tmp_path / "elsewhere")
+    assert main([command[0], str(copy), *command[1:]]) == 2
+    assert "images: is a link to a folder" in capsys.readouterr().err
+    assert run(copy) == 2
+    assert (content(copy), content(tmp_path / "elsewhere")) == before
+
+
+def test_what_is_no_file_is_named_and_made_again(dataset, copy, capsys):
+    empty = next(path for path in copy.rglob("*") if path.is_file() and not path.stat().st_size)
+    image = next(copy.glob("images/*/*.jpg"))
+    for path in (empty, image):
+        path.unlink()
+    os.mkfifo(empty)
+    image.mkdir()
+    assert main(["verify", str(copy)]) == 1
+    said = capsys.readouterr().out
+    assert f"{empty}: is no file" in said
+    assert f"{image.relative_to(copy)}: missing" in said
+    assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
+    assert content(copy) == content(dataset)
 
 
 def test_a_difference_of_a_missing_key_is_told(copy, capsys):

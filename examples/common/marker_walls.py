@@ -188,8 +188,8 @@ _SKY = (SHADE, EVERYTHING)
 def without(element: str) -> Iterator[None]:
     """While it lasts, renders lack what of `element` no scene decides."""
 
-    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> bytes:
-        return open_sky(container.normals).tobytes()
+    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> NDArray[np.uint8]:
+        return open_sky(container.normals)
 
     with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
         yield

@@ -102,7 +102,7 @@ class ContainerDataset(Dataset[Item]):
         self._made: dict[str, Any] = {
             "task": task,
             "seed": seed,
-            "size": list(size),
+            "size": [int(side) for side in size],
             "length": self.length,
             "cameras": list(self.cameras),
             "split": split,

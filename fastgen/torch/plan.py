@@ -1,7 +1,7 @@
 """Which scene and camera stand at each position of an epoch, on every rank and in every worker."""
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import torch
@@ -81,9 +81,11 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     """
     class_names(task)
     rig = config.cameras
-    if isinstance(cameras, str):
+    if isinstance(cameras, str) or not (cameras is None or isinstance(cameras, Iterable)):
         raise ConfigError(f"cameras: {cameras!r} is no list; give [{cameras!r}]")
     usable = [name for name in rig if task != "door" or always_at_an_end(rig[name])]
+    if not usable:
+        raise ConfigError(f"cameras: none of {', '.join(rig)} looks at an end of the container")
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
         if name not in usable:
