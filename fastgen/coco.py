@@ -80,6 +80,11 @@ def annotation(
     }
 
 
+def trained_on(annotations: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those that are not ignored."""
+    return [item for item in annotations if not item["iscrowd"]]
+
+
 def file_text(
     description: str,
     categories: Sequence[dict[str, Any]],

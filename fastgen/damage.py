@@ -18,7 +18,6 @@ Array = NDArray[np.floating]
 FADE_START_MM, FADE_END_MM = 260.0, 520.0
 """A field acts on what lies within this depth behind its face: not on the opposite wall."""
 
-
 SLACK_MM = 150.0
 """Corrugation and castings let a face be seen from this little behind its plane."""
 

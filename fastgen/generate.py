@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fastgen import workers
+from fastgen.coco import trained_on
 from fastgen.config import Config, SplitConfig
 from fastgen.contact_sheet import contact_sheet
 from fastgen.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
@@ -313,13 +314,9 @@ def _records(job: Job, storage: Folder | Remote, split: str) -> Callable[[], Ite
 
 def _counts(record: Record) -> dict[str, int]:
     facts = record["facts"]
-    # what is ignored is nothing to train on
-    seen = {
-        task: [item for item in facts[task] if not item["iscrowd"]] for task in ("damage", "imdg")
-    }
     return {
         "images": 1,
-        "objects": len(seen["imdg"]),
-        "damages": sum(item["category_id"] > 1 for item in seen["damage"]),
+        "objects": len(trained_on(facts["imdg"])),
+        "damages": sum(item["category_id"] > 1 for item in trained_on(facts["damage"])),
         "crops": len(facts["text"]),
     }

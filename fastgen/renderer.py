@@ -155,7 +155,11 @@ class Renderer:
             boxes = [np.concatenate([*boxes, frame]), *above]
             cables = [_region(view, above[-1])]
         regions = bands([_region(view, box) for box in boxes])
-        self._sample(targets, bands([*regions, *near]), view, camera, damages, mesh, spreader)
+        holes = [
+            part for part, item in zip(near, damages, strict=True) if item.kind == "perforation"
+        ]
+        targets.begin_samples(bands([*regions, *near]), holes)
+        self._sample(targets, holes, view, camera, damages, mesh, spreader)
         self._bind_light(targets, light, shadow)
         self._bind_surface(scene, mesh, spreader)
         shading.draw(
@@ -172,18 +176,15 @@ class Renderer:
     def _sample(
         self,
         targets: Targets,
-        asked: Sequence[Region | None],
+        holes: Sequence[Region | None],
         view: View,
         camera: Camera,
         damages: tuple[Damage, ...],
         mesh: GpuMesh,
         spreader: GpuMesh | None,
     ) -> None:
-        """Draw the geometry into the sample targets, for what will be asked of the regions `asked`
-        of the image."""
+        """Draw the geometry into the empty sample targets; holes: pixels that each may touch."""
         damage = variant(damages)
-        holes = [_region(view, corners_mm(d)) for d in damages if d.kind == "perforation"]
-        targets.begin_samples(asked, holes)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._lobes.use(UNITS["lobe_masks"])
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix

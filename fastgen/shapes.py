@@ -100,7 +100,7 @@ def shadow_casters(scene: Scene) -> tuple[Mesh, Body | None]:
     box = scene.container
     shape = build_container if scene.damages else container_outline
     spreader = spreader_outline(scene, bent=False)
-    return shape(box.kind, box.profiles), without_cables(spreader) if spreader else None
+    return shape(box.kind, box.profiles), None if spreader is None else without_cables(spreader)
 
 
 def _shading_spreader(scene: Scene) -> Mesh | None:

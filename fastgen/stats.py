@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.coco import trained_on
 from fastgen.dataset_json import MANIFEST, read_manifest, told_by, without_manifest
 from fastgen.errors import OutputError
 from fastgen.formats import Record
@@ -36,11 +37,7 @@ class _Counts:
     def add(self, record: Record) -> None:
         """Count one image."""
         image_width, image_height = record["size"]
-        # what is ignored is nothing to train on: a crowd in COCO's files
-        damages, markers = (
-            [item for item in record["facts"][task] if not item["iscrowd"]]
-            for task in ("damage", "imdg")
-        )
+        damages, markers = (trained_on(record["facts"][task]) for task in ("damage", "imdg"))
         self.images += 1
         self.damaged += any(item["category_id"] > 1 for item in damages)
         for item in damages:

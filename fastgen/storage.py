@@ -73,7 +73,8 @@ class Folder:
         """Content of a file. Raises FileNotFoundError."""
         place = self.root / path
         with _told(place, "read"):
-            if place.exists() and not (place.is_file() or place.is_dir()):  # a pipe has no end
+            # a pipe would keep us waiting
+            if not (place.is_file() or place.is_dir()) and place.exists():
                 raise OutputError(f"{place}: is no file")
             return place.read_bytes()
 

@@ -114,11 +114,12 @@ def run(
                     if worker.task is not None:  # else it had just done its task
                         waiting.appendleft(on_death(worker.task, worker.place, ended))
                     worker.stop()
+                    workers.remove(worker)
                     if not waiting:
-                        workers.remove(worker)
                         continue
-                    workers[workers.index(worker)] = worker = _Worker(setup, arguments)
-                if (ended or worker.task is None) and waiting:
+                    worker = _Worker(setup, arguments)
+                    workers.append(worker)
+                if worker.task is None and waiting:
                     worker.give(waiting.popleft())
     finally:
         for worker in workers:

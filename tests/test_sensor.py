@@ -174,9 +174,9 @@ def test_a_drop_hides_as_much_as_it_is_large(wide, long):
 @pytest.mark.parametrize(
     ("position", "roll", "ratio"),
     [
-        ((0, -9000, 0), 0.0, 7),
-        ((0, -9000, 0), 90.0, 7),
-        ((0, -9000, 0), -35.0, 7),
+        ((0, -9000, 0), 0.0, 8),
+        ((0, -9000, 0), 90.0, 8),
+        ((0, -9000, 0), -35.0, 8),
         ((0, -500, 9000), 0.0, 2),  # streaks are short about where they run to
     ],
 )

@@ -123,11 +123,12 @@ def _streaks(
     whole pixels, adds up to wide_px squared.
     """
     height, width = depth_m.shape
-    length = np.abs(way_px).max(axis=1)
+    way = np.abs(way_px).max(axis=1)
+    length = way + wide_px  # from the first to the last that it covers
     steps = np.ceil(length).astype(np.int64) + 1
     drop = np.repeat(np.arange(len(z)), steps)
     along = np.arange(len(drop)) - np.repeat(np.cumsum(steps) - steps, steps)
-    step = way_px / np.maximum(length, 1e-6)[:, None]
+    step = way_px / np.maximum(way, 1e-6)[:, None]
     # what is wider than a pixel is so across its way
     across = (np.abs(way_px[:, :1]) > np.abs(way_px[:, 1:])) == [False, True]
     cover = np.zeros(height * width)
