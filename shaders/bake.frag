@@ -3,7 +3,7 @@
 #include "blocks.glsl"
 #include "octahedral.glsl"
 #include "tone.glsl"
-#include "ibl.glsl"
+#include "reflector.glsl"
 #include "layers.glsl"
 #include "ageing.glsl"
 #include "dirt.glsl"

@@ -1,17 +1,8 @@
-// vec3 lit(Material m, vec3 normal, vec3 view, Openness sky): radiance of the environment reflected
-// toward view.
-// Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
+// vec3 lit(Reflector r, Openness sky): radiance of the environment reflected toward the eye.
 
 uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
 uniform sampler2D irradiance_light;      // irradiance / pi, 1-texel border
 uniform sampler2D background_light;      // radiance, 1-texel border
-uniform sampler2D dfg_table;             // x: n_dot_v, y: roughness -> scale and bias
-
-struct Material {
-    vec3 albedo;
-    float roughness;
-    float metallic;
-};
 
 vec3 to_environment(vec3 d) {
     return vec3(fma(yaw.x, d.x, yaw.y * d.y), fma(yaw.x, d.y, -yaw.y * d.x), d.z);
@@ -73,26 +64,19 @@ float open_lobe(Openness sky, vec3 mirror, float roughness) {
     return mix(within, sky.mirrored, sky.rim);
 }
 
-vec3 lit(Material m, vec3 normal, vec3 view, Openness sky) {
-    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
-    vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
-    float all = dfg.x + dfg.y;
-    // energy that single scattering loses comes back: Turquin 2019, Practical multiple scattering
-    // compensation for microfacet models, eq. 16; for metal and dielectric apart, then mixed
-    float gain = 1.0 / all - 1.0;
-    vec3 metal = (m.albedo * dfg.x + dfg.y) * (1.0 + m.albedo * gain);
-    float dielectric = (DIELECTRIC_F0 * dfg.x + dfg.y) * (1.0 + DIELECTRIC_F0 * gain);
-    vec3 specular = mix(vec3(dielectric), metal, m.metallic);
-    vec3 diffuse = m.albedo * ((1.0 - dielectric) * (1.0 - m.metallic));
+vec3 lit(Reflector r, Openness sky) {
+    Material m = r.material;
+    vec3 metal = (m.albedo * r.dfg.x + r.dfg.y) * (1.0 + m.albedo * r.gain);
+    vec3 specular = mix(vec3(r.dielectric), metal, m.metallic);
 
     // rough lobes lean to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
     // from aslant; both fitted to the mean of directions of sampled GGX lobes
-    vec3 mirror = reflect(-view, normal);
-    mirror = normalize(mix(mirror, normal, m.roughness * m.roughness * m.roughness));
-    float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - n_dot_v));
+    vec3 mirror = reflect(-r.view, r.normal);
+    mirror = normalize(mix(mirror, r.normal, m.roughness * m.roughness * m.roughness));
+    float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - r.n_dot_v));
     vec3 around = diffuse_radiance(sky.direction) * (sky.light + bounced(sky, m.albedo));
     // where the sky is hidden the mirror shows the paint that hides it
     vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, width),
                         open_lobe(sky, mirror, m.roughness));
-    return diffuse * around + specular * mirrored;
+    return r.diffuse * around + specular * mirrored;
 }

@@ -6,6 +6,7 @@
 #include "lens.glsl"
 #include "view_ray.glsl"
 #include "tone.glsl"
+#include "reflector.glsl"
 #include "ibl.glsl"
 #if SUN
 #include "sun.glsl"
@@ -59,15 +60,21 @@ vec3 developed(vec3 color) {
     return srgb_encode(color);
 }
 
-vec3 layer_color(SurfacePoint s, vec3 normal, vec3 view, Openness sky) {
+// sun_seen: share of the sun that gets there
+vec3 layer_color(Material m, vec3 normal, vec3 view, Openness sky, float sun_seen) {
 #if LAYER == LAYER_ALL
-    return exposure * lit(s.material, normal, view, sky);
+    Reflector r = reflector(m, normal, view);
+    vec3 radiance = lit(r, sky);
+#if SUN
+    radiance += sun_seen * sunlit(r);
+#endif
+    return exposure * radiance;
 #elif LAYER == LAYER_NORMALS
     return normal * 0.5 + 0.5;
 #elif LAYER == LAYER_REFLECTION
-    return srgb_decode(vec3(s.material.roughness));
+    return srgb_decode(vec3(m.roughness));
 #else
-    return s.material.albedo;
+    return m.albedo;
 #endif
 }
 
@@ -140,16 +147,16 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    vec3 color = layer_color(p.surface, normal, view, sky);
+    float sun_seen = 0.0;
 #if SUN && LAYER == LAYER_ALL
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
     vec2 place = place_of(sample_at);
-    float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
     // before a sun behind the wall stands the whole container, too close to a groove for the map
-    if (dot(p.surface.outward, sun_direction) < 0.0) share = 0.0;
-    color += exposure * share * sunlit(p.surface.material, normal, view);
+    if (dot(p.surface.outward, sun_direction) >= 0.0) {
+        sun_seen = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
+    }
 #endif
-    return color;
+    return layer_color(p.surface.material, normal, view, sky, sun_seen);
 }
 
 // a pixel all of whose samples see the same surface

@@ -1,13 +1,14 @@
-// vec3 sunlit(Material m, vec3 normal, vec3 view): radiance of the sun reflected toward view, unshadowed;
+// vec3 sunlit(Reflector r): radiance of the sun reflected toward the eye, unshadowed;
 // float sun_share(vec3 from_eye, vec3 normal, float footprint_m): how much of it gets there, 0..1.
 
 uniform sampler2DShadow sun_shadow;
 
-vec3 sunlit(Material m, vec3 normal, vec3 view) {
-    float n_dot_l = max(dot(normal, sun_direction), 0.0);
-    float n_dot_v = max(dot(normal, view), 1e-3);
-    vec3 half_way = normalize(view + sun_direction);
-    float n_dot_h = max(dot(normal, half_way), 0.0);
+vec3 sunlit(Reflector r) {
+    Material m = r.material;
+    float n_dot_v = max(r.n_dot_v, 1e-3);
+    float n_dot_l = max(dot(r.normal, sun_direction), 0.0);
+    vec3 half_way = normalize(r.view + sun_direction);
+    float n_dot_h = max(dot(r.normal, half_way), 0.0);
     // the sun's disc spreads half vectors by half its radius (after Karis 2013, area lights)
     float alpha = m.roughness * m.roughness + 0.5 * sun_radius;
     float a2 = alpha * alpha;
@@ -16,17 +17,11 @@ vec3 sunlit(Material m, vec3 normal, vec3 view) {
     float distribution = a2 / (d * d);   // times pi, for sun_light is irradiance / pi
     float masking = 0.5 / (n_dot_l * sqrt(fma(n_dot_v * n_dot_v, 1.0 - a2, a2)) +
                            n_dot_v * sqrt(fma(n_dot_l * n_dot_l, 1.0 - a2, a2)) + 1e-5);
-    float grazing = pow(1.0 - clamp(dot(view, half_way), 0.0, 1.0), 5.0);
-
-    // energy and mix of metal and dielectric as in `lit`
-    vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
-    float gain = 1.0 / (dfg.x + dfg.y) - 1.0;
-    vec3 metal = mix(m.albedo, vec3(1.0), grazing) * (1.0 + m.albedo * gain);
-    float dielectric = mix(DIELECTRIC_F0, 1.0, grazing) * (1.0 + DIELECTRIC_F0 * gain);
+    float grazing = pow(1.0 - clamp(dot(r.view, half_way), 0.0, 1.0), 5.0);
+    vec3 metal = mix(m.albedo, vec3(1.0), grazing) * (1.0 + m.albedo * r.gain);
+    float dielectric = mix(DIELECTRIC_F0, 1.0, grazing) * (1.0 + DIELECTRIC_F0 * r.gain);
     vec3 specular = mix(vec3(dielectric), metal, m.metallic) * (distribution * masking);
-    float taken = (DIELECTRIC_F0 * dfg.x + dfg.y) * (1.0 + DIELECTRIC_F0 * gain);
-    vec3 diffuse = m.albedo * ((1.0 - taken) * (1.0 - m.metallic));
-    return (diffuse + specular) * sun_light * n_dot_l;
+    return (r.diffuse + specular) * sun_light * n_dot_l;
 }
 
 // Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint on the surface, and no

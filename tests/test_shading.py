@@ -91,9 +91,9 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
     roughness, cosine = np.meshgrid(np.linspace(0.05, 1, 20), np.linspace(0.05, 1, 20))
     rows = np.stack([roughness, cosine, np.full_like(cosine, metallic), cosine], -1).reshape(-1, 4)
     body = (
-        '#include "ibl.glsl"\n'
+        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
-        " return vec4(lit(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view,"
+        " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
         " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
@@ -106,9 +106,9 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
     rng = np.random.default_rng(0)
     rows = np.c_[rng.uniform(0.05, 1, (500, 2)), rng.uniform(0, 1, (500, 2))]
     body = (
-        '#include "ibl.glsl"\n'
+        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
-        " return vec4(lit(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view,"
+        " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
         " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))

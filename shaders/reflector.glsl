@@ -1,0 +1,32 @@
+// Reflector reflector(Material m, vec3 normal, vec3 view): what light of any kind meets at a point.
+// Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
+
+uniform sampler2D dfg_table;   // x: n_dot_v, y: roughness -> scale and bias
+
+struct Material {
+    vec3 albedo;
+    float roughness;
+    float metallic;
+};
+
+struct Reflector {
+    Material material;
+    vec3 normal;
+    vec3 view;         // unit, toward the eye
+    float n_dot_v;
+    vec2 dfg;
+    // energy that single scattering loses, a unit of reflectance head-on: Turquin 2019, Practical
+    // multiple scattering compensation for microfacet models, eq. 16
+    float gain;
+    float dielectric;  // share of all light that a clear coat mirrors
+    vec3 diffuse;      // of what it lets through, the share that comes back
+};
+
+Reflector reflector(Material m, vec3 normal, vec3 view) {
+    float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
+    vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
+    float gain = 1.0 / (dfg.x + dfg.y) - 1.0;
+    float dielectric = (DIELECTRIC_F0 * dfg.x + dfg.y) * (1.0 + DIELECTRIC_F0 * gain);
+    vec3 diffuse = m.albedo * ((1.0 - dielectric) * (1.0 - m.metallic));
+    return Reflector(m, normal, view, n_dot_v, dfg, gain, dielectric, diffuse);
+}
