@@ -54,12 +54,14 @@ GROUPS: dict[str, Callable[[Case], str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A case at one quality. measures: as Comparison.both gives them; parts: by part of the image,
-    pixels, their sum of FLIP and the median of stops by which ours is brighter; seconds: processor
-    time of a labelled image; panels: ours, the reference's and FLIP."""
+    """A case at one quality. measures: as Comparison.both gives them; rounding: the same of the
+    reference in eight bits a channel, as our images are; parts: by part of the image, pixels, their
+    sum of FLIP and the median of stops by which ours is brighter; seconds: processor time of a
+    labelled image; panels: ours, the reference's and FLIP."""
 
     case: Case
     measures: tuple[float, ...]
+    rounding: tuple[float, ...]
     parts: dict[str, tuple[int, float, float]]
     seconds: float
     panels: tuple[Array, Array, Array]
@@ -89,6 +91,7 @@ def compared(
     expected = displayed(reference.radiance[filter_name], exposure)
     ours = sample.image / 255.0
     error = Comparison.of(expected, ours)
+    rounded = Comparison.of(expected, np.rint(np.clip(expected, 0, 1) * 255) / 255)
     parts = {
         part: (
             int(mask.sum()),
@@ -102,9 +105,9 @@ def compared(
         began = time.process_time()
         generator.render(scene=scene, camera=camera)
         spent.append(time.process_time() - began)
-    return Result(
-        case, error.both(reference.inside), parts, min(spent), (ours, expected, error.flip_map)
-    )
+    measures, rounding = (c.both(reference.inside) for c in (error, rounded))
+    panels = (ours, expected, error.flip_map)
+    return Result(case, measures, rounding, parts, min(spent), panels)
 
 
 def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
@@ -138,10 +141,13 @@ def row(title: str, rows: list[tuple[float, ...]]) -> str:
 
 
 def overall(results: dict[str, list[Result]], figures: Figures) -> list[str]:
-    """A row a quality, then what Cycles' own noise amounts to."""
+    """A row a quality, then what rounding to eight bits and Cycles' own noise amount to."""
     columns = [f"{m}, {where}" for where in ("whole", "objects") for m in ("FLIP", "SSIM", "PSNR")]
     lines = ["| mean (worst) | " + " | ".join(columns) + " |", "| --- |" + " --- |" * 6]
     lines += [row(name, [result.measures for result in r]) for name, r in results.items()]
+    by_filter = {FILTERS[quality]: r for quality, r in results.items()}
+    for name, r in sorted(by_filter.items()):
+        lines.append(row(f"the reference in 8 bits, {name}", [result.rounding for result in r]))
     for name in sorted(set(FILTERS.values())):
         rows = figures.floor_rows(name)
         if rows:

@@ -52,7 +52,9 @@ bool within_reach(int i, vec3 p) {
 
 struct Field {
     float amount;   // mm along `inward`
-    vec3 slope;     // its gradient in local coordinates; along a fold or an outline only nearly so
+    // its gradient in local coordinates; along a fold or an outline only nearly so, and without what
+    // fading inward adds, which turns neither the damaged sheet nor those across it
+    vec3 slope;
     float scar;     // how much the steel is worked: aged in a fold, rusty along a torn rim; 0..1
 };
 

@@ -1,0 +1,50 @@
+"""Runs single functions of the shaders, for tests."""
+
+import numpy as np
+
+from fastgen.programs import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK, expand
+from fastgen.resources import shader_path
+
+HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'
+
+
+def run(gl, body, inputs, textures=None, damage="sound"):
+    """Evaluate `vec4 f(vec4 x)` of GLSL `body` at each row of inputs [N, 4]. Returns [N, 4]."""
+    ctx = gl.ctx
+    main = (
+        "\nuniform sampler2D inputs; layout(location = 0) out vec4 answer;\n"
+        "void main() { answer = f(texelFetch(inputs, ivec2(gl_FragCoord.xy), 0)); }\n"
+    )
+    program = ctx.program(
+        vertex_shader=expand(shader_path("fullscreen.vert").read_text()),
+        fragment_shader=expand(HEAD + body + main, damage=damage),
+    )
+    rows = np.ascontiguousarray(inputs, np.float32)
+    held = {
+        "inputs": ctx.texture((len(rows), 1), 4, rows.tobytes(), dtype="f4"),
+        **(textures or {}),
+    }
+    for unit, (name, texture) in enumerate(held.items()):
+        if name in program:
+            program[name] = unit
+        texture.use(unit)
+    target = ctx.texture((len(rows), 1), 4, dtype="f4")
+    frame = ctx.framebuffer([target])
+    frame.use()
+    ctx.disable(ctx.DEPTH_TEST)
+    ctx.vertex_array(program, []).render(ctx.TRIANGLES, vertices=3)
+    return np.frombuffer(target.read(), np.float32).reshape(-1, 4)
+
+
+def blocks(gl, **changed):
+    """Uniform blocks of zeros but for `changed`, bound."""
+    kept = []
+    for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):
+        values = {}
+        for member in block.members:
+            size = {"vec2": 2, "vec3": 3, "vec4": 4, "mat4": 16}.get(member[0], 1)
+            values[member[1]] = changed.get(member[1], np.zeros(size))
+        buffer = gl.ctx.buffer(block.pack(values))
+        buffer.bind_to_uniform_block(block.binding)
+        kept.append(buffer)
+    return kept

@@ -1,0 +1,137 @@
+"""shaders/damage.glsl against fastgen/damage.py, which describe the same fields."""
+
+import numpy as np
+import pytest
+
+from fastgen import Config, Generator
+from fastgen.damage import (
+    FADE_END_MM,
+    FADE_START_MM,
+    amount_mm,
+    deform,
+    in_hole,
+    local_coordinates,
+    mask_values,
+    reach_mm,
+)
+from fastgen.gl import open_context
+from fastgen.programs import REACH_MARGIN_MM
+from fastgen.surface_values import damage_values
+from tests.glsl import blocks, run
+
+THRESHOLD_MM = 5.0
+EDGE_MM = 0.01  # nearer to a border than this, either answer is right
+
+
+@pytest.fixture(scope="module")
+def gl():
+    with open_context() as made:
+        yield made
+
+
+def scenes_with(*kinds):
+    """Three scenes; about each of their damages, points as far out as twice its reach."""
+    damage = {"probability": 1.0, "count": [2, 4], "kinds": list(kinds)}
+    generator = Generator(Config.from_values({"damage": damage}), seed=3)
+    rng = np.random.default_rng(0)
+    found = []
+    for index in range(3):
+        scene = generator.scene(index)
+        points = []
+        for d in scene.damages:
+            local = rng.uniform(0, 2, (1000, 1)) * rng.uniform(-1, 1, (1000, 3))
+            local *= np.array(reach_mm(d)) + REACH_MARGIN_MM
+            axes = np.array([d.along, d.across, d.inward])
+            points.append(np.array(d.origin_mm) + local @ axes)
+        found.append((scene, np.concatenate(points).astype(np.float32).astype(np.float64)))
+    assert {d.kind for scene, _ in found for d in scene.damages} == set(kinds)
+    return found
+
+
+@pytest.fixture(scope="module")
+def damages():
+    return scenes_with("axis", "concave", "dented", "perforation")
+
+
+def asked(gl, scene, body, points):
+    """What GLSL `vec4 f(vec4 x)` returns at each of points [N, 3], [N, 4]; and the damages in the
+    order of the shader."""
+    values = damage_values(scene, scene.damages, THRESHOLD_MM, 0)
+    kept = blocks(gl, **values)
+    rows = np.column_stack([points, np.zeros(len(points))])
+    out = run(gl, f'#include "damage.glsl"\n{body}', rows, damage="holed")
+    del kept
+    by_origin = {d.origin_mm: d for d in scene.damages}
+    ordered = [by_origin[tuple(row[:3])] for row in values["damage_origin"]]
+    return out, ordered
+
+
+def test_points_move_as_far_as_numpy_moves_them(gl, damages):
+    for scene, points in damages:
+        moved, _ = asked(gl, scene, "vec4 f(vec4 x) { return vec4(deformed(x.xyz), 0.0); }", points)
+        wanted = deform(scene.damages, points)
+        assert np.abs(wanted - points).max() > 10
+        np.testing.assert_allclose(moved[:, :3], wanted, atol=0.02)
+
+
+def test_reach_is_what_numpy_says(gl, damages):
+    body = (
+        "vec4 f(vec4 x) { vec4 n = vec4(0.0); for (int i = 0; i < damage_count; ++i)"
+        " n.x += within_reach(i, x.xyz) ? exp2(float(i)) : 0.0; return n; }"
+    )
+    for scene, points in damages:
+        out, ordered = asked(gl, scene, body, points)
+        for i, damage in enumerate(ordered):
+            local = np.abs(np.stack(local_coordinates(damage, points), axis=-1))
+            beyond = (local - np.array(reach_mm(damage)) - REACH_MARGIN_MM).max(axis=1)
+            sure = np.abs(beyond) > EDGE_MM
+            seen = out[:, 0].astype(int) >> i & 1 == 1
+            assert (beyond < 0).any()
+            assert (beyond > 0).any()
+            np.testing.assert_array_equal(seen[sure], (beyond < 0)[sure])
+
+
+def test_holes_are_where_numpy_has_them(gl, damages):
+    holes = 0
+    for scene, points in damages:
+        if not any(d.kind == "perforation" for d in scene.damages):
+            continue
+        body = "vec4 f(vec4 x) { return vec4(float(hole_at(x.xyz)), 0.0, 0.0, 0.0); }"
+        out, ordered = asked(gl, scene, body, points)
+        wanted = np.full(len(points), -1)
+        for i, damage in enumerate(ordered):
+            wanted[in_hole(damage, points)] = i
+        holes += np.count_nonzero(wanted >= 0)
+        assert np.count_nonzero(out[:, 0] != wanted) <= 1  # a point on an outline
+    assert holes > 50
+
+
+def test_a_point_is_marked_with_the_damage_that_moves_it_most(gl, damages):
+    body = "vec4 f(vec4 x) { return vec4(float(damage_at(x.xyz).value), 0.0, 0.0, 0.0); }"
+    for scene, points in damages:
+        out, _ = asked(gl, scene, body, points)
+        amounts = np.abs([amount_mm(d, points) for d in scene.damages])
+        most, second = np.sort(np.vstack([amounts, np.zeros_like(amounts[:1])]), axis=0)[[-1, -2]]
+        values = np.array(mask_values(scene.damages))[amounts.argmax(axis=0)]
+        wanted = np.where(most > THRESHOLD_MM, values, 0)
+        sure = (np.abs(most - THRESHOLD_MM) > EDGE_MM) & (most - second > EDGE_MM)
+        assert np.unique(wanted[sure]).size == 1 + len(scene.damages)
+        np.testing.assert_array_equal(out[sure, 0], wanted[sure])
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_bend_is_the_derivative_of_what_moves(gl, column):
+    """Along folds and torn rims it is only nearly so, and where a field fades it lacks what turns
+    neither the damaged sheet nor those across it."""
+    body = f"vec4 f(vec4 x) {{ return vec4(damage_at(x.xyz).bend[{column}], 0.0); }}"
+    step = 0.5 * np.eye(3)[column]
+    for scene, points in scenes_with("axis", "concave"):
+        fading = np.zeros(len(points), bool)
+        for damage in scene.damages:
+            if damage.kind == "concave":
+                w = np.abs(local_coordinates(damage, points)[2])
+                fading |= (w > FADE_START_MM - 1) & (w < FADE_END_MM + 1)
+        out, _ = asked(gl, scene, body, points)
+        wanted = deform(scene.damages, points + step) - deform(scene.damages, points - step)
+        assert np.abs(wanted[~fading] - 2 * step).max() > 0.02
+        np.testing.assert_allclose(out[~fading, :3], wanted[~fading], atol=2e-3)
