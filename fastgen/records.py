@@ -308,6 +308,7 @@ def _check_kind(kind: type, value: Any) -> None:
 def _as_number(value: Any) -> str:
     """A hint for text that reads as a number: YAML 1.1 takes 1e-2 for text, and quotes make it."""
     try:
-        return f" (a text; write {float(value):g} without quotes)" if isinstance(value, str) else ""
+        number = float(value) if isinstance(value, str) else math.nan
     except ValueError:
         return ""
+    return f" (a text; write {number:g} without quotes)" if math.isfinite(number) else ""
