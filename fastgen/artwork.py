@@ -179,7 +179,9 @@ def _json(*parts: str) -> dict[str, Any]:
 
 
 def _image(path: Path, channels: int, size: int | None) -> NDArray[np.uint8]:
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    # by its bytes: OpenCV takes no path that is not UTF-8
+    data = np.frombuffer(path.read_bytes() if path.exists() else b"", np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     found = 0 if image is None else image.shape[2] if image.ndim == 3 else 1
     if image is None or found != channels or (size and image.shape[:2] != (size, size)):
         wanted = f"{size}x{size}, " if size else ""

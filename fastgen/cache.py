@@ -5,6 +5,7 @@ import fcntl
 import hashlib
 import importlib.metadata
 import os
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -23,10 +24,16 @@ LIMIT_BYTES = 4 << 30
 
 
 def default_folder() -> Path:
-    """$XDG_CACHE_HOME/fastgen or ~/.cache/fastgen."""
+    """$XDG_CACHE_HOME/fastgen or ~/.cache/fastgen; for a user without a home, one of the user's
+    own among temporary files."""
     base = os.environ.get("XDG_CACHE_HOME", "")
     # the XDG base directory specification asks to ignore relative paths
-    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "fastgen"
+    if os.path.isabs(base):
+        return Path(base) / "fastgen"
+    try:
+        return Path.home() / ".cache" / "fastgen"
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / f"fastgen-{os.getuid()}"
 
 
 def read(entry: Path) -> dict[str, NDArray[np.generic]]:

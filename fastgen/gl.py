@@ -14,6 +14,7 @@ import moderngl
 from fastgen import gl_forks
 from fastgen.errors import ConfigError, ContextError
 from fastgen.records import check_known
+from fastgen.shader_cache import spare_full_disk
 
 BACKENDS = ("auto", "egl", "osmesa")
 
@@ -151,6 +152,7 @@ def open_context(
         if backend == "osmesa":
             raise ConfigError(f"device_index: {device_index}: osmesa has no devices; use egl")
         backend = "egl"
+    spare_full_disk()
     failures = []
     for name in ("egl", "osmesa") if backend == "auto" else (backend,):
         try:

@@ -161,7 +161,7 @@ def _container(shot: Shot) -> Object:
     """The container's pixels are also those of its decals: what lies on it is part of it.
 
     Where the spreader hides it, or the image ends, its outer box stands for it, a few millimetres
-    larger than rails and sheets: its visible fraction is true to half a percent.
+    larger than rails and sheets: its visible fraction is true to one percent of the whole.
     """
     frame, view = shot.frame, shot.view
     shown = frame.damage > 0  # what is seen through two holes is the container's, though void

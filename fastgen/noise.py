@@ -2,11 +2,12 @@
 
 Channels hold values whose distribution is uniform on 0..1, so that `noise > 1 - c` covers the
 fraction c of the surface. That of rust is normal instead: NORMAL_REACH deviations to either side of
-its mean fill 0..1. Averaging in a mip level narrows those distributions; `lost_deviation` says by
-how much, and the shader widens its thresholds accordingly, so that near and far views agree on how
-much is rusty and nothing shimmers (the idea of Olano and Baker 2010, LEAN mapping: variance that
-filtering removes comes back as softness). Of a normal field that is exact: where its mean over a
-footprint is m and deviates by s within it, Phi((m - t) / s) of that lies above t.
+its mean fill 0..1. Scratches are 0 or 1, and stain runs down from where rust is. Averaging in a mip
+level narrows those distributions; `lost_deviation` says by how much, and the shader widens its
+thresholds accordingly, so that near and far views agree on how much is rusty and nothing shimmers
+(the idea of Olano and Baker 2010, LEAN mapping: variance that filtering removes comes back as
+softness). Of a normal field that is exact: where its mean over a footprint is m and deviates by s
+within it, Phi((m - t) / s) of that lies above t.
 """
 
 from dataclasses import dataclass

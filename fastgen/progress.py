@@ -1,5 +1,6 @@
 """A progress line: images a second and time left, on a terminal; now and then a line elsewhere."""
 
+import os
 import sys
 import time
 from typing import TextIO
@@ -30,8 +31,7 @@ class Progress:
         """Draw the last state."""
         self._draw()
         if self._live:
-            self._stream.write("\n")
-        self._stream.flush()
+            self._show("\n")
 
     def _draw(self) -> None:
         made = self._done - self._first
@@ -43,5 +43,13 @@ class Progress:
             f"[{bar}] {self._done}/{self._total} images, {rate:.1f}/s, "
             f"{left_s // 60}:{left_s % 60:02d} left"
         )
-        self._stream.write(f"\r{line}\x1b[K" if self._live else f"{line}\n")
-        self._stream.flush()
+        self._show(f"\r{line}\x1b[K" if self._live else f"{line}\n")
+
+    def _show(self, text: str) -> None:
+        try:
+            self._stream.write(text)
+            self._stream.flush()
+        except BrokenPipeError:
+            raise
+        except OSError:  # such as a log on a full disk: no reason to lose a run
+            self._stream = open(os.devnull, "w")  # noqa: SIM115

@@ -5,7 +5,7 @@ from collections import Counter
 from typing import Any
 
 from fastgen.artwork import art_images, glyph_tiles
-from fastgen.camera import MM, NEAR_M
+from fastgen.camera import FAR_M, MM, NEAR_M
 from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import LOBE_LIMIT, LOBES
@@ -25,6 +25,9 @@ _SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
 
 _FAR = 1e6
 """Millimetres, or degrees, that no number of a sensible scene passes: the GPU counts in float32."""
+
+_FARTHEST_MM = (FAR_M - 20.0) / MM
+"""Of a camera from the container, so that all of that lies before the far plane."""
 
 _DIVISORS = {"dented": (0, 3, 5), "perforation": (0,)}
 """Which numbers of Damage.shape the field is divided by."""
@@ -95,6 +98,11 @@ def _check_camera(camera: Camera, path: str, container: Container) -> None:
             f"{path}.position_mm: {camera.position_mm} is nearer to the container than "
             f"{NEAR_M / MM:g} mm, before which nothing is drawn; move it away"
         )
+    if away_mm > _FARTHEST_MM:
+        raise ConfigError(
+            f"{path}.position_mm: {camera.position_mm} is {away_mm * MM:.0f} m from the container; "
+            f"sight ends at {_FARTHEST_MM * MM:.0f} m, move it nearer"
+        )
     if camera.sensor is not None and camera.sensor.stamp is not None:
         check_known(f"{path}.sensor.stamp.corner", camera.sensor.stamp.corner, CORNERS)
 
@@ -112,7 +120,13 @@ def _check_decal(decal: Decal, path: str) -> None:
         for char in decal.text:
             if char != " ":
                 check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
-    elif decal.kind in _ART_KINDS and decal.art != "stripes":
+    elif decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
+        width, height = decal.size_mm
+        raise ConfigError(
+            f"{path}.size_mm: a marker is a square that stands on its corner; {width:g} and "
+            f"{height:g} differ"
+        )
+    if decal.kind in _ART_KINDS and decal.art != "stripes":
         check_known(f"{path}.art", decal.art, art_images()[1])
 
 

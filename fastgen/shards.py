@@ -104,8 +104,9 @@ class Strikes:
             return task
         if scene is None:
             raise OutputError(
-                f"worker processes die before they render anything ({ended}); try "
-                f"fastgen doctor; what is written stays good"
+                f"worker processes die before they render anything ({ended}); try fastgen doctor, "
+                'and in a script call this under `if __name__ == "__main__":`; what is written '
+                "stays good"
             )
         reason = f"the process that rendered it died ({ended})"
         return replace(task, skip={**task.skip, scene: reason})

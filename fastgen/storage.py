@@ -22,6 +22,9 @@ ASIDE = ".aside"
 
 LOCK = ".lock"
 
+_RECOVERED = "lost+found"
+"""Where a file system keeps what it finds; a volume of its own has it from the start."""
+
 _BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
 """Protocols of fsspec's object stores."""
 
@@ -97,13 +100,13 @@ class Folder:
         """What lies in the place itself, or in one of its folders; nothing where that is none."""
         with _told(self.root, "listed"):
             try:
-                return os.listdir(self.root / folder)
+                return [name for name in os.listdir(self.root / folder) if name != _RECOVERED]
             except (FileNotFoundError, NotADirectoryError):
                 return []
 
     def _walk(self, folder: Path, prefix: str) -> Iterator[tuple[str, int]]:
         for entry in os.scandir(folder):
-            if not prefix and (entry.name.startswith(ASIDE) or entry.name == LOCK):
+            if not prefix and (entry.name.startswith(ASIDE) or entry.name in (LOCK, _RECOVERED)):
                 continue
             linked = entry.is_symlink() and os.path.isdir(entry.path)
             if linked and "." not in entry.name:  # our files have endings, and our folders none

@@ -153,6 +153,8 @@ def in_words(error: Exception, place: str) -> str:
     """What stops a run, for its user. place: where it happened, for mistakes of ours."""
     if isinstance(error, FastgenError | OSError):
         return str(error)
+    if isinstance(error, MemoryError):
+        return f"{place}: out of memory; give fewer workers or a smaller size"
     traceback.print_exception(error)
     return f"{place}: {error!r} (our mistake: please report it)"
 

@@ -28,10 +28,18 @@ float stretched(vec2 seen) {
     return 1.0 / ((((ratio * q + low.w) * q + low.z) * q + low.y) * q + low.x);
 }
 
-// of the tangential part one step is taken, which is enough for rays of light
+const int TANGENTIAL_STEPS = 6;   // each leaves a third of the error or less
+
+// the tangential part is that about the point sought, so it is found step by step
 vec2 straightened(vec2 pixel) {
     if (lens_model == 0.0) return pixel;
     vec2 seen = (pixel - lens_center) / lens_focal;
-    seen -= tangential(seen * stretched(seen));
-    return lens_center + lens_focal * seen * stretched(seen);
+    vec2 ideal = seen * stretched(seen);
+    int steps = lens_tangential == vec2(0.0) ? 1 : TANGENTIAL_STEPS;
+    int i = 0;
+    do {
+        vec2 radial = seen - tangential(ideal);
+        ideal = radial * stretched(radial);
+    } while (++i < steps);
+    return lens_center + lens_focal * ideal;
 }

@@ -78,6 +78,7 @@ void main() {
             if (chart == PORTAL_CHART) {
                 Shaded through = through_hole(middle + offset, key, ray);
                 lit_color = through.color;
+                if (through.cover == 0.0) sky_weight += weight;
                 if (at_center && side == 0) s = through;
             }
 #endif

@@ -200,6 +200,7 @@ def test_opposite_holes_let_the_sky_through(generator):
     assert sample.ids[128, 128] == 0
     assert sample.damage[128, 128] == 501
     assert np.isinf(sample.depth[128, 128])
+    assert sample.cover[128, 128] == 0
 
 
 def test_undamaged_places_do_not_change(generator):

@@ -193,3 +193,18 @@ def test_a_decal_beside_its_sheet_is_named():
         scene = replace(scene, decals=(beside,))
         with pytest.raises(SceneError, match=r"decals\[0\].* lies off its sheet"):
             generator.render(scene=scene, camera="A")
+
+
+def test_a_marker_that_is_no_square_is_refused(full):
+    number = next(i for i, decal in enumerate(full.decals) if decal.kind == "marker")
+    oblong = replace(full.decals[number], size_mm=(250.0, 500.0))
+    decals = (*full.decals[:number], oblong, *full.decals[number + 1 :])
+    with pytest.raises(ConfigError, match=rf"^scene.decals\[{number}\].size_mm: .*250 and 500"):
+        check_scene(replace(full, decals=decals))
+
+
+def test_a_camera_beyond_sight_is_refused(full):
+    near = replace(full.cameras[0], position_mm=(0.0, -170e3, 0.0), lens=None)
+    assert check_camera(near, full.container) == near
+    with pytest.raises(ConfigError, match=r"camera.position_mm: .* sight ends at 180 m"):
+        check_camera(replace(near, position_mm=(0.0, -300e3, 0.0)), full.container)

@@ -1,7 +1,7 @@
 """Frame -> the Frame that a real camera would have given: weather, optics, sensor, encoder.
 
-In the order of the real thing: fog and rain, defocus and motion, fall-off, exposure and white
-balance, noise, all in linear light; then the tone curve, the stamp and JPEG. The image changes,
+In the order of the real thing: fog and rain, defocus and motion, fall-off, exposure, noise, white
+balance, all in linear light; then the tone curve, the stamp and JPEG. The image changes,
 labels are those of what is there, at the middle of the exposure.
 """
 
@@ -58,13 +58,16 @@ def _exposed(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sen
         light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
     right, down = sensor.motion
     light = moved(light, (right * width, down * width))
-    gains = np.array(sensor.gains, np.float32) * np.float32(2.0**sensor.exposure_error_ev)
     if sensor.vignetting:
         light = light * falloff(view.size, sensor.vignetting)
-    if (gains != 1).any():
-        planes = zip(cv2.split(light), gains, strict=True)
-        light = np.asarray(cv2.merge([plane * gain for plane, gain in planes]))
-    return noisy(light, sensor.noise) if sensor.noise else light
+    if sensor.exposure_error_ev:
+        light = light * np.float32(2.0**sensor.exposure_error_ev)
+    if sensor.noise:
+        light = noisy(light, sensor.noise)
+    if sensor.gains != (1, 1, 1):
+        planes = zip(cv2.split(light), sensor.gains, strict=True)
+        light = np.asarray(cv2.merge([plane * np.float32(gain) for plane, gain in planes]))
+    return light
 
 
 def _ray_m(frame: Frame, view: View) -> np.ndarray:

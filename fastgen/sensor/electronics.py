@@ -46,9 +46,12 @@ def noisy(light: Light, noise: Noise) -> Light:
 
 
 def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:
-    """The image [H, W, 3] with white text, edged in black, burnt into a corner."""
+    """The image [H, W, 3] with white text, edged in black, burnt into a corner; smaller than asked
+    where it would not fit across."""
     height, width = image.shape[:2]
     scale = max(stamp.height * height, 5.0) / _CAP_PX
+    (long, tall), _ = cv2.getTextSize(stamp.text, _FONT, 1.0, 1)
+    scale = min(scale, width / (long + 2 * tall))
     stroke = max(round(1.2 * scale), 1)
     (long, tall), _ = cv2.getTextSize(stamp.text, _FONT, scale, stroke)
     margin = tall

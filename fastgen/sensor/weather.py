@@ -21,7 +21,9 @@ _NEAREST_M, _FARTHEST_M = 0.12, 4.0
 """Drops nearer are blurs before the lens, drops farther are too fine to tell apart."""
 
 _SMALLEST_MM, _LARGEST_MM = 1.0, 4.5
-_MOST_DROPS = 6000
+_MOST_DROPS = 12_000
+"""Of more, as wide lenses see in heavy rain, so many are drawn, each for as many as it takes."""
+
 _DROP_LIGHT = 0.94
 """Of the mean light around, that a drop sends on (Garg and Nayar 2007, "Vision and Rain", 3)."""
 
@@ -85,7 +87,8 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
     per_m3 = 8000 / slope * (np.exp(-slope * _SMALLEST_MM) - np.exp(-slope * _LARGEST_MM))
     reach = np.array([width, height]) / view.focal_px
     volume = reach.prod() * (_FARTHEST_M**3 - _NEAREST_M**3) / 3
-    count = min(int(rng.poisson(per_m3 * volume)), _MOST_DROPS)
+    fallen = int(rng.poisson(per_m3 * volume))
+    count = min(fallen, _MOST_DROPS)
     # uniform in the pyramid that is seen
     near, far = _NEAREST_M**3, _FARTHEST_M**3
     z = np.cbrt(near + rng.random(count) * (far - near))
@@ -100,7 +103,7 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
     from_center = (start - view.center_px) / view.focal_px
     way_px = (fall_m[:, :2] - from_center * fall_m[:, 2:]) / z[:, None] * view.focal_px
     wide_px = size_mm * 1e-3 / z * view.focal_px
-    cover = _streaks(start, way_px, wide_px, z, depth_m)
+    cover = _streaks(start, way_px, wide_px, z, depth_m, fallen / max(count, 1))
     return _mixed(light, _DROP_LIGHT * sky, cover)
 
 
@@ -116,11 +119,12 @@ def _streaks(
     wide_px: NDArray[np.float64],
     z: NDArray[np.float64],
     depth_m: NDArray[np.float32],
+    times: float = 1.0,
 ) -> NDArray[np.float32]:
     """Share of the exposure that drops cover each pixel for, float32 [H, W] in 0..1.
 
     middle, way_px: [N, 2] in pixels, of each streak. A drop's area, over its way and width in
-    whole pixels, adds up to wide_px squared.
+    whole pixels, adds up to wide_px squared. times: how many drops each stands for.
     """
     height, width = depth_m.shape
     way = np.abs(way_px).max(axis=1)
@@ -133,7 +137,7 @@ def _streaks(
     across = (np.abs(way_px[:, :1]) > np.abs(way_px[:, 1:])) == [False, True]
     cover = np.zeros(height * width)
     thick = np.maximum(np.rint(wide_px), 1).astype(int)
-    share = np.minimum(wide_px**2 / (steps * thick), 1.0)
+    share = np.minimum(times * wide_px**2 / (steps * thick), 1.0)
     for side in range(int(thick.max(initial=1))):
         wide = thick[drop] > side
         which = drop[wide]

@@ -1,0 +1,93 @@
+"""What machines are like that nobody sets up on purpose."""
+
+import errno
+import os
+import shutil
+from collections import namedtuple
+from pathlib import Path
+
+import pytest
+
+from fastgen import artwork, cache
+from fastgen.dataset_json import shard_numbers
+from fastgen.errors import AssetError
+from fastgen.progress import Progress
+from fastgen.resources import asset_path
+from fastgen.shader_cache import spare_full_disk
+from fastgen.storage import Folder
+from fastgen.workers import in_words
+
+Disk = namedtuple("Disk", "f_bavail f_frsize")
+
+
+@pytest.mark.parametrize(("free_bytes", "switched"), [(1 << 20, "true"), (1 << 30, None)])
+def test_mesa_caches_nothing_on_a_disk_that_is_nearly_full(
+    monkeypatch, tmp_path, free_bytes, switched
+):
+    asked = []
+
+    def disk(place):
+        asked.append(place)
+        return Disk(free_bytes // 4096, 4096)
+
+    monkeypatch.setattr(os, "statvfs", disk)
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "not" / "yet"))
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "")
+    monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE")
+    spare_full_disk()
+    assert asked == [tmp_path]
+    assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == switched
+
+
+def test_a_user_without_a_home_caches_among_temporary_files(monkeypatch, tmp_path):
+    def no_home():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert cache.default_folder().parent == tmp_path
+    assert str(os.getuid()) in cache.default_folder().name
+
+
+def test_art_is_read_from_a_folder_whose_name_is_not_utf8(tmp_path):
+    source = next(asset_path("markers").rglob("*.png"))
+    folder = tmp_path / os.fsdecode(b"inst\xe9")
+    folder.mkdir()
+    copy = shutil.copy(source, folder)
+    ours = artwork._image(Path(copy), 4, None)
+    assert (ours == artwork._image(source, 4, None)).all()
+    Path(copy).write_bytes(b"")
+    with pytest.raises(AssetError, match="not a PNG"):
+        artwork._image(Path(copy), 4, None)
+
+
+class FullLog:
+    def isatty(self):
+        return False
+
+    def write(self, text):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def flush(self):
+        pass
+
+
+def test_a_log_that_takes_no_more_ends_no_run():
+    progress = Progress(10, stream=FullLog())
+    progress.add(10)
+    progress.close()
+
+
+def test_a_volume_of_its_own_is_an_empty_place(tmp_path):
+    (tmp_path / "lost+found").mkdir()
+    (tmp_path / "lost+found" / "#1").write_text("x")
+    assert Folder(tmp_path).names() == []
+    assert Folder(tmp_path).sizes() == {}
+    assert shard_numbers(Folder(tmp_path)) == []
+
+
+def test_too_little_memory_is_no_mistake_of_ours():
+    assert in_words(MemoryError(), "scene 3") == (
+        "scene 3: out of memory; give fewer workers or a smaller size"
+    )
