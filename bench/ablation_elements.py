@@ -207,8 +207,8 @@ ELEMENTS = (
         "shadow of the sun",
         text=(
             (
-                "float share = sun_share(depth * view_ray(place), normal, depth * pixel_angle);",
-                "float share = 1.0;",
+                "sun_seen = sun_share(depth * view_ray(place), normal, depth * pixel_angle);",
+                "sun_seen = 1.0;",
             ),
         ),
     ),
@@ -235,14 +235,14 @@ ELEMENTS = (
     Element(
         "light",
         "energy of multiple scattering",
-        text=(("float gain = 1.0 / all - 1.0;", "float gain = 0.0;"),),
+        text=(("float gain = 1.0 / (dfg.x + dfg.y) - 1.0;", "float gain = 0.0;"),),
     ),
     Element(
         "light",
         "reflections altogether",
         text=(
             (
-                "return diffuse * around + specular * mirrored;",
+                "return r.diffuse * around + specular * mirrored;",
                 "return m.albedo * (1.0 - m.metallic) * around;",
             ),
         ),
