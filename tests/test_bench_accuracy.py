@@ -13,10 +13,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
 
 import ablation_elements
 import cycles_figures
+import image_error
 import pareto_chart
 import reference_set
+from reference_set import FILTERS
 
-from fastgen import programs
+from fastgen import Config, Generator, programs
 from fastgen.container import build_container
 from fastgen.mesh import FACE_AXES
 from fastgen.resources import shader_path
@@ -193,3 +195,26 @@ def test_without_an_error_measure_one_line_says_what_to_install():
     assert done.returncode == 1
     assert "pip install '.[accuracy]'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    with Generator(
+        Config.preset(), reference_set.SEED, reference_set.SIZE, quality="high"
+    ) as generator:
+        yield generator
+
+
+@pytest.mark.parametrize(("number", "apart"), [(3, 3.5), (5, 5.0), (8, 3.0), (11, 2.5), (14, 5.5)])
+def test_an_image_is_what_a_path_tracer_makes_of_its_scene(renderer, number, apart):
+    """Light, layers, damage and metering together, in steps of 255: clean in the sun, rusty in the
+    sun, clean and overcast, clean in the sun, rusty at dusk."""
+    case, reference = reference_set.cases()[number], reference_set.load(number)
+    scene = reference.scene
+    ours = renderer.render(scene=scene, camera=case.camera).image
+    exposure = renderer.exposure(scene, scene.camera(case.camera))
+    expected = 255 * image_error.displayed(reference.radiance[FILTERS["high"]], exposure)
+    difference = (expected - ours)[reference.inside]
+    assert np.abs(difference).mean() < apart
+    assert np.abs(difference.mean(axis=0)).max() < 3.5
+    assert expected[reference.inside].std() > 15

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fastgen import Config, Generator
 from fastgen.camera import FAR_M, NEAR_M, view_of
 from fastgen.scene import Camera
 
@@ -73,3 +74,22 @@ def test_straight_down_has_a_view_too():
     view = view_of(camera(position_mm=(0, 0, 9000), target_mm=(0, 0, 0)), SIZE)
     np.testing.assert_allclose(view.rotation @ view.rotation.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(view.rotation) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("face", ["front", "back", "door", "no_door"])
+def test_a_rig_turns_to_the_right_and_lifts(face):
+    """Seen from the camera that looks straight at the face, from where it would stand."""
+    still = {"target_shift_mm": 0, "roll_deg": 0, "distance_mm": 9000, "focal_mm": 20}
+
+    def placed(**angles):
+        angles = {"azimuth_deg": 0, "elevation_deg": 0, **angles}
+        rig = {"T": {"face": face, **still, **angles}}
+        return Generator(Config.from_values({"cameras": rig}), seed=1).scene(0).camera("T")
+
+    right, down, forward = view_of(placed(), (64, 64)).rotation
+    first = np.array(placed().position_mm)
+    turned = np.array(placed(azimuth_deg=30).position_mm) - first
+    lifted = np.array(placed(elevation_deg=30).position_mm) - first
+    for moved, toward in ((turned, right), (lifted, -down)):
+        assert moved @ toward == pytest.approx(4500, abs=1)
+        assert moved @ forward == pytest.approx(9000 * (1 - np.cos(np.pi / 6)), abs=1)
