@@ -72,7 +72,8 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel), balanced (four, filtered
     with the neighbours'), or high (nine, and materials from five points or more).
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
-    first that works. Use it from one thread, and make one in each process. Where a driver's
+    first that works. Use it from one thread, and close it there (closed in another, on EGL its
+    memory is not free before the process ends); make one in each process. Where a driver's
     textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a height of
     2730 only. An image much taller than wide takes more memory than one lying, see
     sample_lattice.py.
