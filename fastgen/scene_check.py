@@ -120,14 +120,14 @@ def _check_decal(decal: Decal, path: str) -> None:
         for char in decal.text:
             if char != " ":
                 check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
-    elif decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
+    if decal.kind in _ART_KINDS and decal.art != "stripes":
+        check_known(f"{path}.art", decal.art, art_images()[1])
+    if decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
         width, height = decal.size_mm
         raise ConfigError(
             f"{path}.size_mm: a marker is a square that stands on its corner; {width:g} and "
             f"{height:g} differ"
         )
-    if decal.kind in _ART_KINDS and decal.art != "stripes":
-        check_known(f"{path}.art", decal.art, art_images()[1])
 
 
 def _check_damage(damage: Damage, path: str) -> None:

@@ -54,3 +54,23 @@ def test_a_sky_of_other_colours_is_an_image_of_other_colours(generator, camera, 
     assert np.abs(image - first).mean() > 10
     # each of some steps rounds to 8 bits
     assert np.abs(image - first[..., order]).max() <= 6
+
+
+@pytest.mark.parametrize(("camera", "follows"), [("A", True), ("B", False)])
+def test_exposure_follows_the_light_on_the_side_that_is_seen(tmp_path, camera, follows):
+    """A lamp before the front, out of sight of both cameras, made sixteen times as bright."""
+    toward = texel_grid(128)[0]
+    lamp = np.maximum(toward @ [0.0, -0.6, 0.8] - 0.9, 0)[..., None] * np.ones(3)
+    for name, times in (("dim", 1.0), ("bright", 16.0)):
+        write_exr(tmp_path / f"{name}.exr", (0.02 + times * lamp).astype(np.float32))
+    with Generator(Config.preset(), 7, (64, 64), hdri_dir=tmp_path) as made:
+        scene = made.scene(3)
+        dim, bright = (
+            made.exposure(
+                replace(scene, environment=replace(scene.environment, name=name, yaw_deg=0.0)),
+                scene.camera(camera),
+            )
+            for name in ("dim", "bright")
+        )
+    assert bright <= dim
+    assert (bright < 0.5 * dim) == follows
