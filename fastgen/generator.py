@@ -72,14 +72,13 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel), balanced (four, filtered
     with the neighbours'), or high (nine, and materials from five points or more).
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
-    first that works. Use it from one thread, and close it there (closed in another, on EGL its
-    memory is not free before the process ends); make one in each process. Where a driver's
+    first that works. One thread at a time may use it; make one in each process. Where a driver's
     textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a height of
     2730 only. An image much taller than wide takes more memory than one lying, see
     sample_lattice.py.
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that
-    was dropped unclosed held is freed when the thread that used it next opens another.
+    was dropped unclosed held is freed when the next opens one.
     Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
     """
 
@@ -149,12 +148,14 @@ class Generator:
     @property
     def renderer_name(self) -> str:
         """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
-        return self._gpu.context().renderer
+        with self._gpu.drawing():
+            return self._gpu.context().renderer
 
     @property
     def used_backend(self) -> str:
         """Which backend 'auto' came to: egl or osmesa."""
-        return self._gpu.context().backend
+        with self._gpu.drawing():
+            return self._gpu.context().backend
 
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
@@ -188,10 +189,10 @@ class Generator:
         with self._gpu.drawing() as renderer:
             frame = renderer.render(scene, camera, self.size, layer)
             if layer == "all" and is_needed(camera, scene.weather):
-                airlight = self._airlight(scene, camera)
+                airlight = self._airlight(renderer, scene, camera)
                 frame = develop(frame, view, camera, scene.weather, airlight)
             mesh = renderer.mesh(scene.container)
-            seen_normals = self._normals(frame, scene, camera, view) if normals else None
+            seen_normals = self._normals(renderer, frame, scene, camera, view) if normals else None
         config = self.config if labels is None else replace(self.config, labels=labels)
         spreader = spreader_outline(scene, camera.lens is not None)
         objects = label(Shot(frame, scene, view, mesh, spreader, config))
@@ -208,20 +209,20 @@ class Generator:
             normals=seen_normals,
         )
 
-    def _airlight(self, scene: Scene, camera: Camera) -> Color:
+    def _airlight(self, renderer: Renderer, scene: Scene, camera: Camera) -> Color:
         """Mean light from around in the camera's exposure, no more than its meter would admit."""
-        light = self._gpu.renderer().ambient(scene.environment.name)
+        light = renderer.ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
-        mean = mean * self.exposure(scene, camera)
+        mean = mean * renderer.exposure(scene, camera, self.size)
         red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
         return red, green, blue
 
     def _normals(
-        self, frame: Frame, scene: Scene, camera: Camera, view: View
+        self, renderer: Renderer, frame: Frame, scene: Scene, camera: Camera, view: View
     ) -> NDArray[np.float32]:
         """From the layer that shows them, where 0..255 stands for -1..1 along the world's axes."""
-        shown = self._gpu.renderer().render(scene, camera, self.size, "normals").image
+        shown = renderer.render(scene, camera, self.size, "normals").image
         world = shown.astype(np.float32) / 127.5 - 1
         normals = (world @ view.rotation.T.astype(np.float32)).astype(np.float32)
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
@@ -248,7 +249,8 @@ class Generator:
 
     def cuda_reason(self) -> str:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
-        return cuda_reason(self._gpu.context())
+        with self._gpu.drawing():
+            return cuda_reason(self._gpu.context())
 
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
         """All material layers of a scene's container as textures; texel_mm: width of a texel.

@@ -70,8 +70,9 @@ class GLContext:
     """A current OpenGL context. A context manager: leaving it releases the context.
 
     ctx: moderngl.Context. backend: 'egl' or 'osmesa'. renderer, vendor, version: the driver's
-    own words. Use it from the thread that made it. Several may live at once, of both backends:
-    call `make_current` before going on with one, and before freeing what was made through `ctx`.
+    own words. One thread at a time uses it: `let_go` hands it on. Several may live at once, of
+    both backends: call `make_current` before going on with one, and before freeing what was made
+    through `ctx`.
     """
 
     def __init__(self, native: _Native, backend: str) -> None:
@@ -106,6 +107,13 @@ class GLContext:
         Costs nothing where it is current already. Raises ContextError after a release.
         """
         self._native.__enter__()
+
+    def let_go(self) -> None:
+        """Leave this thread without it, so that another may make it current.
+
+        Does nothing where it is not current.
+        """
+        self._native.__exit__()
 
     def release(self) -> None:
         """Free the context; a second call does nothing.
@@ -232,8 +240,6 @@ class _Egl:
         self._got("eglMakeCurrent", self._make_current(display, None, None, context))
 
     def destroy(self, display: int, context: int) -> None:
-        if self.current() == context:
-            self.make_current(display, None)
         self._destroy(display, context)
 
     def _call(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
@@ -273,10 +279,12 @@ class _EglContext:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._egl.make_current(self._display, None)
+        if self._handle is not None and self._egl.current() == self._handle:
+            self._egl.make_current(self._display, None)
 
     def release(self) -> None:
         if self._handle is not None:
+            self.__exit__()
             self._egl.destroy(self._display, self._handle)
             self._handle = None
 

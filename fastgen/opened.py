@@ -1,8 +1,7 @@
-"""What a Generator holds on the GPU: opened when asked for, freed by the thread that used it."""
+"""What a Generator holds on the GPU: opened when asked for, current only while it draws."""
 
 import contextlib
 import os
-import threading
 from collections.abc import Callable, Iterator
 
 from fastgen.cuda import CudaFrames
@@ -10,10 +9,10 @@ from fastgen.errors import ContextError, FastgenError
 from fastgen.gl import GLContext
 from fastgen.renderer import Renderer
 
-_Left = tuple[int, int, GLContext, Renderer | None, CudaFrames | None]
+_Left = tuple[int, GLContext, Renderer | None, CudaFrames | None]
 
 _left: list[_Left] = []
-"""Process and thread that used what was dropped unclosed, and what that held."""
+"""Process that used what was dropped unclosed, and what that held."""
 
 
 class Opened:
@@ -21,7 +20,7 @@ class Opened:
 
     open_gl, make: open the one and make the other; bound to nothing that holds this, so that what
     is dropped is gone at once. What was opened before a fork stays the parent's: the child opens
-    its own. What was dropped unclosed is freed when the thread that used it opens another.
+    its own. What was dropped unclosed is freed when another is opened.
     """
 
     def __init__(
@@ -32,18 +31,18 @@ class Opened:
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
-        self._process, self._thread = 0, 0
+        self._process = 0
 
     def renderer(self) -> Renderer:
         """The renderer, its context current. Raises ContextError without OpenGL."""
         if self._process != os.getpid():
             self.close()
         if self._renderer is None:
-            self._process, self._thread = os.getpid(), threading.get_ident()
-            for each in [each for each in _left if each[:2] == (self._process, self._thread)]:
-                _left.remove(each)
-                with contextlib.suppress(ContextError):  # no fault of who opens another
-                    _free(*each[2:])
+            self._process = os.getpid()
+            for each in [each for each in _left if each[0] == self._process]:
+                with contextlib.suppress(ValueError):  # another thread was quicker
+                    _left.remove(each)
+                    _free_quietly(*each[1:])
             self._gl = self._open_gl()
             try:
                 self._renderer = self._make(self._gl)
@@ -70,8 +69,9 @@ class Opened:
 
     @contextlib.contextmanager
     def drawing(self) -> Iterator[Renderer]:
-        """The renderer, to draw with. What stops that half way, as Ctrl-C does, closes all: nobody
-        knows what stands on the GPU then, and the next draw would build on it."""
+        """The renderer, to draw with; afterwards any thread may. Not to be nested. What stops that
+        half way, as Ctrl-C does, closes all: nobody knows what stands on the GPU then, and the next
+        draw would build on it."""
         try:
             yield self.renderer()
         except FastgenError:  # refused, not stopped
@@ -79,6 +79,9 @@ class Opened:
         except BaseException:
             self.close()
             raise
+        finally:
+            if self._gl is not None:
+                self._gl.let_go()
 
     def close(self) -> None:
         """Free the renderer and its context; asked for again, they are opened again."""
@@ -86,21 +89,21 @@ class Opened:
         # first, so that nothing goes on with what is freed in part
         self._cuda, self._renderer, self._gl = None, None, None
         if self._process == os.getpid() and gl is not None:
-            # one that another thread holds, even one that ended, goes with the process
-            with contextlib.suppress(ContextError):
-                _free(gl, *held)
+            _free_quietly(gl, *held)
 
     def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
         # not freed here, perhaps in the middle of another's render: that switches contexts
         gl = getattr(self, "_gl", None)
         if gl is not None and self._process == process():
-            left.append((self._process, self._thread, gl, self._renderer, self._cuda))
+            left.append((self._process, gl, self._renderer, self._cuda))
 
 
-def _free(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
-    gl.make_current()  # else what has the same names in another context is freed
-    if cuda is not None:
-        cuda.release()
-    if renderer is not None:
-        renderer.release()
-    gl.release()
+def _free_quietly(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
+    """Free what nobody will use again; what another thread draws with goes with the process."""
+    with contextlib.suppress(ContextError):
+        gl.make_current()  # else what has the same names in another context is freed
+        if cuda is not None:
+            cuda.release()
+        if renderer is not None:
+            renderer.release()
+        gl.release()
