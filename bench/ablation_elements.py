@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastgen import openness, programs, shapes
 from fastgen.mesh import FACE_AXES, Mesh
 from fastgen.scene import Scene, Spreader
+from fastgen.sky_probe import SkyProbe
 
 MeshEdit = Callable[[Mesh], Mesh]
 Light = NDArray[np.uint8]
@@ -68,7 +69,7 @@ class Absence:
                 yield shapes, name, _built(getattr(shapes, name), element.container)
         if element.spreader:
             yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
-        probe = openness.SkyProbe
+        probe = SkyProbe
         yield probe, "openness", _probe(probe.openness, element.open_sky)
         yield probe, "openness_of_spreader", _probe(probe.openness_of_spreader, element.open_sky)
 
@@ -108,7 +109,7 @@ def _probe(measured: Callable[..., Light], open_sky: bool) -> Callable[..., Ligh
     """In place of a method of SkyProbe that gives the first mesh's openness beside the second: what
     it finds for the unedited meshes, or no occlusion at all."""
 
-    def found(self: openness.SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> Light:
+    def found(self: SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> Light:
         if open_sky:
             return _all_open(mesh)
         return measured(

@@ -80,7 +80,7 @@ class GpuMesh:
         return Clusters(self.mesh)
 
     def set_openness(self, values: NDArray[np.uint8]) -> None:
-        """Let the next draws have `values`, of openness.SkyProbe; until then all sky is open."""
+        """Let the next draws have `values`, of sky_probe.SkyProbe; until then all sky is open."""
         if self._shown is None or self._shown() is not values:
             self._openness.write(values)
             self._shown = weakref.ref(values)  # many meshes wait for their turn

@@ -12,9 +12,10 @@ from fastgen.gpu_mesh import GpuMesh, chart_table
 from fastgen.kept import Kept
 from fastgen.mesh import Mesh
 from fastgen.occluders import Body, without_cables
-from fastgen.openness import Sky, SkyProbe
+from fastgen.openness import Sky
 from fastgen.programs import SPREADER_CHART
 from fastgen.scene import Container, Scene
+from fastgen.sky_probe import SkyProbe
 from fastgen.spreader import build_spreader
 from fastgen.spreader_parts import CUT_MM
 

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import Config, Generator, openness
+from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container
 from fastgen.environment import Ambient, prefilter_environment
@@ -13,14 +13,13 @@ from fastgen.gl import open_context
 from fastgen.openness import (
     Openness,
     Sky,
-    SkyProbe,
     encoded,
     lobe_masks,
     open_sky,
-    probe_points,
     sky_directions,
 )
 from fastgen.shapes import spreader_mesh
+from fastgen.sky_probe import SkyProbe, probe_points
 from fastgen.spreader import build_spreader
 
 
@@ -208,7 +207,7 @@ def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
     def never(*_: object) -> None:
         raise AssertionError("probed again")
 
-    monkeypatch.setattr(openness.SkyProbe, "_open_to", never)
+    monkeypatch.setattr(SkyProbe, "_open_to", never)
     again = SkyProbe(gl.ctx).openness(container, spreader, even_sky)
     np.testing.assert_array_equal(again, first)
 

@@ -14,9 +14,9 @@ from fastgen.damage import deform
 from fastgen.environment import irradiance_at, load_environment, prefilter_environment
 from fastgen.gl import open_context
 from fastgen.occluders import without_cables
-from fastgen.openness import probe_points
 from fastgen.programs import link
 from fastgen.scene import Camera, Damage, EnvironmentView, Spreader
+from fastgen.sky_probe import probe_points
 from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.sun import split_sun
 from fastgen.sun_shadow import MAP_SIZE, ShadowMap
