@@ -8,16 +8,14 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastgen import openness, programs, shapes
+from fastgen.interreflection import FormFactors
 from fastgen.mesh import FACE_AXES, Mesh
 from fastgen.scene import Scene, Spreader
-from fastgen.sky_probe import SkyProbe
+from fastgen.sky_probe import Lit, SkyProbe
 
 MeshEdit = Callable[[Mesh], Mesh]
-Light = NDArray[np.uint8]
-"""As openness.Openness.under gives it."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +31,8 @@ class Element:
     container: MeshEdit | None = None
     spreader: MeshEdit | None = None
     open_sky: bool = False
+    thrown: bool = True
+    """Whether surfaces throw light on the spreader."""
 
 
 class Absence:
@@ -69,9 +69,10 @@ class Absence:
                 yield shapes, name, _built(getattr(shapes, name), element.container)
         if element.spreader:
             yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
-        probe = SkyProbe
-        yield probe, "openness", _probe(probe.openness, element.open_sky)
-        yield probe, "openness_of_spreader", _probe(probe.openness_of_spreader, element.open_sky)
+        for name in ("openness", "openness_of_spreader"):
+            yield SkyProbe, name, _probe(getattr(SkyProbe, name), element.open_sky)
+        if not element.thrown:
+            yield FormFactors, "thrown", lambda _, own, *others: np.zeros_like(own)
 
     def _edited(self, expand: Callable[..., str]) -> Callable[..., str]:
         def edited(*args: Any, **kwargs: Any) -> str:
@@ -97,26 +98,28 @@ def _edited_mesh(mesh: Mesh, edit: MeshEdit) -> Mesh:
 
 
 def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
-    return lambda *args: _edited_mesh(build(*args), edit)
+    return lambda *args, **named: _edited_mesh(build(*args, **named), edit)
 
 
 @lru_cache(maxsize=64)
-def _all_open(mesh: Mesh) -> Light:
-    return openness.open_sky(mesh.normals)
+def _all_open(mesh: Mesh) -> Lit:
+    return Lit(mesh, openness.open_sky(mesh.normals), np.zeros(mesh.normals.shape, np.float32))
 
 
-def _probe(measured: Callable[..., Light], open_sky: bool) -> Callable[..., Light]:
-    """In place of a method of SkyProbe that gives the first mesh's openness beside the second: what
-    it finds for the unedited meshes, or no occlusion at all."""
+def _probe(measured: Callable[..., Lit], open_sky: bool) -> Callable[..., Lit]:
+    """In place of a method of SkyProbe that lights the first of some meshes: what it finds for the
+    unedited ones, or no occlusion at all."""
 
-    def found(self: SkyProbe, mesh: Mesh, other: Mesh | None, sky: openness.Sky) -> Light:
+    def found(self: SkyProbe, mesh: Mesh, *others: Any) -> Lit:
         if open_sky:
             return _all_open(mesh)
-        return measured(
-            self, _SOURCES.get(mesh, mesh), _SOURCES.get(other, other) if other else None, sky
-        )
+        return measured(self, *(_unedited(item) for item in (mesh, *others)))
 
     return found
+
+
+def _unedited(item: Any) -> Any:
+    return _SOURCES.get(item, item) if isinstance(item, Mesh) else item
 
 
 def without_charts(*words: str) -> MeshEdit:
@@ -223,6 +226,7 @@ ELEMENTS = (
             ),
         ),
     ),
+    Element("light", "light from surfaces on the spreader", thrown=False),
     Element(
         "light",
         "occlusion of reflections",

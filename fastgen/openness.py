@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.distinct import distinct_rows
-from fastgen.environment import Ambient, sky_irradiance, sky_radiance
+from fastgen.environment import Ambient, sky_irradiance, sky_radiance, to_map_frame
 from fastgen.prefilter import octahedral_decode
 from fastgen.programs import LIGHT_STEPS
 
@@ -102,7 +102,7 @@ def _encoded_part(n: NDArray[np.float32], open_to: Directions) -> Array:
 
 @dataclass(frozen=True)
 class Sky:
-    """An environment's light without its sun, turned by yaw_deg."""
+    """An environment's light, turned by yaw_deg."""
 
     light: Ambient
     yaw_deg: float
@@ -129,15 +129,17 @@ class Openness:
         _, first, which = np.unique(packed, return_index=True, return_inverse=True)
         self._cones, self._which = cone[first], _narrow(which)
 
-    def under(self, sky: Sky) -> NDArray[np.uint8]:
-        """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
-        comes in, and open_to.
+    @property
+    def open_to(self) -> Directions:
+        """Whether each vertex is open to each direction."""
+        return np.unpackbits(self._open_to.T, axis=1).astype(bool)
 
-        Of light there is, as LIGHT_STEPS r, the ratio r of two irradiances in each channel: of
-        what reaches a vertex from where the sky is open, to that of a whole sky about the cone's
-        direction, which is what the shader looks up. The first is a part of the irradiance about
-        the normal: that of the open ones in sums over all directions. Of such sums over eight
-        directions at a time there are 256 for each normal: a byte of open_to finds its own.
+    def irradiance(self, sky: Sky) -> NDArray[np.float32]:
+        """Irradiance / pi, [V, 3], from where `sky` is open, without its sun.
+
+        It is a part of the irradiance about the normal: that of the open ones in sums over all
+        directions. Of such sums over eight directions at a time there are 256 for each normal: a
+        byte of open_to finds its own.
         """
         toward = sky_directions()
         radiance = np.maximum(sky_radiance(sky.light, toward, sky.yaw_deg), _DARK)
@@ -152,22 +154,46 @@ class Openness:
         row = 256 * self._number.astype(np.intp)
         for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
             total += np.take(table, row + bits)
-        about_normal = _directions(open_sky(self._normals)[:, :3])
-        step = LIGHT_STEPS / _WHOLE * self._irradiance(sky, about_normal)
-        about_cone = self._irradiance(sky, _directions(self._cones))
-        found = np.full((len(total), VERTEX_BYTES), 255, np.uint8)
-        found[:, :3] = np.take(self._cones, self._which, axis=0)
+        step = self._whole(sky, _directions(open_sky(self._normals)[:, :3])) / _WHOLE
+        found = np.empty((len(total), 3), np.float32)
         for channel in range(3):
             share = (total & (2 * _WHOLE - 1)).astype(np.float32)
             total >>= _FIELD_BITS
-            share *= np.take(step[:, channel], self._number)
-            share /= np.take(about_cone[:, channel], self._which)
-            found[:, 4 + channel] = np.minimum(share + 0.5, 255)  # rounds
+            np.multiply(share, np.take(step[:, channel], self._number), out=found[:, channel])
+        return found
+
+    def sunlight(self, sky: Sky) -> NDArray[np.float32]:
+        """As `irradiance`, from the sun alone, which is as open as the directions about it."""
+        sun = sky.light.sun
+        if sun is None:
+            return np.zeros((len(self._number), 3), np.float32)
+        toward = to_map_frame(sun.direction, -sky.yaw_deg)
+        nearest = np.argsort(-sky_directions() @ toward)[:_LOBE]
+        bits = [self._open_to[k >> 3] >> (7 - (k & 7)) & 1 for k in nearest.tolist()]
+        cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
+        share = cosine[self._number] * np.sum(bits, axis=0, dtype=np.float32) / _LOBE
+        return share[:, None] * np.array(sun.light, np.float32)
+
+    def under(self, sky: Sky, light: NDArray[np.floating] | None = None) -> NDArray[np.uint8]:
+        """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
+        comes in, and open_to.
+
+        light: irradiance / pi [V, 3], by default that from the sky. There is, as LIGHT_STEPS r, the
+        ratio r in each channel to the irradiance of a whole sky about the cone's direction, which
+        is what the shader looks up.
+        """
+        light = self.irradiance(sky) if light is None else light
+        step = LIGHT_STEPS / self._whole(sky, _directions(self._cones))
+        found = np.full((len(light), VERTEX_BYTES), 255, np.uint8)
+        found[:, :3] = np.take(self._cones, self._which, axis=0)
+        for channel in range(3):
+            steps = light[:, channel] * np.take(step[:, channel], self._which)
+            found[:, 4 + channel] = np.minimum(steps + 0.5, 255)  # rounds
         found[:, 8:] = self._open_to.T
         return found
 
     @staticmethod
-    def _irradiance(sky: Sky, toward: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _whole(sky: Sky, toward: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.maximum(sky_irradiance(sky.light, toward, sky.yaw_deg), _DARK)
 
 

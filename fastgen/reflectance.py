@@ -29,6 +29,16 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
     return cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
 
 
+def mean_specular_albedo(f0: float, roughness: float) -> float:
+    """What a surface mirrors of light that is even all around: its specular albedo, averaged over
+    the cosine-weighted hemisphere."""
+    table = dfg_table()
+    size = len(table)
+    scale, bias = table[min(int(roughness * size), size - 1)].T
+    n_dot_v = (np.arange(size) + 0.5) / size
+    return float(np.average(scale * f0 + bias, weights=n_dot_v))
+
+
 def _integrated(size: int) -> NDArray[np.float32]:
     center = (np.arange(size) + 0.5) / size
     n_dot_v = center[:, None]

@@ -18,6 +18,7 @@ from fastgen.scene import Container, Scene
 from fastgen.sky_probe import SkyProbe
 from fastgen.spreader import build_spreader
 from fastgen.spreader_parts import CUT_MM
+from fastgen.surface_values import reflectances
 
 
 class Shapes:
@@ -42,11 +43,17 @@ class Shapes:
         mesh, spreader = self.container(scene.container), self.spreader(scene, bent)
         usual = _shading_spreader(scene)
         sky = Sky(light, scene.environment.yaw_deg)
-        mesh.set_openness(self._probe.openness(mesh.mesh, usual, sky))
+        below = self._probe.openness(mesh.mesh, usual, sky)
+        mesh.set_openness(below.values)
         if spreader is not None and usual is not None:
-            held = container_outline(scene.container.kind)
             shape = spreader.mesh if bent else usual  # with vertices of its own
-            spreader.set_openness(self._probe.openness_of_spreader(shape, held, sky))
+            outline = spreader_outline(scene, False) if bent else _shading_spreader(scene, np.inf)
+            held = container_outline(scene.container.kind)
+            assert outline is not None
+            lit = self._probe.openness_of_spreader(
+                shape, outline, held, below, sky, reflectances(scene)
+            )
+            spreader.set_openness(lit.values)
         return mesh, spreader
 
     def container(self, container: Container) -> GpuMesh:
@@ -104,8 +111,10 @@ def shadow_casters(scene: Scene) -> tuple[Mesh, Body | None]:
     return shape(box.kind, box.profiles), None if spreader is None else without_cables(spreader)
 
 
-def _shading_spreader(scene: Scene) -> Mesh | None:
+def _shading_spreader(scene: Scene, cut_mm: float = CUT_MM) -> Mesh | None:
     """What hides the sky from the container. At its usual gap: a centimetre more or less cannot be
-    seen in the shade, and every other shape costs half a second once."""
+    seen in the shade, and every other shape costs a second once."""
     held = scene.spreader
-    return build_spreader(scene.container.kind, held.flippers_down) if held.present else None
+    if not held.present:
+        return None
+    return build_spreader(scene.container.kind, held.flippers_down, cut_mm=cut_mm)

@@ -4,14 +4,16 @@ around: a point is hidden from a direction where a face of an occluders.DepthMap
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import cache
+from fastgen.interreflection import Cells, FormFactors, form_factors
 from fastgen.kept import Recent
-from fastgen.mesh import Mesh
+from fastgen.mesh import MATERIALS, Mesh
 from fastgen.occluders import DepthMap, DrawnBody, Solid, map_matrix, without_cables
 from fastgen.openness import DIRECTIONS, Array, Directions, Openness, Sky, encoded, sky_directions
 from fastgen.programs import link
@@ -36,6 +38,9 @@ _INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
 
+Paints = tuple[tuple[float, float, float], ...]
+"""What each of mesh.MATERIALS reflects of diffuse light."""
+
 _CAPACITY = 128
 _LIT_CAPACITY = 2  # a scene asks for two, once a camera
 
@@ -55,6 +60,26 @@ def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
     return positions + inset + _LIFT_MM * mesh.normals
 
 
+def _spreader_points(spreader: Mesh) -> Array:
+    # its faces are long and run into one another: their ends stand for nothing
+    return probe_points(spreader, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Lit:
+    """A mesh in its light. values: `Openness.under` its sky, uint8 [V, VERTEX_BYTES]. irradiance:
+    [V, 3], / pi, the sun's included."""
+
+    mesh: Mesh
+    values: NDArray[np.uint8]
+    irradiance: NDArray[np.float32]
+
+
+def _lit(mesh: Mesh, openness: Openness, sky: Sky) -> Lit:
+    light = openness.irradiance(sky)
+    return Lit(mesh, openness.under(sky, light), light + openness.sunlight(sky))
+
+
 class SkyProbe:
     """Finds the openness of meshes on one GL context. Owned by the renderer, which releases it."""
 
@@ -65,24 +90,57 @@ class SkyProbe:
         self._program = link(ctx, "occluder.vert", "occluder.frag", {})
         self._own: Recent[NDArray[np.uint8]] = Recent(_CAPACITY)
         self._found: Recent[Openness] = Recent(_CAPACITY)
-        self._lit: Recent[NDArray[np.uint8]] = Recent(_LIT_CAPACITY)
+        self._factors: Recent[FormFactors] = Recent(_CAPACITY)
+        self._cells: Recent[Cells] = Recent(_CAPACITY)
+        self._lit: Recent[Lit] = Recent(_LIT_CAPACITY)
 
-    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> NDArray[np.uint8]:
-        """`Openness.under` a sky of a container's vertices below the spreader that holds it.
-        Asked again at once, it gives the same array."""
+    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> Lit:
+        """Of a container below the spreader that holds it. Asked again at once, it gives the same
+        object."""
         key = (container, spreader)
-        return self._under(sky, key, lambda: self._of_container(container, spreader))
+        openness = self._opened(key, lambda: self._of_container(container, spreader))
+        return self._lit.get((openness, sky), lambda: _lit(container, openness, sky))
 
-    def openness_of_spreader(self, spreader: Mesh, container: Mesh, sky: Sky) -> NDArray[np.uint8]:
-        """As `openness`, of a spreader's vertices above the container that it holds."""
-        key = (spreader, container)
-        return self._under(sky, key, lambda: self._of_spreader(spreader, container))
+    def openness_of_spreader(
+        self, spreader: Mesh, outline: Mesh, held: Mesh, below: Lit, sky: Sky, paints: Paints
+    ) -> Lit:
+        """As `openness`, of a spreader above a container, with the light that surfaces throw on it.
 
-    def _under(
-        self, sky: Sky, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
-    ) -> NDArray[np.uint8]:
-        openness = self._found.get(key, lambda: self._stored(key, measure))
-        return self._lit.get((openness, sky), lambda: openness.under(sky))
+        outline: the same surface of as few triangles as can be. held: what of the container hides
+        the sky. below: the container in its light. paints: what all materials reflect.
+        """
+        openness = self._opened((spreader, held), lambda: self._of_spreader(spreader, held))
+
+        def lit() -> Lit:
+            factors = self._factors.get(
+                (openness, outline),
+                lambda: form_factors(
+                    spreader,
+                    without_cables(outline),
+                    held,
+                    _spreader_points(spreader),
+                    sky_directions(),
+                    ~openness.open_to,
+                ),
+            )
+            cells = self._cells.get((below.mesh, held), lambda: Cells.of(below.mesh, held))
+            sheet = np.array(paints[MATERIALS.index("paint_sheet")])
+            reflectance = np.array(paints)[[chart.material_index for chart in spreader.charts]]
+            light = openness.irradiance(sky)
+            light += factors.thrown(
+                light + openness.sunlight(sky),
+                sheet * cells.mean(below.irradiance),
+                reflectance[spreader.chart],
+            )
+            light /= factors.known[:, None]
+            return Lit(spreader, openness.under(sky, light), light)
+
+        return self._lit.get((openness, sky, below, paints), lit)
+
+    def _opened(
+        self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
+    ) -> Openness:
+        return self._found.get(key, lambda: self._stored(key, measure))
 
     def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
@@ -101,8 +159,7 @@ class SkyProbe:
         return Openness(normals, stored[:, 3:], stored[:, :3])
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
-        # its faces are long and run into one another: their ends stand for nothing
-        points = probe_points(spreader, np.inf)
+        points = _spreader_points(spreader)
         own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
         below = self._kept(container, points, _COARSE_SIZE)
         return own & below

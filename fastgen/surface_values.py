@@ -9,8 +9,9 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import SPREADER_CHART, noise_deviation
-from fastgen.scene import Damage, Scene, Spreader, Surface
+from fastgen.programs import DIELECTRIC_F0, SPREADER_CHART, noise_deviation
+from fastgen.reflectance import mean_specular_albedo
+from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm
 
 _TILE_OF_SCALE = 4.0
@@ -40,6 +41,19 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
     base = np.array([[*np.asarray(rows[m][0]), rows[m][1]] for m in MATERIALS], np.float32)
     trait = np.array([[*rows[m][2:], 0.0] for m in MATERIALS], np.float32)
     return base, trait
+
+
+def reflectances(scene: Scene) -> tuple[Color, ...]:
+    """What each of MATERIALS gives back, rust included, of light from all around."""
+    rust = scene.surface.rust
+    found = []
+    for base, trait in zip(*_materials(scene.surface, scene.spreader), strict=True):
+        rusty = min(rust.coverage * float(trait[1]), 1.0)
+        albedo = (1 - rusty) * base[:3] + rusty * np.array(rust.albedo)
+        mirrored = mean_specular_albedo(DIELECTRIC_F0, float(base[3]))
+        red, green, blue = (mirrored + (1 - mirrored) * albedo).tolist()
+        found.append((red, green, blue))
+    return tuple(found)
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:

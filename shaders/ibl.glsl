@@ -35,13 +35,15 @@ vec3 background(vec3 direction) {
 }
 
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
-// its irradiance from there, relative to that of a whole sky about that direction, and the share
-// that is open about where it mirrors the eye's ray
+// its irradiance from there, relative to that of a whole sky about that direction, the share that is
+// open about where it mirrors the eye's ray, and whether `light` lacks what comes from what hides the
+// sky, 1 or 0
 struct Openness {
     vec3 direction;
     float rim;
     vec3 light;
     float mirrored;
+    float bounces;
 };
 
 // Light that gets here by way of what hides the sky, which is taken for the same paint: Jimenez et
@@ -74,7 +76,7 @@ vec3 lit(Reflector r, Openness sky) {
     vec3 mirror = reflect(-r.view, r.normal);
     mirror = normalize(mix(mirror, r.normal, m.roughness * m.roughness * m.roughness));
     float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - r.n_dot_v));
-    vec3 around = diffuse_radiance(sky.direction) * (sky.light + bounced(sky, m.albedo));
+    vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky, m.albedo));
     // where the sky is hidden the mirror shows the paint that hides it
     vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, width),
                         open_lobe(sky, mirror, m.roughness));

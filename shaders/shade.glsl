@@ -41,13 +41,14 @@ struct Shaded {
     float cover;   // share of the pixel that is no sky
 };
 
-// as openness.py encodes it
-Openness openness_at(ivec2 sample_at) {
+// as openness.py encodes it; interreflection.py has found what surfaces throw on the spreader
+Openness openness_at(ivec2 sample_at, uint chart) {
     vec4 stored = texelFetch(openness_points, sample_at, 0);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
     vec3 light = texelFetch(light_points, sample_at, 0).rgb * (255.0 / LIGHT_STEPS);
-    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w);
+    float bounces = chart < SPREADER_CHART ? 1.0 : 0.0;
+    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -142,7 +143,7 @@ Material mean_of(Material sum, float count) {
 
 vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec3 normal = key_normal(key);
-    Openness sky = openness_at(sample_at);
+    Openness sky = openness_at(sample_at, key_chart(key));
 #if WITH_DAMAGE
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);

@@ -164,7 +164,7 @@ def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
     container = build_container(kind)
     spreader = build_spreader(kind) if held else None
     probe = SkyProbe(gl.ctx)
-    found = probe.openness(container, spreader, even_sky)
+    found = probe.openness(container, spreader, even_sky).values
     share = found[:, 4] / 127
     probe.release()
     sheets = [i for i, c in enumerate(container.charts) if c.face != "underside"]
@@ -202,13 +202,13 @@ def test_lobe_masks_hold_the_nearest_directions_and_the_hemisphere():
 
 def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
     container, spreader = build_container("20"), build_spreader("20")
-    first = SkyProbe(gl.ctx).openness(container, spreader, even_sky)
+    first = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
 
     def never(*_: object) -> None:
         raise AssertionError("probed again")
 
     monkeypatch.setattr(SkyProbe, "_open_to", never)
-    again = SkyProbe(gl.ctx).openness(container, spreader, even_sky)
+    again = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
     np.testing.assert_array_equal(again, first)
 
 
@@ -218,7 +218,7 @@ def test_backends_find_the_same(even_sky):
     for backend in ("egl", "osmesa"):
         with open_context(backend) as context:
             probe = SkyProbe(context.ctx)
-            found.append(probe.openness(container, None, even_sky))
+            found.append(probe.openness(container, None, even_sky).values)
     np.testing.assert_array_equal(*found)
 
 

@@ -17,10 +17,11 @@ from fastgen import Config
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import build_container
 from fastgen.mesh import Mesh
-from fastgen.openness import SkyProbe, open_sky
+from fastgen.openness import open_sky
 from fastgen.sample import Object, Sample
 from fastgen.sampling import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
+from fastgen.sky_probe import Lit, SkyProbe
 
 CAMERAS = ("Cl", "Cr")
 """They look at the ends, without doors and with them."""
@@ -188,8 +189,8 @@ _SKY = (SHADE, EVERYTHING)
 def without(element: str) -> Iterator[None]:
     """While it lasts, renders lack what of `element` no scene decides."""
 
-    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> NDArray[np.uint8]:
-        return open_sky(container.normals)
+    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> Lit:
+        return Lit(container, open_sky(container.normals), np.zeros_like(container.normals))
 
     with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
         yield
