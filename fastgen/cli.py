@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
     except KeyboardInterrupt as stop:
-        print(STOPPED, file=sys.stderr)
+        _say(STOPPED)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
 
@@ -103,8 +103,13 @@ def _stopped_by_sigterm() -> Iterator[None]:
 
 
 def _refused(words: str) -> int:
-    print(f"fastgen: {' '.join(words.split())}", file=sys.stderr)
+    _say(f"fastgen: {' '.join(words.split())}")
     return 2
+
+
+def _say(words: str) -> None:
+    with contextlib.suppress(OSError):  # a log on a full disk; the exit code still tells
+        print(words, file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -3,6 +3,8 @@
 import errno
 import os
 import shutil
+import subprocess
+import sys
 from collections import namedtuple
 from pathlib import Path
 
@@ -91,3 +93,9 @@ def test_too_little_memory_is_no_mistake_of_ours():
     assert in_words(MemoryError(), "scene 3") == (
         "scene 3: out of memory; give fewer workers or a smaller size"
     )
+
+
+def test_a_refusal_that_cannot_be_printed_is_one_by_its_exit_code(tmp_path):
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "fastgen", "verify", str(tmp_path / "none")]
+        assert subprocess.run(command, stderr=full, check=False).returncode == 2

@@ -1,5 +1,7 @@
 """Openness to the sky, against rays and integrals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -21,6 +23,7 @@ from fastgen.openness import (
 from fastgen.shapes import spreader_mesh
 from fastgen.sky_probe import SkyProbe, probe_points
 from fastgen.spreader import build_spreader
+from fastgen.sun import Sun
 
 
 @pytest.fixture(scope="module")
@@ -149,6 +152,23 @@ def test_under_an_even_sky_light_is_the_share_of_it_that_is_open(even_sky):
     # the share has the steps of the cone: where it is small, a length of 1/127 is 2/64 of it
     for channel in values[:, 4:7].T:
         np.testing.assert_allclose(channel / 127, decoded(values)[1], atol=0.04)
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
+def test_sunlight_falls_where_the_sun_stands_in_the_open_half(yaw_deg):
+    ambient = replace(light_of(even), sun=Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005))
+    yaw = np.deg2rad(yaw_deg)
+    sun = np.array([0.6 * np.cos(yaw), 0.6 * np.sin(yaw), 0.8])
+    normals = facing(50)
+    cosine = np.maximum(normals @ sun, 0)[:, None]
+    for side, share in ((sun, 1.0), (-sun, 0.0)):
+        found = half_open(normals, side).sunlight(Sky(ambient, yaw_deg))
+        np.testing.assert_allclose(found, share * cosine * [3.0, 2.0, 1.0], atol=1e-5)
+    edge = half_open(normals, np.cross(sun, [0.0, 0.0, 1.0])).sunlight(Sky(ambient, yaw_deg))
+    partly = edge[cosine[:, 0] > 0.1, 0] / (3 * cosine[cosine[:, 0] > 0.1, 0])
+    assert (partly > 0.2).all()
+    assert (partly < 0.8).all()
+    assert not half_open(normals, sun).sunlight(Sky(light_of(even), yaw_deg)).any()
 
 
 def test_a_black_sky_leaves_no_light_undefined():

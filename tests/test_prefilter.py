@@ -11,7 +11,7 @@ from fastgen.environment import (
     prefilter_environment,
 )
 from fastgen.prefilter import octahedral_decode, octahedral_encode, sample_octahedral, shrink
-from fastgen.reflectance import dfg_table
+from fastgen.reflectance import dfg_table, mean_specular_albedo
 from fastgen.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
 
@@ -215,3 +215,10 @@ def test_smooth_surfaces_reflect_all_light_and_rough_ones_never_more():
     white = dfg_table().sum(axis=-1)
     assert white.max() <= 1.0001
     np.testing.assert_allclose(white[:3, 8:], 1.0, atol=0.01)
+
+
+@pytest.mark.parametrize("f0", [0.0, 0.04, 0.5, 1.0])
+def test_a_smooth_surface_mirrors_the_mean_of_schlicks_fresnel(f0):
+    """The integral of 2 c (f0 + (1 - f0) (1 - c)^5) over c in 0..1 is f0 + (1 - f0) / 21."""
+    assert mean_specular_albedo(f0, 0.05) == pytest.approx(f0 + (1 - f0) / 21, abs=0.003)
+    assert mean_specular_albedo(f0, 0.9) < mean_specular_albedo(f0, 0.05)
