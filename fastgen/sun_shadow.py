@@ -14,8 +14,8 @@ from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, map_matrix
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
-MAP_SIZE = (2048, 1024)
-"""Texels along and across: 7 mm for the longest container."""
+MAP_SIZE = (4096, 1024)
+"""Texels along and across: 3.5 mm for the longest container. A locking bar is 34 mm wide."""
 
 _BIAS_MM = 2.0
 

@@ -27,7 +27,7 @@ vec3 sunlit(Reflector r) {
 // Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint on the surface, and no
 // less than a penumbra. from_eye: to the point, in m.
 float sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
-    float reach = clamp(0.3 * footprint_m, 0.003, 0.03);
+    float reach = clamp(0.22 * footprint_m, 0.002, 0.03);
     vec3 along = normalize(abs(normal.z) < 0.7 ? vec3(-normal.y, normal.x, 0.0)
                                                : vec3(normal.z, 0.0, -normal.x));
     vec3 at = (ray_to_shadow * vec4(from_eye, 1.0)).xyz;

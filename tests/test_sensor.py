@@ -16,6 +16,7 @@ from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
 from fastgen.sensor.light import displayed, light_of
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from fastgen.sensor.weather import _streaks, foggy, rained
+from tests.test_sun import write_exr
 
 SIZE = (160, 120)
 
@@ -319,7 +320,8 @@ def test_fog_counts_the_way_along_each_ray(lens):
         scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
         sample = generator.render(scene=scene, camera=camera)
         clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
-        air = np.array(generator._airlight(scene, camera))
+        with generator._gpu.drawing() as renderer:
+            air = np.array(generator._airlight(renderer, scene, camera))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
     away = np.minimum(sample.depth / (rays @ forward), 300)
@@ -328,3 +330,20 @@ def test_fog_counts_the_way_along_each_ray(lens):
     unmixed = np.isin(clear.cover, (0, 255))
     assert unmixed.mean() > 0.9
     assert np.abs(expected.astype(int) - sample.image)[unmixed].max() <= 1
+
+
+def test_before_an_even_sky_fog_is_as_bright_as_the_sky(tmp_path):
+    """It sends as much light to the eye as it takes, whatever its colour."""
+    write_exr(tmp_path / "even.exr", np.full((128, 256, 3), [0.11, 0.08, 0.05], np.float32))
+    camera = Camera("T", (0, -9000, 1200), (0, 0, 3600), 14.0, exposure_ev=-1.0)
+    with Generator(seed=6, size=SIZE, hdri_dir=tmp_path) as generator:
+        scene = generator.scene(2)
+        clear, fog = (
+            generator.render(scene=replace(scene, weather=weather), camera=camera)
+            for weather in (Weather(), Weather(visibility_mm=40e3))
+        )
+    sky = clear.cover == 0
+    assert sky.mean() > 0.2
+    assert clear.image[sky].max() < 250
+    assert np.abs(clear.image[sky].astype(int) - fog.image[sky]).max() <= 2
+    assert np.abs(clear.image[~sky].astype(int) - fog.image[~sky]).max() > 20
