@@ -36,7 +36,7 @@ def mean_specular_albedo(f0: float, roughness: float) -> float:
     size = len(table)
     scale, bias = table[min(int(roughness * size), size - 1)].T
     n_dot_v = (np.arange(size) + 0.5) / size
-    return float(np.average(scale * f0 + bias, weights=n_dot_v))
+    return float(n_dot_v @ (scale * f0 + bias)) * 2 / size
 
 
 def _integrated(size: int) -> NDArray[np.float32]:
