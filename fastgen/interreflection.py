@@ -70,9 +70,9 @@ class Links:
 
     def sum(self, count: int) -> NDArray[np.float32]:
         """The weights of each of `count` together."""
-        return self.gathered(np.ones((1, int(self._source.max(initial=0)) + 1), np.float32), count)[
-            0
-        ]
+        sources = int(self._source.max(initial=0)) + 1
+        (found,) = self.gathered(np.ones((1, sources), np.float32), count)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
