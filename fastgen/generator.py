@@ -72,9 +72,9 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel), balanced (four, filtered
     with the neighbours'), or high (nine, and materials from five points or more).
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
-    first that works. One thread at a time may use it; make one in each process. Where a driver's
-    textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a height of
-    2730 only. An image much taller than wide takes more memory than one lying, see
+    first that works. Threads may share it, and draw in turn; make one in each process. Where a
+    driver's textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a
+    height of 2730 only. An image much taller than wide takes more memory than one lying, see
     sample_lattice.py.
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import threading
 from collections.abc import Callable, Iterator
 
 from fastgen.cuda import CudaFrames
@@ -31,7 +32,8 @@ class Opened:
         self._gl: GLContext | None = None
         self._renderer: Renderer | None = None
         self._cuda: CudaFrames | None = None
-        self._process = 0
+        self._process = os.getpid()
+        self._lock = threading.RLock()
 
     def renderer(self) -> Renderer:
         """The renderer, its context current. Raises ContextError without OpenGL."""
@@ -69,27 +71,35 @@ class Opened:
 
     @contextlib.contextmanager
     def drawing(self) -> Iterator[Renderer]:
-        """The renderer, to draw with; afterwards any thread may. Not to be nested. What stops that
+        """The renderer, to draw with, while other threads wait. Not to be nested. What stops that
         half way, as Ctrl-C does, closes all: nobody knows what stands on the GPU then, and the next
         draw would build on it."""
-        try:
-            yield self.renderer()
-        except FastgenError:  # refused, not stopped
-            raise
-        except BaseException:
-            self.close()
-            raise
-        finally:
-            if self._gl is not None:
-                self._gl.let_go()
+        with self._alone():
+            try:
+                yield self.renderer()
+            except FastgenError:  # refused, not stopped
+                raise
+            except BaseException:
+                self.close()
+                raise
+            finally:
+                if self._gl is not None:
+                    self._gl.let_go()
+
+    def _alone(self) -> threading.RLock:
+        """A lock that no other thread of this process holds."""
+        if self._process != os.getpid():  # a thread that held it stayed with the parent
+            self._lock = threading.RLock()
+        return self._lock
 
     def close(self) -> None:
         """Free the renderer and its context; asked for again, they are opened again."""
-        gl, held = self._gl, (self._renderer, self._cuda)
-        # first, so that nothing goes on with what is freed in part
-        self._cuda, self._renderer, self._gl = None, None, None
-        if self._process == os.getpid() and gl is not None:
-            _free_quietly(gl, *held)
+        with self._alone():
+            gl, held = self._gl, (self._renderer, self._cuda)
+            # first, so that nothing goes on with what is freed in part
+            self._cuda, self._renderer, self._gl = None, None, None
+            if self._process == os.getpid() and gl is not None:
+                _free_quietly(gl, *held)
 
     def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
         # not freed here, perhaps in the middle of another's render: that switches contexts
@@ -99,7 +109,7 @@ class Opened:
 
 
 def _free_quietly(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
-    """Free what nobody will use again; what another thread draws with goes with the process."""
+    """Free what nobody will use again; where that fails, it goes with the process."""
     with contextlib.suppress(ContextError):
         gl.make_current()  # else what has the same names in another context is freed
         if cuda is not None:

@@ -235,6 +235,16 @@ def test_a_generator_goes_from_thread_to_thread():
             np.testing.assert_array_equal(handed.render(index=0).image, expected)
 
 
+@pytest.mark.parametrize("backend", ["egl", "osmesa"])
+def test_threads_that_share_a_generator_draw_in_turn(backend):
+    with Generator(size=SIZE, backend=backend, quality="draft") as shared:
+        expected = [shared.render(index=index).image for index in range(4)]
+        with ThreadPoolExecutor(3) as pool:
+            found = pool.map(lambda k: shared.render(index=k % 4).image, range(24))
+        for k, image in enumerate(found):
+            np.testing.assert_array_equal(image, expected[k % 4])
+
+
 def test_what_another_thread_drew_with_is_freed():
     def closed_here():
         held = Generator(size=(256, 256))
