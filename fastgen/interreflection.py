@@ -79,8 +79,8 @@ class Links:
 class FormFactors:
     """What a spreader's vertices see of one another, and of the container's cells.
 
-    known: what share [V] of its hemisphere is either or sky; the rest of it is within a body, from
-    which faces grow that vertices stand at the ends of.
+    known: what share [V] of its hemisphere is either or sky. Rays that are hidden and meet nothing
+    from in front make up the rest: most start within a body that their face grows out of.
     """
 
     own: Links

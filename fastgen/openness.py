@@ -186,9 +186,11 @@ class Openness:
         step = LIGHT_STEPS / self._whole(sky, _directions(self._cones))
         found = np.full((len(light), VERTEX_BYTES), 255, np.uint8)
         found[:, :3] = np.take(self._cones, self._which, axis=0)
+        steps = [light[:, c] * np.take(step[:, c], self._which) for c in range(3)]
+        # what is brighter than a byte tells is dimmed as a whole: its colour stays
+        fits = np.minimum(255 / np.maximum(np.maximum.reduce(steps), 1), 1)
         for channel in range(3):
-            steps = light[:, channel] * np.take(step[:, channel], self._which)
-            found[:, 4 + channel] = np.minimum(steps + 0.5, 255)  # rounds
+            found[:, 4 + channel] = np.minimum(steps[channel] * fits + 0.5, 255)  # rounds
         found[:, 8:] = self._open_to.T
         return found
 
