@@ -68,7 +68,7 @@ class GpuMesh:
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
         content = (self._vertices, "3f 3f 2f 1u", *names)
         seen = ("in_cone", "in_light", "in_open_to")
-        contents = [content, (self._openness, "3f1 1x 3f1 1x 3u", *seen)]
+        contents = [content, (self._openness, "3f1 1x 4f1 3u", *seen)]
         self._arrays = {
             damage: ctx.vertex_array(program, contents, self._indices)
             for damage, program in programs.items()

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from fastgen.distinct import distinct_rows
 from fastgen.environment import Ambient, sky_irradiance, sky_radiance, to_map_frame
 from fastgen.prefilter import octahedral_decode
-from fastgen.programs import LIGHT_STEPS
+from fastgen.programs import LIGHT_STEPS, LIGHT_TIMES
 
 DIRECTIONS = 96
 """Of the whole sphere, so that about half of them bear on a surface; a multiple of 8."""
 
 VERTEX_BYTES = 8 + DIRECTIONS // 8
-"""What the shader reads of a vertex: a cone, the light from it, each filled up to four bytes, and a
-bit for each direction."""
+"""What the shader reads of a vertex: a cone, filled up to four bytes, four of the light that comes
+in, and a bit for each direction."""
 
 _LOBE = 4
 """Directions about a mirrored ray: as many as a cap of 24 degrees radius holds. With more or fewer
@@ -50,7 +50,7 @@ def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
     as `encoded` and `Openness.under` have it."""
     found = np.full((len(normals), VERTEX_BYTES), 255, np.uint8)
     found[:, :3] = np.rint(128 + 127 * normals)
-    found[:, 4:7] = LIGHT_STEPS
+    found[:, 4:7], found[:, 7] = LIGHT_STEPS, 0
     return found
 
 
@@ -178,19 +178,23 @@ class Openness:
         """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
         comes in, and open_to.
 
-        light: irradiance / pi [V, 3], by default that from the sky. There is, as LIGHT_STEPS r, the
-        ratio r in each channel to the irradiance of a whole sky about the cone's direction, which
-        is what the shader looks up.
+        light: irradiance / pi [V, 3], by default that from the sky. There is, as LIGHT_STEPS r / s,
+        the ratio r in each channel to the irradiance of a whole sky about the cone's direction,
+        which is what the shader looks up, and as LIGHT_TIMES (s - 1) the scale s that all three
+        fit in.
         """
         light = self.irradiance(sky) if light is None else light
         step = LIGHT_STEPS / self._whole(sky, _directions(self._cones))
         found = np.full((len(light), VERTEX_BYTES), 255, np.uint8)
         found[:, :3] = np.take(self._cones, self._which, axis=0)
         steps = [light[:, c] * np.take(step[:, c], self._which) for c in range(3)]
-        # what is brighter than a byte tells is dimmed as a whole: its colour stays
-        fits = np.minimum(255 / np.maximum(np.maximum.reduce(steps), 1), 1)
+        brightest = np.maximum(np.maximum.reduce(steps), 255) / 255
+        times = np.minimum(np.ceil(LIGHT_TIMES * (brightest - 1)), 255)
+        # what is brighter still is dimmed as a whole: its colour stays
+        fits = 1 / np.maximum(1 + times / LIGHT_TIMES, brightest)
         for channel in range(3):
             found[:, 4 + channel] = np.minimum(steps[channel] * fits + 0.5, 255)  # rounds
+        found[:, 7] = times
         found[:, 8:] = self._open_to.T
         return found
 

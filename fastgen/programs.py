@@ -73,8 +73,11 @@ REACH_MARGIN_MM = 40.0
 """Pixels are filtered with their neighbours: this far around a damage they are shaded with it."""
 
 LIGHT_STEPS = 127.0
-"""What of 255 stands for all the light of an open sky, see openness.py; what is open may face more
-of it than the surface does, hence up to twice as much of a channel."""
+"""What of 255 stands for all the light of an open sky, see openness.py."""
+
+LIGHT_TIMES = 4.0
+"""What of 255 in a fourth channel stands for as much again as the others hold together, where one
+of them would pass 255: below spreaders the ground is dark and the sunlit roof throws light."""
 
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""
@@ -220,6 +223,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "TONE_SHOULDER": tone.SHOULDER,
         "TONE_DESATURATION": tone.DESATURATION,
         "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",
+        "LIGHT_TIMES": f"{LIGHT_TIMES:.1f}",
         "LOBE_CELLS": LOBE_CELLS,
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
         "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",

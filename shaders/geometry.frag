@@ -7,7 +7,7 @@
 
 in vec2 atlas_mm;
 in vec4 openness;
-in vec3 sky_light;
+in vec4 sky_light;
 flat in uint surface_key;
 
 layout(location = 0) out uint out_key;
@@ -32,7 +32,7 @@ void main() {
     // 1 / w is the depth along the optical axis, free of the depth buffer's rounding
     out_depth = 1.0 / gl_FragCoord.w;
     out_openness = openness;
-    out_light = vec4(sky_light, 0.0);
+    out_light = sky_light;
 #if DAMAGED
     out_rest = vec4(rest_mm, 0.0);
 #endif

@@ -12,12 +12,12 @@ layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_chart;
 layout(location = 5) in vec3 in_cone;
-layout(location = 6) in vec3 in_light;
+layout(location = 6) in vec4 in_light;
 layout(location = 7) in uvec3 in_open_to;   // a bit for each of openness.py's directions
 
 out vec2 atlas_mm;
 out vec4 openness;   // cone, share of open sky about the mirrored ray
-out vec3 sky_light;
+out vec4 sky_light;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;

@@ -46,7 +46,8 @@ Openness openness_at(ivec2 sample_at, uint chart) {
     vec4 stored = texelFetch(openness_points, sample_at, 0);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec3 light = texelFetch(light_points, sample_at, 0).rgb * (255.0 / LIGHT_STEPS);
+    vec4 encoded = texelFetch(light_points, sample_at, 0);
+    vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = chart < SPREADER_CHART ? 1.0 : 0.0;
     return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces);
 }

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.classes import CONTAINER_ID, SPREADER_ID
+from fastgen.openness import encoded, open_sky, sky_directions
+from fastgen.sky_probe import Lit, SkyProbe
 from tests.sky_samples import texel_grid
 from tests.test_sun import write_exr
 
@@ -74,3 +77,65 @@ def test_exposure_follows_the_light_on_the_side_that_is_seen(tmp_path, camera, f
         )
     assert bright <= dim
     assert (bright < 0.5 * dim) == follows
+
+
+LIT = Config.from_values(
+    {
+        "damage": {"probability": 0.0},
+        "spreader": {"probability": 1.0, "colors": ["#ffffff"]},
+        "surface": {"colors": {"paint": "#ffffff"}},
+        "environment": {"names": ["port_overcast"]},
+        "cameras": {"low": {"face": "no_door", "focal_mm": 45, "distance_mm": 6000}},
+    }
+)
+
+
+def lit_by(monkeypatch, values):
+    """A drawn sample of scene 0 whose every vertex sees what `values` makes of its normals,
+    uint8 [V, VERTEX_BYTES] of float [V, 3]."""
+
+    def seen(mesh):
+        return Lit(mesh, values(mesh.normals), np.ones(mesh.normals.shape, np.float32))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SkyProbe, "openness", lambda _, mesh, *others: seen(mesh))
+        patch.setattr(SkyProbe, "openness_of_spreader", lambda _, mesh, *others: seen(mesh))
+        with Generator(LIT, seed=1, size=(128, 128)) as generator:
+            return generator.render(index=0, camera="low")
+
+
+def test_light_of_a_vertex_is_three_channels_times_a_fourth(monkeypatch):
+    """120 fourfold is as bright as 240 twofold, on container and spreader."""
+
+    def values(steps, times):
+        def of(normals):
+            found = open_sky(normals)
+            found[:, 4:8] = (*steps, times)
+            return found
+
+        return of
+
+    images = [
+        lit_by(monkeypatch, values(*light)).image.astype(int)
+        for light in (((60, 40, 20), 12), ((120, 80, 40), 4), ((120, 80, 40), 0))
+    ]
+    assert np.abs(images[0] - images[1]).max() <= 1
+    assert np.abs(images[1] - images[2]).mean() > 10
+
+
+def test_only_containers_get_light_that_is_guessed_from_what_hides_their_sky(monkeypatch):
+    """That of a spreader's surfaces is in its values; of a container's, a share that the sky lacks
+    comes back as light off paint."""
+
+    def dark(normals):
+        found = open_sky(normals)
+        found[:, :3] = encoded(normals, normals @ sky_directions().T > 0.8)
+        found[:, 4:8] = 0
+        found[:, 8:] = 0
+        return found
+
+    sample = lit_by(monkeypatch, dark)
+    spreader, container = (
+        np.median(sample.image[sample.ids == number]) for number in (SPREADER_ID, CONTAINER_ID)
+    )
+    assert spreader < 0.2 * container

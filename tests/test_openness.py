@@ -10,7 +10,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container
-from fastgen.environment import Ambient, prefilter_environment
+from fastgen.environment import Ambient, prefilter_environment, sky_irradiance
 from fastgen.gl import open_context
 from fastgen.openness import (
     Openness,
@@ -145,6 +145,23 @@ def test_where_nothing_hides_the_sky_any_light_is_whole():
     whole = Openness(normals, bits, open_sky(normals)[:, :3])
     for radiance in (even, sunset):
         assert (whole.under(Sky(light_of(radiance), 30.0)) == open_sky(normals)).all()
+
+
+def test_light_is_kept_however_much_brighter_than_the_sky_about_the_cone():
+    """As of a sunlit roof above dark ground; beyond 130 times as bright, the colour is."""
+    normals = facing(2000)
+    openness = half_open(normals, np.array([0.0, 0.0, 1.0]))
+    sky = Sky(light_of(sunset), 70.0)
+    about = decoded(openness.under(sky))[0]
+    whole = sky_irradiance(sky.light, about.astype(np.float32), sky.yaw_deg)
+    ratio = 10 ** np.random.default_rng(7).uniform(-2, 2, (2000, 3))
+    values = openness.under(sky, whole * ratio).astype(float)
+    found = values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)  # as the shader takes it
+    brightest = np.maximum(ratio.max(axis=1, keepdims=True), 1)
+    assert (np.abs(found - ratio) / brightest).max() < 0.005
+    values = openness.under(sky, whole * [3000.0, 1500.0, 300.0]).astype(int)
+    assert (values[:, 7] == 255).all()
+    np.testing.assert_allclose(values[:, 4:7], np.tile([[255, 127.5, 25.5]], (2000, 1)), atol=1)
 
 
 def test_under_an_even_sky_light_is_the_share_of_it_that_is_open(even_sky):
