@@ -36,42 +36,36 @@ _PARTS = 16
 """Rays are cast so many lots at a time, from left to right."""
 
 _BOUNCES = 2
-"""A third brings path-traced spreaders nearer by less than a hundredth of what two do."""
+"""A third changes the FLIP of the objects in bench/references by 0.0001."""
 
 Array = NDArray[np.floating]
 Numbers = NDArray[np.integer]
 
 
 class Links:
-    """Pairs of who sees and what is seen.
+    """Form factors between receivers and emitters: a sparse matrix.
 
-    of, source: int [K]; pairs may recur. weight: what share of its cosine-weighted hemisphere `of`
-    has of `source` by each.
+    receiver, emitter: int [K], of one ray each, so that pairs may recur. weight [K]: the ray's
+    share of the receiver's cosine-weighted hemisphere.
     """
 
-    def __init__(self, of: Numbers, source: Numbers, weight: Array) -> None:
-        order = np.lexsort((source, of))
-        of, source, weight = of[order], source[order], weight[order]
-        new = np.diff(of, prepend=-1) != 0
-        apart = np.flatnonzero(new | (np.diff(source, prepend=-1) != 0))
-        self._source = source[apart].astype(np.intp)
+    def __init__(self, receiver: Numbers, emitter: Numbers, weight: Array) -> None:
+        order = np.lexsort((emitter, receiver))
+        receiver, emitter, weight = receiver[order], emitter[order], weight[order]
+        new = np.diff(receiver, prepend=-1) != 0
+        apart = np.flatnonzero(new | (np.diff(emitter, prepend=-1) != 0))
+        self._emitter = emitter[apart].astype(np.intp)
         self._weight = np.add.reduceat(weight, apart).astype(np.float32)
-        self._rows = of[new]
+        self._rows = receiver[new]
         self._starts = np.flatnonzero(new[apart])
 
     def gathered(self, given: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-        """What each of `count` gets, [M, count], of what the sources give off [M, S]."""
+        """What each of `count` receivers gets, [M, count], of what the emitters give off [M, E]."""
         found = np.zeros((len(given), count), np.float32)
         for gets, gives in zip(found, given, strict=True):
             gets[self._rows] = np.add.reduceat(
-                self._weight * np.take(gives, self._source), self._starts
+                self._weight * np.take(gives, self._emitter), self._starts
             )
-        return found
-
-    def sum(self, count: int) -> NDArray[np.float32]:
-        """The weights of each of `count` together."""
-        sources = int(self._source.max(initial=0)) + 1
-        (found,) = self.gathered(np.ones((1, sources), np.float32), count)
         return found
 
 
@@ -80,27 +74,31 @@ class FormFactors:
     """What a spreader's vertices see of one another, and of the container's cells.
 
     known: what share [V] of its hemisphere is either or sky. Rays that are hidden and meet nothing
-    from in front make up the rest: most start within a body that their face grows out of.
+    from in front make up the rest: most start within a body that their face grows out of. What is
+    known stands for all of it, so `own` and `below` are shares of that.
     """
 
     own: Links
     below: Links
-    known: Array
+    known: NDArray[np.float32]
 
-    def thrown(self, own: Array, below: Array, reflectance: Array) -> NDArray[np.float32]:
-        """Irradiance / pi [V, 3] of the vertices by way of surfaces, of all that is known.
+    def light(self, sky: Array, sun: Array, below: Array, reflectance: Array) -> Array:
+        """Irradiance / pi [V, 3] of the vertices by the sky and by way of surfaces.
 
-        own: that of the vertices by light from afar [V, 3]. below: radiance that the cells give off
-        [C, 3]. reflectance: of the vertices [V, 3].
+        sky, sun: that which comes straight from either [V, 3]. below: radiance that the cells give
+        off [C, 3]. reflectance: of the vertices [V, 3].
         """
-        lit, cells, paint = (
-            np.ascontiguousarray(a.T, np.float32) for a in (own, below, reflectance)
+        count = len(sky)
+        from_sky, from_sun, cells, paint = (
+            np.ascontiguousarray(values.T, np.float32) for values in (sky, sun, below, reflectance)
         )
-        count = len(own)
-        total = bounce = self.below.gathered(cells, count) + self.own.gathered(paint * lit, count)
+        total = from_sky / self.known
+        bounce = self.below.gathered(cells, count)
+        bounce += self.own.gathered(paint * (total + from_sun), count)
+        total += bounce
         for _ in range(_BOUNCES - 1):
             bounce = self.own.gathered(paint * bounce, count)
-            total = total + bounce
+            total += bounce
         return total.T
 
 
@@ -125,20 +123,22 @@ def form_factors(
     )
     cosine = np.maximum(spreader.normals @ toward.T, 0)
     share = cosine / cosine.sum(axis=1, keepdims=True)
-
-    def links(name: str) -> Links:
-        of, way, source = found[name]
-        return Links(of, source, share[of, way])
-
-    own, below = links("own"), links("below")
-    known = (share * ~hidden).sum(axis=1) + own.sum(len(points)) + below.sum(len(points))
-    return FormFactors(own, below, np.maximum(known, _LEAST_KNOWN))
+    tells = ~hidden
+    for receiver, ray, _ in found.values():
+        tells[receiver, ray] = True
+    known = np.maximum((share * tells).sum(axis=1), _LEAST_KNOWN).astype(np.float32)
+    share /= known[:, None]
+    own, below = (
+        Links(receiver, emitter, share[receiver, ray])
+        for receiver, ray, emitter in (found["own"], found["below"])
+    )
+    return FormFactors(own, below, known)
 
 
 def _found(
     spreader: Mesh, body: Body, box: Array, points: Array, toward: Array, hidden: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.int32]]:
-    """Rows of vertices, directions and sources, int32 [3, K], by what the sources are of."""
+    """Receivers, rays' directions and emitters, int32 [3, K], by what the emitters are of."""
     from scipy.spatial import cKDTree  # takes 0.3 s
 
     near = cKDTree(_with_normals(spreader.positions_mm, spreader.normals))
@@ -148,24 +148,24 @@ def _found(
     corners, normals = corners[size[:, 0] > 0], (normals / np.maximum(size, 1e-9))[size[:, 0] > 0]
     facing = spreader.normals @ toward.T > 0
     rows: dict[str, list[NDArray[np.int32]]] = {"own": [], "below": []}
-    for way, ray in enumerate(toward):
-        of = np.flatnonzero(hidden[:, way] & facing[:, way])
-        start = points[of]
+    for number, ray in enumerate(toward):
+        receiver = np.flatnonzero(hidden[:, number] & facing[:, number])
+        start = points[receiver]
         before = normals @ ray < -1e-3  # a face turned away is the inside of something
         hit, own_mm = _first_hits(start, ray, corners[before])
         side, box_mm = _entered(start, ray, box)
         on_box = box_mm < own_mm
         on_own = ~on_box & np.isfinite(own_mm)
         met = start[on_own] + own_mm[on_own, None] * ray
-        _, source = near.query(_with_normals(met, normals[before][hit[on_own]]))
-        rows["own"].append(_rows(of[on_own], way, source))
+        _, emitter = near.query(_with_normals(met, normals[before][hit[on_own]]))
+        rows["own"].append(_rows(receiver[on_own], number, emitter))
         met = start[on_box] + box_mm[on_box, None] * ray
-        rows["below"].append(_rows(of[on_box], way, cell_of(side[on_box], met, box)))
+        rows["below"].append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
     return {name: np.concatenate(found, axis=1) for name, found in rows.items()}
 
 
-def _rows(of: NDArray[np.intp], way: int, source: NDArray[np.intp]) -> NDArray[np.int32]:
-    return np.stack([of, np.full(len(of), way), source]).astype(np.int32)
+def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
+    return np.stack([receiver, np.full(len(receiver), ray), emitter]).astype(np.int32)
 
 
 def _with_normals(positions_mm: Array, normals: Array) -> Array:

@@ -112,8 +112,8 @@ def shadow_casters(scene: Scene) -> tuple[Mesh, Body | None]:
 
 
 def _shading_spreader(scene: Scene, cut_mm: float = CUT_MM) -> Mesh | None:
-    """What hides the sky from the container. At its usual gap: a centimetre more or less cannot be
-    seen in the shade, and every other shape costs a second once."""
+    """What hides the sky from the container. At its usual gap, whatever the scene's: a few
+    centimetres can hardly be seen in the shade, and every other shape costs a second once."""
     held = scene.spreader
     if not held.present:
         return None

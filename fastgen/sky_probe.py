@@ -126,10 +126,13 @@ class SkyProbe:
             cells = self._cells.get((below.mesh, held), lambda: Cells.of(below.mesh, held))
             sheet = np.array(paints[MATERIALS.index("paint_sheet")])
             reflectance = np.array(paints)[[chart.material_index for chart in spreader.charts]]
-            light, sun = openness.irradiance(sky), openness.sunlight(sky)
-            cells_give = sheet * cells.mean(below.irradiance)
-            light += factors.thrown(light + sun, cells_give, reflectance[spreader.chart])
-            light /= factors.known[:, None]
+            sun = openness.sunlight(sky)
+            light = factors.light(
+                openness.irradiance(sky),
+                sun,
+                sheet * cells.mean(below.irradiance),
+                reflectance[spreader.chart],
+            )
             return Lit(spreader, openness.under(sky, light), light + sun)
 
         return self._lit.get((openness, sky, below, paints), lit)

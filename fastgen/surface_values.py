@@ -44,7 +44,11 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
 
 
 def reflectances(scene: Scene) -> tuple[Color, ...]:
-    """What each of MATERIALS gives back, rust included, of light from all around."""
+    """What each of MATERIALS gives back, rust included, of light from all around.
+
+    Without dirt, which changes the mean over a roof by 3 %, and wetness, which darkens what is
+    soaked by up to 20 %.
+    """
     rust = scene.surface.rust
     found = []
     for base, trait in zip(*_materials(scene.surface, scene.spreader), strict=True):

@@ -1,20 +1,28 @@
 """Light that surfaces throw on a spreader, against rays and sums."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import Config, Generator
+from fastgen import Config, Generator, interreflection
 from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container, container_outline
+from fastgen.environment import Ambient, prefilter_environment
+from fastgen.gl import open_context
 from fastgen.interreflection import Cells, form_factors
+from fastgen.mesh import MATERIALS
 from fastgen.occluders import without_cables
-from fastgen.openness import sky_directions
-from fastgen.sky_probe import probe_points
+from fastgen.openness import Sky, sky_directions
+from fastgen.sky_probe import Lit, SkyProbe, probe_points
 from fastgen.spreader import build_spreader
+from fastgen.sun import Sun
 
 KIND = "20"
+ROOF, BEAM = np.array([0.8, 0.4, 0.2]), np.array([0.1, 0.2, 0.3])
+TO_SUN, SUN = np.array([0.48, -0.36, 0.8]), np.array([4.0, 3.0, 2.0])
 
 
 @pytest.fixture(scope="module")
@@ -76,16 +84,22 @@ def outside(world):
     ]
 
 
-def by_rays(world, glow, of):
-    """Irradiance / pi [K, 3] of vertices of the spreader, by 800 rays each, off bodies that glow:
-    radiance [N, 3] of a body's number, of places and of normals."""
-    _, spreader, points, casters = world
-    step = np.arange(1600)
-    height = 1 - (2 * step + 1) / 1600
+def evenly(count):
+    """Unit vectors [count, 3] spread over the sphere."""
+    step = np.arange(count)
+    height = 1 - (2 * step + 1) / count
     turn = step * 2.399963  # the golden angle
     flat = np.sqrt(1 - height**2)
-    directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
-    found = []
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+
+
+def by_rays(world, glow, of, sky=0.0):
+    """Irradiance / pi [K, 3] of vertices of the spreader, by 800 rays each, off bodies that glow,
+    radiance [N, 3] of a body's number, of places and of normals, and from an even sky. Rays that
+    start within a body, and meet a face from behind, tell nothing: [K], the share that tells."""
+    _, spreader, points, casters = world
+    directions = evenly(1600)
+    found, told = [], []
     for vertex in of:
         facing = directions[directions @ spreader.normals[vertex] > 0]
         weight = facing @ spreader.normals[vertex]
@@ -93,12 +107,15 @@ def by_rays(world, glow, of):
         met = [hits(caster, start, facing) for caster in casters]
         away = np.array([np.linalg.norm(place - start, axis=1) for place, _ in met])
         first = np.where(np.isnan(away), 1e9, away).argmin(axis=0)
-        light = np.zeros((len(facing), 3))
+        light = np.full((len(facing), 3), sky)
+        tells = np.ones(len(facing), bool)
         for number, (place, normal) in enumerate(met):
             mine = (first == number) & np.isfinite(away[number])
+            tells[mine] = (normal[mine] * facing[mine]).sum(axis=1) < 0
             light[mine] = glow(number, place[mine], normal[mine])
-        found.append((weight[:, None] * light).sum(axis=0) / weight.sum())
-    return np.array(found)
+        told.append(weight[tells].sum() / weight.sum())
+        found.append(weight[tells] @ light[tells] / max(weight[tells].sum(), 1e-9))
+    return np.array(found), np.array(told)
 
 
 def pattern(places):
@@ -111,8 +128,8 @@ def test_light_off_the_container_is_what_rays_bring(world, factors, outside):
     container, spreader, _, _ = world
     cells = Cells.of(container, container_outline(KIND)).mean(pattern(container.positions_mm))
     none = np.zeros((len(spreader.positions_mm), 3))
-    found = factors.thrown(none, cells, none)[outside]
-    expected = by_rays(world, lambda body, place, _: pattern(place) * (body == 0), outside)
+    found = factors.light(none, none, cells, none)[outside]
+    expected, _ = by_rays(world, lambda body, place, _: pattern(place) * (body == 0), outside)
     assert len(outside) > 200
     assert expected.mean() > 0.1
     assert np.abs(found - expected).mean() < 0.03
@@ -127,10 +144,12 @@ def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outsid
         up = normals[:, 2:]
         return np.concatenate([up > 0.5, up < -0.5, np.abs(up) < 0.5], axis=1).astype(float)
 
-    lit = glow(spreader.normals)
+    glowing = glow(spreader.normals)
     dim = 1e-4
-    found = (factors.thrown(lit, np.zeros((1000, 3)), np.full(lit.shape, dim)) / dim)[outside]
-    expected = by_rays(world, lambda body, _, normal: glow(normal) * (body == 1), outside)
+    dark = np.zeros((1000, 3))
+    paint = np.full(glowing.shape, dim)
+    found = (factors.light(0 * glowing, glowing, dark, paint) / dim)[outside]
+    expected, _ = by_rays(world, lambda body, _, normal: glow(normal) * (body == 1), outside)
     assert expected.mean() > 0.03
     assert np.abs(found - expected).mean() < 0.03
     assert np.abs((found - expected).mean(axis=0)).max() < 0.006
@@ -139,9 +158,9 @@ def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outsid
 def test_two_bounces_are_a_geometric_sum(factors, world):
     """Twice the paint gives twice the first bounce and four times the second."""
     _, spreader, _, _ = world
-    lit = np.ones((len(spreader.positions_mm), 3))
+    sun = np.ones((len(spreader.positions_mm), 3))
     dark = np.zeros((1000, 3))
-    once, twice, thrice = (factors.thrown(lit, dark, k * lit) for k in (0.1, 0.2, 0.3))
+    once, twice, thrice = (factors.light(0 * sun, sun, dark, k * sun) for k in (0.1, 0.2, 0.3))
     assert once.max() > 0.02
     second = (twice - 2 * once) / 2  # of 0.1
     np.testing.assert_allclose(thrice, 3 * (once - second) + 9 * second, atol=1e-5)
@@ -153,6 +172,106 @@ def test_light_is_neither_lost_nor_made(factors, outside):
     assert factors.known.max() < 1 + 1e-5
     assert np.median(factors.known[outside]) > 0.999
     assert np.quantile(factors.known[outside], 0.05) > 0.95
+
+
+def by_sky_and_sun(world, points, normals):
+    """Irradiance / pi [K, 3] of surfaces by an even sky of 1, 200 rays each, and by the sun."""
+    casters = world[3]
+    toward, start = evenly(200), points + 3 * normals
+    cosine = np.maximum(normals @ toward.T, 0)
+    far, rays = np.repeat(start, len(toward), axis=0), np.tile(toward, (len(points), 1))
+    hidden = np.logical_or(*(caster.intersects_any(far, rays) for caster in casters))
+    open_to = (cosine * ~hidden.reshape(cosine.shape)).sum(axis=1) / cosine.sum(axis=1)
+    rays = np.tile(TO_SUN, (len(points), 1))
+    shaded = np.logical_or(*(caster.intersects_any(start, rays) for caster in casters))
+    return open_to[:, None] + (np.maximum(normals @ TO_SUN, 0) * ~shaded)[:, None] * SUN
+
+
+@pytest.fixture(scope="module")
+def lit(world, tmp_path_factory):
+    """What SkyProbe finds of the spreader under an even sky of 1, a function of a sun's light, of
+    the paint of sheets and of its own, and of what else lights the container; all else would glare.
+    """
+    container, spreader, _, _ = world
+    ambient = Ambient.of(prefilter_environment("even", np.ones((64, 128, 3), np.float32)))
+    outline, held = build_spreader(KIND, cut_mm=np.inf), container_outline(KIND)
+    with pytest.MonkeyPatch.context() as patch, open_context() as gl:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        probe = SkyProbe(gl.ctx)
+
+        def found(sun, roof, beam, below=None):
+            sky = Sky(replace(ambient, sun=Sun(tuple(TO_SUN), tuple(sun), 0.005)), 0.0)
+            used = {"paint_sheet": roof, **{chart.material: beam for chart in spreader.charts}}
+            paints = tuple(tuple(used.get(material, 50 * ROOF)) for material in MATERIALS)
+            below = below or probe.openness(container, spreader, sky)
+            return probe.openness_of_spreader(spreader, outline, held, below, sky, paints)
+
+        yield found
+        probe.release()
+
+
+BLACK, WHITE = np.zeros(3), np.ones(3)
+
+
+def stored(values):
+    """Light [V, 3] as the shader takes it, of an even sky's irradiance, which is 1."""
+    values = values.astype(float)
+    return values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)
+
+
+def test_all_the_light_of_a_spreader_is_what_rays_bring(world, outside, lit):
+    """Of sky and sun, by themselves and by way of the container's paint and of its own."""
+    _, spreader, points, _ = world
+    chosen = outside[::3]
+    dark, roof, beam = lit(SUN, BLACK, BLACK), lit(SUN, ROOF, BLACK), lit(SUN, BLACK, BEAM)
+    arriving = by_sky_and_sun(world, points[chosen], spreader.normals[chosen])
+    for found in (dark, roof, beam):
+        with_sun = found.irradiance - stored(found.values)
+        np.testing.assert_allclose(with_sun, dark.irradiance - stored(dark.values), atol=0.02)
+    assert np.abs((dark.irradiance[chosen] - arriving).mean(axis=0)).max() < 0.03 * arriving.mean()
+    for body, (some, paint) in enumerate(((roof, ROOF), (beam, BEAM))):
+        expected, _ = by_rays(
+            world,
+            lambda number, place, normal, body=body, paint=paint: (
+                paint * by_sky_and_sun(world, place, normal) * (number == body)
+            ),
+            chosen,
+        )
+        found = (stored(some.values) - stored(dark.values))[chosen]
+        ratio = found.mean(axis=0) / expected.mean(axis=0)
+        assert (np.abs(ratio - 1.1) < 0.15).all()  # coarse cells are too bright below the beams
+        assert np.corrcoef(found.ravel(), expected.ravel())[0, 1] > 0.85
+
+
+def test_in_a_white_furnace_a_spreader_is_as_bright_as_the_sky(world, lit, monkeypatch):
+    """Also where rays that start within a body know only a part of what is around."""
+    monkeypatch.setattr(interreflection, "_BOUNCES", 100)
+    container, spreader, _, _ = world
+    count = len(container.positions_mm)
+    glowing = Lit(container, np.zeros((count, 0), np.uint8), np.ones((count, 3), np.float32))
+    light = lit(BLACK, WHITE, WHITE, glowing).irradiance
+    locks = [".locks." in chart.name for chart in spreader.charts]
+    assert light.max() < 1 + 1e-4
+    assert np.quantile(light[~np.array(locks)[spreader.chart]], 0.1) > 0.99
+
+
+def test_another_hemisphere_has_other_form_factors(world, tmp_path, monkeypatch):
+    """Though all else is the same: what is kept on disk does not stand for both."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    _, spreader, points, _ = world
+    toward = sky_directions()
+    body, held = without_cables(build_spreader(KIND, cut_mm=np.inf)), container_outline(KIND)
+    all_hidden = np.ones((len(points), len(toward)), bool)
+    upper_hidden = all_hidden & (toward[:, 2] > 0)
+    cells = np.ones((1000, 3))
+    dark = np.zeros((len(points), 3))
+    found = [
+        form_factors(spreader, body, held, points, toward, hidden).light(dark, dark, cells, dark)
+        for hidden in (all_hidden, upper_hidden)
+    ]
+    assert found[0].mean() > 0.1
+    # the container lies below, but for flippers, which hang beside it
+    assert found[1].mean() < 0.1 * found[0].mean()
 
 
 def test_the_roofs_paint_shows_below_the_spreader():
