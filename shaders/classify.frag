@@ -22,7 +22,7 @@ void main() {
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
     bool decal = key != 0u && cell_at(key_chart(key), sheet_mm).x != 0u;
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
-    if (decal) ++found;   // programs.PIXEL_CLASSES has the one with decals next
+    if (decal && !mixed) ++found;   // programs.PIXEL_CLASSES has the one with decals next
 #if DAMAGED
     vec3 rest_mm = texelFetch(rest_points, middle, 0).xyz;
     int near = 0;   // 1 near a damage, 2 near a hole

@@ -13,6 +13,7 @@ from fastgen.generator import Generator
 from fastgen.gpu_mesh import facing_groups
 from fastgen.scene import Spreader
 from fastgen.sensor.light import displayed, light_of
+from fastgen.srgb import DECODED
 from tests import oracle
 
 CAMERAS = ("A", "B", "Cl", "Cr")
@@ -99,6 +100,25 @@ def test_the_layers_of_high_approach_a_fine_render_averaged_down():
         inside = cv2.erode((sample.ids > 0).astype(np.uint8), np.ones((3, 3))) > 0
         errors.append(np.abs(light_of(sample.image) - reference)[inside].mean())
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_marker_behind_a_locking_bar_shows_up_to_the_bar():
+    """Also in pixels whose centre the bar or the gasket covers: a fine render averaged down."""
+    dark = {"surface": {"colors": {"paint": "#101010"}, "rust_coverage": 0}}
+    rig = {"cameras": {"end": {"face": "door", "focal_mm": 45, "distance_mm": 6000}}}
+    config = Config.from_values({**dark, **rig, "damage": {"probability": 0}})
+    images = []
+    for quality, size in (("draft", (864, 864)), ("high", (96, 96))):
+        with Generator(config, seed=3, size=size, quality=quality) as generator:
+            scene = replace(generator.scene(1), spreader=Spreader())
+            marker = next(decal for decal in scene.decals if decal.kind == "marker")
+            place = {"face": "door", "center_mm": (1091.0, 1400.0), "size_mm": (900.0, 900.0)}
+            white = replace(marker, art="C6.1", class_name="C6.1", wear=0.0, **place)
+            alone = replace(scene, decals=(white,))
+            shown = generator.render(scene=alone, layer="decals").image
+            images.append(DECODED[shown])
+    reference = images[0].reshape(96, 9, 96, 9, 3).mean(axis=(1, 3))
+    assert np.abs(images[1] - reference)[2:-2, 2:-2].max() < 0.25
 
 
 @pytest.mark.parametrize("quality", ["balanced", "high"])
