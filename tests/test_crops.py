@@ -53,3 +53,14 @@ def test_no_letter_of_a_crop_is_mostly_hidden():
                     hidden += 1
     assert kept >= 1
     assert hidden >= 3
+
+
+def test_a_text_that_is_hidden_by_more_than_a_seventh_is_no_crop():
+    with Generator(seed=21, size=(640, 640), quality="draft") as generator:
+        sample = generator.render(index=3, camera="Cl")
+    whole = {item.id for item, _ in text_crops(sample, 10.0)}
+    assert whole
+    for fraction, kept in ((0.95, True), (0.8, False)):
+        seen = tuple(replace(item, visible_fraction=fraction) for item in sample.objects)
+        crops = {item.id for item, _ in text_crops(replace(sample, objects=seen), 10.0)}
+        assert crops == (whole if kept else set())

@@ -128,6 +128,22 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert sample.image[through].mean() < 0.6 * around
 
 
+def test_a_hole_shows_brown_boards_below_and_grey_walls(generator):
+    scene = close_up(scene_with(generator, "perforation"), "perforation")
+    above = replace(scene.cameras[0], position_mm=tuple(
+        np.array(scene.cameras[0].position_mm) + (0.0, 0.0, 600.0)
+    ))  # fmt: skip
+    scene = replace(scene, cameras=(above,))
+    albedo = generator.render(scene=scene, camera="close", layer="base")
+    sample = generator.render(scene=scene, camera="close", normals=True)
+    through = (sample.damage == 501) & (sample.depth > 3.5)
+    up = (sample.normals @ sample.view.rotation)[..., 2]
+    for part, low, high in ((up > 0.95, 1.3, 2.0), (np.abs(up) < 0.4, 0.9, 1.1)):
+        seen = albedo.image[through & part].astype(float).mean(axis=0)
+        assert (through & part).sum() > 10
+        assert low < seen[0] / seen[2] < high
+
+
 def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
     scene = close_up(scene_with(generator, "perforation"), "perforation")
     sample = generator.render(scene=scene, camera="close", normals=True)
@@ -201,6 +217,22 @@ def test_opposite_holes_let_the_sky_through(generator):
     assert sample.damage[128, 128] == 501
     assert np.isinf(sample.depth[128, 128])
     assert sample.cover[128, 128] == 0
+
+
+def test_worked_steel_is_dulled_and_rusts(generator):
+    """Blue paint without rust of its own: as brown as rust, in part, where a dent is deep."""
+    scene = close_up(scene_with(generator, "dented"), "dented")
+    surface = scene.surface
+    paint = replace(surface.paint, albedo=(0.02, 0.05, 0.4))
+    rust = replace(surface.rust, coverage=0.0)
+    scene = replace(scene, surface=replace(surface, paint=paint, rust=rust), decals=())
+    sound = replace(scene, damages=())
+    dented, whole = (
+        generator.render(scene=one, camera="close", layer="rust") for one in (scene, sound)
+    )
+    marked = dented.damage == fields.mask_values(scene.damages)[0]
+    worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
+    assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
 
 
 def test_undamaged_places_do_not_change(generator):

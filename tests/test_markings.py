@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fastgen.generator import Generator
 from fastgen.lettering import layout
 from fastgen.markings import rhombus_offsets
 from fastgen.sampling import sheet_sizes
+from fastgen.srgb import DECODED
 from fastgen.weights import weight_lines
 
 
@@ -232,3 +234,21 @@ def test_a_stream_more_does_not_move_the_rest():
         assert a.surface == b.surface
         classes = [[d.class_name for d in s.decals if d.kind == "marker"] for s in (a, b)]
         assert classes[0] == classes[1]
+
+
+def test_wear_takes_print_off_in_proportion():
+    """Of the same spots, half as much by half the wear; all of it leaves a part of the print."""
+    config = Config.from_values({"damage": {"probability": 0}, "spreader": {"probability": 0}})
+    images = []
+    with Generator(config, seed=4, size=(256, 256), quality="draft") as generator:
+        scene = generator.scene(0)
+        for wear in (0.0, 0.5, 1.0):
+            worn = tuple(replace(decal, wear=wear) for decal in scene.decals)
+            sample = generator.render(scene=replace(scene, decals=worn), layer="decals")
+            images.append(DECODED[sample.image])
+        bare = generator.render(scene=replace(scene, decals=()), layer="decals")
+    fresh, half, all_worn = (image - DECODED[bare.image] for image in images)
+    printed = np.abs(fresh).max(axis=2) > 0.2
+    share = 1 - all_worn[printed] / np.where(np.abs(fresh[printed]) > 0.1, fresh[printed], np.nan)
+    assert 0.3 < np.nanmean(share) < 0.5  # where an even noise is above 0.6
+    np.testing.assert_allclose(half[printed], ((fresh + all_worn) / 2)[printed], atol=0.05)

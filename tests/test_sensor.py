@@ -161,6 +161,21 @@ def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
     assert heavy.sum() > seen.sum()
 
 
+def test_drops_shine_with_nearly_all_of_the_light_around():
+    """With 94 % of it (Garg and Nayar 2007): what is as bright hides them."""
+    view = view_of(Camera("T", (0, -9000, 0), (0, 0, 0), 30.0), SIZE)
+    depth = np.full((120, 160), np.inf, np.float32)
+    sky = np.array([2.0, 1.0, 0.5], np.float32)
+    for share, sign in ((0.94, 0), (1.0, -1), (0.8, 1)):
+        light = np.broadcast_to(share * sky, (120, 160, 3)).astype(np.float32)
+        change = (rained(light, depth, view, Rain(150, 0.01, 0.3, 11), sky) - light) / sky
+        assert (sign * change >= -1e-6).all()
+        if sign:
+            assert (sign * change).max() > 0.001
+        else:
+            assert np.abs(change).max() < 1e-6
+
+
 @pytest.mark.parametrize(("wide", "long"), [(0.3, 2.0), (0.3, 20.0), (1.05, 20.0), (2.1, 5.4)])
 def test_a_drop_hides_as_much_as_it_is_large(wide, long):
     """Whatever pixels its streak begins and ends in: its width squared, over the exposure."""
