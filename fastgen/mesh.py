@@ -31,6 +31,13 @@ MATERIALS = (
 UNIT_CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 """Corners of a cube from 0 to 1, int [8, 3]."""
 
+_UNIT_CUBE_FACES = ("013 032", "467 475", "045 051", "237 276", "026 064", "157 173")
+UNIT_CUBE_TRIANGLES = np.array(
+    [[int(corner) for corner in three] for face in _UNIT_CUBE_FACES for three in face.split()],
+    np.uint32,
+)
+"""Its faces, uint32 [12, 3], counter-clockwise from outside."""
+
 MAX_CHARTS = 500
 """Of one mesh: the renderer keeps chart + 1 of a container and of its spreader in ten bits."""
 
