@@ -26,6 +26,9 @@ _BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
 
 _FRONT_MM = DOOR_RING_MM + 0.5
 
+_BEND_MM = 80.0
+"""Levers are cut as short, to bend with a leaf that is dented and stay before it."""
+
 
 def gear(layout: Layout) -> list[Sheet]:
     """Bars, cams, keepers, brackets, handles, catches and hinges."""
@@ -52,7 +55,7 @@ def _block(
     place: Opening, y: tuple[float, float], z: tuple[float, float], inset: tuple[float, float]
 ) -> Patch:
     low, high = sorted(y)
-    return box((place.x - inset[1], low, z[0]), (place.x - inset[0], high, z[1]))
+    return box((place.x - inset[1], low, z[0]), (place.x - inset[0], high, z[1]), _BEND_MM)
 
 
 def _bar(layout: Layout, place: Opening, y: float) -> Patch:

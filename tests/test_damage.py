@@ -6,6 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import damage as fields
 from fastgen.classes import DAMAGE_CLASSES
@@ -233,6 +235,27 @@ def test_worked_steel_is_dulled_and_rusts(generator):
     marked = dented.damage == fields.mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
     assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
+
+
+def test_a_dented_leaf_stays_behind_its_locking_gear():
+    """From outside one meets a bar or lever first wherever one does at rest."""
+    doors = {"damage": {"probability": 1.0, "faces": ["door"], "kinds": ["dented"]}}
+    across, up = np.meshgrid(np.arange(-870.0, 870.0, 8.0), np.arange(900.0, 1200.0, 8.0))
+    eyes = np.column_stack([np.full(across.size, 9000.0), across.ravel(), up.ravel()])
+    rays = np.tile([-1.0, 0.0, 0.0], (len(eyes), 1))
+    gear = 0
+    with Generator(Config.from_values(doors), seed=3, size=(64, 64)) as generator:
+        for scene in map(generator.scene, range(40)):
+            mesh = build_container(scene.container.kind, scene.container.profiles)
+            names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
+            is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
+            met = []
+            for positions in (mesh.positions_mm, fields.deform(scene.damages, mesh.positions_mm)):
+                body = trimesh.Trimesh(positions, mesh.triangles.astype(np.int64), process=False)
+                met.append(is_gear[RayMeshIntersector(body).intersects_first(eyes, rays)])
+            gear += met[0].sum()
+            assert (met[0] & ~met[1]).sum() <= 10  # of 8 mm each, where a leaf folds sharply
+    assert gear > 40 * 200
 
 
 def test_undamaged_places_do_not_change(generator):
