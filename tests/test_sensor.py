@@ -145,6 +145,27 @@ def test_fog_lies_between_an_edge_and_what_shows_beside_it():
     np.testing.assert_allclose(seen, expected, atol=1e-5)
 
 
+def test_detail_behind_an_edge_does_not_shine_through_fog():
+    """However bright: an edge and a cable stay between their own veiled light and the air's."""
+    rng = np.random.default_rng(8)
+    air, thing = np.array([0.4, 0.5, 0.6]), np.array([0.1, 0.2, 0.05])
+    sky = rng.exponential(2.0, (40, 40, 3))
+    share = np.zeros((40, 40))
+    share[:, 20:] = 1
+    share[:, 19] = rng.random(40)
+    share[:, 5] = 0.4
+    cover = np.rint(255 * share).astype(np.uint8)
+    share = cover[..., None] / 255
+    clear = share * thing + (1 - share) * sky
+    away = np.where(cover == 255, 20.0, np.inf)
+    values = [array.astype(np.float32) for array in (clear, away, air)]
+    seen = foggy(values[0], values[1], cover, 40e3, values[2])
+    near = np.exp(-3.912 * 20 / 40)
+    veiled = share * (thing * near + air * (1 - near)) + (1 - share) * air
+    assert (seen <= veiled + 1e-5).all()
+    assert (seen >= air * (1 - near * share) - 1e-5).all()
+
+
 def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
     view = view_of(Camera("T", (0, -9000, 0), (0, 0, 0), 30.0), SIZE)
     light = np.full((120, 160, 3), 0.1, np.float32)

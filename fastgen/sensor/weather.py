@@ -14,7 +14,7 @@ _CONTRAST = 3.912
 _BACKDROP_M = 300.0
 """How far away the surroundings are taken to be, of which an HDRI does not say it."""
 
-_BESIDE = (5, 5)
+_BESIDE = 2
 """Pixels around one in which its surroundings are looked for."""
 
 _NEAREST_M, _FARTHEST_M = 0.12, 4.0
@@ -42,27 +42,43 @@ def foggy(
     """
     decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
     far, near = np.exp(decay * np.float32(_BACKDROP_M)), np.exp(decay * _objects_m(ray_m))
-    open_share = 1 - cover * np.float32(1 / 255)
-    left = near + (far - near) * open_share
-    planes = []
-    for plane, beyond, air in zip(
-        cv2.split(light), cv2.split(_beyond(light, cover)), airlight, strict=True
-    ):
-        behind = np.minimum(open_share * beyond, plane)
-        planes.append((plane - behind) * near + behind * far + air * (1 - left))
-    return np.asarray(cv2.merge(planes))
+    left = np.where(cover == 0, far, near)
+    seen = _mixed(light, airlight, 1 - left)
+    mixed = np.nonzero((cover > 0) & (cover < 255))
+    share = cover[mixed][:, None] * np.float32(1 / 255)
+    own = light[mixed]
+    behind = _behind(light, cover, mixed, share)
+    near_them = near[mixed][:, None]
+    left_of_them = near_them * share + far * (1 - share)
+    seen[mixed] = (own - behind) * near_them + behind * far + airlight * (1 - left_of_them)
+    return seen
 
 
-def _beyond(light: Light, cover: NDArray[np.uint8]) -> Light:
-    """Light [H, W, 3] of the surroundings in each pixel: where objects cover a part of one, that of
-    pixels beside it that show nothing else; its own where there are none."""
-    bare = (cover == 0).astype(np.float32)
-    count = cv2.boxFilter(bare, -1, _BESIDE, normalize=False)
-    total = cv2.boxFilter(light * bare[..., None], -1, _BESIDE, normalize=False)
-    mixed = (cover > 0) & (count > 0.5)
-    found = light.copy()
-    found[mixed] = total[mixed] / count[mixed][:, None]
-    return found
+def _behind(
+    light: Light,
+    cover: NDArray[np.uint8],
+    mixed: tuple[NDArray[np.intp], ...],
+    share: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Of the light of pixels that objects cover a share [N, 1] of, the surroundings', [N, 3].
+
+    It is that of pixels beside them that show nothing else, where there are some. But objects are
+    no brighter than pixels beside them that they cover whole, or where there are none, as beside
+    cables, than the mean of all such: what detail of the surroundings adds to that is theirs.
+    """
+    step = np.arange(-_BESIDE, _BESIDE + 1)
+    down, right = (offset.ravel() for offset in np.meshgrid(step, step, indexing="ij"))
+    height, width = cover.shape
+    rows = np.clip(mixed[0][:, None] + down, 0, height - 1)
+    columns = np.clip(mixed[1][:, None] + right, 0, width - 1)
+    beside, covered = light[rows, columns], cover[rows, columns][..., None]
+    own, bare, whole = light[mixed], covered == 0, covered == 255
+    count = bare.sum(axis=1)
+    beyond = np.where(count > 0, (beside * bare).sum(axis=1) / np.maximum(count, 1), own)
+    everywhere = cover == 255
+    usual = light[everywhere].mean(axis=0) if everywhere.any() else beyond
+    most = np.where(whole.any(axis=1), np.where(whole, beside, 0).max(axis=1), usual)
+    return np.clip((1 - share) * beyond, own - share * most, own)
 
 
 def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
