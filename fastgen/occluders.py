@@ -12,8 +12,11 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.mesh import Mesh
+from fastgen.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
+
+_CORE_MM = 200.0
+"""So far behind a container's sides, and behind what dents push in, its core begins."""
 
 Array = NDArray[np.float64]
 
@@ -43,6 +46,18 @@ def without_cables(spreader: Mesh) -> Body:
     triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
     used, numbers = np.unique(triangles, return_inverse=True)
     return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
+
+
+def core_of(container: Mesh, deepest_mm: float = 0.0) -> Body:
+    """A box within a container whose damages reach deepest_mm.
+
+    It stands in the way as well: maps that keep back faces lack the side that the light meets, and
+    through the far one, thin as it is, light leaks along creases, within a texel and the bias.
+    """
+    low, high = container.bounds_mm
+    inset = np.minimum(_CORE_MM + deepest_mm, (high - low) / 3)
+    corners = low + inset + UNIT_CUBE * (high - low - 2 * inset)
+    return Body(corners.astype(np.float32), UNIT_CUBE_TRIANGLES)
 
 
 def map_matrix(toward: Array, low: Array, high: Array) -> Array:

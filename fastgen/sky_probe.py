@@ -3,7 +3,7 @@ around: a point is hidden from a direction where a face of an occluders.DepthMap
 """
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import moderngl
@@ -14,11 +14,18 @@ from fastgen import cache
 from fastgen.interreflection import Cells, FormFactors, form_factors
 from fastgen.kept import Recent
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.occluders import DepthMap, DrawnBody, Solid, map_matrix, without_cables
+from fastgen.occluders import (
+    DepthMap,
+    DrawnBody,
+    Solid,
+    core_of,
+    map_matrix,
+    without_cables,
+)
 from fastgen.openness import DIRECTIONS, Array, Directions, Openness, Sky, encoded, sky_directions
 from fastgen.programs import link
 
-_VERSION = 3
+_VERSION = 4
 """Part of the disk cache's key: count up whenever the openness changes."""
 
 _MAP_SIZE = (2048, 512)
@@ -160,40 +167,47 @@ class SkyProbe:
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
         points = _spreader_points(spreader)
-        own = self._kept(without_cables(spreader), points, _SPREADER_SIZE)
-        below = self._kept(container, points, _COARSE_SIZE)
+        own = self._kept([without_cables(spreader)], points, _SPREADER_SIZE)
+        below = self._kept([container], points, _COARSE_SIZE)
         return own & below
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
-        open_to = self._own.get(container, lambda: self._kept(container, points, _MAP_SIZE))
+        whole: list[Solid] = [container, core_of(container)]
+        open_to = self._own.get(container, lambda: self._kept(whole, points, _MAP_SIZE))
         if spreader is not None:
-            open_to = open_to & self._kept(without_cables(spreader), points, _COARSE_SIZE)
+            open_to = open_to & self._kept([without_cables(spreader)], points, _COARSE_SIZE)
         return open_to
 
-    def _kept(self, body: Solid, points_mm: Array, size: tuple[int, int]) -> NDArray[np.uint8]:
+    def _kept(
+        self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
+    ) -> NDArray[np.uint8]:
         """As _open_to, packed along the directions; from the disk cache where it is there."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
-        for array in (body.positions_mm, body.triangles, points_mm):
+        arrays = [array for body in bodies for array in (body.positions_mm, body.triangles)]
+        for array in (*arrays, points_mm):
             digest.update(np.ascontiguousarray(array).tobytes())
         return _from_disk(
             digest.hexdigest(),
             (len(points_mm), DIRECTIONS // 8),
-            lambda: np.packbits(self._open_to(body, points_mm, size), axis=1),
+            lambda: np.packbits(self._open_to(bodies, points_mm, size), axis=1),
         )
 
-    def _open_to(self, body: Solid, points_mm: Array, size: tuple[int, int]) -> Directions:
-        shape = DrawnBody(self._ctx, self._program, body)
+    def _open_to(
+        self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
+    ) -> Directions:
+        drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
         depths = DepthMap(self._ctx, self._program, size)
-        low, high = body.bounds_mm
+        low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
+        high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
         # what is probed outside of the box of occluders may be hidden too
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
         found = np.empty((len(points_mm), DIRECTIONS), bool)
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
             to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-            depths.draw([shape], to_map)
+            depths.draw(drawn, to_map)
             nearest = np.frombuffer(depths.depth.read(alignment=1), np.float32)
             at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
             texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)
@@ -201,7 +215,8 @@ class SkyProbe:
             before = nearest[texel[:, 1] * size[0] + texel[:, 0]] * 2 - 1
             found[:, i] = at[:, 2] - bias <= before
         depths.release()
-        shape.release()
+        for body in drawn:
+            body.release()
         return found
 
     def release(self) -> None:

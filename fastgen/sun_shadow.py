@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
-from fastgen.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, map_matrix
+from fastgen.mesh import Mesh
+from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, core_of, map_matrix
 from fastgen.scene import Damage
 from fastgen.sun import Sun
 
@@ -18,11 +18,6 @@ MAP_SIZE = (4096, 1024)
 """Texels along and across: 3.5 mm for the longest container. A locking bar is 34 mm wide."""
 
 _BIAS_MM = 2.0
-
-_CORE_MM = 200.0
-"""So far behind a container's sides, and behind what dents push in, stands a box that throws shade
-too: maps that keep back faces have no lit side, and through the far one, thin as it is, light would
-leak past the bias along every crease on the dark side."""
 
 Array = NDArray[np.float64]
 
@@ -59,7 +54,8 @@ class ShadowMap:
         if shown == self._shown:
             return
         self._shown = shown
-        bodies = [_bent(container, damages), _core(container, damages)]
+        deepest = max((damage.depth_mm for damage in damages), default=0.0)
+        bodies = [_bent(container, damages), core_of(container, deepest)]
         if spreader is not None:
             bodies.append(spreader)
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
@@ -96,15 +92,6 @@ def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Solid:
         rest = positions_mm[near].astype(np.float64)
         moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
     return Body(moved, container.triangles)
-
-
-def _core(container: Mesh, damages: tuple[Damage, ...]) -> Body:
-    """A box within a container, as large as its damages leave room for."""
-    low, high = container.bounds_mm
-    deepest = max((damage.depth_mm for damage in damages), default=0.0)
-    inset = np.minimum(_CORE_MM + deepest, (high - low) / 3)
-    corners = low + inset + UNIT_CUBE * (high - low - 2 * inset)
-    return Body(corners.astype(np.float32), UNIT_CUBE_TRIANGLES)
 
 
 def sun_values(sun: Sun | None, shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:

@@ -221,6 +221,24 @@ def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
     assert abs(error.mean()) < 0.02
 
 
+def test_nothing_is_open_to_the_sky_through_the_container(gl, even_sky):
+    """As creases would be, over which a thin sheet is all that depth maps have of the wall."""
+    container = build_container("20")
+    probe = SkyProbe(gl.ctx)
+    bits = probe.openness(container, None, even_sky).values[:, 8:]
+    probe.release()
+    open_to = np.unpackbits(bits, axis=1).astype(bool)
+    points, low, high = probe_points(container), *container.bounds_mm
+    found = 0
+    for toward, seen in zip(sky_directions(), open_to.T, strict=True):
+        ways = np.sort([(low + 350 - points) / toward, (high - 350 - points) / toward], axis=0)
+        enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
+        behind = (enters > 0) & (leaves > enters)
+        found += behind.sum()
+        assert not seen[behind].any()
+    assert found > 100_000
+
+
 def test_lobe_masks_hold_the_nearest_directions_and_the_hemisphere():
     cells = 16
     masks = np.unpackbits(lobe_masks(cells)[..., :3].view(np.uint8), axis=-1).astype(bool)
