@@ -64,6 +64,8 @@ def map_matrix(toward: Array, low: Array, high: Array) -> Array:
     """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
     the box's x axis lies along the view's."""
     along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
+    if np.linalg.norm(along) < 1e-6:  # the view is along x itself
+        along = np.array([0.0, 1.0, 0.0])
     along /= np.linalg.norm(along)
     axes = np.stack([along, np.cross(toward, along), -toward])
     center = (low + high) / 2

@@ -231,7 +231,8 @@ def test_nothing_is_open_to_the_sky_through_the_container(gl, even_sky):
     points, low, high = probe_points(container), *container.bounds_mm
     found = 0
     for toward, seen in zip(sky_directions(), open_to.T, strict=True):
-        ways = np.sort([(low + 350 - points) / toward, (high - 350 - points) / toward], axis=0)
+        with np.errstate(divide="ignore"):
+            ways = np.sort([(low + 350 - points) / toward, (high - 350 - points) / toward], axis=0)
         enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
         behind = (enters > 0) & (leaves > enters)
         found += behind.sum()

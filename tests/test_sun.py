@@ -163,6 +163,22 @@ def test_a_dent_shades_itself_as_rays_say(gl):
     shadow.release()
 
 
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
+def test_a_sun_along_an_axis_lights_what_is_outermost(gl, axis):
+    container = build_container("20")
+    shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
+    shadow.cast(container, None, np.array(axis))
+    depth = np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(MAP_SIZE[::-1])
+    height = container.positions_mm @ axis
+    outermost = (container.normals @ axis > 0.9) & (height > height.max() - 1)
+    matrix = shadow.from_ray(np.zeros(3))
+    at = container.positions_mm[outermost] / 1000 @ matrix[:3, :3].T + matrix[:3, 3]
+    column, row = (at[:, :2] * MAP_SIZE).astype(int).T
+    assert outermost.sum() > 10
+    assert (at[:, 2] <= depth[row, column]).mean() > 0.9
+    shadow.release()
+
+
 @pytest.mark.parametrize("toward", [(0.95, 0.25, 0.12), (0.35, 0.9, 0.25), (-0.3, -0.8, 0.5)])
 def test_what_has_the_container_before_the_sun_lies_in_its_shade(gl, toward):
     """A millimetre off the surface too, in every crease of rails, posts and walls."""
@@ -174,7 +190,8 @@ def test_what_has_the_container_before_the_sun_lies_in_its_shade(gl, toward):
     facing = container.normals @ toward > 0.05
     points = container.positions_mm[facing].astype(float) + container.normals[facing]
     low, high = np.array(container.bounds_mm) + [[350.0], [-350.0]]
-    ways = np.sort(np.stack([(low - points) / toward, (high - points) / toward]), axis=0)
+    with np.errstate(divide="ignore"):
+        ways = np.sort(np.stack([(low - points) / toward, (high - points) / toward]), axis=0)
     enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
     behind = (enters > 0) & (leaves > enters)
     matrix = shadow.from_ray(np.zeros(3))
