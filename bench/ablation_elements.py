@@ -72,7 +72,7 @@ class Absence:
         for name in ("openness", "openness_of_spreader"):
             yield SkyProbe, name, _probe(getattr(SkyProbe, name), element.open_sky)
         if not element.thrown:
-            yield FormFactors, "thrown", lambda _, own, *others: np.zeros_like(own)
+            yield FormFactors, "light", lambda _, sky, *others: np.asarray(sky)
 
     def _edited(self, expand: Callable[..., str]) -> Callable[..., str]:
         def edited(*args: Any, **kwargs: Any) -> str:

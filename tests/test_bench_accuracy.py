@@ -141,6 +141,12 @@ def test_every_text_that_an_ablation_changes_stands_in_a_shader():
             assert old in text, element.name
 
 
+def test_everything_that_an_ablation_replaces_is_there():
+    for element in ablation_elements.ELEMENTS:
+        for owner, name, _ in ablation_elements.Absence(element)._replacements():
+            assert hasattr(owner, name), (element.name, name)
+
+
 def test_mesh_without_charts_lacks_their_triangles_alone_and_keeps_its_groups():
     mesh = build_container("20")
     less = ablation_elements.without_charts("door.bar.")(mesh)
