@@ -33,15 +33,15 @@ PIXEL_CLASSES = {
     "sky": (),
     "plain": (),
     "decal": ("DECALS",),
-    "mixed": ("MIXED", "DECALS"),
+    "mixed": ("MIXED",),
+    "mixed_decal": ("MIXED", "DECALS"),
     "damaged": ("DECALS", "DAMAGE"),
     "mixed_damaged": ("MIXED", "DECALS", "DAMAGE"),
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
     "cable": (),
 }
 """Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near;
-cables that cover part of the sky. Where a single surface bears decals, classify.frag takes the next
-class; of several any may, and to ask each of them costs more than to look for decals on all.
+cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
 """
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")

@@ -13,16 +13,28 @@
 uniform sampler2D sheet_points;
 uniform sampler2D rest_points;
 
+bool bears_decals(uint key, ivec2 sample_at) {
+    return key != 0u && cell_at(key_chart(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
+}
+
 void main() {
     ivec2 middle = middle_of(ivec2(gl_FragCoord.xy));
-    bool mixed = false;
     uint keys[FILTER_NEAR] = keys_near(middle);
     uint key = keys[0];
-    for (int i = 1; i < FILTER_NEAR; ++i) mixed = mixed || keys[i] != key;
-    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
-    bool decal = key != 0u && cell_at(key_chart(key), sheet_mm).x != 0u;
+    bool mixed = false;
+    // the first and the last of other parts stand for all: few pixels see a fourth
+    uint first = key, last = key;
+    ivec2 first_at = middle, last_at = middle;
+    for (int i = 1; i < FILTER_NEAR; ++i) {
+        mixed = mixed || keys[i] != key;
+        if (key_chart(keys[i]) == key_chart(key)) continue;
+        last = keys[i];
+        last_at = middle + FILTER_OFFSET[i];
+        if (first == key) { first = last; first_at = last_at; }
+    }
+    bool decal = bears_decals(key, middle) || bears_decals(first, first_at) || bears_decals(last, last_at);
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
-    if (decal && !mixed) ++found;   // programs.PIXEL_CLASSES has the one with decals next
+    if (decal) ++found;   // programs.PIXEL_CLASSES has the one with decals next
 #if DAMAGED
     vec3 rest_mm = texelFetch(rest_points, middle, 0).xyz;
     int near = 0;   // 1 near a damage, 2 near a hole

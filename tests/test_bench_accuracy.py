@@ -134,7 +134,7 @@ def test_every_text_that_an_ablation_changes_stands_in_a_shader():
             shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class, sun=True
         )
         for name in shaders
-        for pixel_class in ("plain", "mixed")
+        for pixel_class in ("plain", "mixed_decal")
     )
     for element in ablation_elements.ELEMENTS:
         for old, _ in element.text:
