@@ -27,7 +27,7 @@ _BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
 _FRONT_MM = DOOR_RING_MM + 0.5
 
 _BEND_MM = 80.0
-"""Levers are cut as short, to bend with a leaf that is dented and stay before it."""
+"""Blocks are cut as short, so that levers bend with a dented leaf and stay before it."""
 
 
 def gear(layout: Layout) -> list[Sheet]:

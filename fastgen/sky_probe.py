@@ -14,14 +14,7 @@ from fastgen import cache
 from fastgen.interreflection import Cells, FormFactors, form_factors
 from fastgen.kept import Recent
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.occluders import (
-    DepthMap,
-    DrawnBody,
-    Solid,
-    core_of,
-    map_matrix,
-    without_cables,
-)
+from fastgen.occluders import DepthMap, DrawnBody, Solid, core_of, map_matrix, without_cables
 from fastgen.openness import DIRECTIONS, Array, Directions, Openness, Sky, encoded, sky_directions
 from fastgen.programs import link
 

@@ -75,3 +75,12 @@ def around(rng, mesh: Mesh, count: int):
     points = rng.uniform(low - reach, high + reach)
     outside = ((points < low) | (points > high)).any(axis=1)
     return points[outside]
+
+
+def behind_the_middle(container, points, toward):
+    """Whether rays [3] from points [K, 3] in mm cross the box 350 mm within a container: slabs."""
+    low, high = np.array(container.bounds_mm) + [[350.0], [-350.0]]
+    with np.errstate(divide="ignore"):
+        ways = np.sort([(low - points) / toward, (high - points) / toward], axis=0)
+    enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
+    return (enters > 0) & (leaves > enters)

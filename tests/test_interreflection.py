@@ -93,13 +93,12 @@ def evenly(count):
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
 
 
-def by_rays(world, glow, of, sky=0.0):
-    """Irradiance / pi [K, 3] of vertices of the spreader, by 800 rays each, off bodies that glow,
-    radiance [N, 3] of a body's number, of places and of normals, and from an even sky. Rays that
-    start within a body, and meet a face from behind, tell nothing: [K], the share that tells."""
+def by_rays(world, glow, of):
+    """Irradiance / pi [K, 3] of vertices of the spreader, by 800 rays each, off bodies that glow:
+    radiance [N, 3] of a body's number, of places and of normals."""
     _, spreader, points, casters = world
     directions = evenly(1600)
-    found, told = [], []
+    found = []
     for vertex in of:
         facing = directions[directions @ spreader.normals[vertex] > 0]
         weight = facing @ spreader.normals[vertex]
@@ -107,15 +106,12 @@ def by_rays(world, glow, of, sky=0.0):
         met = [hits(caster, start, facing) for caster in casters]
         away = np.array([np.linalg.norm(place - start, axis=1) for place, _ in met])
         first = np.where(np.isnan(away), 1e9, away).argmin(axis=0)
-        light = np.full((len(facing), 3), sky)
-        tells = np.ones(len(facing), bool)
+        light = np.zeros((len(facing), 3))
         for number, (place, normal) in enumerate(met):
             mine = (first == number) & np.isfinite(away[number])
-            tells[mine] = (normal[mine] * facing[mine]).sum(axis=1) < 0
             light[mine] = glow(number, place[mine], normal[mine])
-        told.append(weight[tells].sum() / weight.sum())
-        found.append(weight[tells] @ light[tells] / max(weight[tells].sum(), 1e-9))
-    return np.array(found), np.array(told)
+        found.append(weight @ light / weight.sum())
+    return np.array(found)
 
 
 def pattern(places):
@@ -129,7 +125,7 @@ def test_light_off_the_container_is_what_rays_bring(world, factors, outside):
     cells = Cells.of(container, container_outline(KIND)).mean(pattern(container.positions_mm))
     none = np.zeros((len(spreader.positions_mm), 3))
     found = factors.light(none, none, cells, none)[outside]
-    expected, _ = by_rays(world, lambda body, place, _: pattern(place) * (body == 0), outside)
+    expected = by_rays(world, lambda body, place, _: pattern(place) * (body == 0), outside)
     assert len(outside) > 200
     assert expected.mean() > 0.1
     assert np.abs(found - expected).mean() < 0.03
@@ -149,7 +145,7 @@ def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outsid
     dark = np.zeros((1000, 3))
     paint = np.full(glowing.shape, dim)
     found = (factors.light(0 * glowing, glowing, dark, paint) / dim)[outside]
-    expected, _ = by_rays(world, lambda body, _, normal: glow(normal) * (body == 1), outside)
+    expected = by_rays(world, lambda body, _, normal: glow(normal) * (body == 1), outside)
     assert expected.mean() > 0.03
     assert np.abs(found - expected).mean() < 0.03
     assert np.abs((found - expected).mean(axis=0)).max() < 0.006
@@ -230,7 +226,7 @@ def test_all_the_light_of_a_spreader_is_what_rays_bring(world, outside, lit):
         np.testing.assert_allclose(with_sun, dark.irradiance - stored(dark.values), atol=0.02)
     assert np.abs((dark.irradiance[chosen] - arriving).mean(axis=0)).max() < 0.03 * arriving.mean()
     for body, (some, paint) in enumerate(((roof, ROOF), (beam, BEAM))):
-        expected, _ = by_rays(
+        expected = by_rays(
             world,
             lambda number, place, normal, body=body, paint=paint: (
                 paint * by_sky_and_sun(world, place, normal) * (number == body)

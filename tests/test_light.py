@@ -105,7 +105,7 @@ def lit_by(monkeypatch, values):
 
 
 def test_light_of_a_vertex_is_three_channels_times_a_fourth(monkeypatch):
-    """120 fourfold is as bright as 240 twofold, on container and spreader."""
+    """60 fourfold is as bright as 120 twofold, on container and spreader."""
 
     def values(steps, times):
         def of(normals):

@@ -24,6 +24,7 @@ from fastgen.shapes import spreader_mesh
 from fastgen.sky_probe import SkyProbe, probe_points
 from fastgen.spreader import build_spreader
 from fastgen.sun import Sun
+from tests.mesh_probe import behind_the_middle
 
 
 @pytest.fixture(scope="module")
@@ -228,13 +229,10 @@ def test_nothing_is_open_to_the_sky_through_the_container(gl, even_sky):
     bits = probe.openness(container, None, even_sky).values[:, 8:]
     probe.release()
     open_to = np.unpackbits(bits, axis=1).astype(bool)
-    points, low, high = probe_points(container), *container.bounds_mm
+    points = probe_points(container)
     found = 0
     for toward, seen in zip(sky_directions(), open_to.T, strict=True):
-        with np.errstate(divide="ignore"):
-            ways = np.sort([(low + 350 - points) / toward, (high - 350 - points) / toward], axis=0)
-        enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
-        behind = (enters > 0) & (leaves > enters)
+        behind = behind_the_middle(container, points, toward)
         found += behind.sum()
         assert not seen[behind].any()
     assert found > 100_000

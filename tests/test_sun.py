@@ -20,6 +20,7 @@ from fastgen.sky_probe import probe_points
 from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.sun import split_sun
 from fastgen.sun_shadow import MAP_SIZE, ShadowMap
+from tests.mesh_probe import behind_the_middle
 from tests.sky_samples import even_directions, one_light, texel_grid
 from tests.test_environment import write_exr
 
@@ -189,11 +190,7 @@ def test_what_has_the_container_before_the_sun_lies_in_its_shade(gl, toward):
     depth = np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(MAP_SIZE[::-1])
     facing = container.normals @ toward > 0.05
     points = container.positions_mm[facing].astype(float) + container.normals[facing]
-    low, high = np.array(container.bounds_mm) + [[350.0], [-350.0]]
-    with np.errstate(divide="ignore"):
-        ways = np.sort(np.stack([(low - points) / toward, (high - points) / toward]), axis=0)
-    enters, leaves = ways[0].max(axis=1), ways[1].min(axis=1)
-    behind = (enters > 0) & (leaves > enters)
+    behind = behind_the_middle(container, points, toward)
     matrix = shadow.from_ray(np.zeros(3))
     at = points[behind] / 1000 @ matrix[:3, :3].T + matrix[:3, 3]
     column, row = (at[:, :2] * MAP_SIZE).astype(int).T

@@ -5,13 +5,8 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.mesh import MATERIALS
+from fastgen.srgb import DECODED
 from fastgen.surface_values import reflectances
-
-
-def linear(encoded):
-    """sRGB bytes as albedo: IEC 61966-2-1."""
-    share = encoded / 255
-    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
 @pytest.mark.parametrize(("rust", "roughness"), [(0.0, 0.3), (0.0, 0.8), (0.12, 0.5)])
@@ -42,7 +37,7 @@ def test_what_a_roof_reflects_is_the_mean_of_its_paint_and_rust(rust, roughness)
         )
         / atlas.texel_mm
     ).astype(int)
-    roof = linear(atlas.base_color[::-1][y + 1 : y + height, x + 1 : x + width])
+    roof = DECODED[atlas.base_color[::-1][y + 1 : y + height, x + 1 : x + width]]
     albedo = roof.reshape(-1, 3).mean(axis=0)
     found = np.array(reflectances(scene)[MATERIALS.index("paint_sheet")])
     mirrored = (found - albedo) / (1 - albedo)
