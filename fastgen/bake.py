@@ -58,12 +58,12 @@ def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
 
 
 def bake_atlas(
-    ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str, first_chart: int = 0
+    ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str, first_zone: int = 0
 ) -> Atlas:
     """Bake all texels of `mesh`. The scene's textures and uniform blocks are bound already.
 
-    damage: one of programs.DAMAGE_VARIANTS. first_chart: what the numbers of the mesh's charts
-    begin with in the chart table. Raises ConfigError where texel_mm does not fit.
+    damage: one of programs.DAMAGE_VARIANTS. first_zone: what the numbers of the mesh's zones
+    begin with in the table of zones. Raises ConfigError where texel_mm does not fit.
     """
     width, height = atlas_size(mesh, texel_mm)
     program = link(
@@ -76,13 +76,13 @@ def bake_atlas(
     )
     layout = np.dtype([("p", "f4", 3), ("a", "f4", 2), ("c", "u4")])
     vertices = np.empty(len(mesh.positions_mm), layout)
-    vertices["p"], vertices["a"], vertices["c"] = mesh.positions_mm, mesh.atlas_mm, mesh.chart
-    vertices["c"] += first_chart
+    vertices["p"], vertices["a"], vertices["c"] = mesh.positions_mm, mesh.atlas_mm, mesh.zone
+    vertices["c"] += first_zone
     vertex_buffer = ctx.buffer(vertices.tobytes())
     index_buffer = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
     # without damage no texel asks for its rest position
     rest = ["in_position_mm"] if damage != "sound" else []
-    content = (vertex_buffer, "3f 2f 1u" if rest else "12x 2f 1u", *rest, "in_atlas_mm", "in_chart")
+    content = (vertex_buffer, "3f 2f 1u" if rest else "12x 2f 1u", *rest, "in_atlas_mm", "in_zone")
     array = ctx.vertex_array(program, [content], index_buffer)
     targets = [ctx.renderbuffer((_TILE, _TILE), 4) for _ in range(2)]
     depth = ctx.depth_renderbuffer((_TILE, _TILE))

@@ -79,7 +79,7 @@ def hole_radius_mm(damage: Damage, angle: Array) -> Array:
 
 
 def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
-    """Which rest points [..., 3] a perforation has torn away, bool [...]."""
+    """Which rest points [..., 3] a perforation has torn away, bool [...], but for door gear."""
     if damage.kind != "perforation":
         return np.zeros(np.shape(points_mm)[:-1], bool)
     u, v, w = local_coordinates(damage, points_mm)

@@ -17,6 +17,7 @@ from fastgen.damage import (
     local_coordinates,
     reach_mm,
 )
+from fastgen.door_gear import is_gear
 from fastgen.mesh import Mesh
 from fastgen.scene import Damage
 
@@ -29,7 +30,8 @@ HOLE_EDGE_MM = 15.0
 _SLOPE_STEP_MM = 0.5
 
 _REST, _MOVED, _NORMAL, _ATLAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 11)
-"""Columns of the corner arrays [T, 3, 11] in this module."""
+_SPARED = 11
+"""Columns of the corner arrays [T, 3, 12] in this module; spared is 1 where holes tear nothing."""
 
 Array = NDArray[np.float64]
 
@@ -51,7 +53,9 @@ class DamagedMesh:
 def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     """`mesh` with all `damages` done to it."""
     rest = mesh.positions_mm.astype(np.float64)
-    vertices = np.concatenate([rest, deform(damages, rest), mesh.normals, mesh.atlas_mm], axis=1)
+    spared = np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart, None]
+    moved = deform(damages, rest)
+    vertices = np.concatenate([rest, moved, mesh.normals, mesh.atlas_mm, spared], axis=1)
     corners = vertices[mesh.triangles]
     kept = np.ones(len(corners), bool)
     made = []
@@ -64,7 +68,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     fine = np.concatenate([np.empty((0, 3, vertices.shape[1])), *made])
     for damage in damages:
         if damage.kind == "perforation":
-            near = _within_reach(damage, fine)
+            near = _within_reach(damage, fine) & (fine[:, 0, _SPARED] == 0)
             fine = np.concatenate([fine[~near], _cut(damage, _refined(fine[near], HOLE_EDGE_MM))])
 
     used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
@@ -121,7 +125,7 @@ def _cut(hole: Damage, corners: Array) -> Array:
 
 
 def _turned(corners: Array, level: Array, first: NDArray[np.intp]) -> tuple[Array, ...]:
-    """Corners a, b, c [T, 11] and levels [T, 3], each triangle turned to begin at `first`."""
+    """Corners a, b, c [T, 12] and levels [T, 3], each triangle turned to begin at `first`."""
     order = (first[:, None] + np.arange(3)) % 3
     rows = np.arange(len(corners))[:, None]
     turned = corners[rows, order]
@@ -129,7 +133,7 @@ def _turned(corners: Array, level: Array, first: NDArray[np.intp]) -> tuple[Arra
 
 
 def _crossing(a: Array, other: Array, level: Array, corner: int) -> Array:
-    """Where the level is 0 between corner 0 and `corner`, [T, 11]."""
+    """Where the level is 0 between corner 0 and `corner`, [T, 12]."""
     share = level[:, :1] / (level[:, :1] - level[:, corner : corner + 1])
     return a + share * (other - a)
 

@@ -20,14 +20,14 @@ def as_drawn(mesh: Mesh, bent: bool) -> Mesh:
 
 @lru_cache(maxsize=32)
 def divided(mesh: Mesh, edge_mm: float) -> Mesh:
-    """`mesh` with no edge longer than edge_mm; charts and groups stay.
+    """`mesh` with no edge longer than edge_mm; zones and groups stay.
 
     Triangles are cut in two at the middle of their longest edge (Rivara 1984, "Algorithms for
     refining triangular grids"). Neighbours cut a shared edge at the same point, so no gaps open.
     Calls with the same mesh return the same object.
     """
     values = np.concatenate(
-        [mesh.positions_mm, mesh.normals, mesh.atlas_mm, mesh.chart[:, None]], axis=1
+        [mesh.positions_mm, mesh.normals, mesh.atlas_mm, mesh.zone[:, None]], axis=1
     ).astype(np.float64)
     corners = values[mesh.triangles]
     group = np.repeat(np.arange(len(mesh.groups)), [s.stop - s.start for s in mesh.groups.values()])
@@ -54,7 +54,7 @@ def divided(mesh: Mesh, edge_mm: float) -> Mesh:
         positions_mm=np.ascontiguousarray(unique[:, :3]),
         normals=np.ascontiguousarray(unique[:, 3:6]),
         atlas_mm=np.ascontiguousarray(unique[:, 6:8]),
-        chart=np.rint(unique[:, 8]).astype(np.uint16),
+        zone=np.rint(unique[:, 8]).astype(np.uint16),
         triangles=triangles.reshape(-1, 3).astype(np.uint32),
         groups={name: slice(int(ends[i]), int(ends[i + 1])) for i, name in enumerate(mesh.groups)},
     )

@@ -9,6 +9,7 @@ import numpy as np
 from fastgen.container_layout import DOOR_RING_MM, Layout
 from fastgen.container_parts import DOOR_FACE_MM
 from fastgen.door import LEAF_MM, SWAGE, Opening, opening
+from fastgen.mesh import Chart
 from fastgen.unfold import Patch, Sheet, beside, box, breaks, prism, regular
 
 BAR_RADIUS_MM = 17.0
@@ -28,6 +29,16 @@ _FRONT_MM = DOOR_RING_MM + 0.5
 
 _BEND_MM = 80.0
 """Blocks are cut as short, so that levers bend with a dented leaf and stay before it."""
+
+
+_PARTS = ("bar", "cams", "keepers", "brackets", "handle", "hinges")
+
+
+def is_gear(chart: Chart) -> bool:
+    """Whether a chart is of what `gear` makes: it stands before the leaves and is not torn with
+    them, though it bends as they do."""
+    name = chart.name.split(".")
+    return name[0] == "door" and len(name) > 1 and name[1] in _PARTS
 
 
 def gear(layout: Layout) -> list[Sheet]:

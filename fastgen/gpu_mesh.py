@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.clusters import Clusters
+from fastgen.door_gear import is_gear
 from fastgen.mesh import FACE_AXES, FACES, Mesh
 from fastgen.openness import open_sky
+from fastgen.programs import ZONE_GEAR, ZONE_TURN
 from fastgen.textures import data_texture
 
 _SLACK_MM = 120.0
@@ -40,11 +42,11 @@ _COMMAND = np.dtype(
 
 
 class GpuMesh:
-    """Vertex, index and chart data of one Mesh. Owned by the renderer, which releases it.
+    """Vertex and index data of one Mesh. Owned by the renderer, which releases it.
 
     programs: the geometry program of each of programs.DAMAGE_VARIANTS; that of 'holed' draws what
-    shows through holes. first_chart: what the numbers of the mesh's charts begin with in the chart
-    table.
+    shows through holes. first_zone: what the numbers of the mesh's zones begin with in the table of
+    zones.
     """
 
     def __init__(
@@ -52,20 +54,20 @@ class GpuMesh:
         ctx: moderngl.Context,
         mesh: Mesh,
         programs: Mapping[str, moderngl.Program],
-        first_chart: int = 0,
+        first_zone: int = 0,
     ) -> None:
         self.mesh = mesh
         layout = np.dtype([("p", "f4", 3), ("n", "f4", 3), ("a", "f4", 2), ("c", "u4")])
         vertices = np.empty(len(mesh.positions_mm), layout)
         vertices["p"], vertices["n"] = mesh.positions_mm, mesh.normals
-        vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.chart + first_chart
+        vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.zone + first_zone
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
         self._openness = ctx.buffer(open_sky(mesh.normals).tobytes())
         self._shown: weakref.ref[NDArray[np.uint8]] | None = None
         most = max(len(mesh.groups), Clusters.most_runs(mesh))
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
-        names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_chart")
+        names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_zone")
         content = (self._vertices, "3f 3f 2f 1u", *names)
         seen = ("in_cone", "in_light", "in_open_to")
         contents = [content, (self._openness, "3f1 1x 4f1 3u", *seen)]
@@ -116,19 +118,23 @@ class GpuMesh:
             item.release()
 
 
-def chart_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Texture:
-    """Place and material of each chart as the shader reads them (shaders/material.glsl).
+def zone_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Texture:
+    """What is known of each zone, as the shader reads it (shaders/zone.glsl).
 
-    meshes: by the number that each one's charts begin with. The caller releases the texture.
+    meshes: by the number that each one's zones begin with. The caller releases the texture.
     """
-    count = max(first + len(mesh.charts) for first, mesh in meshes.items())
+    count = max(first + len(mesh.zones) for first, mesh in meshes.items())
     table = np.zeros((2, count, 4), np.float32)
     for first, mesh in meshes.items():
-        columns = slice(first, first + len(mesh.charts))
-        table[0, columns] = [chart.rect_mm for chart in mesh.charts]
-        table[1, columns, 0] = [chart.material_index for chart in mesh.charts]
+        charts = [mesh.charts[zone.chart] for zone in mesh.zones]
+        columns = slice(first, first + len(charts))
+        table[0, columns] = [zone.rect_mm for zone in mesh.zones]
+        table[1, columns, 0] = [
+            chart.material_index + ZONE_TURN * zone.quarter_turns + ZONE_GEAR * is_gear(chart)
+            for chart, zone in zip(charts, mesh.zones, strict=True)
+        ]
         table[1, columns, 1:] = [
             FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
-            for chart in mesh.charts
+            for chart in charts
         ]
     return data_texture(ctx, table)

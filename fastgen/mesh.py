@@ -38,8 +38,8 @@ UNIT_CUBE_TRIANGLES = np.array(
 )
 """Its faces, uint32 [12, 3], counter-clockwise from outside."""
 
-MAX_CHARTS = 500
-"""Of one mesh: the renderer keeps chart + 1 of a container and of its spreader in ten bits."""
+MAX_ZONES = 500
+"""Of one mesh: the renderer keeps zone + 1 of a container and of its spreader in ten bits."""
 
 GROUP_SLACK_MM = 12.0
 """A face's frame stands back from the castings' plane by at most this much, see Mesh.groups."""
@@ -86,12 +86,26 @@ class Chart:
         return MATERIALS.index(self.material)
 
 
+@dataclass(frozen=True)
+class Zone:
+    """A part of a chart that wears by itself, such as one side of a beam.
+
+    chart: index into Mesh.charts. rect_mm: x0, y0, width, height in the atlas. quarter_turns: from
+    the atlas's +y clockwise to what is up in the world; 0 where the part lies flat.
+    """
+
+    chart: int
+    rect_mm: tuple[float, float, float, float]
+    quarter_turns: int
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles counter-clockwise from outside, flat normals, vertices split at creases.
 
     positions_mm: float32 [V, 3]. normals: float32 [V, 3], unit. atlas_mm: float32 [V, 2].
-    chart: uint16 [V], index into charts. triangles: uint32 [T, 3]. atlas_size_mm: width, height.
+    zone: uint16 [V], index into zones, the largest of each chart first. triangles: uint32 [T, 3].
+    atlas_size_mm: width, height.
 
     groups: range of triangles of each face, and of "frame". A triangle of face F is never the
     first hit of a ray from a point outside the container's outer box unless that point lies in
@@ -105,12 +119,18 @@ class Mesh:
     positions_mm: NDArray[np.float32]
     normals: NDArray[np.float32]
     atlas_mm: NDArray[np.float32]
-    chart: NDArray[np.uint16]
+    zone: NDArray[np.uint16]
     triangles: NDArray[np.uint32]
     charts: tuple[Chart, ...]
+    zones: tuple[Zone, ...]
     atlas_size_mm: tuple[float, float]
     groups: Mapping[str, slice]
     flats: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+
+    @cached_property
+    def chart(self) -> NDArray[np.uint16]:
+        """Index [V] into charts."""
+        return np.array([zone.chart for zone in self.zones], np.uint16)[self.zone]
 
     def chart_index(self, name: str) -> int:
         """Number of the chart called `name`. Raises ConfigError for an unknown one."""

@@ -15,7 +15,7 @@ from fastgen import environment, tone
 from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
 from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS, TILE_RANGE_CAPS
-from fastgen.mesh import MATERIALS, MAX_CHARTS
+from fastgen.mesh import MATERIALS, MAX_ZONES
 from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.resources import shader_path
@@ -60,11 +60,18 @@ MAX_DAMAGES = 128
 CLASS_DEPTH_STEP = 0.125
 """Classes are told apart as depths, multiples of this (exact in every depth format)."""
 
-SPREADER_CHART = MAX_CHARTS
-"""The spreader's charts number from here on, the container's below."""
+SPREADER_ZONE = MAX_ZONES
+"""The spreader's zones number from here on, the container's below."""
 
-PORTAL_CHART = 1000
-"""Chart number of what a perforation tore away; real charts number below it."""
+PORTAL_ZONE = 1000
+"""Zone number of what a perforation tore away; real zones number below it."""
+
+ZONE_TURN, ZONE_GEAR = 16, 64
+"""Of a zone's code (shaders/zone.glsl): steps of quarter turns above the material, and of gear."""
+
+EDGE_SHARE = 0.4
+"""Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
+beam would be their edge."""
 
 DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with a perforation among it."""
@@ -155,7 +162,7 @@ VIEW_BLOCK = Block(
         ("vec3", "sun_direction"),
         ("float", "sun_radius"),
         ("vec3", "sun_light"),  # irradiance / pi on what faces it
-        ("float", "cable_chart"),
+        ("float", "cable_zone"),
         ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m, and length, 0 for none
     ),
 )
@@ -215,7 +222,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "SOUND_CONTAINER": f"{SOUND_CONTAINER}u",
         "CONTAINER_ID": f"{CONTAINER_ID}u",
         "SPREADER_ID": f"{SPREADER_ID}u",
-        "SPREADER_CHART": f"{SPREADER_CHART}u",
+        "SPREADER_ZONE": f"{SPREADER_ZONE}u",
         "MIN_ROUGHNESS": MIN_ROUGHNESS,
         "DIELECTRIC_F0": DIELECTRIC_F0,
         "INSIDE_LIGHT": INSIDE_LIGHT,
@@ -258,7 +265,11 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "DAMAGE_FADE_END_MM": f"{fields.FADE_END_MM:.1f}",
         "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
         "HOLE_REACH": f"{fields.HOLE_REACH:g}",
-        "PORTAL_CHART": f"{PORTAL_CHART}u",
+        "PORTAL_ZONE": f"{PORTAL_ZONE}u",
+        "ZONE_MATERIAL": ZONE_TURN - 1,
+        "ZONE_TURN": ZONE_TURN,
+        "ZONE_GEAR": ZONE_GEAR,
+        "EDGE_SHARE": EDGE_SHARE,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),
         "CABLES": CABLES,

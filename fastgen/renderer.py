@@ -33,7 +33,7 @@ from fastgen.programs import (
     LAYERS,
     LOBE_CELLS,
     SCENE_BLOCK,
-    SPREADER_CHART,
+    SPREADER_ZONE,
     VIEW_BLOCK,
     link,
 )
@@ -159,9 +159,9 @@ class Renderer:
             part for part, item in zip(near, damages, strict=True) if item.kind == "perforation"
         ]
         targets.begin_samples(bands([*regions, *near]), holes)
+        self._bind_surface(scene, mesh, spreader)
         self._sample(targets, holes, view, camera, damages, mesh, spreader)
         self._bind_light(targets, light, shadow)
-        self._bind_surface(scene, mesh, spreader)
         shading.draw(
             targets,
             regions,
@@ -234,7 +234,7 @@ class Renderer:
         memory for that; lens: whether one bends what is drawn."""
         for scene in scenes:
             light = self.ambient(scene.environment.name)
-            self._shapes.chart_table(*self._shapes.of(scene, lens, light))
+            self._shapes.zone_table(*self._shapes.of(scene, lens, light))
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(
@@ -263,7 +263,7 @@ class Renderer:
             return None
         self._set(SCENE_BLOCK, scene_values(scene, 0))
         self._bind_surface(scene, self._shapes.container(scene.container), spreader)
-        return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_CHART)
+        return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_ZONE)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
@@ -284,7 +284,7 @@ class Renderer:
             "noise_tiles": self._noise,
             "art": self._art,
             "glyph_tiles": self._tiles,
-            "chart_table": self._shapes.chart_table(mesh, spreader),
+            "zone_table": self._shapes.zone_table(mesh, spreader),
             "decal_grid": decals.grid,
             "decal_table": decals.table,
             "glyph_table": decals.glyphs,

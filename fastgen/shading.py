@@ -19,7 +19,7 @@ UNITS = {
     "noise_tiles": 6,
     "art": 7,
     "glyph_tiles": 8,
-    "chart_table": 9,
+    "zone_table": 9,
     "decal_grid": 10,
     "decal_table": 11,
     "glyph_table": 12,

@@ -8,12 +8,12 @@ import numpy as np
 from fastgen.container import build_container, container_outline
 from fastgen.divided_mesh import as_drawn
 from fastgen.environment import Ambient
-from fastgen.gpu_mesh import GpuMesh, chart_table
+from fastgen.gpu_mesh import GpuMesh, zone_table
 from fastgen.kept import Kept
 from fastgen.mesh import Mesh
 from fastgen.occluders import Body, without_cables
 from fastgen.openness import Sky
-from fastgen.programs import SPREADER_CHART
+from fastgen.programs import SPREADER_ZONE
 from fastgen.scene import Container, Scene
 from fastgen.sky_probe import SkyProbe
 from fastgen.spreader import build_spreader
@@ -32,7 +32,7 @@ class Shapes:
         self._programs = programs
         self._containers: Kept[GpuMesh] = Kept(16)
         self._spreaders: Kept[GpuMesh] = Kept(64)
-        self._charts: Kept[moderngl.Texture] = Kept(128)
+        self._zones: Kept[moderngl.Texture] = Kept(128)
         self._probe = SkyProbe(ctx)
 
     def of(self, scene: Scene, bent: bool, light: Ambient) -> tuple[GpuMesh, GpuMesh | None]:
@@ -72,19 +72,19 @@ class Shapes:
             return None
         mesh = as_drawn(built, bent)
         return self._spreaders.get(
-            mesh, lambda: GpuMesh(self._ctx, mesh, self._programs, SPREADER_CHART)
+            mesh, lambda: GpuMesh(self._ctx, mesh, self._programs, SPREADER_ZONE)
         )
 
-    def chart_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
-        """The charts of both as the material layers read them."""
+    def zone_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
+        """The zones of both as the material layers read them."""
         meshes = {0: container.mesh}
         if spreader is not None:
-            meshes[SPREADER_CHART] = spreader.mesh
-        return self._charts.get(tuple(meshes.values()), lambda: chart_table(self._ctx, meshes))
+            meshes[SPREADER_ZONE] = spreader.mesh
+        return self._zones.get(tuple(meshes.values()), lambda: zone_table(self._ctx, meshes))
 
     def release(self) -> None:
         """Free all GL objects."""
-        for kept in (self._containers, self._spreaders, self._charts, self._probe):
+        for kept in (self._containers, self._spreaders, self._zones, self._probe):
             kept.release()
 
 

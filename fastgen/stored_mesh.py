@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen import cache
-from fastgen.mesh import Chart, Mesh
+from fastgen.mesh import Chart, Mesh, Zone
 
-_ARRAYS = ("positions_mm", "normals", "atlas_mm", "chart", "triangles")
+_ARRAYS = ("positions_mm", "normals", "atlas_mm", "zone", "triangles")
 
 
 def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
@@ -21,6 +21,10 @@ def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
         charts=tuple(
             Chart(part, face, material, (x, y, width, height))
             for part, face, material, (x, y, width, height) in about["charts"]
+        ),
+        zones=tuple(
+            Zone(chart, (x, y, width, height), turns)
+            for chart, (x, y, width, height), turns in about["zones"]
         ),
         atlas_size_mm=(about["atlas_size_mm"][0], about["atlas_size_mm"][1]),
         groups={group: slice(*ends) for group, ends in about["groups"].items()},
@@ -34,6 +38,7 @@ def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
 def _packed(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     about = {
         "charts": [(c.name, c.face, c.material, c.rect_mm) for c in mesh.charts],
+        "zones": [(z.chart, z.rect_mm, z.quarter_turns) for z in mesh.zones],
         "atlas_size_mm": mesh.atlas_size_mm,
         "groups": {name: (part.start, part.stop) for name, part in mesh.groups.items()},
         "flats": dict(mesh.flats),

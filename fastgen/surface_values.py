@@ -9,7 +9,7 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import DIELECTRIC_F0, SPREADER_CHART, noise_deviation
+from fastgen.programs import DIELECTRIC_F0, SPREADER_ZONE, noise_deviation
 from fastgen.reflectance import mean_specular_albedo
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm
@@ -122,11 +122,13 @@ def cable_values(
 ) -> dict[str, ArrayLike]:
     """Members of VIEW_BLOCK about the cables of a scene's spreader, none where `mesh` is None."""
     if mesh is None:
-        return {"cable_chart": -1.0, "cable_foot": np.zeros((CABLES, 4))}
+        return {"cable_zone": -1.0, "cable_foot": np.zeros((CABLES, 4))}
     feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
     from_eye = np.array(feet) / 1000 - eye_m
+    chart = mesh.chart_index(CABLE_CHART)
+    zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
     lengths = np.full((CABLES, 1), CABLE_LENGTH_MM / 1000)
     return {
-        "cable_chart": float(SPREADER_CHART + mesh.chart_index(CABLE_CHART)),
+        "cable_zone": float(SPREADER_ZONE + zone),
         "cable_foot": np.concatenate([from_eye, lengths], axis=1),
     }

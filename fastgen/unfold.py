@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen.mesh import FACE_AXES, FACES, GROUP_SLACK_MM, MATERIALS, MAX_CHARTS, Chart, Mesh
+from fastgen.mesh import FACE_AXES, FACES, GROUP_SLACK_MM, MATERIALS, MAX_ZONES, Chart, Mesh, Zone
 from fastgen.seams import stitched
+from fastgen.zones import zones_of
 
 Array = NDArray[np.float64]
 
@@ -234,18 +235,16 @@ def assemble(
     outer_size_mm: length, width and height of the container, whose planes the groups refer to;
     without it, all sheets keep the group they name.
     """
-    assert len(sheets) < MAX_CHARTS
     assert all(s.material in MATERIALS and s.face in FACES for s in sheets)
     packing = _packed(np.array([s.patch.size_mm for s in sheets]))
     patches = [
         (s.patch.turned() if turned else s.patch).at(x, y)
         for s, turned, (x, y) in zip(sheets, packing.turned, packing.corners, strict=True)
     ]
-    counts = [len(p.positions_mm) for p in patches]
+    zones, zone = _zones(patches)
+    assert len(zones) < MAX_ZONES
     whole = joined(patches)
-    values = np.column_stack(
-        [whole.normals, whole.sheet_mm, np.repeat(np.arange(len(sheets)), counts)]
-    )
+    values = np.column_stack([whole.normals, whole.sheet_mm, zone])
     positions, values, triangles, source = stitched(whole.positions_mm, values, whole.triangles)
     group = np.concatenate([_groups(s, outer_size_mm) for s in sheets])[source]
     order = np.argsort(group, kind="stable")
@@ -255,16 +254,30 @@ def assemble(
         positions_mm=positions.astype(np.float32),
         normals=values[:, :3].astype(np.float32),
         atlas_mm=values[:, 3:5].astype(np.float32),
-        chart=np.rint(values[:, 5]).astype(np.uint16),
+        zone=np.rint(values[:, 5]).astype(np.uint16),
         triangles=triangles[order].astype(np.uint32),
         charts=tuple(
             Chart(s.name, s.face, s.material, (float(x), float(y), *p.size_mm.tolist()))
             for s, p, (x, y) in zip(sheets, patches, packing.corners, strict=True)
         ),
+        zones=zones,
         atlas_size_mm=packing.size,
         groups={n: slice(int(ends[i]), int(ends[i + 1])) for i, n in enumerate(names)},
         flats=flats or {},
     )
+
+
+def _zones(patches: Sequence[Patch]) -> tuple[tuple[Zone, ...], NDArray[np.int64]]:
+    """The zones of charts that have their place, and which of them each vertex is in."""
+    zones: list[Zone] = []
+    of_vertices = []
+    for chart, patch in enumerate(patches):
+        heights, corners = patch.positions_mm[:, 2], patch.triangles
+        found, which = zones_of(chart, patch.sheet_mm, heights, patch.normals, corners)
+        of_vertices.append(np.zeros(len(heights), np.int64))
+        of_vertices[-1][corners] = len(zones) + which[:, None]
+        zones += found
+    return tuple(zones), np.concatenate(of_vertices)
 
 
 def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> NDArray[np.int64]:

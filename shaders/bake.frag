@@ -13,6 +13,7 @@
 #include "wet.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
+#include "zone.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
 #include "damage.glsl"
@@ -21,7 +22,7 @@ in vec3 rest_mm;
 #endif
 
 in vec2 atlas_mm;
-flat in uint chart;
+flat in uint zone;
 
 uniform float texel_mm;
 
@@ -33,7 +34,7 @@ void main() {
 #if WITH_DAMAGE
     scar = damage_at(rest_mm).scar;
 #endif
-    Material m = surface_at(chart, atlas_mm, texel_mm, scar).material;
+    Material m = surface_at(zone, atlas_mm, texel_mm, scar).material;
     out_albedo = vec4(srgb_encode(m.albedo), 1.0);
     out_surface = vec4(1.0, m.roughness, m.metallic, 1.0);
 }

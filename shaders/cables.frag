@@ -14,7 +14,7 @@ void main() {
     uint keys[FILTER_NEAR] = keys_near(middle);
     bool bare = true;
     for (int i = 0; i < FILTER_NEAR; ++i)
-        bare = bare && (keys[i] == 0u || float(key_chart(keys[i])) == cable_chart);
+        bare = bare && (keys[i] == 0u || float(key_zone(keys[i])) == cable_zone);
     if (!bare || abs(cables_cover(gl_FragCoord.xy) - 0.5) > 0.496) discard;
     gl_FragDepth = CLASS_DEPTH_STEP * float(CLASS_CABLE);
 }

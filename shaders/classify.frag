@@ -14,7 +14,7 @@ uniform sampler2D sheet_points;
 uniform sampler2D rest_points;
 
 bool bears_decals(uint key, ivec2 sample_at) {
-    return key != 0u && cell_at(key_chart(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
+    return key != 0u && cell_at(key_zone(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
 }
 
 void main() {
@@ -27,7 +27,7 @@ void main() {
     ivec2 first_at = middle, last_at = middle;
     for (int i = 1; i < FILTER_NEAR; ++i) {
         mixed = mixed || keys[i] != key;
-        if (key_chart(keys[i]) == key_chart(key)) continue;
+        if (key_zone(keys[i]) == key_zone(key)) continue;
         last = keys[i];
         last_at = middle + FILTER_OFFSET[i];
         if (first == key) { first = last; first_at = last_at; }

@@ -87,10 +87,10 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(uint chart, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise) {
+DecalHit decals_at(uint zone, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
     float worn = covered(noise.value.w, 0.6, noise.lost.w, 0.15);
-    uvec4 cell = cell_at(chart, sheet_mm);
+    uvec4 cell = cell_at(zone, sheet_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;
     do {

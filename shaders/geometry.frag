@@ -2,7 +2,9 @@
 #version 430 core
 #include "blocks.glsl"
 #if HOLED
+#include "octahedral.glsl"
 #include "damage.glsl"
+#include "zone.glsl"
 #endif
 
 in vec2 atlas_mm;
@@ -25,7 +27,7 @@ layout(location = 5) out vec4 out_rest;    // rest position in mm, -
 void main() {
 #if HOLED
     // seen from outside torn sheet marks the hole, from inside it is not there
-    if (hole_at(rest_mm) >= 0) discard;
+    if (hole_at(rest_mm) >= 0 && !before_sheet(key_zone(surface_key))) discard;
 #endif
     out_key = surface_key;
     out_sheet = atlas_mm;

@@ -10,7 +10,7 @@
 layout(location = 0) in vec3 in_position_mm;
 layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
-layout(location = 3) in uint in_chart;
+layout(location = 3) in uint in_zone;
 layout(location = 5) in vec3 in_cone;
 layout(location = 6) in vec4 in_light;
 layout(location = 7) in uvec3 in_open_to;   // a bit for each of openness.py's directions
@@ -41,12 +41,12 @@ float open_about_mirror(vec3 position_m, vec3 normal) {
 void main() {
     atlas_mm = in_atlas_mm;
     sky_light = in_light;
-    surface_key = pack_surface_key(in_chart, in_normal);
+    surface_key = pack_surface_key(in_zone, in_normal);
     vec3 position_mm = in_position_mm;
 #if DAMAGED
     rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
-    if (in_chart >= SPREADER_CHART) {   // no damage moves or marks it
+    if (in_zone >= SPREADER_ZONE) {   // no damage moves or marks it
         rest_mm = vec3(OUT_OF_REACH_MM);
         position_mm = in_position_mm;
     }

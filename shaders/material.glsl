@@ -1,19 +1,17 @@
-// SurfacePoint surface_at(chart, sheet_mm, footprint_mm, scar): all layers at a point of the sheet.
-
-uniform sampler2D chart_table;   // row 0: x0, y0, width, height in mm; row 1: material, and
-                                 // of panels and door gear their face's outward axis, else 0
+// SurfacePoint surface_at(zone, sheet_mm, footprint_mm, scar): all layers at a point of the sheet.
 
 struct SurfacePoint {
     Material material;
     uint decal_id;
-    vec3 outward;   // as in the chart table
+    vec3 outward;   // as in the table of zones
 };
 
 // footprint_mm: width of the lookup on the sheet; scar: how much damage has worked the steel, 0..1
-SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float scar) {
-    vec4 rect = texelFetch(chart_table, ivec2(int(chart), 0), 0);
-    vec4 part = texelFetch(chart_table, ivec2(int(chart), 1), 0);
-    int kind = int(part.x);
+SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar) {
+    vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
+    vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
+    int code = int(part.x);
+    int kind = code & ZONE_MATERIAL;
     vec4 base = material_base[kind];   // albedo, roughness
     vec4 trait = material_trait[kind]; // metallic, proneness to rust, share of the paint layers, -
 
@@ -21,7 +19,8 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
     vec2 to_border = min(from_low, rect.zw - from_low);
     float edge_mm = max(min(to_border.x, to_border.y), 0.0);
     float corner_mm = length(max(to_border, 0.0));
-    vec2 noise_mm = sheet_mm + noise_offset_mm;
+    float narrow_mm = min(rect.z, rect.w);
+    vec2 noise_mm = upright(sheet_mm, code) + noise_offset_mm;
     NoiseSample coarse = read_noise(0, noise_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
 
@@ -36,7 +35,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
-    DecalHit decal = decals_at(chart, albedo, sheet_mm, footprint_mm, coarse);
+    DecalHit decal = decals_at(zone, albedo, sheet_mm, footprint_mm, coarse);
     s.decal_id = decal.id;
 #if SHOWN(DECALS)
     albedo = decal.albedo;
@@ -45,7 +44,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 #endif
 #endif
 #if SHOWN(AGEING)
-    albedo *= 1.0 - 0.85 * trait.z * ageing(corner_mm, coarse.value.x);
+    albedo *= 1.0 - 0.85 * trait.z * ageing(corner_mm, narrow_mm, coarse.value.x);
 #endif
 #if SHOWN(REFLECTION)
     roughness = worn_roughness(roughness, streaks);
@@ -55,7 +54,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
     albedo = mix(albedo, vec3(0.38, 0.36, 0.33), 0.5 * scraped);
 #endif
 #if SHOWN(DIRT)
-    float grime = trait.z * dirt(edge_mm, streaks);
+    float grime = trait.z * dirt(edge_mm, narrow_mm, streaks);
     albedo = mix(albedo, dirt_albedo, grime);
     roughness = mix(roughness, 0.9, grime);
 #endif
@@ -63,7 +62,7 @@ SurfacePoint surface_at(uint chart, vec2 sheet_mm, float footprint_mm, float sca
 #if SHOWN(RUST)
     float sticker = 1.0 - 0.8 * decal_alpha;
     albedo = mix(albedo, albedo * rust_albedo * 4.0, trait.y * sticker * rust_stain(coarse) * 0.5);
-    rusty = sticker * rust(edge_mm, coarse, trait.y);
+    rusty = sticker * rust(edge_mm, narrow_mm, coarse, trait.y);
 #if WITH_DAMAGE
     // worked steel shows: dulled paint, then rust where the noise is rustiest
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);

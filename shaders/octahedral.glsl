@@ -15,14 +15,14 @@ vec3 octahedral_direction(vec2 uv) {
     return normalize(n);
 }
 
-// chart + 1 in the low bits, so that 0 is the void; the normal in 2 x 11 bits
-uint pack_surface_key(uint chart, vec3 normal) {
+// zone + 1 in the low bits, so that 0 is the void; the normal in 2 x 11 bits
+uint pack_surface_key(uint zone, vec3 normal) {
     // 2046 steps, so that the axes are met exactly
     uvec2 n = uvec2(octahedral(normal) * 2046.0 + 0.5);
-    return (chart + 1u) | (n.x << 10) | (n.y << 21);
+    return (zone + 1u) | (n.x << 10) | (n.y << 21);
 }
 
-uint key_chart(uint key) { return (key & 1023u) - 1u; }
+uint key_zone(uint key) { return (key & 1023u) - 1u; }
 
 vec3 key_normal(uint key) {
     return octahedral_direction(vec2((key >> 10) & 2047u, key >> 21) / 2046.0);

@@ -20,6 +20,7 @@
 #include "wet.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
+#include "zone.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
 #include "damage.glsl"
@@ -42,13 +43,13 @@ struct Shaded {
 };
 
 // as openness.py encodes it; interreflection.py has found what surfaces throw on the spreader
-Openness openness_at(ivec2 sample_at, uint chart) {
+Openness openness_at(ivec2 sample_at, uint zone) {
     vec4 stored = texelFetch(openness_points, sample_at, 0);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
     vec4 encoded = texelFetch(light_points, sample_at, 0);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
-    float bounces = chart < SPREADER_CHART ? 1.0 : 0.0;
+    float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces);
 }
 
@@ -121,9 +122,9 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
     p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(key_chart(key), sheet_mm, p.footprint_mm, p.scar);
+    p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
-    if (key_chart(key) >= SPREADER_CHART) {
+    if (key_zone(key) >= SPREADER_ZONE) {
         p.id = SPREADER_ID;
         p.damage = 0u;
     }
@@ -132,8 +133,8 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 
 #if FINE_LAYERS
 // the material of `p` at another point of its sheet goes into `sum`
-void add_layers(inout Material sum, Part p, uint chart, vec2 sheet_mm) {
-    Material m = surface_at(chart, sheet_mm, p.footprint_mm, p.scar).material;
+void add_layers(inout Material sum, Part p, uint zone, vec2 sheet_mm) {
+    Material m = surface_at(zone, sheet_mm, p.footprint_mm, p.scar).material;
     sum = Material(sum.albedo + m.albedo, sum.roughness + m.roughness, sum.metallic + m.metallic);
 }
 
@@ -144,7 +145,7 @@ Material mean_of(Material sum, float count) {
 
 vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec3 normal = key_normal(key);
-    Openness sky = openness_at(sample_at, key_chart(key));
+    Openness sky = openness_at(sample_at, key_zone(key));
 #if WITH_DAMAGE
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
@@ -176,7 +177,7 @@ Shaded single_surface(ivec2 pixel) {
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
     for (int i = 0; i < 4; ++i) {
         vec2 place = 0.28867513 * vec2(ivec2((i & 1) * 2 - 1, (i & 2) - 1));
-        add_layers(p.surface.material, p, key_chart(key), sheet_mm + mm_of_pixel * place);
+        add_layers(p.surface.material, p, key_zone(key), sheet_mm + mm_of_pixel * place);
     }
     p.surface.material = mean_of(p.surface.material, 5.0);
 #endif

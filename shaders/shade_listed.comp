@@ -26,7 +26,8 @@ void main() {
         else left |= 1u << i;
 #if WITH_HOLES
         int hole = hole_at(texelFetch(rest_points, middle + FILTER_OFFSET[i], 0).xyz);
-        if (keys[i] != 0u && hole >= 0) keys[i] = (PORTAL_CHART + 1u) | (uint(hole) << 10);
+        if (keys[i] != 0u && hole >= 0 && !before_sheet(key_zone(keys[i])))
+            keys[i] = (PORTAL_ZONE + 1u) | (uint(hole) << 10);
 #endif
     }
     bool sees_sky = keys[0] == 0u;
@@ -41,10 +42,10 @@ void main() {
         ivec2 offset = ivec2(0);
         for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
             if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = FILTER_OFFSET[i]; }
-        uint chart = key_chart(first_key);
+        uint zone = key_zone(first_key);
         uint of_part = 0u;
         for (int i = 0; i < FILTER_SAMPLES; ++i)
-            if (key_chart(keys[i]) == chart) of_part |= 1u << i;
+            if (key_zone(keys[i]) == zone) of_part |= 1u << i;
         of_part &= left;
         vec3 ray = view_ray(center + from_center(vec2(offset)));
         vec3 view = -normalize(ray);
@@ -54,7 +55,7 @@ void main() {
         for (int i = 0; i < FILTER_SAMPLES; ++i)
             if ((of_part & 1u << i) != 0u && FILTER_OFFSET[i] != offset) {
                 vec2 sheet_mm = texelFetch(sheet_points, middle + FILTER_OFFSET[i], 0).xy;
-                add_layers(p.surface.material, p, chart, sheet_mm);
+                add_layers(p.surface.material, p, zone, sheet_mm);
                 count += 1.0;
             }
         p.surface.material = mean_of(p.surface.material, count);
@@ -75,7 +76,7 @@ void main() {
             left &= ~of_side;
             vec3 lit_color = part_color(p, middle + side_offset, key, view);
 #if WITH_HOLES
-            if (chart == PORTAL_CHART) {
+            if (zone == PORTAL_ZONE) {
                 Shaded through = through_hole(middle + offset, key, ray);
                 lit_color = through.color;
                 if (through.cover == 0.0) sky_weight += weight;

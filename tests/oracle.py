@@ -8,6 +8,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import damage as fields
 from fastgen.camera import View
+from fastgen.door_gear import is_gear
 from fastgen.mesh import Mesh
 from fastgen.scene import Decal, Scene
 from fastgen.spreader import build_spreader
@@ -49,6 +50,7 @@ def cast(
     """
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
+    tears = ~np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
     moved = fields.deform(damages, rest)
     # Embree sees metres around the origin, where its float32 is finest
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
@@ -76,7 +78,7 @@ def cast(
         travelled[active] = np.maximum(distance, travelled[active] + 0.02)
         torn = np.full(len(active), -1)
         for i, damage in enumerate(damages):
-            torn[fields.in_hole(damage, point)] = i
+            torn[fields.in_hole(damage, point) & tears[triangle]] = i
         inside = hole[active] >= 0
         # outsides end a ray from outside, insides one that came in through a hole
         wall = facing != inside

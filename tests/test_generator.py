@@ -195,7 +195,7 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         def never(*_: object, **__: object) -> None:
             raise AssertionError("made after all")
 
-        for made in ("GpuMesh", "chart_table", "encoded"):
+        for made in ("GpuMesh", "zone_table", "encoded"):
             monkeypatch.setattr(
                 f"fastgen.{'openness' if made == 'encoded' else 'shapes'}.{made}", never
             )

@@ -93,7 +93,7 @@ def test_surface_keys_keep_chart_and_normal(gl):
     charts = np.arange(400) * 2
     body = (
         "vec4 f(vec4 x) { uint key = pack_surface_key(uint(x.w), x.xyz);"
-        " return vec4(key_normal(key), float(key_chart(key))); }"
+        " return vec4(key_normal(key), float(key_zone(key))); }"
     )
     out = run(gl, body, np.c_[directions, charts])
     np.testing.assert_array_equal(out[:, 3], charts)

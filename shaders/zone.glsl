@@ -1,0 +1,16 @@
+// What is known of each zone of the atlas (fastgen/gpu_mesh.py). bool before_sheet(zone): whether it is
+// of the door's gear; vec2 upright(sheet_mm, code): turned so that +y is up in the world.
+
+uniform sampler2D zone_table;   // row 0: x0, y0, width, height in mm; row 1: code, and of panels and
+                                // door gear their face's outward axis, else 0
+// code: material, quarter turns clockwise from +y to up, 1 of gear
+
+bool before_sheet(uint zone) {
+    return int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x) >= ZONE_GEAR;
+}
+
+vec2 upright(vec2 sheet_mm, int code) {
+    int turns = code / ZONE_TURN;
+    vec2 turned = (turns & 1) == 0 ? sheet_mm : vec2(-sheet_mm.y, sheet_mm.x);
+    return (turns & 2) == 0 ? turned : -turned;
+}
