@@ -11,8 +11,8 @@ from fastgen.mesh import Zone
 
 Array = NDArray[np.float64]
 
-_LEVEL = 0.6
-"""Cosine of the slope, 53 degrees, up to which a roof's corrugation and the like count as level."""
+_LEVEL = 0.8
+"""Mean rise, of a slope of 53 degrees, below which a zone counts as level."""
 
 _CREASE = 0.3
 """Cosine of the angle, 73 degrees, from which on a fold is an edge: that of a box, not of a bar of
@@ -34,8 +34,8 @@ def zones_of(
     sheet_mm: [V, 2], where vertices lie in the atlas. heights_mm: [V], their z in the world.
     normals: [V, 3]. triangles: [T, 3]. Triangles that share a vertex share a zone.
     """
-    turns = _quarter_turns(sheet_mm[triangles], heights_mm[triangles], normals[triangles[:, 0], 2])
-    piece = _connected(sheet_mm, normals, triangles, turns)
+    piece = _connected(sheet_mm, normals, triangles)
+    turns = _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)[piece]
     low, high = _bounds(sheet_mm[triangles], piece)
     small = (high - low).min(axis=1) < _SMALL_MM
     piece = np.where(small[piece], -1 - turns, piece)
@@ -50,24 +50,25 @@ def zones_of(
     return found, rank[piece]
 
 
-def _quarter_turns(corners: Array, heights: Array, upward: Array) -> NDArray[np.int64]:
-    """Zone.quarter_turns of triangles: sheet corners [T, 3, 2], heights [T, 3], normals' z [T]."""
+def _quarter_turns(corners: Array, heights: Array, piece: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Zone.quarter_turns [P] of pieces by their mean rise: a corrugated roof goes down as often as
+    up. corners: of triangles on the sheet, [T, 3, 2]. heights: [T, 3]. piece: [T]."""
     sides, rises = corners[:, 1:] - corners[:, :1], heights[:, 1:] - heights[:, :1]
+    area = np.abs(np.linalg.det(sides))
     gradient = np.linalg.solve(sides, rises[..., None])[..., 0]
-    across, along = np.abs(gradient).T
+    along_x, along_y = (np.bincount(piece, area * part) for part in gradient.T)
+    rise = np.hypot(along_x, along_y) / np.bincount(piece, area)
     turns = np.where(
-        along >= across,
-        np.where(gradient[:, 1] >= 0, 0, 2),
-        np.where(gradient[:, 0] >= 0, 1, 3),
+        np.abs(along_y) >= np.abs(along_x),
+        np.where(along_y >= 0, 0, 2),
+        np.where(along_x >= 0, 1, 3),
     )
-    return np.where(np.abs(upward) > _LEVEL, 0, turns)
+    return np.where(rise < _LEVEL, 0, turns)
 
 
-def _connected(
-    sheet_mm: Array, normals: Array, triangles: NDArray[np.int64], turns: NDArray[np.int64]
-) -> NDArray[np.int64]:
-    """Number of the piece of each triangle [T]: those that stand alike and meet without a crease
-    along an edge of the sheet are one."""
+def _connected(sheet_mm: Array, normals: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Number of the piece of each triangle [T]: those that meet along an edge of the sheet without
+    a crease are one."""
     from scipy.sparse import coo_array  # takes 0.3 s, and finished meshes are kept on disk
     from scipy.sparse.csgraph import connected_components
 
@@ -80,9 +81,9 @@ def _connected(
     shared = np.flatnonzero(code[order][1:] == code[order][:-1])
     first, second = order[shared] // 3, order[shared + 1] // 3
     normal = normals[triangles[:, 0]]
-    alike = (turns[first] == turns[second]) & ((normal[first] * normal[second]).sum(1) > _CREASE)
+    even = (normal[first] * normal[second]).sum(axis=1) > _CREASE
     count = len(triangles)
-    links = coo_array((alike[alike], (first[alike], second[alike])), shape=(count, count))
+    links = coo_array((even[even], (first[even], second[even])), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
