@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from fastgen import doctor, gl
+from fastgen.egl import EGL_PACKAGES, EglDevice
 from fastgen.errors import ConfigError, ContextError
 
 BACKENDS = ("egl", "osmesa")
@@ -180,12 +181,12 @@ def test_the_first_thread_count_of_a_process_stands(backend):
 
 def test_hardware_comes_first_and_software_serves_where_it_fails(monkeypatch):
     (software,) = (device for device in gl.egl_devices() if device.software)
-    broken = gl.EglDevice(handle=64, software=False)
+    broken = EglDevice(handle=64, software=False)
     tried = []
-    create = gl._Egl.create
-    monkeypatch.setattr(gl._Egl, "devices", lambda _: [software, broken])
+    create = gl.Egl.create
+    monkeypatch.setattr(gl.Egl, "devices", lambda _: [software, broken])
     monkeypatch.setattr(
-        gl._Egl, "create", lambda egl, device: tried.append(device) or create(egl, device)
+        gl.Egl, "create", lambda egl, device: tried.append(device) or create(egl, device)
     )
     gl.open_context("egl").release()
     assert tried == [broken, software]
@@ -194,7 +195,7 @@ def test_hardware_comes_first_and_software_serves_where_it_fails(monkeypatch):
 
 
 def test_surfaceless_serves_where_no_device_is_listed(monkeypatch):
-    monkeypatch.setattr(gl._Egl, "devices", lambda _: [])
+    monkeypatch.setattr(gl.Egl, "devices", lambda _: [])
     np.testing.assert_array_equal(triangle("egl"), expected())
 
 
@@ -250,7 +251,7 @@ def test_doctor_names_the_packages_where_egl_finds_no_driver(monkeypatch):
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
     egl, osmesa = doctor.diagnose()
     assert not egl.works
-    assert f"apt-get install {gl.EGL_PACKAGES}" in egl.words
+    assert f"apt-get install {EGL_PACKAGES}" in egl.words
     assert osmesa.works
 
 
