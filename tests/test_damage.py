@@ -186,8 +186,7 @@ def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeyp
     np.testing.assert_allclose(short.depth, usual.depth, rtol=4e-6)
 
 
-def test_a_hole_torn_through_rods_and_handles_shows_no_sky():
-    """The door's gear stands before its sheet, and all of it is torn away."""
+def test_a_hole_behind_rods_and_handles_shows_no_sky():
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
     with Generator(Config.from_values({"damage": values}), 77, (256, 256)) as generator:
         samples = [generator.render(index, "Cr") for index in range(12)]

@@ -113,13 +113,10 @@ def holes(scene):
 
 @pytest.fixture(scope="module")
 def torn(generator, tmp_path_factory):
-    """A container with at least one hole, and its file.
-
-    No hole is in the door: the renderer shows sky there in place of what torn gear would hide.
-    """
-    scenes = (generator.scene(index) for index in range(50))
-    scene = next(s for s in scenes if {d.face for d in holes(s)} & {"front", "back"})
-    scene = replace(scene, damages=tuple(d for d in scene.damages if d.face != "door"))
+    """A container with holes in the door and in a side, and its file."""
+    scenes = (generator.scene(index) for index in range(200))
+    faces = ((scene, {damage.face for damage in holes(scene)}) for scene in scenes)
+    scene = next(s for s, torn in faces if "door" in torn and torn & {"front", "back"})
     path = tmp_path_factory.mktemp("export") / "torn.glb"
     export_glb(generator, scene, path, texel_mm=8.0)
     return scene, Exported(path)
@@ -163,8 +160,9 @@ def test_rays_at_the_exported_geometry_meet_it_at_the_rendered_depth(generator, 
     triangle, depth = exported.first_hits(camera, exported.whole)
     both = (triangle >= 0) & (sample.ids.ravel() > 0)
     error = np.abs(depth[both] - sample.depth.ravel()[both])
-    # insides lie the thickness of the steel deeper than what the renderer shows through a hole
-    assert np.quantile(error, 0.995) < 3e-3
+    # insides lie the thickness of the steel deeper than what the renderer shows through a hole, and
+    # beside one locking bars bend in finer steps
+    assert np.quantile(error, 0.995) < 4e-3
 
 
 @pytest.mark.parametrize("camera", ["A", "Cr"])
@@ -196,7 +194,7 @@ def test_the_exported_spreader_wears_the_renderers_paint(generator, tmp_path):
 
 def test_holes_are_open_to_a_millimetre(torn):
     scene, _ = torn
-    hole = holes(scene)[0]
+    hole = next(hole for hole in holes(scene) if hole.face != "door")  # gear would stand before it
     rest = build_container(scene.container.kind, scene.container.profiles)
     flat = replace(hole, depth_mm=0.0)
     cut = damaged_mesh(rest, (flat,))
