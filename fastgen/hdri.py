@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,10 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
     return named
 
 
+_HOURS = {"dawn": (5, 7), "sunset": (17, 20), "dusk": (18, 21), "night": (21, 28)}
+_DAYTIME = (8, 17)
+
+
 def bundled_hdris() -> dict[str, Path]:
     """Name -> file of every environment that ships with fastgen, sorted by name.
 
@@ -83,6 +88,16 @@ def bundled_weights() -> dict[str, float]:
         name: 0.0 if "interior" in kind else PORT_WEIGHT if "port" in kind else 1.0
         for name, kind in kinds.items()
     }
+
+
+@lru_cache
+def hours_of(name: str) -> tuple[int, int]:
+    """First and last hour of the day, past 24 after midnight, at which an environment may look so:
+    any for one that does not ship with fastgen."""
+    if name not in _index():
+        return 0, 24
+    kinds = _index()[name]["kind"]
+    return next((hours for kind, hours in _HOURS.items() if kind in kinds), _DAYTIME)
 
 
 def _index() -> dict[str, dict[str, Any]]:

@@ -8,6 +8,7 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from datetime import datetime
 from itertools import product
 
 import numpy as np
@@ -17,6 +18,7 @@ from fastgen.config import CameraConfig, Config, ContainerConfig, SpreaderConfig
 from fastgen.container import KINDS, build_container
 from fastgen.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
+from fastgen.hdri import hours_of
 from fastgen.markings import sample_decals
 from fastgen.mesh import SHEET_FACES, Mesh
 from fastgen.records import Range
@@ -36,7 +38,7 @@ from fastgen.scene import (
     Wear,
 )
 from fastgen.scene_check import mm_away
-from fastgen.sensor.sampling import sample_lens, sample_sensor, sample_weather
+from fastgen.sensor.sampling import sample_lens, sample_moment, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
 
@@ -67,14 +69,17 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     mesh = build_container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
+    environment = _environment(config, streams, environments)
+    hours = hours_of(environment.name)
+    moment = sample_moment(config.sensor.stamp.years, hours, streams("moment"))
     return Scene(
         seed=seed,
         index=index,
         container=container,
         surface=surface,
-        environment=_environment(config, streams, environments),
+        environment=environment,
         cameras=tuple(
-            _with_sensor(_camera(name, rig, kind, streams), config, streams)
+            _with_sensor(_camera(name, rig, kind, streams), config, moment, streams)
             for name, rig in config.cameras.items()
         ),
         decals=sample_decals(
@@ -262,10 +267,10 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     return replace(camera, roll_deg=round((roll + level + 180) % 360 - 180, 3))
 
 
-def _with_sensor(camera: Camera, config: Config, streams: Streams) -> Camera:
+def _with_sensor(camera: Camera, config: Config, moment: datetime, streams: Streams) -> Camera:
     distance_mm = float(np.linalg.norm(np.subtract(camera.position_mm, camera.target_mm)))
     sensor = sample_sensor(
-        config.sensor, distance_mm, lambda part: streams(f"sensor.{camera.name}.{part}")
+        config.sensor, distance_mm, moment, lambda part: streams(f"sensor.{camera.name}.{part}")
     )
     return replace(camera, sensor=sensor)
 

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterator
-from datetime import date, timedelta
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -24,11 +24,14 @@ def extreme_lenses(config: LensConfig) -> Iterator[Lens]:
 
 
 def sample_sensor(
-    config: SensorConfig, distance_mm: float, streams: Callable[[str], np.random.Generator]
+    config: SensorConfig,
+    distance_mm: float,
+    moment: datetime,
+    streams: Callable[[str], np.random.Generator],
 ) -> Sensor | None:
     """What a camera `distance_mm` before its target does to an image, None where it is nothing.
 
-    streams: gives the random stream of each part by its name.
+    moment: when it takes it. streams: gives the random stream of each part by its name.
     """
     sensor = Sensor(
         defocus=_defocus(config, distance_mm, streams("defocus")),
@@ -37,10 +40,21 @@ def sample_sensor(
         exposure_error_ev=_drawn(streams("exposure"), config.exposure_error_ev),
         gains=_gains(config.white_balance_ev, streams("white balance")),
         noise=_noise(config, streams("noise")),
-        stamp=_stamp(config, streams("stamp")),
+        stamp=_stamp(config, moment, streams("stamp")),
         jpeg_quality=int(streams("jpeg").integers(*config.jpeg_quality, endpoint=True)),
     )
     return None if sensor == Sensor() else sensor
+
+
+def sample_moment(
+    years: tuple[int, int], hours: tuple[int, int], rng: np.random.Generator
+) -> datetime:
+    """When a scene is, to the second: in one of `years`, within `hours` of the day, past 24 after
+    midnight."""
+    first, last = years
+    day = datetime(int(rng.integers(first, last, endpoint=True)), 1, 1)
+    seconds = int(rng.integers(3600 * hours[0], 3600 * hours[1]))
+    return day + timedelta(days=int(rng.integers(364)), seconds=seconds)
 
 
 def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
@@ -94,17 +108,13 @@ def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
     return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))
 
 
-def _stamp(config: SensorConfig, rng: np.random.Generator) -> Stamp | None:
+def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> Stamp | None:
     if rng.random() >= config.stamp.probability:
         return None
-    first, last = config.stamp.years
-    day = date(int(rng.integers(first, last, endpoint=True)), 1, 1)
-    day += timedelta(days=int(rng.integers(365)))
-    seconds = int(rng.integers(86400))
-    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
     shape = str(rng.choice(["%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d"]))
     corner = str(rng.choice(config.stamp.corners))
-    return Stamp(f"{day.strftime(shape)} {clock}", corner, _drawn(rng, config.stamp.height))
+    text = moment.strftime(f"{shape} %H:%M:%S")
+    return Stamp(text, corner, _drawn(rng, config.stamp.height))
 
 
 def _drawn(rng: np.random.Generator, values: Range) -> float:
