@@ -234,6 +234,15 @@ def test_worked_steel_is_dulled_and_rusts(generator):
     marked = dented.damage == fields.mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
     assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
+    # along the fold no paint is as it was, be it rusty or not
+    (damage,) = scene.damages
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    hits = oracle.cast(mesh, dented.view, scene)
+    along, across, _ = fields.local_coordinates(damage, hits.rest_mm)
+    fold = np.abs(across - fields.fold_path_mm(damage, along)) < 0.3 * damage.shape[0]
+    fold &= marked & (np.abs(along) < 0.6 * damage.size_mm[0] / 2)
+    assert fold.sum() > 100
+    assert (dented.image[fold][:, 2] < painted[2] - 10).mean() > 0.98
 
 
 def test_a_dented_leaf_stays_behind_its_locking_gear():
