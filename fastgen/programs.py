@@ -73,6 +73,10 @@ EDGE_SHARE = 0.4
 """Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
 beam would be their edge."""
 
+SHADOW_TEXELS = 1.0
+"""Texels of the sun's shadow map that its lookups stand apart at least: with fewer, slanted edges of
+shadows have teeth."""
+
 DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with a perforation among it."""
 
@@ -272,6 +276,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "EDGE_SHARE": EDGE_SHARE,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),
+        "SHADOW_TEXELS": SHADOW_TEXELS,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),

@@ -24,15 +24,21 @@ vec3 sunlit(Reflector r) {
     return (r.diffuse + specular) * sun_light * n_dot_l;
 }
 
-// Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint on the surface, and no
-// less than a penumbra. from_eye: to the point, in m.
+// Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint, and no less than hides
+// the map's texels. from_eye: to the point, in m.
 float sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
-    float reach = clamp(0.22 * footprint_m, 0.002, 0.03);
-    vec3 along = normalize(abs(normal.z) < 0.7 ? vec3(-normal.y, normal.x, 0.0)
-                                               : vec3(normal.z, 0.0, -normal.x));
     vec3 at = (ray_to_shadow * vec4(from_eye, 1.0)).xyz;
-    vec3 u = mat3(ray_to_shadow) * (reach * along);
-    vec3 v = mat3(ray_to_shadow) * (reach * cross(normal, along));
-    return 0.25 * (textureLod(sun_shadow, at + u + v, 0.0) + textureLod(sun_shadow, at + u - v, 0.0) +
-                   textureLod(sun_shadow, at - u + v, 0.0) + textureLod(sun_shadow, at - u - v, 0.0));
+    mat3 axes = transpose(mat3(ray_to_shadow));   // the map's, in its units a metre
+    vec3 squared = vec3(dot(axes[0], axes[0]), dot(axes[1], axes[1]), dot(axes[2], axes[2]));
+    vec2 texels = SHADOW_TEXELS / vec2(textureSize(sun_shadow, 0));
+    vec2 reach = max(texels, min(0.22 * footprint_m, 0.03) * sqrt(squared.xy));
+    // slanted, so that each lookup has a row and a column of its own
+    vec3 u = vec3(reach * vec2(0.75, 0.25), 0.0), v = vec3(reach * vec2(-0.25, 0.75), 0.0);
+    // and on the plane of the surface
+    vec3 plane = normal * axes / squared;
+    vec2 slope = plane.xy / min(plane.z, -1e-3);
+    u.z = -dot(slope, u.xy);
+    v.z = -dot(slope, v.xy);
+    return 0.25 * (textureLod(sun_shadow, at + u, 0.0) + textureLod(sun_shadow, at - u, 0.0) +
+                   textureLod(sun_shadow, at + v, 0.0) + textureLod(sun_shadow, at - v, 0.0));
 }

@@ -125,7 +125,7 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, toward):
 
 def test_a_dent_shades_itself_as_rays_say(gl):
     """Under a raking sun, half of a deep dent lies in the shade of the other."""
-    toward = np.array([0.93, -0.3, 0.2]) / np.linalg.norm([0.93, -0.3, 0.2])
+    toward = np.array([0.3, -0.75, 0.6]) / np.linalg.norm([0.3, -0.75, 0.6])
     container = build_container("20")
     half_width = KINDS["20"].size_mm[1] / 2
     dent = Damage(
@@ -244,3 +244,34 @@ def test_shadows_fall_where_they_do_without_antialiasing(quality):
     assert inside.sum() > 5000
     apart = np.abs(soft[0] - soft[1]).max(axis=2)[inside]
     assert (apart > 20).mean() < 0.002
+
+
+def test_edges_of_shadows_have_no_teeth(tmp_path):
+    """A flipper's straight edge throws a straight one on the end beam, at 2 mm a pixel."""
+    toward = np.array([0.3, -0.75, 0.6]) / np.linalg.norm([0.3, -0.75, 0.6])
+    sky = np.full((512, 1024, 3), 0.2, np.float32)
+    write_exr(tmp_path / "flat.exr", sky + one_light(toward, 1e5, 512))
+    even = {"rust_coverage": 0, "dirt_strength": 0, "ageing_strength": 0, "tone_variation": 0}
+    even |= {"scratch_coverage": 0, "wear_strength": 0}
+    config = Config.from_values({"surface": even, "damage": {"probability": 0}})
+    half_length, height = KINDS["20"].size_mm[0] / 2, KINDS["20"].size_mm[2]
+    target = (half_length - 12.0, -600.0, height + 15 + 260.0)
+    place = (target[0] + 6000.0, *target[1:])
+    camera = Camera("straight", place, target, 6000 / (2.0 * 400) * 36.0)
+    with Generator(config, 1, (400, 160), "auto", tmp_path, "draft") as generator:
+        scene = replace(
+            generator.scene(0),
+            environment=EnvironmentView("flat", 0.0),
+            decals=(),
+            container=replace(generator.scene(0).container, kind="20"),
+            spreader=Spreader(True, (0.5, 0.5, 0.5), (False, False), 15.0),
+        )
+        image = generator.render(scene=scene, camera=camera).image
+    strip = image[60:155, 100:180].astype(float).sum(axis=2)
+    shade, light = strip[:, :20].mean(axis=1), strip[:, -20:].mean(axis=1)
+    assert (light > 1.3 * shade).all()
+    # how many columns of each row lie in the shade
+    ends = ((light[:, None] - strip) / (light - shade)[:, None]).sum(axis=1)
+    rows = np.arange(len(ends))
+    apart = ends - np.polyval(np.polyfit(rows, ends, 1), rows)
+    assert apart.std() < 0.33
