@@ -74,8 +74,8 @@ EDGE_SHARE = 0.4
 beam would be their edge."""
 
 SHADOW_TEXELS = 1.0
-"""Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges of shadows
-have teeth."""
+"""Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges have
+teeth."""
 
 DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with a perforation among it."""
