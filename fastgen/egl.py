@@ -3,9 +3,10 @@
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 from fastgen.errors import ContextError
+from fastgen.native_context import NativeContext
 
 EGL_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 EGL_LIBRARY = "libEGL.so.1"
@@ -117,35 +118,25 @@ class Egl:
         raise ContextError(f"{call} failed: {_EGL_ERRORS.get(code, hex(code))}")
 
 
-class EglContext:
-    """A context on a device, or on Mesa's surfaceless platform; current from the start."""
+class EglContext(NativeContext):
+    """A context on a device, or on Mesa's surfaceless platform."""
 
     def __init__(self, egl: Egl, device: EglDevice | None) -> None:
         self._egl = egl
-        self._display, context = egl.create(device)
-        self._handle: int | None = context
-        try:
-            self.__enter__()
-        except ContextError:
-            self.release()
-            raise
+        self._display, handle = egl.create(device)
+        super().__init__("egl", handle)
 
     def load_opengl_function(self, name: str) -> int:
         return self._egl.address(name.encode()) or 0
 
-    def __enter__(self) -> Self:
-        if self._handle is None:
-            raise ContextError("egl: the context was released; open another")
-        if self._egl.current() != self._handle:
-            self._egl.make_current(self._display, self._handle)
-        return self
+    def _is_current(self, handle: int) -> bool:
+        return bool(self._egl.current() == handle)
 
-    def __exit__(self, *_: object) -> None:
-        if self._handle is not None and self._egl.current() == self._handle:
-            self._egl.make_current(self._display, None)
+    def _bind(self, handle: int) -> None:
+        self._egl.make_current(self._display, handle)
 
-    def release(self) -> None:
-        if self._handle is not None:
-            self.__exit__()
-            self._egl.destroy(self._display, self._handle)
-            self._handle = None
+    def _unbind(self) -> None:
+        self._egl.make_current(self._display, None)
+
+    def _destroy(self, handle: int) -> None:
+        self._egl.destroy(self._display, handle)

@@ -6,13 +6,14 @@ Mesa dropped OSMesa in version 25.1; EGL with the software device does the same 
 import ctypes
 import os
 from collections.abc import Callable
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import moderngl
 
 from fastgen import gl_forks
 from fastgen.egl import EGL_PACKAGES, Egl, EglContext, EglDevice
 from fastgen.errors import ConfigError, ContextError
+from fastgen.native_context import NativeContext
 from fastgen.osmesa import OSMesaContext
 from fastgen.records import check_known
 from fastgen.shader_cache import spare_full_disk
@@ -21,18 +22,6 @@ BACKENDS = ("auto", "egl", "osmesa")
 
 MIN_VERSION = 440
 """Textures cleared in part: OpenGL 4.4 core."""
-
-
-class _Native(Protocol):
-    """A context of one backend, with what moderngl asks of it."""
-
-    def load_opengl_function(self, name: str) -> int: ...
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-    def release(self) -> None: ...
 
 
 class GLContext:
@@ -44,7 +33,7 @@ class GLContext:
     through `ctx`.
     """
 
-    def __init__(self, native: _Native, backend: str) -> None:
+    def __init__(self, native: NativeContext, backend: str) -> None:
         foreign: Any = native  # moderngl's annotation knows no foreign contexts
         try:
             self.ctx = moderngl.create_context(

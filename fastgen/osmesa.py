@@ -2,11 +2,11 @@
 
 import ctypes
 import os
-from typing import Self
 
 from fastgen import gl_forks
 from fastgen.egl import EGL_LIBRARY
 from fastgen.errors import ContextError
+from fastgen.native_context import NativeContext
 
 OSMESA_PACKAGES = "libosmesa6"
 
@@ -20,76 +20,64 @@ _GL_UNSIGNED_BYTE = 0x1401
 _POINTER, _INT, _UINT = ctypes.c_void_p, ctypes.c_int, ctypes.c_uint
 
 
-class OSMesaContext:
-    """A context that draws into a buffer of its own; current from the start."""
+class OSMesaContext(NativeContext):
+    """A context that draws into a buffer of its own."""
 
     def __init__(self) -> None:
         if not gl_forks.usable("osmesa"):
             raise ContextError(f"osmesa: {gl_forks.REASON}")
         gl_forks.opened("osmesa", software=True)
         self._library = _osmesa_library()
-        self._library.OSMesaCreateContextAttribs.restype = _POINTER
-        self._library.OSMesaCreateContextAttribs.argtypes = [_POINTER, _POINTER]
-        self._library.OSMesaMakeCurrent.argtypes = [_POINTER, _POINTER, _UINT, _INT, _INT]
-        self._library.OSMesaGetCurrentContext.restype = _POINTER
-        self._library.OSMesaGetProcAddress.restype = _POINTER
-        self._library.OSMesaDestroyContext.argtypes = [_POINTER]
-        self._handle: int | None = None
+        # OSMesa binds no context without a buffer; nothing is ever drawn into this one
+        self._pixels = ctypes.create_string_buffer(16 * 16 * 4)
         for minor in (5, 4):
             flat = (*_OSMESA_ATTRIBUTES, _OSMESA_MAJOR, 4, _OSMESA_MINOR, minor, 0)
             attributes = (_INT * len(flat))(*flat)
-            self._handle = self._library.OSMesaCreateContextAttribs(attributes, None)
-            if self._handle:
+            handle = self._library.OSMesaCreateContextAttribs(attributes, None)
+            if handle:
                 break
         else:
             raise ContextError("osmesa: this Mesa gives no OpenGL 4.4 core context; update it")
-        # OSMesa binds no context without a buffer; nothing is ever drawn into this one
-        self._pixels = ctypes.create_string_buffer(16 * 16 * 4)
-        try:
-            self.__enter__()
-        except ContextError:
-            self.release()
-            raise
+        super().__init__("osmesa", handle)
 
     def load_opengl_function(self, name: str) -> int:
         return self._library.OSMesaGetProcAddress(name.encode()) or 0
 
-    def __enter__(self) -> Self:
-        if self._handle is None:
-            raise ContextError("osmesa: the context was released; open another")
-        if not self._is_current():
-            _unbind_egl()
-            if not self._library.OSMesaMakeCurrent(
-                self._handle, self._pixels, _GL_UNSIGNED_BYTE, 16, 16
-            ):
-                raise ContextError("osmesa: the context cannot be made current")
-        return self
+    def _is_current(self, handle: int) -> bool:
+        return bool(self._library.OSMesaGetCurrentContext() == handle)
 
-    def __exit__(self, *_: object) -> None:
-        if self._is_current():
-            self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
+    def _bind(self, handle: int) -> None:
+        _unbind_egl()
+        if not self._library.OSMesaMakeCurrent(handle, self._pixels, _GL_UNSIGNED_BYTE, 16, 16):
+            raise ContextError("osmesa: the context cannot be made current")
 
-    def release(self) -> None:
-        if self._handle is not None:
-            self.__exit__()
-            self._library.OSMesaDestroyContext(self._handle)
-            self._handle = None
+    def _unbind(self) -> None:
+        self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
 
-    def _is_current(self) -> bool:
-        return bool(self._library.OSMesaGetCurrentContext() == self._handle)
+    def _destroy(self, handle: int) -> None:
+        self._library.OSMesaDestroyContext(handle)
 
 
 def _osmesa_library() -> ctypes.CDLL:
     failures = []
     for name in _OSMESA_NAMES:
         try:
-            return ctypes.CDLL(name)
+            library = ctypes.CDLL(name)
+            break
         except OSError as error:
             failures.append(str(error))
-    raise ContextError(
-        f"osmesa: {failures[0]}; on Debian or Ubuntu: apt-get install {OSMESA_PACKAGES} "
-        f"(Mesa 25.1 and later have no OSMesa; use egl there)"
-    )
+    else:
+        raise ContextError(
+            f"osmesa: {failures[0]}; on Debian or Ubuntu: apt-get install {OSMESA_PACKAGES} "
+            f"(Mesa 25.1 and later have no OSMesa; use egl there)"
+        )
+    library.OSMesaCreateContextAttribs.restype = _POINTER
+    library.OSMesaCreateContextAttribs.argtypes = [_POINTER, _POINTER]
+    library.OSMesaMakeCurrent.argtypes = [_POINTER, _POINTER, _UINT, _INT, _INT]
+    library.OSMesaGetCurrentContext.restype = _POINTER
+    library.OSMesaGetProcAddress.restype = _POINTER
+    library.OSMesaDestroyContext.argtypes = [_POINTER]
+    return library
 
 
 def _unbind_egl() -> None:
