@@ -254,9 +254,10 @@ def test_what_another_thread_drew_with_is_freed():
 
     closed_here()
     before = resident_mib()
-    for _ in range(3):
+    for _ in range(4):
         closed_here()
-    assert resident_mib() - before < 100
+    # one holds some 130; what tests before this one left may be collected or cached meanwhile
+    assert resident_mib() - before < 250
 
 
 def test_generators_dropped_unclosed_do_not_pile_up():
