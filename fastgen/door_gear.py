@@ -31,14 +31,14 @@ _BEND_MM = 80.0
 """Blocks are cut as short, so that levers bend with a dented leaf and stay before it."""
 
 
-_PARTS = ("bar", "cams", "keepers", "brackets", "handle", "hinges")
+_ON_BARS = ("bar", "cams", "brackets", "handle")
 
 
 def is_gear(chart: Chart) -> bool:
-    """Whether a chart is of what `gear` makes: it stands before the leaves and is not torn with
-    them, though it bends as they do."""
+    """Whether a chart is of a locking bar or hangs on one: it stands before the leaves and is not
+    torn or scarred with them, though it bends as they do."""
     name = chart.name.split(".")
-    return name[0] == "door" and len(name) > 1 and name[1] in _PARTS
+    return name[0] == "door" and len(name) > 1 and name[1] in _ON_BARS
 
 
 def gear(layout: Layout) -> list[Sheet]:
@@ -71,7 +71,8 @@ def _block(
 
 def _bar(layout: Layout, place: Opening, y: float) -> Patch:
     stations = breaks(_BAR_END_MM, layout.top - _BAR_END_MM, 2 * layout.max_edge_mm)
-    outline = regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8)
+    # unfolded from its back: there the sheet's borders, which rust like edges, are not seen
+    outline = np.roll(regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8), 4, axis=0)
     return prism(outline, stations, 2, capped=(True, True))
 
 

@@ -241,7 +241,7 @@ def assemble(
         (s.patch.turned() if turned else s.patch).at(x, y)
         for s, turned, (x, y) in zip(sheets, packing.turned, packing.corners, strict=True)
     ]
-    zones, zone = _zones(patches)
+    zones, zone = _zones(patches, [s.name in FACES for s in sheets])
     assert len(zones) < MAX_ZONES
     whole = joined(patches)
     values = np.column_stack([whole.normals, whole.sheet_mm, zone])
@@ -267,13 +267,15 @@ def assemble(
     )
 
 
-def _zones(patches: Sequence[Patch]) -> tuple[tuple[Zone, ...], NDArray[np.int64]]:
+def _zones(
+    patches: Sequence[Patch], panels: Sequence[bool]
+) -> tuple[tuple[Zone, ...], NDArray[np.int64]]:
     """The zones of charts that have their place, and which of them each vertex is in."""
     zones: list[Zone] = []
     of_vertices = []
-    for chart, patch in enumerate(patches):
+    for chart, (patch, panel) in enumerate(zip(patches, panels, strict=True)):
         heights, corners = patch.positions_mm[:, 2], patch.triangles
-        found, which = zones_of(chart, patch.sheet_mm, heights, patch.normals, corners)
+        found, which = zones_of(chart, patch.sheet_mm, heights, patch.normals, corners, panel)
         of_vertices.append(np.zeros(len(heights), np.int64))
         of_vertices[-1][corners] = len(zones) + which[:, None]
         zones += found

@@ -18,6 +18,9 @@ _CREASE = 0.3
 """Cosine of the angle, 73 degrees, from which on a fold is an edge: that of a box, not of a bar of
 eight sides."""
 
+_ANY_FOLD = -1.1
+"""Less than any cosine."""
+
 _SMALL_MM = 100.0
 """What is narrower shares a zone with the rest of its chart that stands as it does: rust reaches
 some 90 mm in from an edge."""
@@ -27,14 +30,20 @@ _POINTS_A_MM = 20.0
 
 
 def zones_of(
-    chart: int, sheet_mm: Array, heights_mm: Array, normals: Array, triangles: NDArray[np.int64]
+    chart: int,
+    sheet_mm: Array,
+    heights_mm: Array,
+    normals: Array,
+    triangles: NDArray[np.int64],
+    panel: bool = False,
 ) -> tuple[list[Zone], NDArray[np.int64]]:
     """The zones of chart number `chart`, widest first, and which of them each triangle is in, [T].
 
     sheet_mm: [V, 2], where vertices lie in the atlas. heights_mm: [V], their z in the world.
-    normals: [V, 3]. triangles: [T, 3]. Triangles that share a vertex share a zone.
+    normals: [V, 3]. triangles: [T, 3]. Triangles that share a vertex share a zone. panel: whether
+    it is rolled from one sheet, which has no edge within, however sharp its waves are.
     """
-    piece = _connected(sheet_mm, normals, triangles)
+    piece = _connected(sheet_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
     turns = _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)[piece]
     low, high = _bounds(sheet_mm[triangles], piece)
     small = (high - low).min(axis=1) < _SMALL_MM
@@ -66,9 +75,11 @@ def _quarter_turns(corners: Array, heights: Array, piece: NDArray[np.int64]) -> 
     return np.where(rise < _LEVEL, 0, turns)
 
 
-def _connected(sheet_mm: Array, normals: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Number of the piece of each triangle [T]: those that meet along an edge of the sheet without
-    a crease are one."""
+def _connected(
+    sheet_mm: Array, normals: Array, triangles: NDArray[np.int64], crease: float
+) -> NDArray[np.int64]:
+    """Number of the piece of each triangle [T]: those that meet along an edge of the sheet, their
+    normals' cosine greater than `crease`, are one."""
     from scipy.sparse import coo_array  # takes 0.3 s, and finished meshes are kept on disk
     from scipy.sparse.csgraph import connected_components
 
@@ -81,7 +92,7 @@ def _connected(sheet_mm: Array, normals: Array, triangles: NDArray[np.int64]) ->
     shared = np.flatnonzero(code[order][1:] == code[order][:-1])
     first, second = order[shared] // 3, order[shared + 1] // 3
     normal = normals[triangles[:, 0]]
-    even = (normal[first] * normal[second]).sum(axis=1) > _CREASE
+    even = (normal[first] * normal[second]).sum(axis=1) > crease
     count = len(triangles)
     links = coo_array((even[even], (first[even], second[even])), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)

@@ -1,5 +1,5 @@
 // What is known of each zone of the atlas (fastgen/gpu_mesh.py). bool before_sheet(zone): whether it is
-// of the door's gear; vec2 upright(sheet_mm, code): turned so that +y is up in the world.
+// of the door's bars; vec2 upright(sheet_mm, code): turned so that +y is up in the world.
 
 uniform sampler2D zone_table;   // row 0: x0, y0, width, height in mm; row 1: code, and of panels and
                                 // door gear their face's outward axis, else 0
