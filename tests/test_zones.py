@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.container import build_container
-from fastgen.scene import Camera
+from fastgen.container import WallProfiles, Wave, build_container
+from fastgen.damaged_mesh import damaged_mesh
+from fastgen.gl import open_context
+from fastgen.scene import Camera, Damage
 from fastgen.spreader import build_spreader
+from fastgen.srgb import DECODED
 from tests import oracle
+from tests.glsl import run
 from tests.mesh_probe import ISO_668, triangles_of, winding_normals
 
 UP_IN_ATLAS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)], float)
@@ -20,6 +24,24 @@ DIRTY = Config.from_values(
         "surface": {"dirt_strength": 0.9, "dirt_reach_mm": 300, "rust_coverage": 0.0},
     }
 )
+
+
+@pytest.fixture(scope="module")
+def gl():
+    with open_context() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def even():
+    """A generator, and a scene whose surfaces are plain paint."""
+    values = {
+        "dirt_strength": 0, "ageing_strength": 0, "tone_variation": 0, "wear_strength": 0,
+        "scratch_coverage": 0, "rust_coverage": 0,
+    }  # fmt: skip
+    config = Config.from_values({"damage": {"probability": 0}, "surface": values})
+    with Generator(config, 3, (64, 64)) as generator:
+        yield generator, generator.scene(0)
 
 
 def meshes(kind):
@@ -96,6 +118,73 @@ def test_walls_and_roof_are_one_zone_and_each_door_leaf_is():
     }  # fmt: skip
 
 
+def test_a_wall_of_steep_waves_is_one_zone_too():
+    steep = WallProfiles(side=Wave(278.0, 36.0, 130.0, 9.0, 130.0))
+    mesh = build_container("45HC", steep)
+    for name in ("front", "back"):
+        assert len(np.unique(zone_of(mesh)[triangles_of(mesh, name)])) == 1
+
+
+def test_the_shader_turns_a_zone_so_that_up_is_up(gl):
+    points = np.random.default_rng(0).normal(size=(20, 2))
+    for turns, up in enumerate(UP_IN_ATLAS):
+        body = f"vec4 f(vec4 x) {{ return vec4(upright(x.xy, {5 + 16 * turns + 64}), x.zw); }}"
+        rows = np.column_stack([points, np.zeros((20, 2))])
+        found = run(gl, f'#include "zone.glsl"\n{body}', rows)[:, :2]
+        right = np.array([up[1], -up[0]])
+        np.testing.assert_allclose(found, np.column_stack([points @ right, points @ up]), atol=1e-5)
+
+
+def baked_sides(generator, scene, layer_mm):
+    """Mean albedo along the long borders, and along the middle, of a main beam's long sides."""
+    scene = replace(scene, spreader=replace(scene.spreader, present=True, albedo=(0.5, 0.5, 0.5)))
+    atlas = generator.bake_spreader(scene, 8.0)
+    mesh = build_spreader(scene.container.kind, scene.spreader.flippers_down)
+    linear = DECODED[atlas.base_color[::-1]].mean(axis=2)
+    chart = mesh.chart_index("spreader.frame.front")
+    found = []
+    for zone in (zone for zone in mesh.zones if zone.chart == chart):
+        x, y, width, height = np.array(zone.rect_mm) / atlas.texel_mm
+        side = linear[int(y) + 2 : int(y + height) - 1, int(x) + 2 : int(x + width) - 1]
+        side = side if width > height else side.T
+        if side.shape[1] > 8 * side.shape[0]:  # no cap
+            rim = round(layer_mm / atlas.texel_mm)
+            ends = side[:, side.shape[0] : -side.shape[0]]
+            middle = ends[len(ends) // 2 - rim : len(ends) // 2 + rim]
+            found.append((np.concatenate([ends[:rim], ends[-rim:]]).mean(), middle.mean()))
+    assert len(found) == 4
+    return np.array(found)
+
+
+def test_dirt_keeps_to_the_edges_of_each_side_of_a_beam(even):
+    """However far it reaches on what is wider: to a good part of the way to the middle."""
+    generator, scene = even
+    dirt = replace(scene.surface.dirt, strength=1.0, albedo=(0.0, 0.0, 0.0), reach_mm=3000.0)
+    scene = replace(scene, surface=replace(scene.surface, dirt=dirt))
+    rim, middle = baked_sides(generator, scene, 24.0).T
+    assert (rim < 0.2).all()
+    assert (middle > 0.3).all()
+    narrow = replace(scene.surface.dirt, reach_mm=30.0)
+    less = replace(scene, surface=replace(scene.surface, dirt=narrow))
+    assert (baked_sides(generator, less, 24.0)[:, 1] > 0.49).all()
+
+
+def test_rust_starts_at_the_edges_of_each_side_of_a_beam(even):
+    generator, scene = even
+    rust = replace(scene.surface.rust, coverage=0.15, albedo=(0.0, 0.0, 0.0))
+    scene = replace(scene, surface=replace(scene.surface, rust=rust))
+    rim, middle = baked_sides(generator, scene, 24.0).T
+    assert (0.5 - rim > 1.3 * (0.5 - middle)).all()
+
+
+def test_ageing_darkens_the_ends_of_a_beam_and_not_its_middle(even):
+    """From the corners, at most half as far as a side is wide: a beam is no wall."""
+    generator, scene = even
+    ageing = replace(scene.surface.ageing, strength=1.0, reach_mm=5000.0)
+    scene = replace(scene, surface=replace(scene.surface, ageing=ageing))
+    assert (baked_sides(generator, scene, 24.0) > 0.49).all()
+
+
 def seen_straight(scene, target, right, out):
     """A camera 2 mm a pixel, straight before `target`; x in the image runs along `right`."""
     place = np.array(target) + 6000.0 * np.array(out, float)
@@ -146,6 +235,11 @@ def test_holes_leave_the_locking_bars():
         camera = Camera("straight", (length / 2 + 3000, 275.0, 1500.0), hole.origin_mm, 60.0)
         scene = replace(scene, damages=(hole,), cameras=(camera,), decals=())
         sample = generator.render(scene=scene, camera="straight")
+        sound = replace(scene, damages=())
+        rusty, paint = (
+            generator.render(scene=one, camera="straight", layer="rust").image.astype(float)
+            for one in (scene, sound)
+        )
         mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view)
     names = np.array([chart.name for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
@@ -158,3 +252,30 @@ def test_holes_leave_the_locking_bars():
     np.testing.assert_allclose(sample.depth[sure], hits.depth_m[sure], atol=bends_m)
     beside = torn & ~bar
     assert (beside & (sample.depth > 4.0)).sum() > 1000
+    # nor are they scarred as the rim is
+    assert np.abs(rusty - paint)[sure].mean() < 4
+    assert np.abs(rusty - paint)[torn & ~bar].mean() > 15
+
+
+def test_an_exported_hole_is_cut_out_of_the_leaf_and_not_of_the_bar_before_it():
+    mesh = build_container("20")
+    radius = 200.0
+    hole = Damage(
+        "perforation", "door", (6058 / 2 - 58.0, 275.0, 1500.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0),
+        (-1.0, 0.0, 0.0), (2 * radius, 2 * radius), 30.0, (60.0, *[0.0] * 10),
+    )  # fmt: skip
+    cut = damaged_mesh(mesh, (hole,))
+    lost = {}
+    for name in ("door", "door.bar.2", "door.brackets.2", "door.bar.1"):
+        x, y, width, height = mesh.charts[mesh.chart_index(name)].rect_mm
+        areas = []
+        for atlas in (mesh.atlas_mm[mesh.triangles], cut.atlas_mm[cut.triangles]):
+            a, b, c = atlas.astype(float).transpose(1, 0, 2)
+            middle = (a + b + c) / 3
+            mine = ((middle > (x, y)) & (middle < (x + width, y + height))).all(axis=1)
+            u, v = (b - a)[mine].T, (c - a)[mine].T
+            areas.append((u[0] * v[1] - u[1] * v[0]).sum() / 2)
+        lost[name] = areas[0] - areas[1]
+    # slopes of the swages are longer on the sheet than seen from before it
+    assert np.pi * radius**2 < lost.pop("door") < 1.25 * np.pi * radius**2
+    np.testing.assert_allclose(list(lost.values()), 0.0, atol=1.0)
