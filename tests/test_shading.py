@@ -86,7 +86,7 @@ def test_octahedral_mapping_equals_its_numpy_twin(gl):
     assert out[:, 2].max() < 1e-5
 
 
-def test_surface_keys_keep_chart_and_normal(gl):
+def test_surface_keys_keep_zone_and_normal(gl):
     directions = np.random.default_rng(2).normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     directions[:6] = np.r_[np.eye(3), -np.eye(3)]
