@@ -1,6 +1,7 @@
 """What each part of a sensor does to a whole image, one part at a time."""
 
 from dataclasses import replace
+from datetime import datetime
 
 import numpy as np
 import pytest
@@ -146,3 +147,31 @@ def test_what_is_drawn_of_a_sensor_is_what_its_ranges_say():
         red, green, blue = sensor.gains
         assert green == 1
         assert 2**0.2 <= min(red, blue) <= max(red, blue) <= 2**0.3 + 1e-4
+
+
+@pytest.mark.parametrize(
+    ("name", "hours"), [("port_noon", range(8, 17)), ("port_night", (21, 22, 23, 0, 1, 2, 3))]
+)
+def test_cameras_of_a_scene_are_stamped_with_one_moment_that_looks_so(name, hours):
+    values = {
+        "environment": {"names": [name]},
+        "sensor": {"stamp": {"probability": 1.0, "years": [2020, 2021]}},
+    }
+    generator = Generator(Config.from_values(values), seed=2)
+    shapes = ("%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d")
+    seen, found = set(), set()
+    for index in range(60):
+        texts = [camera.sensor.stamp.text for camera in generator.scene(index).cameras]
+        moments = set()
+        for text in texts:
+            separator = next(c for c in "-/." if c in text)
+            long = len(text.split(separator)[0]) == 4
+            shape = next(s for s in shapes if separator in s and s.startswith("%Y") == long)
+            seen.add(shape)
+            moments.add(datetime.strptime(text, f"{shape} %H:%M:%S"))
+        (moment,) = moments
+        assert moment.year in (2020, 2021)
+        assert moment.hour in hours
+        found.add(moment)
+    assert len(found) == 60
+    assert seen == set(shapes)
