@@ -1,13 +1,13 @@
 """Tileable noise for the material layers, baked once per process and mip-mapped.
 
 Channels hold values whose distribution is uniform on 0..1, so that `noise > 1 - c` covers the
-fraction c of the surface. That of rust is normal instead: NORMAL_REACH deviations to either side of
-its mean fill 0..1. Scratches are 0 or 1, and stain runs down from where rust is. Averaging in a mip
-level narrows those distributions; `lost_deviation` says by how much, and the shader widens its
-thresholds accordingly, so that near and far views agree on how much is rusty and nothing shimmers
-(the idea of Olano and Baker 2010, LEAN mapping: variance that filtering removes comes back as
-softness). Of a normal field that is exact: where its mean over a footprint is m and deviates by s
-within it, Phi((m - t) / s) of that lies above t.
+fraction c of the surface. That of rust and run-off is normal instead: NORMAL_REACH deviations to
+either side of its mean fill 0..1. Scratches are 0 or 1. Averaging in a mip level narrows those
+distributions; `lost_deviation` says by how much, and the shader widens its thresholds accordingly,
+so that near and far views agree on how much is rusty and nothing shimmers (the idea of Olano and
+Baker 2010, LEAN mapping: variance that filtering removes comes back as softness). Of a normal field
+that is exact: where its mean over a footprint is m and deviates by s within it, Phi((m - t) / s) of
+that lies above t.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,10 @@ NOISE_SIZE = 1024
 NORMAL_REACH = 3.2
 """Deviations from the mean that a normal channel holds; one value in 600 lies beyond."""
 
-_SEED = 20261
+_RUN_TEXELS = 110.0
+"""Length over which run-off below a spot of rust fades to 1 / e."""
+
+_SEED = 20262
 _BINS = 8191
 
 
@@ -34,7 +37,7 @@ _BINS = 8191
 class NoiseTiles:
     """levels: uint8 [2, S, S, 4] for S = NOISE_SIZE, NOISE_SIZE / 2, ... 1; row 0 is v = 0.
 
-    Layer 0: tone, rust, stain, grain. Layer 1: scratches, wear, dirt, fine grain.
+    Layer 0: tone, rust, run-off, grain. Layer 1: scratches, wear, dirt, fine grain.
     scratched: share of the tile that scratches cover.
     lost_deviation: float32 [2, levels, 4], standard deviation that bilinear lookups in a level have
     lost against those in level 0.
@@ -91,15 +94,15 @@ def _spectral(
     return np.asarray(np.fft.irfft2(shaped, s=(NOISE_SIZE, NOISE_SIZE)))
 
 
-def _stain(rust: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Run-off below the rustiest spots: rust dragged toward -y (down a wall), 0..1."""
-    spots = np.clip((rust - 0.93) / 0.07, 0, 1)
-    y = np.arange(NOISE_SIZE)
-    drag = np.exp(-y / 70.0)
+def _run_off(rust: NDArray[np.float32], streaks: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Where most water comes down from rust, as ranks: the rustiest fifth dragged toward -y (down a
+    wall), in streaks. Both are ranks [S, S]."""
+    spots = np.clip((rust - 0.8) / 0.2, 0, 1)
+    drag = np.exp(-np.arange(NOISE_SIZE) / _RUN_TEXELS)
     dragged = np.fft.irfft(
         np.fft.rfft(spots, axis=0) * np.conj(np.fft.rfft(drag))[:, None], n=NOISE_SIZE, axis=0
     )
-    return np.clip(dragged / np.quantile(dragged, 0.985), 0, 1).astype(np.float32)
+    return _uniform(dragged * (0.3 + streaks))
 
 
 def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
@@ -142,9 +145,10 @@ def _baked() -> dict[str, NDArray[Any]]:
     wear = _uniform(_spectral(rng, 2.2, 2.0, 250.0, stretch=1.8))
     dirt = _uniform(_spectral(rng, 1.9, 2.0, 320.0, stretch=6.0))
     fine = _uniform(_spectral(rng, 0.3, 90.0, 500.0))
+    streaks = _uniform(_spectral(rng, 1.6, 4.0, 320.0, stretch=14.0))
     layers = np.stack(
         [
-            np.stack([tone, _normal(rust), _stain(rust), grain], axis=-1),
+            np.stack([tone, _normal(rust), _normal(_run_off(rust, streaks)), grain], axis=-1),
             np.stack([_scratches(rng), wear, dirt, fine], axis=-1),
         ]
     )

@@ -73,6 +73,16 @@ EDGE_SHARE = 0.4
 """Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
 beam would be their edge."""
 
+RUST_REACH_MM = 90.0
+"""Distance from an edge at which rust is 1 / e as much more likely than far from all edges."""
+
+RUN_REACH_MM = 400.0
+"""The same of run-off below an edge."""
+
+STAIN_COVERS, STAIN_ALBEDO = 0.45, 2.2
+"""What rust stains: how much of the paint under it the stain hides, and how bright it is, thin,
+beside rust."""
+
 SHADOW_TEXELS = 1.0
 """Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges have
 teeth."""
@@ -274,6 +284,10 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ZONE_TURN": ZONE_TURN,
         "ZONE_GEAR": ZONE_GEAR,
         "EDGE_SHARE": EDGE_SHARE,
+        "RUST_REACH_MM": RUST_REACH_MM,
+        "RUN_REACH_MM": RUN_REACH_MM,
+        "STAIN_COVERS": STAIN_COVERS,
+        "STAIN_ALBEDO": STAIN_ALBEDO,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),
         "SHADOW_TEXELS": SHADOW_TEXELS,

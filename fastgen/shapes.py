@@ -51,7 +51,7 @@ class Shapes:
             held = container_outline(scene.container.kind)
             assert outline is not None
             lit = self._probe.openness_of_spreader(
-                shape, outline, held, below, sky, reflectances(scene)
+                shape, outline, held, below, sky, reflectances(scene, (mesh.mesh, usual))
             )
             spreader.set_openness(lit.values)
         return mesh, spreader

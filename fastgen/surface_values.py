@@ -1,6 +1,8 @@
 """A scene's materials, layers and damages as the values of the shader's uniform blocks."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,10 +11,24 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import DIELECTRIC_F0, SPREADER_ZONE, noise_deviation
+from fastgen.programs import (
+    DIELECTRIC_F0,
+    EDGE_SHARE,
+    RUN_REACH_MM,
+    RUST_REACH_MM,
+    SPREADER_ZONE,
+    STAIN_ALBEDO,
+    STAIN_COVERS,
+    noise_deviation,
+)
 from fastgen.reflectance import mean_specular_albedo
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm
+
+Array = NDArray[np.floating]
+
+_normal_cdf = np.vectorize(NormalDist().cdf)
+_normal_quantile = np.vectorize(NormalDist().inv_cdf)
 
 _TILE_OF_SCALE = 4.0
 """A noise tile spans this many of its pattern's typical lengths."""
@@ -43,21 +59,52 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
     return base, trait
 
 
-def reflectances(scene: Scene) -> tuple[Color, ...]:
+def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
     """What each of MATERIALS gives back, rust included, of light from all around.
 
-    Without dirt, which changes the mean over a roof by 3 %, and wetness, which darkens what is
-    soaked by up to 20 %.
+    meshes: what the scene's container and spreader are made of. The container's sheet is taken for
+    its roof, down which no rust runs. Without dirt, which changes the mean over a roof by 3 %, and
+    wetness, which darkens what is soaked by up to 20 %.
     """
     rust = scene.surface.rust
-    found = []
-    for base, trait in zip(*_materials(scene.surface, scene.spreader), strict=True):
-        rusty = min(rust.coverage * float(trait[1]), 1.0)
-        albedo = (1 - rusty) * base[:3] + rusty * np.array(rust.albedo)
-        mirrored = mean_specular_albedo(DIELECTRIC_F0, float(base[3]))
-        red, green, blue = (mirrored + (1 - mirrored) * albedo).tolist()
-        found.append((red, green, blue))
-    return tuple(found)
+    base, trait = _materials(scene.surface, scene.spreader)
+    rusty, stained = _rusted(rust.coverage * trait[:, 1:2], *_edges(tuple(meshes)))
+    stain = STAIN_COVERS * stained
+    paint = (1 - stain) * base[:, :3] + stain * STAIN_ALBEDO * np.array(rust.albedo)
+    albedo = np.minimum((1 - rusty) * paint + rusty * np.array(rust.albedo), 0.95)
+    mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
+    return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
+
+
+def _rusted(proneness: Array, near_edge: Array, near_top: Array) -> tuple[Array, Array]:
+    """What share has gone to rust, and of the rest what share rust has stained, [M, 1], as
+    shaders/rust.glsl has it on the mean."""
+    share = np.clip(proneness * (0.6 + 3.0 * near_edge), 1e-6, 0.9)
+    about = _normal_cdf((_normal_quantile(share) + 0.3) / np.hypot(1.0, 0.25))
+    run = np.clip(proneness * (1.2 + 4.0 * near_top), 1e-6, 0.6) * (near_top > 0)
+    return share, 1 - (1 - about) / (1 - share) * (1 - run)
+
+
+@lru_cache(maxsize=256)
+def _edges(meshes: tuple[Mesh, ...]) -> tuple[Array, Array]:
+    """Means over each of MATERIALS of how near it is to an edge, and to one above it, as
+    shaders/rust.glsl falls off with either; [M, 1]."""
+    area, near, top = np.zeros((3, len(MATERIALS)))
+    for mesh in meshes:
+        material = np.array([mesh.charts[zone.chart].material_index for zone in mesh.zones])
+        low, high = np.sort([zone.rect_mm[2:] for zone in mesh.zones], axis=1).T
+        reach = np.minimum(RUST_REACH_MM, EDGE_SHARE * low)
+        # of a rectangle, 2 (low + high) - 8 d lies d from its border, up to half its width
+        end = np.exp(-low / (2 * reach))
+        ring = 2 * (low + high) * (1 - end) - 8 * reach * (1 - end * (1 + low / (2 * reach)))
+        area += np.bincount(material, low * high, len(MATERIALS))
+        near += np.bincount(material, reach * ring, len(MATERIALS))
+        # most lie along
+        falling = RUN_REACH_MM * (1 - np.exp(-low / RUN_REACH_MM))
+        top += np.bincount(material, falling * high, len(MATERIALS))
+    top[MATERIALS.index("paint_sheet")] = 0.0
+    area = np.maximum(area, 1e-9)
+    return (near / area)[:, None], (top / area)[:, None]
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:

@@ -21,7 +21,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     float corner_mm = length(max(to_border, 0.0));
     float narrow_mm = min(rect.z, rect.w);
     vec2 noise_mm = upright(sheet_mm, code) + noise_offset_mm;
-    NoiseSample coarse = read_noise(0, noise_mm, rust_tile_mm, footprint_mm);
+    NoiseSample coarse = read_without_period(0, noise_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
 
     SurfacePoint s;
@@ -61,14 +61,19 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     float rusty = 0.0;
 #if SHOWN(RUST)
     float sticker = 1.0 - 0.8 * decal_alpha;
-    albedo = mix(albedo, albedo * rust_albedo * 4.0, trait.y * sticker * rust_stain(coarse) * 0.5);
-    rusty = sticker * rust(edge_mm, narrow_mm, coarse, trait.y);
+    float below_mm = to_upper_side(from_low, rect.zw, code);
+    Rust rust = rust_at(edge_mm, narrow_mm, below_mm, 1.0 - abs(part.w), coarse, trait.y);
+    albedo = mix(albedo, STAIN_ALBEDO * rust_albedo, STAIN_COVERS * sticker * rust.stain);
+    rusty = sticker * rust.all;
 #if WITH_DAMAGE
     // worked steel shows: dulled paint, then rust where the noise is rustiest
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
-    rusty = max(rusty, normal_covered(coarse.value.y, scar, coarse.lost.y, 0.3) * step(0.01, scar));
+    rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(scar), coarse.lost.y, 0.3) *
+                       step(0.01, scar));
 #endif
-    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x);
+    float fresh = 1.0 - rust.thick / max(rust.all, 1e-4);
+    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x) *
+                 mix(0.6, 1.4, clamp(fresh, 0.0, 1.0));
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif

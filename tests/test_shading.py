@@ -181,7 +181,7 @@ def points_and_steps(side):
 
 def rusty_share(gl, points, footprint, coverage):
     """Share [N] of pixels of a width, at points [N, 2] on the sheet, that is rusty; both in mm."""
-    rust = "normal_covered(n.value.y, x.w, n.lost.y, 0.03)"
+    rust = "normal_covered(n.value.y, normal_threshold(x.w), n.lost.y, 0.03)"
     return noise_share(gl, 0, rust, points, footprint, coverage)
 
 
@@ -189,10 +189,11 @@ def noise_share(gl, layer, share, points, footprint, w=0.0, **scene):
     """GLSL `share` [N] of the noise sample n under pixels of a width at points [N, 2], and x.w;
     scene: of the uniform blocks."""
     texture = noise_texture(gl)
+    read = "read_without_period" if layer == 0 else "read_noise"
     kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4), **scene)
     body = (
         '#include "layers.glsl"\n#include "scratches.glsl"\n'
-        f"vec4 f(vec4 x) {{ NoiseSample n = read_noise({layer}, x.xy, 1000.0, x.z);"
+        f"vec4 f(vec4 x) {{ NoiseSample n = {read}({layer}, x.xy, 1000.0, x.z);"
         f" return vec4({share}, 0.0, 0.0, 0.0); }}"
     )
     count = len(points)

@@ -1,0 +1,62 @@
+"""Rust on a wall: it recurs nowhere, and water takes it down."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen import Config, Generator
+from fastgen.srgb import DECODED
+
+TEXEL_MM = 20.0
+BORDER = 8
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def wall(request):
+    """How bright the rusty side of a white container is, [H, W], row 0 lowest; rust is black."""
+    config = Config.from_values(
+        {
+            "container": {"kinds": {"40": 1}},
+            "damage": {"probability": 0},
+            "weather": {"wet_probability": 0},
+            "surface": {
+                "colors": {"white": "#ffffff"},
+                "rust_coverage": 0.1,
+                "dirt_strength": 0,
+                "ageing_strength": 0,
+                "scratch_coverage": 0,
+                "tone_variation": 0,
+            },
+        }
+    )
+    with Generator(config, 3, (64, 64)) as generator:
+        scene = generator.scene(request.param)
+        rust = replace(scene.surface.rust, albedo=(0.0, 0.0, 0.0))
+        scene = replace(scene, decals=(), surface=replace(scene.surface, rust=rust))
+        mesh = generator._gpu.renderer().mesh(scene.container)
+        colors = generator.bake(scene, TEXEL_MM).base_color[::-1]
+    side = next(c for c in mesh.charts if (c.face, c.material) == ("front", "paint_sheet"))
+    x, y, width, height = (np.array(side.rect_mm) / TEXEL_MM).astype(int)
+    inside = colors[y + BORDER : y + height - BORDER, x + BORDER : x + width - BORDER]
+    return DECODED[inside].mean(axis=-1)
+
+
+def test_rust_does_not_recur_along_a_wall(wall):
+    """A tile that repeats is as it was one length on; of a sum of two, a half is."""
+    apart = wall - wall.mean()
+    alike = [
+        (apart[:, lag:] * apart[:, :-lag]).mean() / apart.var()
+        for lag in range(int(1000 / TEXEL_MM), int(0.8 * wall.shape[1]))
+    ]
+    assert max(alike) < 0.65
+
+
+def test_water_takes_rust_down_a_wall(wall):
+    """Paint below rust is darker than paint above it."""
+    rusty = wall < 0.3
+    step = int(200 / TEXEL_MM)
+    low, high = slice(None, -step), slice(step, None)
+    below = wall[low][rusty[high] & ~rusty[low]].mean()
+    above = wall[high][rusty[low] & ~rusty[high]].mean()
+    assert below < above - 0.05
