@@ -91,12 +91,14 @@ class Zone:
     """A part of a chart that wears by itself, such as one side of a beam.
 
     chart: index into Mesh.charts. rect_mm: x0, y0, width, height in the atlas. quarter_turns: from
-    the atlas's +y clockwise to what is up in the world; 0 where the part lies flat.
+    the atlas's +y clockwise to what is up in the world; 0 where the part lies flat. small: whether
+    it is pieces all of which are narrow, wherever there was room for them in the chart.
     """
 
     chart: int
     rect_mm: tuple[float, float, float, float]
     quarter_turns: int
+    small: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,8 +66,13 @@ SPREADER_ZONE = MAX_ZONES
 PORTAL_ZONE = 1000
 """Zone number of what a perforation tore away; real zones number below it."""
 
-ZONE_TURN, ZONE_GEAR = 16, 64
-"""Of a zone's code (shaders/zone.glsl): steps of quarter turns above the material, and of gear."""
+ZONE_TURN, ZONE_GEAR, ZONE_SMALL = 16, 64, 128
+"""Of a zone's code (shaders/zone.glsl): steps of quarter turns above the material, and the bits of
+gear and of small pieces."""
+
+SMALL_WIDE_MM, SMALL_EDGE_MM = 60.0, 15.0
+"""Width of small pieces, as they wear, and the mean distance from their edges: where in a piece a
+point lies is not known."""
 
 EDGE_SHARE = 0.4
 """Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
@@ -79,9 +84,12 @@ RUST_REACH_MM = 90.0
 RUN_REACH_MM = 400.0
 """The same of run-off below an edge."""
 
-STAIN_COVERS, STAIN_ALBEDO = 0.45, 2.2
-"""What rust stains: how much of the paint under it the stain hides, and how bright it is, thin,
-beside rust."""
+STAIN_HIDES, STAIN_HIDES_MOST = 0.4, 0.8
+"""How much of the paint a stain of rust hides in the channel that rust reflects most, and where it
+reflects nothing."""
+
+STAIN_ALBEDO = 2.2
+"""How bright it is, thin, beside rust."""
 
 SHADOW_TEXELS = 1.0
 """Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges have
@@ -283,10 +291,14 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ZONE_MATERIAL": ZONE_TURN - 1,
         "ZONE_TURN": ZONE_TURN,
         "ZONE_GEAR": ZONE_GEAR,
+        "ZONE_SMALL": ZONE_SMALL,
+        "SMALL_WIDE_MM": SMALL_WIDE_MM,
+        "SMALL_EDGE_MM": SMALL_EDGE_MM,
         "EDGE_SHARE": EDGE_SHARE,
         "RUST_REACH_MM": RUST_REACH_MM,
         "RUN_REACH_MM": RUN_REACH_MM,
-        "STAIN_COVERS": STAIN_COVERS,
+        "STAIN_HIDES": STAIN_HIDES,
+        "STAIN_HIDES_MOST": STAIN_HIDES_MOST,
         "STAIN_ALBEDO": STAIN_ALBEDO,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),

@@ -1,8 +1,8 @@
 """A scene's materials, layers and damages as the values of the shader's uniform blocks."""
 
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from statistics import NormalDist
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,9 +16,12 @@ from fastgen.programs import (
     EDGE_SHARE,
     RUN_REACH_MM,
     RUST_REACH_MM,
+    SMALL_EDGE_MM,
+    SMALL_WIDE_MM,
     SPREADER_ZONE,
     STAIN_ALBEDO,
-    STAIN_COVERS,
+    STAIN_HIDES,
+    STAIN_HIDES_MOST,
     noise_deviation,
 )
 from fastgen.reflectance import mean_specular_albedo
@@ -67,11 +70,13 @@ def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
     wetness, which darkens what is soaked by up to 20 %.
     """
     rust = scene.surface.rust
+    albedo_of_rust = np.array(rust.albedo)
     base, trait = _materials(scene.surface, scene.spreader)
-    rusty, stained = _rusted(rust.coverage * trait[:, 1:2], *_edges(tuple(meshes)))
-    stain = STAIN_COVERS * stained
-    paint = (1 - stain) * base[:, :3] + stain * STAIN_ALBEDO * np.array(rust.albedo)
-    albedo = np.minimum((1 - rusty) * paint + rusty * np.array(rust.albedo), 0.95)
+    rusty, stained = _rusted(rust.coverage * trait[:, 1:2], *_edges(meshes))
+    reflected = albedo_of_rust / max(albedo_of_rust.max(), 1e-4)
+    stain = stained * (STAIN_HIDES_MOST + (STAIN_HIDES - STAIN_HIDES_MOST) * reflected)
+    paint = (1 - stain) * base[:, :3] + stain * STAIN_ALBEDO * albedo_of_rust
+    albedo = np.minimum((1 - rusty) * paint + rusty * albedo_of_rust, 0.95)
     mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
     return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
 
@@ -85,26 +90,42 @@ def _rusted(proneness: Array, near_edge: Array, near_top: Array) -> tuple[Array,
     return share, 1 - (1 - about) / (1 - share) * (1 - run)
 
 
-@lru_cache(maxsize=256)
-def _edges(meshes: tuple[Mesh, ...]) -> tuple[Array, Array]:
+_EDGES: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
+
+
+def _edges(meshes: Iterable[Mesh]) -> tuple[Array, Array]:
     """Means over each of MATERIALS of how near it is to an edge, and to one above it, as
     shaders/rust.glsl falls off with either; [M, 1]."""
-    area, near, top = np.zeros((3, len(MATERIALS)))
+    sums = np.zeros((3, len(MATERIALS)))
     for mesh in meshes:
-        material = np.array([mesh.charts[zone.chart].material_index for zone in mesh.zones])
-        low, high = np.sort([zone.rect_mm[2:] for zone in mesh.zones], axis=1).T
-        reach = np.minimum(RUST_REACH_MM, EDGE_SHARE * low)
-        # of a rectangle, 2 (low + high) - 8 d lies d from its border, up to half its width
-        end = np.exp(-low / (2 * reach))
-        ring = 2 * (low + high) * (1 - end) - 8 * reach * (1 - end * (1 + low / (2 * reach)))
-        area += np.bincount(material, low * high, len(MATERIALS))
-        near += np.bincount(material, reach * ring, len(MATERIALS))
-        # most lie along
-        falling = RUN_REACH_MM * (1 - np.exp(-low / RUN_REACH_MM))
-        top += np.bincount(material, falling * high, len(MATERIALS))
-    top[MATERIALS.index("paint_sheet")] = 0.0
+        if mesh not in _EDGES:
+            _EDGES[mesh] = _edge_sums(mesh)
+        sums += _EDGES[mesh]
+    area, near, above = sums[..., None]
     area = np.maximum(area, 1e-9)
-    return (near / area)[:, None], (top / area)[:, None]
+    above[MATERIALS.index("paint_sheet")] = 0.0
+    return near / area, above / area
+
+
+def _edge_sums(mesh: Mesh) -> Array:
+    """Of each of MATERIALS, [3, M]: area, and how near it is to an edge and to one above it, each
+    times area."""
+    low, high = np.sort([zone.rect_mm[2:] for zone in mesh.zones], axis=1).T
+    reach = np.minimum(RUST_REACH_MM, EDGE_SHARE * low)
+    # of a rectangle, 2 (low + high) - 8 d lies d from its border, up to half its width
+    end = np.exp(-low / (2 * reach))
+    ring = 2 * (low + high) * (1 - end) - 8 * reach * (1 - end * (1 + low / (2 * reach)))
+    near = reach * ring / (low * high)
+    above = RUN_REACH_MM / low * (1 - np.exp(-low / RUN_REACH_MM))  # most lie along
+    small = [zone.small for zone in mesh.zones]
+    near[small] = np.exp(-SMALL_EDGE_MM / (EDGE_SHARE * SMALL_WIDE_MM))
+    above[small] = np.exp(-SMALL_EDGE_MM / RUN_REACH_MM)
+    corners = mesh.atlas_mm[mesh.triangles].astype(float)
+    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
+    area = np.bincount(mesh.zone[mesh.triangles[:, 0]], area, len(small))
+    material = [mesh.charts[zone.chart].material_index for zone in mesh.zones]
+    sums = (np.bincount(material, area * part, len(MATERIALS)) for part in (1.0, near, above))
+    return np.array(list(sums))
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:

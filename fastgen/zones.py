@@ -22,8 +22,8 @@ _ANY_FOLD = -1.1
 """Less than any cosine."""
 
 _SMALL_MM = 100.0
-"""What is narrower shares a zone with the rest of its chart that stands as it does: rust reaches
-some 90 mm in from an edge."""
+"""What is narrower shares a zone with the rest of its chart that stands as it does: it is near an
+edge all over, as rust reaches some 90 mm in."""
 
 _POINTS_A_MM = 20.0
 """Corners on the sheet that are closer than the inverse of this are one."""
@@ -46,14 +46,20 @@ def zones_of(
     piece = _connected(sheet_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
     turns = _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)[piece]
     low, high = _bounds(sheet_mm[triangles], piece)
-    small = (high - low).min(axis=1) < _SMALL_MM
-    piece = np.where(small[piece], -1 - turns, piece)
-    _, piece = np.unique(piece, return_inverse=True)
+    small = ((high - low).min(axis=1) < _SMALL_MM)[piece]
+    _, first, piece = np.unique(
+        np.where(small, -1 - turns, piece), return_index=True, return_inverse=True
+    )
     low, high = _bounds(sheet_mm[triangles], piece)
     order = np.argsort(-(high - low).prod(axis=1), kind="stable")
     rank = np.argsort(order)
     found = [
-        Zone(chart, (*low[i].tolist(), *(high - low)[i].tolist()), int(turns[piece == i][0]))
+        Zone(
+            chart,
+            (*low[i].tolist(), *(high - low)[i].tolist()),
+            int(turns[first[i]]),
+            bool(small[first[i]]),
+        )
         for i in order
     ]
     return found, rank[piece]

@@ -20,6 +20,11 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     float edge_mm = max(min(to_border.x, to_border.y), 0.0);
     float corner_mm = length(max(to_border, 0.0));
     float narrow_mm = min(rect.z, rect.w);
+    float below_mm = to_upper_side(from_low, rect.zw, code);
+    if ((code & ZONE_SMALL) != 0) {
+        edge_mm = corner_mm = below_mm = SMALL_EDGE_MM;
+        narrow_mm = SMALL_WIDE_MM;
+    }
     vec2 noise_mm = upright(sheet_mm, code) + noise_offset_mm;
     NoiseSample coarse = read_without_period(0, noise_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
@@ -61,9 +66,8 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     float rusty = 0.0;
 #if SHOWN(RUST)
     float sticker = 1.0 - 0.8 * decal_alpha;
-    float below_mm = to_upper_side(from_low, rect.zw, code);
     Rust rust = rust_at(edge_mm, narrow_mm, below_mm, 1.0 - abs(part.w), coarse, trait.y);
-    albedo = mix(albedo, STAIN_ALBEDO * rust_albedo, STAIN_COVERS * sticker * rust.stain);
+    albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
     // worked steel shows: dulled paint, then rust where the noise is rustiest

@@ -1,4 +1,4 @@
-// Rust rust_at(...): what has rusted, and what rust has stained.
+// Rust rust_at(...): what has rusted, and what rust has stained; vec3 stained(albedo, share).
 
 struct Rust {
     float all;     // share of the footprint whose paint has gone to rust
@@ -21,4 +21,11 @@ Rust rust_at(
     float run = normal_covered(noise.value.z, normal_threshold(wetted), noise.lost.z, 0.5);
     float any = step(1e-4, share);
     return Rust(found.x * any, found.y * any, max(found.z, steep * run) * any);
+}
+
+// A thin layer, of which little but red comes back through.
+vec3 stained(vec3 albedo, float share) {
+    float most = max(max(rust_albedo.r, rust_albedo.g), max(rust_albedo.b, 1e-4));
+    vec3 hides = mix(vec3(STAIN_HIDES_MOST), vec3(STAIN_HIDES), rust_albedo / most);
+    return mix(albedo, STAIN_ALBEDO * rust_albedo, share * hides);
 }

@@ -368,7 +368,8 @@ def test_a_dent_marks_the_wall_that_it_is_in_and_not_the_opposite_one(generator)
         inward=(0.0, 1.0, 0.0),
     )
     without, dented = (generator.bake(replace(sound, damages=d), 16.0) for d in ((), (dent,)))
-    changed = (without.base_color != dented.base_color).any(axis=2)
+    levels = [atlas.base_color.astype(int) for atlas in (without, dented)]
+    changed = np.abs(levels[0] - levels[1]).max(axis=2) > 1  # two programs round as they like
     found = {}
     for face in ("front", "back"):
         x, y, width, height = mesh.charts[mesh.chart_index(face)].rect_mm
