@@ -259,6 +259,33 @@ def test_holes_leave_the_locking_bars():
     assert np.abs(rusty - paint)[torn & ~bar].mean() > 15
 
 
+def test_a_bar_is_seen_from_behind_through_holes_in_both_ends():
+    """The back of the bar stands before the sky that the hole in its leaf shows."""
+    bare = {"damage": {"probability": 0}, "spreader": {"probability": 0}}
+    with Generator(Config.from_values(bare), 77, (320, 320)) as generator:
+        scene = generator.scene(3)
+        length = ISO_668[scene.container.kind][0]
+        near, far = (
+            Damage(
+                "perforation", face, (x, 275.0, 1500.0), (0.0, -sign, 0.0), (0.0, 0.0, 1.0),
+                (sign, 0.0, 0.0), (400.0, 400.0), 30.0, (60.0, *[0.0] * 10),
+            )
+            for face, x, sign in (
+                ("no_door", 40 - length / 2, 1.0), ("door", length / 2 - 58, -1.0)
+            )
+        )  # fmt: skip
+        eye = (-length / 2 - 1500, 275.0, 1500.0)
+        camera = Camera("straight", eye, far.origin_mm, 600.0)
+        scene = replace(scene, damages=(near, far), cameras=(camera,), decals=())
+        depth = generator.render(scene=scene, camera="straight").depth
+    row = depth[120, 100:220]
+    bar = np.flatnonzero(np.isfinite(row))
+    assert len(bar) > 5
+    assert (np.diff(bar) == 1).all()
+    assert np.isinf(row[[0, -1]]).all()
+    np.testing.assert_allclose(row[bar], length / 1000 + 1.44, atol=0.06)
+
+
 def test_an_exported_hole_is_cut_out_of_the_leaf_and_not_of_the_bar_before_it():
     mesh = build_container("20")
     radius = 200.0
