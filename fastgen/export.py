@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import fastgen
-from fastgen.bake import Atlas, atlas_size
+from fastgen.bake import MAX_ATLAS, Atlas, atlas_size
 from fastgen.camera import MM, view_of
 from fastgen.container import build_container
 from fastgen.damage import variant
@@ -34,9 +34,6 @@ _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 SHEET_MM = 2.0
 """Thickness of the steel: where there are holes, the inside lies this far behind the outside."""
 
-SPREADER_TEXEL_MM = 8.0
-"""Width of a texel of the spreader's atlas."""
-
 _FLOOR_SLOPE = 0.7
 """What faces up more than this on the inside is the wooden floor."""
 
@@ -50,10 +47,9 @@ def export_glb(
 ) -> None:
     """Write `scene` as glTF in metres, y up, with cameras for images of the generator's size.
 
-    cameras: by default all of the scene. texel_mm: width of a texel of the baked atlas. Scenes
-    with holes get insides, of one colour for the floor and one for the rest. Raises ConfigError
-    for a texel too small or a scene that cannot be drawn, OutputError when the file cannot be
-    written.
+    cameras: by default all of the scene. texel_mm: width of a texel of the baked atlases. Scenes
+    with holes get insides, of one colour for the floor and one for the rest. Raises ConfigError for
+    a texel too small or a scene that cannot be drawn, OutputError when the file cannot be written.
     """
     check_scene(scene)
     cameras = scene.cameras if cameras is None else cameras
@@ -79,7 +75,7 @@ def export_glb(
     )
     if variant(scene.damages) == "holed":
         _add_inside(glb, body)
-    _add_spreader(glb, generator, scene)
+    _add_spreader(glb, generator, scene, texel_mm)
     for camera in chosen:
         _add_camera(glb, generator, scene, camera)
     data = glb.data(
@@ -109,12 +105,14 @@ def _baked_material(glb: Glb, name: str, atlas: Atlas, prefix: str = "") -> int:
     )
 
 
-def _add_spreader(glb: Glb, generator: Generator, scene: Scene) -> None:
-    """What the container hangs on; its textures are coarse, for nothing on it is printed."""
+def _add_spreader(glb: Glb, generator: Generator, scene: Scene, texel_mm: float) -> None:
+    """What the container hangs on. Its atlas may be larger than the container's."""
     mesh = spreader_mesh(scene)
-    atlas = generator.bake_spreader(scene, SPREADER_TEXEL_MM)
-    if mesh is None or atlas is None:
+    if mesh is None:
         return
+    least_mm = np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100
+    atlas = generator.bake_spreader(scene, max(texel_mm, float(least_mm)))
+    assert atlas is not None
     glb.add_mesh(
         "spreader",
         _baked_material(glb, "spreader", atlas, "spreader_"),
