@@ -13,7 +13,7 @@ from fastgen.clusters import Clusters
 from fastgen.door_gear import is_gear
 from fastgen.mesh import FACE_AXES, FACES, Mesh
 from fastgen.openness import open_sky
-from fastgen.programs import ZONE_GEAR, ZONE_SMALL, ZONE_TURN
+from fastgen.programs import ZONE_GEAR, ZONE_LEVEL, ZONE_SMALL, ZONE_TURN
 from fastgen.textures import data_texture
 
 _SLACK_MM = 120.0
@@ -134,6 +134,7 @@ def zone_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Te
             + ZONE_TURN * zone.quarter_turns
             + ZONE_GEAR * is_gear(chart)
             + ZONE_SMALL * zone.small
+            + ZONE_LEVEL * zone.level
             for chart, zone in zip(charts, mesh.zones, strict=True)
         ]
         table[1, columns, 1:] = [

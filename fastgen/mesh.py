@@ -92,13 +92,15 @@ class Zone:
 
     chart: index into Mesh.charts. rect_mm: x0, y0, width, height in the atlas. quarter_turns: from
     the atlas's +y clockwise to what is up in the world; 0 where the part lies flat. small: whether
-    it is pieces all of which are narrow, wherever there was room for them in the chart.
+    it is pieces all of which are narrow, wherever there was room for them in the chart. level:
+    whether it lies flat, and water does not run down it.
     """
 
     chart: int
     rect_mm: tuple[float, float, float, float]
     quarter_turns: int
     small: bool
+    level: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from fastgen.mesh import MATERIALS, MAX_ZONES
 from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.resources import shader_path
+from fastgen.rust import DEFINES as RUST_DEFINES
 from fastgen.sample_lattice import SampleLattice
 from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
 from fastgen.uniforms import Block
@@ -66,30 +67,9 @@ SPREADER_ZONE = MAX_ZONES
 PORTAL_ZONE = 1000
 """Zone number of what a perforation tore away; real zones number below it."""
 
-ZONE_TURN, ZONE_GEAR, ZONE_SMALL = 16, 64, 128
+ZONE_TURN, ZONE_GEAR, ZONE_SMALL, ZONE_LEVEL = 16, 64, 128, 256
 """Of a zone's code (shaders/zone.glsl): steps of quarter turns above the material, and the bits of
-gear and of small pieces."""
-
-SMALL_WIDE_MM, SMALL_EDGE_MM = 60.0, 15.0
-"""Width of small pieces, as they wear, and the mean distance from their edges: where in a piece a
-point lies is not known."""
-
-EDGE_SHARE = 0.4
-"""Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
-beam would be their edge."""
-
-RUST_REACH_MM = 90.0
-"""Distance from an edge at which rust is 1 / e as much more likely than far from all edges."""
-
-RUN_REACH_MM = 400.0
-"""The same of run-off below an edge."""
-
-STAIN_HIDES, STAIN_HIDES_MOST = 0.4, 0.8
-"""How much of the paint a stain of rust hides in the channel that rust reflects most, and where it
-reflects nothing."""
-
-STAIN_ALBEDO = 2.2
-"""How bright it is, thin, beside rust."""
+gear, of small pieces and of what lies level."""
 
 SHADOW_TEXELS = 1.0
 """Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges have
@@ -292,20 +272,15 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ZONE_TURN": ZONE_TURN,
         "ZONE_GEAR": ZONE_GEAR,
         "ZONE_SMALL": ZONE_SMALL,
-        "SMALL_WIDE_MM": SMALL_WIDE_MM,
-        "SMALL_EDGE_MM": SMALL_EDGE_MM,
-        "EDGE_SHARE": EDGE_SHARE,
-        "RUST_REACH_MM": RUST_REACH_MM,
-        "RUN_REACH_MM": RUN_REACH_MM,
-        "STAIN_HIDES": STAIN_HIDES,
-        "STAIN_HIDES_MOST": STAIN_HIDES_MOST,
-        "STAIN_ALBEDO": STAIN_ALBEDO,
+        "ZONE_LEVEL": ZONE_LEVEL,
+        **RUST_DEFINES,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUN": int(sun),
         "SHADOW_TEXELS": SHADOW_TEXELS,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),
+        "SHEET_MATERIAL": list(MATERIALS).index("paint_sheet"),
         "LAYER": LAYERS.index(layer),
         "SAMPLES_PER_AXIS": samples_per_axis,
         "SAMPLE_SLANT": lattice.slant,

@@ -23,8 +23,8 @@ def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
             for part, face, material, (x, y, width, height) in about["charts"]
         ),
         zones=tuple(
-            Zone(chart, (x, y, width, height), turns, small)
-            for chart, (x, y, width, height), turns, small in about["zones"]
+            Zone(chart, (x, y, width, height), turns, small, level)
+            for chart, (x, y, width, height), turns, small, level in about["zones"]
         ),
         atlas_size_mm=(about["atlas_size_mm"][0], about["atlas_size_mm"][1]),
         groups={group: slice(*ends) for group, ends in about["groups"].items()},
@@ -38,7 +38,7 @@ def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
 def _packed(mesh: Mesh) -> dict[str, NDArray[np.generic]]:
     about = {
         "charts": [(c.name, c.face, c.material, c.rect_mm) for c in mesh.charts],
-        "zones": [(z.chart, z.rect_mm, z.quarter_turns, z.small) for z in mesh.zones],
+        "zones": [(z.chart, z.rect_mm, z.quarter_turns, z.small, z.level) for z in mesh.zones],
         "atlas_size_mm": mesh.atlas_size_mm,
         "groups": {name: (part.start, part.stop) for name, part in mesh.groups.items()},
         "flats": dict(mesh.flats),

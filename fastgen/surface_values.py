@@ -1,8 +1,6 @@
 """A scene's materials, layers and damages as the values of the shader's uniform blocks."""
 
 from collections.abc import Iterable, Mapping
-from statistics import NormalDist
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,27 +9,11 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import (
-    DIELECTRIC_F0,
-    EDGE_SHARE,
-    RUN_REACH_MM,
-    RUST_REACH_MM,
-    SMALL_EDGE_MM,
-    SMALL_WIDE_MM,
-    SPREADER_ZONE,
-    STAIN_ALBEDO,
-    STAIN_HIDES,
-    STAIN_HIDES_MOST,
-    noise_deviation,
-)
+from fastgen.programs import DIELECTRIC_F0, SPREADER_ZONE, noise_deviation
 from fastgen.reflectance import mean_specular_albedo
+from fastgen.rust import rusted
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm
-
-Array = NDArray[np.floating]
-
-_normal_cdf = np.vectorize(NormalDist().cdf)
-_normal_quantile = np.vectorize(NormalDist().inv_cdf)
 
 _TILE_OF_SCALE = 4.0
 """A noise tile spans this many of its pattern's typical lengths."""
@@ -65,67 +47,15 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
 def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
     """What each of MATERIALS gives back, rust included, of light from all around.
 
-    meshes: what the scene's container and spreader are made of. The container's sheet is taken for
-    its roof, down which no rust runs. Without dirt, which changes the mean over a roof by 3 %, and
-    wetness, which darkens what is soaked by up to 20 %.
+    meshes: what the scene's container and spreader are made of. Without dirt, which changes the
+    mean over a roof by 3 %, and wetness, which darkens what is soaked by up to 20 %.
     """
     rust = scene.surface.rust
-    albedo_of_rust = np.array(rust.albedo)
     base, trait = _materials(scene.surface, scene.spreader)
-    rusty, stained = _rusted(rust.coverage * trait[:, 1:2], *_edges(meshes))
-    reflected = albedo_of_rust / max(albedo_of_rust.max(), 1e-4)
-    stain = stained * (STAIN_HIDES_MOST + (STAIN_HIDES - STAIN_HIDES_MOST) * reflected)
-    paint = (1 - stain) * base[:, :3] + stain * STAIN_ALBEDO * albedo_of_rust
-    albedo = np.minimum((1 - rusty) * paint + rusty * albedo_of_rust, 0.95)
+    coverage = rust.coverage * trait[:, 1:2].astype(float)
+    albedo = rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
     mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
     return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
-
-
-def _rusted(proneness: Array, near_edge: Array, near_top: Array) -> tuple[Array, Array]:
-    """What share has gone to rust, and of the rest what share rust has stained, [M, 1], as
-    shaders/rust.glsl has it on the mean."""
-    share = np.clip(proneness * (0.6 + 3.0 * near_edge), 1e-6, 0.9)
-    about = _normal_cdf((_normal_quantile(share) + 0.3) / np.hypot(1.0, 0.25))
-    run = np.clip(proneness * (1.2 + 4.0 * near_top), 1e-6, 0.6) * (near_top > 0)
-    return share, 1 - (1 - about) / (1 - share) * (1 - run)
-
-
-_EDGES: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
-
-
-def _edges(meshes: Iterable[Mesh]) -> tuple[Array, Array]:
-    """Means over each of MATERIALS of how near it is to an edge, and to one above it, as
-    shaders/rust.glsl falls off with either; [M, 1]."""
-    sums = np.zeros((3, len(MATERIALS)))
-    for mesh in meshes:
-        if mesh not in _EDGES:
-            _EDGES[mesh] = _edge_sums(mesh)
-        sums += _EDGES[mesh]
-    area, near, above = sums[..., None]
-    area = np.maximum(area, 1e-9)
-    above[MATERIALS.index("paint_sheet")] = 0.0
-    return near / area, above / area
-
-
-def _edge_sums(mesh: Mesh) -> Array:
-    """Of each of MATERIALS, [3, M]: area, and how near it is to an edge and to one above it, each
-    times area."""
-    low, high = np.sort([zone.rect_mm[2:] for zone in mesh.zones], axis=1).T
-    reach = np.minimum(RUST_REACH_MM, EDGE_SHARE * low)
-    # of a rectangle, 2 (low + high) - 8 d lies d from its border, up to half its width
-    end = np.exp(-low / (2 * reach))
-    ring = 2 * (low + high) * (1 - end) - 8 * reach * (1 - end * (1 + low / (2 * reach)))
-    near = reach * ring / (low * high)
-    above = RUN_REACH_MM / low * (1 - np.exp(-low / RUN_REACH_MM))  # most lie along
-    small = [zone.small for zone in mesh.zones]
-    near[small] = np.exp(-SMALL_EDGE_MM / (EDGE_SHARE * SMALL_WIDE_MM))
-    above[small] = np.exp(-SMALL_EDGE_MM / RUN_REACH_MM)
-    corners = mesh.atlas_mm[mesh.triangles].astype(float)
-    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
-    area = np.bincount(mesh.zone[mesh.triangles[:, 0]], area, len(small))
-    material = [mesh.charts[zone.chart].material_index for zone in mesh.zones]
-    sums = (np.bincount(material, area * part, len(MATERIALS)) for part in (1.0, near, above))
-    return np.array(list(sums))
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:

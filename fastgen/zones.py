@@ -44,11 +44,13 @@ def zones_of(
     it is rolled from one sheet, which has no edge within, however sharp its waves are.
     """
     piece = _connected(sheet_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
-    turns = _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)[piece]
+    turns, level = (
+        found[piece] for found in _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)
+    )
     low, high = _bounds(sheet_mm[triangles], piece)
     small = ((high - low).min(axis=1) < _SMALL_MM)[piece]
     _, first, piece = np.unique(
-        np.where(small, -1 - turns, piece), return_index=True, return_inverse=True
+        np.where(small, -1 - turns - 4 * level, piece), return_index=True, return_inverse=True
     )
     low, high = _bounds(sheet_mm[triangles], piece)
     order = np.argsort(-(high - low).prod(axis=1), kind="stable")
@@ -59,15 +61,19 @@ def zones_of(
             (*low[i].tolist(), *(high - low)[i].tolist()),
             int(turns[first[i]]),
             bool(small[first[i]]),
+            bool(level[first[i]]),
         )
         for i in order
     ]
     return found, rank[piece]
 
 
-def _quarter_turns(corners: Array, heights: Array, piece: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Zone.quarter_turns [P] of pieces by their mean rise: a corrugated roof goes down as often as
-    up. corners: of triangles on the sheet, [T, 3, 2]. heights: [T, 3]. piece: [T]."""
+def _quarter_turns(
+    corners: Array, heights: Array, piece: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Zone.quarter_turns [P] of pieces and whether they are level, by their mean rise: a corrugated
+    roof goes down as often as up. corners: of triangles on the sheet, [T, 3, 2]. heights: [T, 3].
+    piece: [T]."""
     sides, rises = corners[:, 1:] - corners[:, :1], heights[:, 1:] - heights[:, :1]
     area = np.abs(np.linalg.det(sides))
     gradient = np.linalg.solve(sides, rises[..., None])[..., 0]
@@ -78,7 +84,8 @@ def _quarter_turns(corners: Array, heights: Array, piece: NDArray[np.int64]) -> 
         np.where(along_y >= 0, 0, 2),
         np.where(along_x >= 0, 1, 3),
     )
-    return np.where(rise < _LEVEL, 0, turns)
+    level = rise < _LEVEL
+    return np.where(level, 0, turns), level
 
 
 def _connected(

@@ -66,18 +66,20 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     float rusty = 0.0;
 #if SHOWN(RUST)
     float sticker = 1.0 - 0.8 * decal_alpha;
-    Rust rust = rust_at(edge_mm, narrow_mm, below_mm, 1.0 - abs(part.w), coarse, trait.y);
+    Rust rust = rust_at(edge_mm, narrow_mm, below_mm, (code & ZONE_LEVEL) == 0 ? 1.0 : 0.0,
+                        coarse, trait.y);
     albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
-    // worked steel shows: dulled paint, then rust where the noise is rustiest
+    // worked steel shows, which rubber is not: dulled paint, then rust where the noise is rustiest
+    scar *= step(1e-4, trait.y);
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(scar), coarse.lost.y, 0.3) *
                        step(0.01, scar));
 #endif
-    float fresh = 1.0 - rust.thick / max(rust.all, 1e-4);
+    float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
     vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x) *
-                 mix(0.6, 1.4, clamp(fresh, 0.0, 1.0));
+                 mix(1.22, 0.6, old);   // RUST_OLD of it is old: 1 on the mean
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif

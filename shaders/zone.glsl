@@ -4,14 +4,14 @@
 
 uniform sampler2D zone_table;   // row 0: x0, y0, width, height in mm; row 1: code, and of panels and
                                 // door gear their face's outward axis, else 0
-// code: material, quarter turns clockwise from +y to up, bits of gear and of small pieces
+// code: material, quarter turns clockwise from +y to up, bits of gear, small pieces, what is level
 
 bool before_sheet(uint zone) {
     return (int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x) & ZONE_GEAR) != 0;
 }
 
 vec2 upright(vec2 sheet_mm, int code) {
-    int turns = code / ZONE_TURN;
+    int turns = code / ZONE_TURN & 3;
     vec2 turned = (turns & 1) == 0 ? sheet_mm : vec2(-sheet_mm.y, sheet_mm.x);
     return (turns & 2) == 0 ? turned : -turned;
 }
