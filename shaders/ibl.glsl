@@ -36,15 +36,21 @@ vec3 background(vec3 direction) {
 
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
 // its irradiance from there, relative to that of a whole sky about that direction, the share that is
-// open about where it mirrors the eye's ray, and whether `light` lacks what comes from what hides the
-// sky, 1 or 0
+// open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
+// 1 or 0, and irradiance / pi that the sun throws on what hides it and faces here, times its share
 struct Openness {
     vec3 direction;
     float rim;
     vec3 light;
     float mirrored;
     float bounces;
+    vec3 sun;
 };
+
+// along the surface, away from what hides the sky most; 0 where it is hidden all round alike
+vec3 leaning(Openness sky, vec3 normal) {
+    return sky.direction - normal * dot(normal, sky.direction);
+}
 
 // Light that gets here by way of what hides the sky, which is taken for the same paint: Jimenez et
 // al. 2016, Practical Realtime Strategies for Accurate Indirect Occlusion, section 4. Three
@@ -77,8 +83,14 @@ vec3 lit(Reflector r, Openness sky) {
     mirror = normalize(mix(mirror, r.normal, m.roughness * m.roughness * m.roughness));
     float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - r.n_dot_v));
     vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky, m.albedo));
-    // where the sky is hidden the mirror shows the paint that hides it
-    vec3 mirrored = mix(m.albedo * around, prefiltered(mirror, width),
-                        open_lobe(sky, mirror, m.roughness));
+    around += sky.sun * mix(m.albedo, material_base[SHEET_MATERIAL].rgb, 0.5);
+    // where the sky is hidden the mirror shows the paint that hides it; what is left of a lobe leans
+    // away from there and is narrower, by how much path-traced containers tell
+    float open = open_lobe(sky, mirror, m.roughness);
+    vec3 aside = leaning(sky, r.normal);
+    float most = length(aside);
+    float lean = 1.5 * m.roughness * (1.0 - open) * smoothstep(0.0, 0.2, most) / max(most, 1e-3);
+    vec3 mirrored = mix(m.albedo * around,
+                        prefiltered(fma(vec3(lean), aside, mirror), width * mix(0.7, 1.0, open)), open);
     return r.diffuse * around + specular * mirrored;
 }

@@ -19,7 +19,7 @@ Shaded cable(ivec2 pixel) {
     vec3 normal = normalize(vec3(view.xy, 0.0));
     vec4 base = material_base[CABLE_MATERIAL];
     Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
-    Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0);
+    Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0));
     vec3 color = layer_color(steel, normal, view, whole, 1.0);
     Shaded s = sky(ray);
     s.cover = cables_cover(center);

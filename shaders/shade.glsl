@@ -50,7 +50,7 @@ Openness openness_at(ivec2 sample_at, uint zone) {
     vec4 encoded = texelFetch(light_points, sample_at, 0);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
-    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces);
+    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces, vec3(0.0));
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -156,7 +156,9 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     vec2 place = place_of(sample_at);
     // before a sun behind the wall stands the whole container, too close to a groove for the map
     if (dot(p.surface.outward, sun_direction) >= 0.0) {
-        sun_seen = sun_share(depth * view_ray(place), normal, depth * pixel_angle);
+        vec3 from_eye = depth * view_ray(place);
+        sun_seen = sun_share(from_eye, normal, depth * pixel_angle);
+        sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky);
     }
 #endif
     return layer_color(p.surface.material, normal, view, sky, sun_seen);

@@ -1,5 +1,6 @@
 // vec3 sunlit(Reflector r): radiance of the sun reflected toward the eye, unshadowed;
-// float sun_share(vec3 from_eye, vec3 normal, float footprint_m): how much of it gets there, 0..1.
+// float sun_share(vec3 from_eye, vec3 normal, float footprint_m): how much of it gets there, 0..1;
+// vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky): what it throws on what hides the sky.
 
 uniform sampler2DShadow sun_shadow;
 
@@ -41,4 +42,17 @@ float sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
     v.z = -dot(slope, v.xy);
     return 0.25 * (textureLod(sun_shadow, at + u, 0.0) + textureLod(sun_shadow, at - u, 0.0) +
                    textureLod(sun_shadow, at + v, 0.0) + textureLod(sun_shadow, at - v, 0.0));
+}
+
+// Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a
+// wall at right angles to the surface, facing where the open sky leans to, or walls all round where it
+// leans nowhere; it is lit if the sun gets close to the point.
+vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky) {
+    vec3 aside = leaning(sky, normal);
+    float most = length(aside);
+    float walled = length(sun_direction - normal * dot(normal, sun_direction)) / PI;
+    float facing = mix(walled, max(dot(aside, sun_direction), 0.0) / max(most, 1e-3),
+                       smoothstep(0.0, 0.1, most));
+    vec3 at = (ray_to_shadow * vec4(from_eye + 0.02 * sky.direction, 1.0)).xyz;
+    return sky.rim * sky.rim * facing * textureLod(sun_shadow, at, 0.0) * sun_light;
 }

@@ -49,7 +49,7 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0)), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0))), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     np.testing.assert_allclose(out[:, :3], 1.0, atol=0.01)
@@ -64,7 +64,7 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0)), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0))), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     assert (out[:, 0] <= 1.01).all()
