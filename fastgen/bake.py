@@ -40,6 +40,11 @@ class Atlas:
         return np.stack([u / width, 1 - v / height], axis=-1)
 
 
+def least_texel_mm(mesh: Mesh) -> float:
+    """The finest texel, in hundredths of a millimetre, with which `mesh`'s atlas fits."""
+    return float(np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100)
+
+
 def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
     """(width, height) in texels of `mesh`'s atlas. Raises ConfigError where that is too large."""
     if not isinstance(texel_mm, numbers.Real) or not 0 < texel_mm <= _COARSEST_MM:
@@ -49,10 +54,10 @@ def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
         )
     width, height = (int(np.ceil(side / texel_mm)) for side in mesh.atlas_size_mm)
     if max(width, height) > MAX_ATLAS:
-        least = np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100
         raise ConfigError(
             f"texel_mm: {texel_mm:g} makes a texture of {width}x{height} texels, over the "
-            f"{MAX_ATLAS} that viewers take; give {least:.2f} or more for this container"
+            f"{MAX_ATLAS} that viewers take; give {least_texel_mm(mesh):.2f} or more for this "
+            "container"
         )
     return width, height
 

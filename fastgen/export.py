@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import fastgen
-from fastgen.bake import MAX_ATLAS, Atlas, atlas_size
+from fastgen.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.camera import MM, view_of
 from fastgen.container import build_container
 from fastgen.damage import variant
@@ -110,8 +110,7 @@ def _add_spreader(glb: Glb, generator: Generator, scene: Scene, texel_mm: float)
     mesh = spreader_mesh(scene)
     if mesh is None:
         return
-    least_mm = np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100
-    atlas = generator.bake_spreader(scene, max(texel_mm, float(least_mm)))
+    atlas = generator.bake_spreader(scene, max(texel_mm, least_texel_mm(mesh)))
     assert atlas is not None
     glb.add_mesh(
         "spreader",

@@ -21,6 +21,7 @@ from fastgen.export import export_glb
 from fastgen.generator import Generator
 from fastgen.scene import Camera, Scene, Spreader
 from fastgen.sensor.parts import Lens
+from fastgen.spreader import build_spreader
 
 SIZE = (320, 240)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
@@ -352,6 +353,27 @@ def test_the_texel_that_an_error_proposes_fits(generator, tmp_path):
     proposed = float(str(caught.value).split("give ")[1].split()[0])
     mesh = build_container(scene.container.kind, scene.container.profiles)
     assert max(mesh.atlas_size_mm) / proposed <= 8192
+
+
+def test_a_spreaders_texels_are_the_containers_but_where_its_atlas_would_be_too_large(
+    generator, tmp_path, monkeypatch
+):
+    scene = replace(
+        generator.scene(0), spreader=Spreader(True, (0.5, 0.5, 0.5), (True, True), 15.0)
+    )
+    container = build_container(scene.container.kind, scene.container.profiles)
+    asked = []
+    baked = generator.bake_spreader
+    monkeypatch.setattr(
+        generator, "bake_spreader", lambda scene, mm: asked.append(mm) or baked(scene, mm)
+    )
+    for most in (4000, int(max(container.atlas_size_mm) / 16)):
+        monkeypatch.setattr("fastgen.bake.MAX_ATLAS", most)
+        export_glb(generator, scene, tmp_path / "box.glb", [], 16.1)
+    widest = max(build_spreader(scene.container.kind).atlas_size_mm)
+    assert asked[0] == 16.1
+    assert asked[1] == pytest.approx(widest * 16 / max(container.atlas_size_mm), rel=0.01)
+    assert asked[1] > 16.1
 
 
 def test_a_dent_marks_the_wall_that_it_is_in_and_not_the_opposite_one(generator):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -60,3 +61,28 @@ def test_water_takes_rust_down_a_wall(wall):
     below = wall[low][rusty[high] & ~rusty[low]].mean()
     above = wall[high][rusty[low] & ~rusty[high]].mean()
     assert below < above - 0.05
+
+
+def test_most_runs_down_from_a_walls_top(wall):
+    """Rust stains more of the paint below the upper edge than above the lower one."""
+    sound = np.where(wall < 0.3, np.nan, wall)
+    rows = int(300 / TEXEL_MM)
+    top, bottom = np.nanmean(sound[-rows:]), np.nanmean(sound[:rows])
+    assert top < bottom - 0.02
+
+
+def test_old_rust_is_darker_and_lies_within_what_is_younger():
+    even = {"dirt_strength": 0, "ageing_strength": 0, "scratch_coverage": 0, "tone_variation": 0}
+    values = {"surface": {"colors": {"white": "#ffffff"}, "rust_coverage": 0.2, **even}}
+    config = Config.from_values({"damage": {"probability": 0}, **values})
+    with Generator(config, 3, (64, 64)) as generator:
+        scene = replace(generator.scene(0), decals=())
+        mesh = generator._gpu.renderer().mesh(scene.container)
+        colors = DECODED[generator.bake(scene, 5.0).base_color[::-1]]
+    roof = next(c for c in mesh.charts if (c.face, c.material) == ("roof", "paint_sheet"))
+    x, y, width, height = (np.array(roof.rect_mm) / 5.0).astype(int)
+    blue, red = colors[y + 60 : y + height - 60, x + 60 : x + width - 60, [2, 0]].transpose(2, 0, 1)
+    rusty = blue < 0.5 * red.max() * 0.2
+    depth = cv2.distanceTransform(rusty.astype(np.uint8), cv2.DIST_L2, 5)
+    rim, core = red[(depth > 1.5) & (depth < 3)].mean(), red[depth > 8].mean()
+    assert core < 0.8 * rim

@@ -136,6 +136,34 @@ def test_the_shader_turns_a_zone_so_that_up_is_up(gl):
         np.testing.assert_allclose(found, np.column_stack([points @ right, points @ up]), atol=1e-5)
 
 
+def test_the_shader_finds_the_upper_side_of_a_zone(gl):
+    """Whatever bits its code has beside."""
+    points = np.random.default_rng(0).uniform(0, (300, 200), (20, 2))
+    for turns, up in enumerate(UP_IN_ATLAS):
+        for more in (0, 64, 128, 64 + 128 + 256):
+            code = 5 + 16 * turns + more
+            body = f"vec4 f(vec4 x) {{ return vec4(to_upper_side(x.xy, x.zw, {code})); }}"
+            rows = np.column_stack([points, np.tile((300.0, 200.0), (20, 1))])
+            found = run(gl, f'#include "zone.glsl"\n{body}', rows)[:, 0]
+            highest = max(corner @ up for corner in ((0, 0), (300, 0), (0, 200), (300, 200)))
+            np.testing.assert_allclose(found, highest - points @ up, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", ISO_668)
+def test_level_zones_are_those_that_neither_rise_nor_fall(kind):
+    """A roof's waves go up and down alike."""
+    for mesh in meshes(kind):
+        tilt = np.abs(mesh.normals[mesh.triangles[:, 0], 2])
+        corners = mesh.positions_mm[mesh.triangles].astype(float)
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        for number, zone in enumerate(mesh.zones):
+            mine = zone_of(mesh) == number
+            flat = area[mine][tilt[mine] > 0.7].sum() / area[mine].sum()
+            assert zone.level == (flat > 0.5), (mesh.charts[zone.chart].name, number, flat)
+
+
 def baked_sides(generator, scene, layer_mm, value=np.array):
     """Mean albedo, or value of it, along the long borders, and along the middle, of a main beam's
     long sides."""
