@@ -211,7 +211,7 @@ ELEMENTS = (
         "shadow of the sun",
         text=(
             (
-                "sun_seen = sun_share(depth * view_ray(place), normal, depth * pixel_angle);",
+                "sun_seen = sun_share(from_eye, normal, depth * pixel_angle);",
                 "sun_seen = 1.0;",
             ),
         ),
@@ -229,11 +229,21 @@ ELEMENTS = (
     Element("light", "light from surfaces on the spreader", thrown=False),
     Element(
         "light",
+        "the sun's light from walls in recesses",
+        text=(("sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky);", ""),),
+    ),
+    Element(
+        "light",
+        "reflections lean away from what hides the sky",
+        text=(("fma(vec3(lean), aside, mirror), width * mix(0.7, 1.0, open)", "mirror, width"),),
+    ),
+    Element(
+        "light",
         "occlusion of reflections",
         text=(
             (
-                "open_lobe(sky, mirror, m.roughness));",
-                "1.0);",
+                "float open = open_lobe(sky, mirror, m.roughness);",
+                "float open = 1.0;",
             ),
         ),
     ),
