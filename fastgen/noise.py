@@ -7,7 +7,7 @@ distributions; `lost_deviation` says by how much, and the shader widens its thre
 so that near and far views agree on how much is rusty and nothing shimmers (the idea of Olano and
 Baker 2010, LEAN mapping: variance that filtering removes comes back as softness). Of a normal field
 that is exact: where its mean over a footprint is m and deviates by s within it, Phi((m - t) / s) of
-that lies above t.
+that lies above t. What is read as a sum of two lookups (shaders/layers.glsl) is uniform no longer.
 """
 
 from dataclasses import dataclass

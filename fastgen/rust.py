@@ -27,7 +27,7 @@ DEFINES = {
     "RUST_OLD": 0.35,  # of what is rusty
     "HALO": 0.3,  # deviations of the noise by which stains reach out
     "HALO_SOFTNESS": 0.25,
-    "RUN_REACH_MM": 400.0,  # the same of run-off below an edge
+    "RUN_REACH_MM": 400.0,  # below an edge, to where run-off is 1 / e as much more likely
     "RUN_FAR": 1.2,
     "RUN_NEAR": 4.0,
     "RUN_MOST": 0.6,
