@@ -32,7 +32,7 @@ layout(location = 1) out vec4 out_surface;   // -, roughness, metallic, as glTF 
 void main() {
     float scar = 0.0;
 #if WITH_DAMAGE
-    scar = before_sheet(zone) ? 0.0 : damage_at(rest_mm).scar;
+    scar = damage_at(rest_mm).scar;
 #endif
     Material m = surface_at(zone, atlas_mm, texel_mm, scar).material;
     out_albedo = vec4(srgb_encode(m.albedo), 1.0);

@@ -71,8 +71,9 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
-    // worked steel shows, which rubber is not: dulled paint, then rust where the noise is rustiest
-    scar *= step(1e-4, trait.y);
+    // worked steel shows, which rubber is not, and what stands before the sheet is not worked: dulled
+    // paint, then rust where the noise is rustiest
+    scar *= (code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0;
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(scar), coarse.lost.y, 0.3) *
                        step(0.01, scar));

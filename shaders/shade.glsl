@@ -115,7 +115,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 #if WITH_DAMAGE
     Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
     if (d.value != 0u) p.damage = d.value;
-    p.scar = before_sheet(key_zone(key)) ? 0.0 : d.scar;
+    p.scar = d.scar;
     p.bend = d.bend;
     normal = bent_normal(d.bend, normal);
 #endif

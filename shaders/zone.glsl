@@ -10,14 +10,16 @@ bool before_sheet(uint zone) {
     return (int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x) & ZONE_GEAR) != 0;
 }
 
+int quarter_turns(int code) { return code / ZONE_TURN & 3; }
+
 vec2 upright(vec2 sheet_mm, int code) {
-    int turns = code / ZONE_TURN & 3;
+    int turns = quarter_turns(code);
     vec2 turned = (turns & 1) == 0 ? sheet_mm : vec2(-sheet_mm.y, sheet_mm.x);
     return (turns & 2) == 0 ? turned : -turned;
 }
 
 float to_upper_side(vec2 from_low, vec2 size, int code) {
-    int turns = code / ZONE_TURN & 3;
+    int turns = quarter_turns(code);
     vec2 left = turns < 2 ? size - from_low : from_low;
     return (turns & 1) == 0 ? left.y : left.x;
 }
