@@ -6,15 +6,12 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
-
 import ablation_elements
 import cycles_figures
 import image_error
+import numpy as np
 import pareto_chart
+import pytest
 import reference_set
 from reference_set import FILTERS
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import trimesh
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "bench"))
 sys.path.insert(0, str(Path(__file__).parent.parent / "bench" / "peer_renderers"))
 
 import growth

@@ -8,6 +8,7 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.srgb import DECODED
+from tests.plain import EVEN_PAINT
 
 TEXEL_MM = 20.0
 BORDER = 8
@@ -23,11 +24,8 @@ def wall(request):
             "weather": {"wet_probability": 0},
             "surface": {
                 "colors": {"white": "#ffffff"},
+                **EVEN_PAINT,
                 "rust_coverage": 0.1,
-                "dirt_strength": 0,
-                "ageing_strength": 0,
-                "scratch_coverage": 0,
-                "tone_variation": 0,
             },
         }
     )
@@ -72,8 +70,7 @@ def test_most_runs_down_from_a_walls_top(wall):
 
 
 def test_old_rust_is_darker_and_lies_within_what_is_younger():
-    even = {"dirt_strength": 0, "ageing_strength": 0, "scratch_coverage": 0, "tone_variation": 0}
-    values = {"surface": {"colors": {"white": "#ffffff"}, "rust_coverage": 0.2, **even}}
+    values = {"surface": {"colors": {"white": "#ffffff"}, **EVEN_PAINT, "rust_coverage": 0.2}}
     config = Config.from_values({"damage": {"probability": 0}, **values})
     with Generator(config, 3, (64, 64)) as generator:
         scene = replace(generator.scene(0), decals=())

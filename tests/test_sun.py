@@ -21,6 +21,7 @@ from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.sun import split_sun
 from fastgen.sun_shadow import MAP_SIZE, ShadowMap
 from tests.mesh_probe import behind_the_middle
+from tests.plain import EVEN_PAINT
 from tests.sky_samples import even_directions, one_light, texel_grid
 from tests.test_environment import write_exr
 
@@ -251,9 +252,7 @@ def test_edges_of_shadows_have_no_teeth(tmp_path):
     toward = np.array([0.3, -0.75, 0.6]) / np.linalg.norm([0.3, -0.75, 0.6])
     sky = np.full((512, 1024, 3), 0.2, np.float32)
     write_exr(tmp_path / "flat.exr", sky + one_light(toward, 1e5, 512))
-    even = {"rust_coverage": 0, "dirt_strength": 0, "ageing_strength": 0, "tone_variation": 0}
-    even |= {"scratch_coverage": 0, "wear_strength": 0}
-    config = Config.from_values({"surface": even, "damage": {"probability": 0}})
+    config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
     half_length, height = KINDS["20"].size_mm[0] / 2, KINDS["20"].size_mm[2]
     target = (half_length - 12.0, -600.0, height + 15 + 260.0)
     place = (target[0] + 6000.0, *target[1:])

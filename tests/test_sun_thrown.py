@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import image_error
 import numpy as np
 import pytest
 import trimesh
@@ -10,21 +11,12 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import Config, Generator
 from fastgen.scene import EnvironmentView, Spreader
 from tests import oracle
+from tests.plain import EVEN_PAINT
 from tests.sky_samples import one_light
-from tests.test_bench_accuracy import image_error
 from tests.test_environment import write_exr
 
 RAYS = 400
-EVEN = {
-    "colors": {"grey": "#bcbcbc"},
-    "roughness": 1.0,
-    "rust_coverage": 0,
-    "dirt_strength": 0,
-    "ageing_strength": 0,
-    "tone_variation": 0,
-    "scratch_coverage": 0,
-    "wear_strength": 0,
-}
+EVEN = {**EVEN_PAINT, "colors": {"grey": "#bcbcbc"}, "roughness": 1.0}
 
 
 @pytest.fixture(scope="module", params=[(0.7, 0.5, 0.5), (0.6, -0.75, 0.3)], ids=["right", "left"])

@@ -16,6 +16,7 @@ from fastgen.srgb import DECODED
 from tests import oracle
 from tests.glsl import run
 from tests.mesh_probe import ISO_668, triangles_of, winding_normals
+from tests.plain import EVEN_PAINT
 
 UP_IN_ATLAS = np.array([(0, 1), (1, 0), (0, -1), (-1, 0)], float)
 DIRTY = Config.from_values(
@@ -36,11 +37,7 @@ def gl():
 @pytest.fixture(scope="module")
 def even():
     """A generator, and a scene whose surfaces are plain paint."""
-    values = {
-        "dirt_strength": 0, "ageing_strength": 0, "tone_variation": 0, "wear_strength": 0,
-        "scratch_coverage": 0, "rust_coverage": 0,
-    }  # fmt: skip
-    config = Config.from_values({"damage": {"probability": 0}, "surface": values})
+    config = Config.from_values({"damage": {"probability": 0}, "surface": EVEN_PAINT})
     with Generator(config, 3, (64, 64)) as generator:
         yield generator, generator.scene(0)
 

@@ -1,0 +1,11 @@
+"""Values of a configuration that leave things out."""
+
+EVEN_PAINT = {
+    "rust_coverage": 0,
+    "dirt_strength": 0,
+    "ageing_strength": 0,
+    "tone_variation": 0,
+    "scratch_coverage": 0,
+    "wear_strength": 0,
+}
+"""Of `surface`: bare paint of one colour and roughness."""
