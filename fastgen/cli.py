@@ -42,6 +42,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     _mend_streams()
     try:
+        return _run(arguments)
+    finally:
+        _drop_unprinted()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    try:
         try:
             options = _parser().parse_args(arguments)
             with _stopped_by_sigterm():
@@ -51,9 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FastgenError as error:
         return _refused(str(error))
     except BrokenPipeError:
-        # whoever read what we print, such as head, has gone; the interpreter would flush again
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 128 + signal.SIGPIPE
+        return 128 + signal.SIGPIPE  # whoever read what we print, such as head, has gone
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
     except KeyboardInterrupt as stop:
@@ -70,6 +75,16 @@ def _mend_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _drop_unprinted() -> None:
+    """Forget what can be printed nowhere: the interpreter would try again as it ends, and Python
+    3.13 puts an exit code of its own in place of ours where it fails."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class _Terminated(KeyboardInterrupt):

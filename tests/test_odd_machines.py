@@ -95,7 +95,16 @@ def test_too_little_memory_is_no_mistake_of_ours():
     )
 
 
-def test_a_refusal_that_cannot_be_printed_is_one_by_its_exit_code(tmp_path):
+def test_what_cannot_be_printed_leaves_the_exit_code_as_it_is(tmp_path):
+    command, out = [sys.executable, "-m", "fastgen"], str(tmp_path / "out")
+    make = [*command, "generate", out, "--images", "1", "--size", "64x64"]
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "fastgen", "verify", str(tmp_path / "none")]
-        assert subprocess.run(command, stderr=full, check=False).returncode == 2
+        assert subprocess.run(make, stderr=full, check=False).returncode == 0
+        bad = [*command, "verify", str(tmp_path / "none")]
+        assert subprocess.run(bad, stderr=full, check=False).returncode == 2
+        # what was asked for and is lost is a fault
+        told = subprocess.run(
+            [*command, "verify", out], stdout=full, stderr=subprocess.PIPE, check=False
+        )
+    assert told.returncode == 2
+    assert told.stderr.decode().splitlines() == ["fastgen: system: No space left on device"]
