@@ -165,6 +165,7 @@ VIEW_BLOCK = Block(
         ("float", "sun_radius"),
         ("vec3", "sun_light"),  # irradiance / pi on what faces it
         ("float", "cable_zone"),
+        ("vec4", "cable_rusted"),  # mean albedo under rust, and its share
         ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m, and length, 0 for none
     ),
 )

@@ -45,8 +45,11 @@ _normal_cdf = np.vectorize(NormalDist().cdf)
 _normal_quantile = np.vectorize(NormalDist().inv_cdf)
 
 
-def rusted(albedo: Array, coverage: Array, rust_albedo: Array, meshes: Iterable[Mesh]) -> Array:
-    """Mean albedo [M, 3] of MATERIALS that had `albedo` [M, 3], under rust and what it stains.
+def rusted(
+    albedo: Array, coverage: Array, rust_albedo: Array, meshes: Iterable[Mesh]
+) -> tuple[Array, Array]:
+    """Of MATERIALS that had `albedo` [M, 3] the mean albedo [M, 3], under rust and what it stains,
+    and the share that has gone to rust, [M, 1].
 
     coverage: times each material's proneness, [M, 1]; up to 0.2 that is good to 5 %, above it edges
     count for too much. rust_albedo: [3]. meshes: what is made of them. Sheet is taken for a roof's,
@@ -63,7 +66,7 @@ def rusted(albedo: Array, coverage: Array, rust_albedo: Array, meshes: Iterable[
     hides = c["STAIN_HIDES_MOST"] + (c["STAIN_HIDES"] - c["STAIN_HIDES_MOST"]) * reflected
     stain = c["STAIN_HIDES"] * c["STAIN_ALBEDO"] * rust_albedo
     paint = (1 - stained * hides) * albedo + stained * stain
-    return np.asarray(np.minimum((1 - share) * paint + share * rust_albedo, 0.95))
+    return np.minimum((1 - share) * paint + share * rust_albedo, 0.95), share
 
 
 def _spread(share: Array, reach: float, softness: float) -> Array:

@@ -50,12 +50,18 @@ def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
     meshes: what the scene's container and spreader are made of. Without dirt, which changes the
     mean over a roof by 3 %, and wetness, which darkens what is soaked by up to 20 %.
     """
+    base, _ = _materials(scene.surface, scene.spreader)
+    albedo, _ = _rusted(scene, meshes)
+    mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
+    return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
+
+
+def _rusted(scene: Scene, meshes: Iterable[Mesh]) -> tuple[np.ndarray, np.ndarray]:
+    """As rust.rusted, of the scene's materials."""
     rust = scene.surface.rust
     base, trait = _materials(scene.surface, scene.spreader)
     coverage = rust.coverage * trait[:, 1:2].astype(float)
-    albedo = rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
-    mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
-    return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
+    return rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
@@ -120,13 +126,16 @@ def cable_values(
 ) -> dict[str, ArrayLike]:
     """Members of VIEW_BLOCK about the cables of a scene's spreader, none where `mesh` is None."""
     if mesh is None:
-        return {"cable_zone": -1.0, "cable_foot": np.zeros((CABLES, 4))}
+        none: dict[str, ArrayLike] = {"cable_zone": -1.0, "cable_rusted": np.zeros(4)}
+        return {**none, "cable_foot": np.zeros((CABLES, 4))}
     feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
     from_eye = np.array(feet) / 1000 - eye_m
     chart = mesh.chart_index(CABLE_CHART)
     zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
     lengths = np.full((CABLES, 1), CABLE_LENGTH_MM / 1000)
+    albedo, share = (row[MATERIALS.index("cable")] for row in _rusted(scene, [mesh]))
     return {
         "cable_zone": float(SPREADER_ZONE + zone),
+        "cable_rusted": [*albedo, *share],
         "cable_foot": np.concatenate([from_eye, lengths], axis=1),
     }

@@ -11,16 +11,28 @@ layout(location = 1) out uint out_labels;   // object id | damage value << 16
 layout(location = 2) out float out_depth;
 
 #if CLASS == CLASS_CABLE
-// bare steel that faces the eye, as much of it as covers the pixel
+// steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye
+// sees two, each as wide as it faces the eye
 Shaded cable(ivec2 pixel) {
     vec2 center = vec2(pixel) + 0.5;
     vec3 ray = view_ray(center);
     vec3 view = -normalize(ray);
-    vec3 normal = normalize(vec3(view.xy, 0.0));
     vec4 base = material_base[CABLE_MATERIAL];
     Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
-    Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0));
-    vec3 color = layer_color(steel, normal, view, whole, 1.0);
+#if SHOWN(RUST)
+    steel.albedo = cable_rusted.rgb;
+    steel.roughness = mix(steel.roughness, rust_roughness, cable_rusted.a);
+    steel.metallic *= 1.0 - cable_rusted.a;
+#endif
+    wet(steel.albedo, steel.roughness, steel.metallic, 0.8 * wetness);   // material.glsl's mean
+    vec3 color = vec3(0.0);
+    for (int axis = 0; axis < 2; ++axis) {
+        vec3 normal = vec3(0.0);
+        normal[axis] = view[axis] < 0.0 ? -1.0 : 1.0;
+        Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0));
+        color += abs(view[axis]) * layer_color(steel, normal, view, whole, 1.0);
+    }
+    color /= max(abs(view.x) + abs(view.y), 1e-6);
     Shaded s = sky(ray);
     s.cover = cables_cover(center);
     s.color = mix(s.color, color, s.cover);

@@ -17,6 +17,7 @@ from fastgen.generator import Generator
 from fastgen.scene import Decal, Scene, Spreader
 from fastgen.shapes import spreader_mesh
 from fastgen.spreader import build_spreader, tier_bounds_mm
+from fastgen.srgb import DECODED
 from tests import oracle
 from tests.mesh_probe import ISO_668, first_hits, winding_normals
 
@@ -166,6 +167,30 @@ def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
     assert 0.85 < black < 1.0
     assert np.abs(lit / black - expected).max() < 0.15
     assert np.abs(lit / black - expected)[expected > 0.1].mean() < 0.03
+
+
+def test_a_thin_cable_looks_like_the_mean_of_what_is_seen_of_it_from_nearby():
+    """Within a pixel it is of one steel; nearby each sample of its sides has its own layers."""
+    rusty = {"surface": {"rust_coverage": 0.2}, "spreader": {"probability": 1}}
+    config = Config.from_values({**rusty, "damage": {"probability": 0}})
+    colors = {}
+    for focal_mm, side in ((14.5, 240), (110.0, 1280)):
+        with Generator(config, seed=6, size=(side, side)) as generator:
+            scene = generator.scene(0)
+            aslant = {"position_mm": (-8e3, -7e3, 6e3), "target_mm": (0.0, 0.0, 9e3)}
+            camera = replace(scene.cameras[0], focal_mm=focal_mm, roll_deg=0.0, **aslant)
+            renderer = generator._gpu.renderer()
+            for layer in ("rust", "normals"):
+                frame = renderer.render(scene, camera, (side, side), layer)
+                middle = slice(side * 2 // 5, side * 3 // 5)
+                code, cover = frame.image[middle], frame.cover[middle, :, None] / 255
+                linear = DECODED[code] if layer == "rust" else code / 255
+                sky = linear[0, 0]
+                colors[layer, side] = (linear - sky * (1 - cover)).sum(axis=(0, 1)) / cover.sum()
+                if side == 240:
+                    assert (cover[cover > 0] < 0.7).all()
+    np.testing.assert_allclose(colors["rust", 240], colors["rust", 1280], atol=0.01)
+    np.testing.assert_allclose(colors["normals", 240], colors["normals", 1280], atol=0.03)
 
 
 def front_marker(scene, down):

@@ -37,12 +37,13 @@ def test_mean_albedo_under_rust_is_that_of_baked_textures(rust):
     scene = replace(scene, decals=())
     base, trait = (np.asarray(scene_values(scene, 16)[f"material_{k}"]) for k in ("base", "trait"))
     coverage = rust * trait[:, 1:2]
-    found = rusted(base[:, :3], coverage, np.array(scene.surface.rust.albedo), meshes)
+    found, _ = rusted(base[:, :3], coverage, np.array(scene.surface.rust.albedo), meshes)
     for mesh, atlas, material, face in (
         (meshes[0], atlases[0], "paint_sheet", "roof"),
         (meshes[0], atlases[0], "paint_frame", None),
         (meshes[0], atlases[0], "casting", None),
         (meshes[1], atlases[1], "spreader", None),
+        (meshes[1], atlases[1], "cable", None),
     ):
         charts = [mesh.charts[i] for i in mesh.chart[mesh.triangles[:, 0]]]
         of_it = np.array([c.material == material and face in (None, c.face) for c in charts])
