@@ -17,6 +17,7 @@ from fastgen.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.scene import Camera, Scene
+from tests.backends import BACKENDS
 
 SIZE = (96, 64)
 RIG = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
@@ -235,7 +236,7 @@ def test_a_generator_goes_from_thread_to_thread():
             np.testing.assert_array_equal(handed.render(index=0).image, expected)
 
 
-@pytest.mark.parametrize("backend", ["egl", "osmesa"])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_threads_that_share_a_generator_draw_in_turn(backend):
     with Generator(size=SIZE, backend=backend, quality="draft") as shared:
         expected = [shared.render(index=index).image for index in range(4)]

@@ -24,6 +24,7 @@ from fastgen.shapes import spreader_mesh
 from fastgen.sky_probe import SkyProbe, probe_points
 from fastgen.spreader import build_spreader
 from fastgen.sun import Sun
+from tests.backends import needs_osmesa
 from tests.mesh_probe import behind_the_middle
 
 
@@ -266,6 +267,7 @@ def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
     np.testing.assert_array_equal(again, first)
 
 
+@needs_osmesa
 def test_backends_find_the_same(even_sky):
     container = build_container("20")
     found = []

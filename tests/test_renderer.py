@@ -15,6 +15,7 @@ from fastgen.scene import Spreader
 from fastgen.sensor.light import displayed, light_of
 from fastgen.srgb import DECODED
 from tests import oracle
+from tests.backends import needs_osmesa
 
 CAMERAS = ("A", "B", "Cl", "Cr")
 SIZE = (320, 240)
@@ -165,6 +166,7 @@ def test_what_was_drawn_before_leaves_no_trace(quality):
             np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
 
 
+@needs_osmesa
 def test_backends_agree_on_every_label():
     frames = []
     for backend in ("egl", "osmesa"):

@@ -6,6 +6,7 @@ import pytest
 
 from fastgen.gl import open_context
 from fastgen.rgb9e5 import LARGEST, packed, unpacked
+from tests.backends import BACKENDS
 
 _RGB9_E5 = 0x8C3D
 
@@ -21,7 +22,7 @@ def colours() -> np.ndarray:
     return values.astype(np.float32)
 
 
-@pytest.mark.parametrize("backend", ["egl", "osmesa"])
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_the_driver_packs_alike(backend):
     values = colours()
     with open_context(backend) as gl:
