@@ -28,7 +28,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from results import RESULTS, ROOT, machine, parse_size, save
-from throughput import generate_command, whole_run
+from throughput import fill_caches, generate_command, whole_run
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -142,6 +142,7 @@ def workers(images: int) -> Table:
     """Images a second of `fastgen generate` against worker processes, up to twice the cores."""
     cores = len(os.sched_getaffinity(0))
     counts = sorted({1, 2, cores, 2 * cores})
+    fill_caches("auto", images)
     rates = [whole_run("auto", "640x640", images, count) for count in counts]
     return {"workers": [float(c) for c in counts], "images_per_s": rates}
 
