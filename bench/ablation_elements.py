@@ -211,8 +211,8 @@ ELEMENTS = (
         "shadow of the sun",
         text=(
             (
-                "sun_seen = sun_share(from_eye, normal, depth * pixel_angle);",
-                "sun_seen = 1.0;",
+                "sun_seen[i] = sun_share(from_eye, normal, depth * pixel_angle, i);",
+                "sun_seen[i] = 1.0;",
             ),
         ),
     ),
@@ -230,7 +230,7 @@ ELEMENTS = (
     Element(
         "light",
         "the sun's light from walls in recesses",
-        text=(("sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky);", ""),),
+        text=(("sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);", ""),),
     ),
     Element(
         "light",

@@ -19,9 +19,9 @@ from fastgen import cache, prefilter, rgb9e5
 from fastgen.errors import AssetError
 from fastgen.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
-from fastgen.sun import Sun, split_sun
+from fastgen.sun import Sun, split_suns
 
-PREFILTER_VERSION = 9
+PREFILTER_VERSION = 10
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -36,7 +36,7 @@ _LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average t
 _DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
 _BRIGHTEST = 1e4  # leaves what is six times the mean within half floats
 _SKY_CELLS = 42  # along a side of `Ambient.sky`: 5 degrees
-_MAPS = ("specular", "irradiance", "background", "luminance", "sun")
+_MAPS = ("specular", "irradiance", "background", "luminance", "suns")
 _SUN_WIDTH = 2048  # a texel is a third of the real sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 
@@ -45,7 +45,7 @@ _MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
 class Ambient:
     """What of an environment's light the CPU asks for, apart from the large maps.
 
-    Maps are finite, float32 and within [0, HALF_MAX]. `irradiance` lacks what `sun` has.
+    Maps are finite, float32 and within [0, HALF_MAX]. `irradiance` lacks what `suns` have.
     """
 
     name: str
@@ -55,10 +55,10 @@ class Ambient:
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
     """Mean of the luminance over the whole sphere."""
-    sun: Sun | None
-    """The one strong compact light, None where there is none."""
+    suns: tuple[Sun, ...]
+    """Strong compact lights, brightest first; none under an even sky."""
     sky: NDArray[np.float32]
-    """[42, 42, 3] octahedral without a border, mean radiance of each cell, without the sun."""
+    """[42, 42, 3] octahedral without a border, mean radiance of each cell, without suns."""
 
     @staticmethod
     def of(light: "Ambient") -> "Ambient":
@@ -76,7 +76,7 @@ class EnvironmentLight(Ambient):
 
     specular: NDArray[np.float32]
     """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS;
-    without the sun, as `irradiance`."""
+    without the suns, as `irradiance`."""
     background: NDArray[np.uint32]
     """[B, B] radiance as it is, as rgb9e5.py packs it; B is a power of two from 512 to 2048 near
     twice the width, for as much as that is needed to look as sharp as the HDRI itself, and 4096
@@ -102,7 +102,7 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
 
     # about a texel and a half of the layers; wider lobes do with half of it
     narrow = prefilter.shrink(source, _SUN_WIDTH)
-    sun, sunless = split_sun(narrow)
+    suns, sunless = split_suns(narrow)
     fine = prefilter.shrink(sunless, 4 * SPECULAR_SIZE)
     coarse = prefilter.shrink(fine, 2 * SPECULAR_SIZE)
     layers = []
@@ -118,7 +118,7 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
 
     cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
     packed = rgb9e5.packed(background)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, sun)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, suns)
 
 
 def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -131,7 +131,7 @@ def _light(
     irradiance: NDArray[np.float16],
     background: NDArray[np.uint32],
     luminance: NDArray[np.float32],
-    sun: Sun | None,
+    suns: tuple[Sun, ...],
 ) -> EnvironmentLight:
     weight = prefilter.row_solid_angle(luminance.shape[0]) / (4 * np.pi)
     return EnvironmentLight(
@@ -141,7 +141,7 @@ def _light(
         background=background,
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
-        sun=sun,
+        suns=suns,
         sky=_sky_cells(specular[0].astype(np.float32)),
     )
 
@@ -193,7 +193,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
 def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
     stored = cache.read(entry)
     try:
-        specular, irradiance, background, luminance, sun = (stored[field] for field in _MAPS)
+        specular, irradiance, background, luminance, suns = (stored[field] for field in _MAPS)
     except KeyError:
         return None
     if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
@@ -204,21 +204,19 @@ def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
         irradiance.astype(np.float16),
         background.astype(np.uint32),
         luminance.astype(np.float32),
-        _unpacked_sun(sun.astype(np.float64)),
+        _unpacked_suns(suns.astype(np.float64)),
     )
 
 
-def _unpacked_sun(stored: NDArray[np.float64]) -> Sun | None:
-    if not len(stored):
-        return None
-    x, y, z, red, green, blue, radius = (float(v) for v in stored)
-    return Sun((x, y, z), (red, green, blue), radius)
+def _unpacked_suns(stored: NDArray[np.float64]) -> tuple[Sun, ...]:
+    rows = stored.reshape(-1, 7).tolist()
+    return tuple(Sun((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows)
 
 
 def _write_cache(light: EnvironmentLight, entry: Path) -> None:
     specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
-    sun = np.array([*light.sun.direction, *light.sun.light, light.sun.radius] if light.sun else [])
-    maps = (specular, irradiance, light.background, light.luminance, sun)
+    suns = np.array([[*sun.direction, *sun.light, sun.radius] for sun in light.suns])
+    maps = (specular, irradiance, light.background, light.luminance, suns)
     cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
 
 
@@ -240,12 +238,12 @@ def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
 
 
 def irradiance_at(env: Ambient, normals: ArrayLike, yaw_deg: float = 0.0) -> NDArray[np.float32]:
-    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], sun included."""
+    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], suns included."""
     normals = to_map_frame(normals, yaw_deg)
     found = prefilter.sample_octahedral(env.irradiance, normals)
-    if env.sun is not None:
-        cosine = np.maximum(normals @ np.array(env.sun.direction), 0.0)
-        found += (cosine[:, None] * env.sun.light).astype(np.float32)
+    for sun in env.suns:
+        cosine = np.maximum(normals @ np.array(sun.direction), 0.0)
+        found += (cosine[:, None] * sun.light).astype(np.float32)
     return found
 
 

@@ -38,6 +38,7 @@ from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
 from fastgen.shapes import shadow_casters, spreader_outline
+from fastgen.sun_shadow import shader_suns
 from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
@@ -290,9 +291,9 @@ class Generator:
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             renderer.preload(chain(lit, shaped), lens)
-            sunny = {renderer.ambient(name).sun is not None: name for name in names}
+            lights = {shader_suns(renderer.ambient(name).suns): name for name in names}
         # programs and targets: every way to draw, every container
-        ways = list(product(one_damage_each(self.config), sunny.values()))
+        ways = list(product(one_damage_each(self.config), lights.values()))
         boxes = list(one_container_each(self.config.container))
         for i in range(max(len(ways), len(boxes))):
             (config, name), box = ways[i % len(ways)], boxes[i % len(boxes)]

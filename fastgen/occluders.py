@@ -102,14 +102,18 @@ class DepthMap:
         self.depth = ctx.depth_texture(size)
         self._target = ctx.framebuffer([], self.depth)
 
-    def draw(self, bodies: Iterable[DrawnBody], to_map: Array) -> None:
-        """Show what a map_matrix sees of bodies."""
+    def draw(
+        self, bodies: Iterable[DrawnBody], to_map: Array, tile: tuple[int, int, int, int]
+    ) -> None:
+        """Show what a map_matrix sees of bodies in a part of the map: its first texels along and
+        across, and how many they are."""
         ctx = self._ctx
         self._target.use()
+        self._target.viewport = tile
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face, ctx.cull_face = "ccw", "front"
-        self._target.clear(depth=1.0)
+        self._target.clear(depth=1.0, viewport=tile)
         self._program["to_map"] = tuple(to_map.T.ravel())
         for body in bodies:
             body.array.render(moderngl.TRIANGLES)

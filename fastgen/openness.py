@@ -164,15 +164,15 @@ class Openness:
 
     def sunlight(self, sky: Sky) -> NDArray[np.float32]:
         """As `irradiance`, from the sun alone, which is as open as the directions about it."""
-        sun = sky.light.sun
-        if sun is None:
-            return np.zeros((len(self._number), 3), np.float32)
-        toward = to_map_frame(sun.direction, -sky.yaw_deg)
-        nearest = np.argsort(-sky_directions() @ toward)[:_LOBE]
-        bits = [self._open_to[k >> 3] >> (7 - (k & 7)) & 1 for k in nearest.tolist()]
-        cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
-        share = cosine[self._number] * np.sum(bits, axis=0, dtype=np.float32) / _LOBE
-        return share[:, None] * np.array(sun.light, np.float32)
+        found = np.zeros((len(self._number), 3), np.float32)
+        for sun in sky.light.suns:
+            toward = to_map_frame(sun.direction, -sky.yaw_deg)
+            nearest = np.argsort(-sky_directions() @ toward)[:_LOBE]
+            bits = [self._open_to[k >> 3] >> (7 - (k & 7)) & 1 for k in nearest.tolist()]
+            cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
+            share = cosine[self._number] * np.sum(bits, axis=0, dtype=np.float32) / _LOBE
+            found += share[:, None] * np.array(sun.light, np.float32)
+        return found
 
     def under(self, sky: Sky, light: NDArray[np.floating] | None = None) -> NDArray[np.uint8]:
         """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that

@@ -22,6 +22,7 @@ from fastgen.resources import shader_path
 from fastgen.rust import DEFINES as RUST_DEFINES
 from fastgen.sample_lattice import SampleLattice
 from fastgen.spreader_parts import CABLE_SIDE_MM, CABLES
+from fastgen.sun import MOST_SUNS
 from fastgen.uniforms import Block
 
 LAYERS = (
@@ -160,10 +161,10 @@ VIEW_BLOCK = Block(
         ("vec2", "lens_end"),  # where its formula ends, and the slope there
         ("float", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
-        ("mat4", "ray_to_shadow"),  # from the eye to a point in m, to a place in the sun's map
-        ("vec3", "sun_direction"),
-        ("float", "sun_radius"),
-        ("vec3", "sun_light"),  # irradiance / pi on what faces it
+        ("mat4", "ray_to_shadow", MOST_SUNS),  # from the eye to a point in m, to a place in its map
+        ("vec4", "sun_toward", MOST_SUNS),  # unit vector to it, angular radius
+        ("vec4", "sun_light", MOST_SUNS),  # irradiance / pi on what faces it
+        ("int", "sun_count"),
         ("float", "cable_zone"),
         ("vec4", "cable_rusted"),  # mean albedo under rust, and its share
         ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m, and length, 0 for none
@@ -211,7 +212,7 @@ def noise_deviation() -> NDArray[np.float32]:
     return noise_tiles().lost_deviation.reshape(-1, 4)
 
 
-def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, sun: bool) -> str:
+def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, suns: int) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
@@ -276,7 +277,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ZONE_LEVEL": ZONE_LEVEL,
         **RUST_DEFINES,
         **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
-        "SUN": int(sun),
+        "SUNS": suns,
         "SHADOW_TEXELS": SHADOW_TEXELS,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
@@ -309,13 +310,13 @@ def expand(
     layer: str = "all",
     pixel_class: str = "sky",
     damage: str = "sound",
-    sun: bool = False,
+    suns: int = 0,
 ) -> str:
     """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
-            constants = _constants(samples_per_axis, layer, pixel_class, damage, sun)
+            constants = _constants(samples_per_axis, layer, pixel_class, damage, suns)
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)
         return included(shader_path(match[1]).read_text(encoding="utf-8"))

@@ -43,7 +43,7 @@ from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.shapes import Shapes, shadow_casters
 from fastgen.spreader import tier_bounds_mm
-from fastgen.sun_shadow import ShadowMap, sun_values
+from fastgen.sun_shadow import ShadowMap, shader_suns, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
 from fastgen.targets import Region, Targets, bands
 from fastgen.textures import art_texture, data_texture, mipmapped_array, noise_texture
@@ -140,7 +140,7 @@ class Renderer:
         )
         shadow = self._shadow(scene)
         seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
-        sunny = sun_values(light.ambient.sun, shadow, view.position_m)
+        sunny = sun_values(light.ambient.suns, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
         hung = cable_values(scene, spreader.mesh if spreader else None, view.position_m)
         self._set(VIEW_BLOCK, {**seen, **sunny, **hung})
@@ -168,7 +168,7 @@ class Renderer:
             damage,
             near,
             cables,
-            sun=shadow is not None,
+            suns=shader_suns(light.ambient.suns),
             bent=camera.lens is not None,
         )
         return targets
@@ -221,11 +221,11 @@ class Renderer:
             texture.use(UNITS[name])
 
     def _shadow(self, scene: Scene) -> ShadowMap | None:
-        """What the sun of a scene leaves in the shade, None without a sun."""
-        sun = self.ambient(scene.environment.name).sun
-        if sun is None:
+        """What the suns of a scene leave in the shade, None without any."""
+        suns = self.ambient(scene.environment.name).suns
+        if not suns:
             return None
-        toward = to_map_frame(sun.direction, -scene.environment.yaw_deg)
+        toward = to_map_frame([sun.direction for sun in suns], -scene.environment.yaw_deg)
         self._sun_shadow.cast(*shadow_casters(scene), toward, scene.damages)
         return self._sun_shadow
 

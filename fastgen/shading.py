@@ -52,8 +52,8 @@ class Shading:
         self._samples_per_axis = samples_per_axis
         self._layer = layer
         self._programs: list[moderngl.Program] = []
-        self._arrays: dict[tuple[str, str, str, bool], moderngl.VertexArray] = {}
-        self._listed: dict[tuple[str, bool], moderngl.ComputeShader] = {}
+        self._arrays: dict[tuple[str, str, str, int], moderngl.VertexArray] = {}
+        self._listed: dict[tuple[str, int], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -62,15 +62,15 @@ class Shading:
         damage: str,
         near_damage: Sequence[Region | None],
         cables: Sequence[Region | None] = (),
-        sun: bool = False,
+        suns: int = 0,
         bent: bool = False,
     ) -> None:
         """Shade into `targets.image`; all samplers and uniform blocks are bound already.
 
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that each damage may touch,
-        None where that is not known. cables: likewise, of each bundle of them. sun: whether there
-        is one, with its shadow map bound. bent: whether a lens bends the view.
+        None where that is not known. cables: likewise, of each bundle of them. suns: as many as
+        sun_shadow.shader_suns tells, their shadow map bound. bent: whether a lens bends the view.
         """
         image = targets.image
         image.use()
@@ -92,15 +92,15 @@ class Shading:
             targets.lists.begin(name)
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
-        self._run("shade", "plain", "sound", regions, sun)
+        self._run("shade", "plain", "sound", regions, suns)
         if self._samples_per_axis > 1:
-            self._run("shade", "cable", "sound", cables, sun)
+            self._run("shade", "cable", "sound", cables, suns)
         self._draw_sky(bent)
         self._ctx.scissor = None
         self._ctx.memory_barrier()
         targets.bind_images()
         for name in listed:
-            self._dispatch(name, targets.lists, sun)
+            self._dispatch(name, targets.lists, suns)
         self._ctx.memory_barrier()
         image.depth_mask = True
         self._ctx.depth_func = "<"
@@ -111,11 +111,11 @@ class Shading:
         pixel_class: str,
         damage: str,
         regions: Sequence[Region | None],
-        sun: bool = False,
+        suns: int = 0,
     ) -> None:
         """Draw `stage`.frag over the pixels of a class in `regions`; the classifier gives all of
         them theirs."""
-        key = (stage, pixel_class, damage, sun)
+        key = (stage, pixel_class, damage, suns)
         if key not in self._arrays:
             depth = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
             self._link(key, "fullscreen.vert", f"{stage}.frag", depth)
@@ -128,7 +128,7 @@ class Shading:
         if bent or self._layer != "all":
             self._run("shade", "sky", "sound", [None])
             return
-        key = ("sky", "sky", "sound", False)
+        key = ("sky", "sky", "sound", 0)
         if key not in self._arrays:
             # clipping may round depths: they lie between the first two classes
             self._link(key, "sky.vert", "sky.frag", CLASS_DEPTH_STEP / 2)
@@ -137,30 +137,30 @@ class Shading:
         self._arrays[key].render(moderngl.TRIANGLES, vertices=_OCTAHEDRON)
 
     def _link(
-        self, key: tuple[str, str, str, bool], vertex: str, fragment: str, class_depth: float
+        self, key: tuple[str, str, str, int], vertex: str, fragment: str, class_depth: float
     ) -> None:
         program = link(self._ctx, vertex, fragment, UNITS, **self._variant(*key[1:]))
         program["class_depth"] = class_depth
         self._programs.append(program)
         self._arrays[key] = self._ctx.vertex_array(program, [])
 
-    def _dispatch(self, pixel_class: str, lists: PixelLists, sun: bool) -> None:
+    def _dispatch(self, pixel_class: str, lists: PixelLists, suns: int) -> None:
         """Shade the listed pixels of a class."""
-        key = (pixel_class, sun)
+        key = (pixel_class, suns)
         if key not in self._listed:
             damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
             self._listed[key] = link_compute(
-                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage, sun)
+                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage, suns)
             )
         lists.dispatch(pixel_class, self._listed[key])
 
-    def _variant(self, pixel_class: str, damage: str, sun: bool) -> dict[str, Any]:
+    def _variant(self, pixel_class: str, damage: str, suns: int) -> dict[str, Any]:
         return {
             "samples_per_axis": self._samples_per_axis,
             "layer": self._layer,
             "pixel_class": pixel_class,
             "damage": damage,
-            "sun": sun,
+            "suns": suns,
         }
 
     def release(self) -> None:

@@ -1,8 +1,10 @@
-"""The shadow of a container and its spreader under a sun: one depth map from where it stands.
+"""The shadows of a container and its spreader: a depth map from where each sun stands.
 
 Dents are bent in, holes are not cut out. Williams 1978, Casting Curved Shadows on
 Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 """
+
+from collections.abc import Sequence
 
 import moderngl
 import numpy as np
@@ -12,10 +14,17 @@ from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
 from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, core_of, map_matrix
 from fastgen.scene import Damage
-from fastgen.sun import Sun
+from fastgen.sun import MOST_SUNS, Sun
 
 MAP_SIZE = (4096, 1024)
-"""Texels along and across: 3.5 mm for the longest container. A locking bar is 34 mm wide."""
+"""Texels along and across: 3.5 mm for the longest container. A locking bar is 34 mm wide. Several
+suns share them, each in a tile of its own: what one of them throws is fainter."""
+
+_TILES = {1: (1, 1), 2: (1, 2), 3: (2, 2), 4: (2, 2)}
+"""How many tiles stand side by side along and across, by the number of suns."""
+
+_MARGIN_TEXELS = 8
+"""Between two tiles, empty: lookups reach over the edges of what is drawn, by 30 mm at most."""
 
 _BIAS_MM = 2.0
 
@@ -23,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 class ShadowMap:
-    """What a sun meets first of a container and the spreader that holds it, less its cables.
+    """What each sun meets first of a container and the spreader that holds it, less its cables.
 
     Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
     made anew for each, freed ones would stay with the process in pieces.
@@ -33,8 +42,8 @@ class ShadowMap:
         self._ctx = ctx
         self._program = program
         self._shown: tuple[object, ...] = ()
-        self.toward = np.zeros(3)
-        self._to_map = np.eye(4)
+        self.toward = np.zeros((0, 3))
+        self._to_map = np.zeros((0, 4, 4))
         self._map = DepthMap(ctx, program, MAP_SIZE)
         self.depth = self._map.depth
         self.depth.compare_func = "<="
@@ -49,8 +58,8 @@ class ShadowMap:
         damages: tuple[Damage, ...] = (),
     ) -> None:
         """Draw the map if it does not show this. container: at rest; damages: done to it. toward:
-        unit vector [3] to the sun in the container's frame."""
-        shown = (container, spreader, *toward, damages)
+        unit vectors [S, 3] to the suns in the container's frame, 1 to MOST_SUNS."""
+        shown = (container, spreader, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
             return
         self._shown = shown
@@ -58,21 +67,31 @@ class ShadowMap:
         bodies = [_bent(container, damages), core_of(container, deepest)]
         if spreader is not None:
             bodies.append(spreader)
-        low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
-        high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
-        self.toward = toward
-        self._to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
+        low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
+        high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
         drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
-        self._map.draw(drawn, self._to_map)
+        tiles = np.array(_TILES[len(toward)])
+        size = np.array(MAP_SIZE) // tiles
+        self.toward = toward
+        self._to_map = np.stack([map_matrix(way, low, high) for way in toward])
+        margin = _MARGIN_TEXELS if len(toward) > 1 else 0
+        self._to_map[:, :2] *= (1 - 2 * margin / size)[:, None]
+        for number, to_tile in enumerate(self._to_map):
+            place = np.array([number % tiles[0], number // tiles[0]])
+            (left, bottom), (width, height) = (place * size).tolist(), size.tolist()
+            self._map.draw(drawn, to_tile, (left, bottom, width, height))
+            to_tile[:2] /= tiles[:, None]
+            to_tile[:2, 3] += (2 * place + 1) / tiles - 1
         for body in drawn:
             body.release()
 
     def from_ray(self, eye_m: Array) -> Array:
-        """From a vector in metres, from the eye to a point, to (u, v, depth) in the map: [4, 4]."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = 0.5 * self._to_map[:3, :3] * 1000
-        matrix[:3, 3] = matrix[:3, :3] @ eye_m + 0.5 * self._to_map[:3, 3] + 0.5
-        matrix[2, 3] -= 0.5 * _BIAS_MM * np.linalg.norm(self._to_map[2, :3])
+        """From a vector in metres, from the eye to a point, to (u, v, depth) in the map of each
+        sun: [S, 4, 4]."""
+        matrix = np.tile(np.eye(4), (len(self._to_map), 1, 1))
+        matrix[:, :3, :3] = 500 * self._to_map[:, :3, :3]
+        matrix[:, :3, 3] = matrix[:, :3, :3] @ eye_m + 0.5 * self._to_map[:, :3, 3] + 0.5
+        matrix[:, 2, 3] -= 0.5 * _BIAS_MM * np.linalg.norm(self._to_map[:, 2, :3], axis=-1)
         return matrix
 
     def release(self) -> None:
@@ -94,15 +113,17 @@ def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Solid:
     return Body(moved, container.triangles)
 
 
-def sun_values(sun: Sun | None, shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
-    """Members of VIEW_BLOCK about the sun for a camera at eye_m [3], zeros without one."""
-    if sun is None or shadow is None:
-        zero = np.zeros(3)
-        none: dict[str, ArrayLike] = {"ray_to_shadow": np.zeros((4, 4)), "sun_radius": 0.0}
-        return {**none, "sun_direction": zero, "sun_light": zero}
+def shader_suns(suns: Sequence[Sun]) -> int:
+    """How many suns the shaders are linked for that shade their light: none, one, or MOST_SUNS."""
+    return len(suns) if len(suns) < 2 else MOST_SUNS
+
+
+def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
+    """Members of VIEW_BLOCK about the suns for a camera at eye_m [3]; shadow: None without any."""
+    lit = [] if shadow is None else [*zip(shadow.toward, suns, strict=True)]
     return {
-        "ray_to_shadow": shadow.from_ray(eye_m),
-        "sun_direction": shadow.toward,
-        "sun_radius": sun.radius,
-        "sun_light": sun.light,
+        "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
+        "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
+        "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
+        "sun_count": len(lit),
     }

@@ -8,7 +8,7 @@
 #include "tone.glsl"
 #include "reflector.glsl"
 #include "ibl.glsl"
-#if SUN
+#if SUNS
 #include "sun.glsl"
 #endif
 #include "layers.glsl"
@@ -63,13 +63,14 @@ vec3 developed(vec3 color) {
     return srgb_encode(color);
 }
 
-// sun_seen: share of the sun that gets there
-vec3 layer_color(Material m, vec3 normal, vec3 view, Openness sky, float sun_seen) {
+// sun_seen: share of each sun that gets there
+vec3 layer_color(Material m, vec3 normal, vec3 view, Openness sky, vec4 sun_seen) {
 #if LAYER == LAYER_ALL
     Reflector r = reflector(m, normal, view);
     vec3 radiance = lit(r, sky);
-#if SUN
-    radiance += sun_seen * sunlit(r);
+#if SUNS
+    for (int i = 0; i < SUNS; ++i)
+        if (sun_seen[i] > 0.0) radiance += sun_seen[i] * sunlit(r, i);
 #endif
     return exposure * radiance;
 #elif LAYER == LAYER_NORMALS
@@ -150,15 +151,17 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    float sun_seen = 0.0;
-#if SUN && LAYER == LAYER_ALL
+    vec4 sun_seen = vec4(0.0);
+#if SUNS && LAYER == LAYER_ALL
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
     vec2 place = place_of(sample_at);
-    // before a sun behind the wall stands the whole container, too close to a groove for the map
-    if (dot(p.surface.outward, sun_direction) >= 0.0) {
-        vec3 from_eye = depth * view_ray(place);
-        sun_seen = sun_share(from_eye, normal, depth * pixel_angle);
-        sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky);
+    vec3 from_eye = depth * view_ray(place);
+    for (int i = 0; i < SUNS; ++i) {
+        // before a sun behind the wall stands the whole container, too close to a groove for the map
+        if (i < sun_count && dot(p.surface.outward, sun_toward[i].xyz) >= 0.0) {
+            sun_seen[i] = sun_share(from_eye, normal, depth * pixel_angle, i);
+            sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);
+        }
     }
 #endif
     return layer_color(p.surface.material, normal, view, sky, sun_seen);

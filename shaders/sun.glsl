@@ -1,17 +1,19 @@
-// vec3 sunlit(Reflector r): radiance of the sun reflected toward the eye, unshadowed;
-// float sun_share(vec3 from_eye, vec3 normal, float footprint_m): how much of it gets there, 0..1;
-// vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky): what it throws on what hides the sky.
+// Of sun i, the sun itself or a lamp:
+// vec3 sunlit(Reflector r, int i): its radiance reflected toward the eye, unshadowed;
+// float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i): how much of it gets there, 0..1;
+// vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i): what it throws on what hides the sky.
 
-uniform sampler2DShadow sun_shadow;
+uniform sampler2DShadow sun_shadow;   // a tile for each
 
-vec3 sunlit(Reflector r) {
+vec3 sunlit(Reflector r, int i) {
     Material m = r.material;
+    vec3 toward = sun_toward[i].xyz;
     float n_dot_v = max(r.n_dot_v, 1e-3);
-    float n_dot_l = max(dot(r.normal, sun_direction), 0.0);
-    vec3 half_way = normalize(r.view + sun_direction);
+    float n_dot_l = max(dot(r.normal, toward), 0.0);
+    vec3 half_way = normalize(r.view + toward);
     float n_dot_h = max(dot(r.normal, half_way), 0.0);
     // the sun's disc spreads half vectors by half its radius (after Karis 2013, area lights)
-    float alpha = m.roughness * m.roughness + 0.5 * sun_radius;
+    float alpha = m.roughness * m.roughness + 0.5 * sun_toward[i].w;
     float a2 = alpha * alpha;
     // Walter et al. 2007, eq. 33; Heitz 2014, eq. 99
     float d = fma(n_dot_h * n_dot_h, a2 - 1.0, 1.0);
@@ -22,14 +24,17 @@ vec3 sunlit(Reflector r) {
     vec3 metal = mix(m.albedo, vec3(1.0), grazing) * (1.0 + m.albedo * r.gain);
     float dielectric = mix(DIELECTRIC_F0, 1.0, grazing) * (1.0 + DIELECTRIC_F0 * r.gain);
     vec3 specular = mix(vec3(dielectric), metal, m.metallic) * (distribution * masking);
-    return (r.diffuse + specular) * sun_light * n_dot_l;
+    return (r.diffuse + specular) * sun_light[i].rgb * n_dot_l;
 }
 
 // Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint, and no less than hides
-// the map's texels. from_eye: to the point, in m.
-float sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
-    vec3 at = (ray_to_shadow * vec4(from_eye, 1.0)).xyz;
-    mat3 axes = transpose(mat3(ray_to_shadow));   // the map's, in its units a metre
+// the map's texels; one lookup where there are several suns. from_eye: to the point, in m.
+float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i) {
+    vec3 at = (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
+#if SUNS > 1
+    return textureLod(sun_shadow, at, 0.0);
+#else
+    mat3 axes = transpose(mat3(ray_to_shadow[i]));   // the map's, in its units a metre
     vec3 squared = vec3(dot(axes[0], axes[0]), dot(axes[1], axes[1]), dot(axes[2], axes[2]));
     vec2 texels = SHADOW_TEXELS / vec2(textureSize(sun_shadow, 0));
     vec2 reach = max(texels, min(0.22 * footprint_m, 0.03) * sqrt(squared.xy));
@@ -42,17 +47,19 @@ float sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
     v.z = -dot(slope, v.xy);
     return 0.25 * (textureLod(sun_shadow, at + u, 0.0) + textureLod(sun_shadow, at - u, 0.0) +
                    textureLod(sun_shadow, at + v, 0.0) + textureLod(sun_shadow, at - v, 0.0));
+#endif
 }
 
 // Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a
 // wall at right angles to the surface, facing where the open sky leans to, or walls all round where it
 // leans nowhere; it is lit if the sun gets close to the point.
-vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky) {
+vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i) {
+    vec3 toward = sun_toward[i].xyz;
     vec3 aside = leaning(sky, normal);
     float most = length(aside);
-    float walled = length(sun_direction - normal * dot(normal, sun_direction)) / PI;
-    float facing = mix(walled, max(dot(aside, sun_direction), 0.0) / max(most, 1e-3),
+    float walled = length(toward - normal * dot(normal, toward)) / PI;
+    float facing = mix(walled, max(dot(aside, toward), 0.0) / max(most, 1e-3),
                        smoothstep(0.0, 0.1, most));
-    vec3 at = (ray_to_shadow * vec4(from_eye + 0.02 * sky.direction, 1.0)).xyz;
-    return sky.rim * sky.rim * facing * textureLod(sun_shadow, at, 0.0) * sun_light;
+    vec3 at = (ray_to_shadow[i] * vec4(from_eye + 0.02 * sky.direction, 1.0)).xyz;
+    return sky.rim * sky.rim * facing * textureLod(sun_shadow, at, 0.0) * sun_light[i].rgb;
 }

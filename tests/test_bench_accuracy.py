@@ -128,7 +128,7 @@ def test_every_text_that_an_ablation_changes_stands_in_a_shader():
     shaders = ("shade.frag", "shade_listed.comp")
     text = "".join(
         programs.expand(
-            shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class, sun=True
+            shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class, suns=1
         )
         for name in shaders
         for pixel_class in ("plain", "mixed_decal")

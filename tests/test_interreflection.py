@@ -196,7 +196,7 @@ def lit(world, tmp_path_factory):
         probe = SkyProbe(gl.ctx)
 
         def found(sun, roof, beam, below=None):
-            sky = Sky(replace(ambient, sun=Sun(tuple(TO_SUN), tuple(sun), 0.005)), 0.0)
+            sky = Sky(replace(ambient, suns=(Sun(tuple(TO_SUN), tuple(sun), 0.005),)), 0.0)
             used = {"paint_sheet": roof, **{chart.material: beam for chart in spreader.charts}}
             paints = tuple(tuple(used.get(material, 50 * ROOF)) for material in MATERIALS)
             below = below or probe.openness(container, spreader, sky)

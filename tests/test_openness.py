@@ -175,7 +175,7 @@ def test_under_an_even_sky_light_is_the_share_of_it_that_is_open(even_sky):
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
 def test_sunlight_falls_where_the_sun_stands_in_the_open_half(yaw_deg):
-    ambient = replace(light_of(even), sun=Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005))
+    ambient = replace(light_of(even), suns=(Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),))
     yaw = np.deg2rad(yaw_deg)
     sun = np.array([0.6 * np.cos(yaw), 0.6 * np.sin(yaw), 0.8])
     normals = facing(50)

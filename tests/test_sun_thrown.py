@@ -33,7 +33,7 @@ def recess(request, tmp_path_factory):
             spreader=Spreader(False, (0.5, 0.5, 0.5), (False, False), 15.0),
         )  # fmt: skip
         renderer = generator._gpu.renderer()
-        sun = renderer.ambient("sun").sun
+        (sun,) = renderer.ambient("sun").suns
         mesh = renderer.mesh(scene.container)
         sample = generator.render(scene=scene, camera="Cr")
         exposure = generator.exposure(scene, scene.camera("Cr"))
