@@ -27,7 +27,14 @@ _RECESS_MM = 150.0
 """And how far within it they may lie, as corrugated walls do."""
 
 _TURNED_MM = 1000.0
-"""So far apart, for finding the nearest vertex, are two surfaces at right angles."""
+"""So far apart, for finding the vertex nearest to a place, are two surfaces at right angles."""
+
+_OFF_PLANE = 20.0
+"""And by so much counts what a vertex lies before or behind a place's plane more than what it lies
+beside it: a plate's two sides, or two plates, may be as near as a face's own vertices."""
+
+_NEAREST = 24
+"""Vertices that this chooses from."""
 
 _LEAST_KNOWN = 0.25
 """Of a hemisphere that is taken for what the rest of it looks like."""
@@ -141,7 +148,7 @@ def _found(
     """Receivers, rays' directions and emitters, int32 [3, K], by what the emitters are of."""
     from scipy.spatial import cKDTree  # takes 0.3 s
 
-    near = cKDTree(_with_normals(spreader.positions_mm, spreader.normals))
+    tree = cKDTree(_with_normals(spreader.positions_mm, spreader.normals))
     corners = body.positions_mm[body.triangles].astype(np.float64)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -157,11 +164,24 @@ def _found(
         on_box = box_mm < own_mm
         on_own = ~on_box & np.isfinite(own_mm)
         met = start[on_own] + own_mm[on_own, None] * ray
-        _, emitter = near.query(_with_normals(met, normals[before][hit[on_own]]))
+        normal = normals[before][hit[on_own]]
+        _, near = tree.query(_with_normals(met, normal), k=_NEAREST)
+        emitter = _standing_for(met, normal, near, spreader)
         rows["own"].append(_rows(receiver[on_own], number, emitter))
         met = start[on_box] + box_mm[on_box, None] * ray
         rows["below"].append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
     return {name: np.concatenate(found, axis=1) for name, found in rows.items()}
+
+
+def _standing_for(met: Array, normal: Array, near: Numbers, spreader: Mesh) -> Numbers:
+    """Which of the vertices `near` [K, N] to places [K, 3] of surfaces with normals [K, 3] stands
+    for each, [K]."""
+    apart = _with_normals(met, normal)[:, None] - _with_normals(
+        spreader.positions_mm[near], spreader.normals[near]
+    )
+    off = _OFF_PLANE * (apart[..., :3] * normal[:, None]).sum(axis=-1)
+    best = ((apart**2).sum(axis=-1) + off**2).argmin(axis=1)
+    return near[np.arange(len(near)), best]
 
 
 def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
@@ -169,7 +189,7 @@ def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
 
 
 def _with_normals(positions_mm: Array, normals: Array) -> Array:
-    return np.concatenate([positions_mm, _TURNED_MM / 2**0.5 * normals], axis=1)
+    return np.concatenate([positions_mm, _TURNED_MM / 2**0.5 * normals], axis=-1)
 
 
 def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.intp], Array]:

@@ -151,6 +151,24 @@ def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outsid
     assert np.abs((found - expected).mean(axis=0)).max() < 0.006
 
 
+def test_light_comes_off_the_face_that_a_ray_meets(world, factors, outside):
+    """Each plane has its own brightness, so that those of a parallel face near by are wrong."""
+    _, spreader, _, _ = world
+
+    def glow(places, normals):
+        plane_mm = (places * normals).sum(axis=1, keepdims=True)
+        return np.tile(1 + np.sin(plane_mm * (2 * np.pi / 70)), 3)
+
+    glowing = glow(spreader.positions_mm, spreader.normals)
+    dim = 1e-4
+    found = factors.light(0 * glowing, glowing, np.zeros((1000, 3)), np.full(glowing.shape, dim))
+    expected = by_rays(world, lambda body, *met: glow(*met) * (body == 1), outside)
+    off = np.abs(found[outside] / dim - expected)[:, 0]
+    assert expected.mean() > 0.03
+    assert off.mean() < 0.04
+    assert np.quantile(off, 0.99) < 0.3
+
+
 def test_two_bounces_are_a_geometric_sum(factors, world):
     """Twice the paint gives twice the first bounce and four times the second."""
     _, spreader, _, _ = world
