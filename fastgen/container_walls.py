@@ -111,6 +111,8 @@ def _panel(
     # a cell's diagonal is an edge too: columns are no wider than the wave's own facets and take at
     # most 0.8 of it, rows what is left
     widest = max(wave.outer_mm, wave.inner_mm, float(np.hypot(wave.slope_mm, wave.depth_mm)))
+    if face == "no_door":
+        widest /= 2  # light changes most across the facets of deep waves
     arc = breaks(0.0, station_arc[-1], min(widest, 0.8 * layout.max_edge_mm), station_arc)
     columns, depth = (
         np.interp(arc, station_arc, stations),
