@@ -229,7 +229,7 @@ def test_cross_members_hang_below_the_floor_about_every_300_mm():
 
 
 @pytest.mark.parametrize(
-    ("kind", "limit"), [("20", 27_000), ("40", 43_000), ("40HC", 45_000), ("45HC", 49_000)]
+    ("kind", "limit"), [("20", 27_000), ("40", 43_000), ("40HC", 45_000), ("45HC", 49_500)]
 )
 def test_triangle_count_stays_within_its_budget(kind, limit):
     assert len(build_container(kind).triangles) < limit
