@@ -21,7 +21,7 @@ from fastgen.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
 from fastgen.sun import Sun, split_suns
 
-PREFILTER_VERSION = 10
+PREFILTER_VERSION = 11
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -255,12 +255,12 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """`irradiance_at` without the sun, [K, 3]: what ibl.glsl's diffuse_radiance is."""
+    """`irradiance_at` without suns, [K, 3]: what ibl.glsl's diffuse_radiance is."""
     return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 
 
 def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """Mean radiance [K, 3], without the sun, of what lies nearest to each of world directions.
+    """Mean radiance [K, 3], without suns, of what lies nearest to each of world directions.
 
     The directions [K, 3] are spread over the whole sphere; each holds several cells of `env.sky`.
     """

@@ -135,7 +135,7 @@ class Openness:
         return np.unpackbits(self._open_to.T, axis=1).astype(bool)
 
     def irradiance(self, sky: Sky) -> NDArray[np.float32]:
-        """Irradiance / pi, [V, 3], from where `sky` is open, without its sun.
+        """Irradiance / pi, [V, 3], from where `sky` is open, without its suns.
 
         It is a part of the irradiance about the normal: that of the open ones in sums over all
         directions. Of such sums over eight directions at a time there are 256 for each normal: a
@@ -163,7 +163,7 @@ class Openness:
         return found
 
     def sunlight(self, sky: Sky) -> NDArray[np.float32]:
-        """As `irradiance`, from the sun alone, which is as open as the directions about it."""
+        """As `irradiance`, from the suns alone; each is as open as the directions about it."""
         found = np.zeros((len(self._number), 3), np.float32)
         for sun in sky.light.suns:
             toward = to_map_frame(sun.direction, -sky.yaw_deg)

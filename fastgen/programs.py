@@ -73,8 +73,8 @@ ZONE_TURN, ZONE_GEAR, ZONE_SMALL, ZONE_LEVEL = 16, 64, 128, 256
 gear, of small pieces and of what lies level."""
 
 SHADOW_TEXELS = 1.0
-"""Texels of the sun's shadow map between its lookups, at least: with fewer, slanted edges have
-teeth."""
+"""Texels of the shadow map between lookups for the first sun, at least: with fewer, slanted edges
+have teeth."""
 
 DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with a perforation among it."""
@@ -162,6 +162,7 @@ VIEW_BLOCK = Block(
         ("float", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
         ("mat4", "ray_to_shadow", MOST_SUNS),  # from the eye to a point in m, to a place in its map
+        ("vec4", "sun_tile", MOST_SUNS),  # the part of the map that is its own, centres of texels
         ("vec4", "sun_toward", MOST_SUNS),  # unit vector to it, angular radius
         ("vec4", "sun_light", MOST_SUNS),  # irradiance / pi on what faces it
         ("int", "sun_count"),

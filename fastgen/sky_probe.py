@@ -68,7 +68,7 @@ def _spreader_points(spreader: Mesh) -> Array:
 @dataclass(frozen=True, eq=False)
 class Lit:
     """A mesh in its light. values: `Openness.under` its sky, uint8 [V, VERTEX_BYTES]. irradiance:
-    [V, 3], / pi, the sun's included."""
+    [V, 3], / pi, the suns' included."""
 
     mesh: Mesh
     values: NDArray[np.uint8]

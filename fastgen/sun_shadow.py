@@ -16,15 +16,15 @@ from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, core_of, map_mat
 from fastgen.scene import Damage
 from fastgen.sun import MOST_SUNS, Sun
 
-MAP_SIZE = (4096, 1024)
-"""Texels along and across: 3.5 mm for the longest container. A locking bar is 34 mm wide. Several
-suns share them, each in a tile of its own: what one of them throws is fainter."""
+FIRST_SIZE = (4096, 1024)
+"""Texels along and across for the first sun: 3.5 mm for the longest container. A locking bar is
+34 mm wide."""
 
-_TILES = {1: (1, 1), 2: (1, 2), 3: (2, 2), 4: (2, 2)}
-"""How many tiles stand side by side along and across, by the number of suns."""
+OTHERS_SIZE = (4096, 512)
+"""For all others, side by side: what each of them throws is fainter."""
 
-_MARGIN_TEXELS = 8
-"""Between two tiles, empty: lookups reach over the edges of what is drawn, by 30 mm at most."""
+_EDGE_TEXELS = 1
+"""Nothing is drawn on a tile's edge: it stands for all that lies beyond."""
 
 _BIAS_MM = 2.0
 
@@ -35,7 +35,9 @@ class ShadowMap:
     """What each sun meets first of a container and the spreader that holds it, less its cables.
 
     Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
-    made anew for each, freed ones would stay with the process in pieces.
+    made anew for each, freed ones would stay with the process in pieces. toward: unit vectors
+    [S, 3] to the suns. tiles: [S, 4], where in the texture each has its own part, from the centre
+    (u, v) of the first texel to that of the last.
     """
 
     def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
@@ -44,7 +46,9 @@ class ShadowMap:
         self._shown: tuple[object, ...] = ()
         self.toward = np.zeros((0, 3))
         self._to_map = np.zeros((0, 4, 4))
-        self._map = DepthMap(ctx, program, MAP_SIZE)
+        self.tiles = np.zeros((0, 4))
+        size = (FIRST_SIZE[0], FIRST_SIZE[1] + OTHERS_SIZE[1])
+        self._map = DepthMap(ctx, program, size)
         self.depth = self._map.depth
         self.depth.compare_func = "<="
         self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -70,18 +74,18 @@ class ShadowMap:
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
         drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
-        tiles = np.array(_TILES[len(toward)])
-        size = np.array(MAP_SIZE) // tiles
         self.toward = toward
         self._to_map = np.stack([map_matrix(way, low, high) for way in toward])
-        margin = _MARGIN_TEXELS if len(toward) > 1 else 0
-        self._to_map[:, :2] *= (1 - 2 * margin / size)[:, None]
-        for number, to_tile in enumerate(self._to_map):
-            place = np.array([number % tiles[0], number // tiles[0]])
-            (left, bottom), (width, height) = (place * size).tolist(), size.tolist()
-            self._map.draw(drawn, to_tile, (left, bottom, width, height))
-            to_tile[:2] /= tiles[:, None]
-            to_tile[:2, 3] += (2 * place + 1) / tiles - 1
+        tiles = _tiles(len(toward))
+        whole = np.array(self.depth.size)
+        for tile, to_tile in zip(tiles, self._to_map, strict=True):
+            place, size = np.array(tile).reshape(2, 2)
+            to_tile[:2] *= (1 - 2 * _EDGE_TEXELS / size)[:, None]
+            self._map.draw(drawn, to_tile, tile)
+            to_tile[:2] *= (size / whole)[:, None]
+            to_tile[:2, 3] += (2 * place + size) / whole - 1
+        first, size = np.split(np.array(tiles), 2, axis=1)
+        self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(whole, 2)
         for body in drawn:
             body.release()
 
@@ -97,6 +101,14 @@ class ShadowMap:
     def release(self) -> None:
         """Free all GL objects."""
         self._map.release()
+
+
+def _tiles(suns: int) -> list[tuple[int, int, int, int]]:
+    """First texel and size, both along and across, of each sun's part of the map."""
+    along, across = OTHERS_SIZE
+    width = along // max(suns - 1, 1)
+    others = [(k * width, FIRST_SIZE[1], width, across) for k in range(suns - 1)]
+    return [(0, 0, *FIRST_SIZE), *others]
 
 
 def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Solid:
@@ -123,6 +135,7 @@ def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> d
     lit = [] if shadow is None else [*zip(shadow.toward, suns, strict=True)]
     return {
         "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
+        "sun_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
         "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
         "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
         "sun_count": len(lit),

@@ -37,7 +37,7 @@ vec3 background(vec3 direction) {
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
 // its irradiance from there, relative to that of a whole sky about that direction, the share that is
 // open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
-// 1 or 0, and irradiance / pi that the sun throws on what hides it and faces here, times its share
+// 1 or 0, and irradiance / pi that the suns throw on what hides it and faces here, times its share
 struct Openness {
     vec3 direction;
     float rim;

@@ -5,6 +5,11 @@
 
 uniform sampler2DShadow sun_shadow;   // a tile for each
 
+// 1 where sun i gets to, 0 in the shade; all that lies beyond its tile is lit, as the tile's edge is
+float sun_at(vec3 at, int i) {
+    return textureLod(sun_shadow, vec3(clamp(at.xy, sun_tile[i].xy, sun_tile[i].zw), at.z), 0.0);
+}
+
 vec3 sunlit(Reflector r, int i) {
     Material m = r.material;
     vec3 toward = sun_toward[i].xyz;
@@ -28,12 +33,11 @@ vec3 sunlit(Reflector r, int i) {
 }
 
 // Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint, and no less than hides
-// the map's texels; one lookup where there are several suns. from_eye: to the point, in m.
+// the map's texels; the first is the brightest sun, and the others, fainter, have one lookup each.
+// from_eye: to the point, in m.
 float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i) {
     vec3 at = (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
-#if SUNS > 1
-    return textureLod(sun_shadow, at, 0.0);
-#else
+    if (i > 0) return sun_at(at, i);
     mat3 axes = transpose(mat3(ray_to_shadow[i]));   // the map's, in its units a metre
     vec3 squared = vec3(dot(axes[0], axes[0]), dot(axes[1], axes[1]), dot(axes[2], axes[2]));
     vec2 texels = SHADOW_TEXELS / vec2(textureSize(sun_shadow, 0));
@@ -45,9 +49,7 @@ float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i) {
     vec2 slope = plane.xy / min(plane.z, -1e-3);
     u.z = -dot(slope, u.xy);
     v.z = -dot(slope, v.xy);
-    return 0.25 * (textureLod(sun_shadow, at + u, 0.0) + textureLod(sun_shadow, at - u, 0.0) +
-                   textureLod(sun_shadow, at + v, 0.0) + textureLod(sun_shadow, at - v, 0.0));
-#endif
+    return 0.25 * (sun_at(at + u, i) + sun_at(at - u, i) + sun_at(at + v, i) + sun_at(at - v, i));
 }
 
 // Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a
@@ -61,5 +63,5 @@ vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i) {
     float facing = mix(walled, max(dot(aside, toward), 0.0) / max(most, 1e-3),
                        smoothstep(0.0, 0.1, most));
     vec3 at = (ray_to_shadow[i] * vec4(from_eye + 0.02 * sky.direction, 1.0)).xyz;
-    return sky.rim * sky.rim * facing * textureLod(sun_shadow, at, 0.0) * sun_light[i].rgb;
+    return sky.rim * sky.rim * facing * sun_at(at, i) * sun_light[i].rgb;
 }

@@ -39,3 +39,16 @@ def one_light(direction: np.ndarray, radiance: float, height: int = 128) -> np.n
     image = np.zeros((height, 2 * height, 3), np.float32)
     image[np.unravel_index((grid @ direction).argmax(), grid.shape[:2])] = radiance
     return image
+
+
+def lamps_at_night(
+    toward: np.ndarray, lights: np.ndarray, height: int = 512, radius_deg: float = 0.9
+) -> np.ndarray:
+    """A dim sky of 0.02 with even discs about directions [K, 3] that give lights [K, 3], irradiance
+    / pi, float32 [H, 2H, 3]."""
+    direction, solid_angle = texel_grid(height)
+    sky = np.full((height, 2 * height, 3), 0.02)
+    for way, light in zip(toward, lights, strict=True):
+        disc = np.arccos(np.clip(direction @ way, -1, 1)) < np.deg2rad(radius_deg)
+        sky[disc] += np.pi * np.asarray(light) / solid_angle[disc].sum()
+    return sky.astype(np.float32)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fastgen.container import build_container
+from fastgen.container_layout import WallProfiles
 from fastgen.mesh import FACES, MATERIALS, Mesh
 from tests.mesh_probe import (
     ISO_668,
@@ -105,6 +106,23 @@ def test_no_edge_of_a_panel_is_too_long_to_bend(max_edge):
         p = mesh.positions_mm[mesh.triangles[triangles_of(mesh, face)]].astype(np.float64)
         longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max()
         assert 0.5 * max_edge < longest <= max_edge + 0.01
+
+
+@pytest.mark.parametrize(("face", "columns"), [("no_door", 2), ("front", 1)])
+def test_facets_of_a_wall_have_enough_columns_for_light_to_change_across(face, columns):
+    """Two on the end wall, whose waves are deep; flats are the widest facets."""
+    profiles = WallProfiles()
+    mesh = build_container("20", profiles)
+    p = mesh.positions_mm[np.unique(mesh.triangles[triangles_of(mesh, face)])].astype(np.float64)
+    axis = 1 if face == "no_door" else 0
+    along, out = p[:, axis], np.abs(p[:, 1 - axis])
+    outer = np.unique(np.round(along[out > out.max() - 0.1], 1))
+    inner = np.unique(np.round(along[out < out.min() + 0.1], 1))
+    wave = profiles.end if face == "no_door" else profiles.side
+    widest = max(wave.outer_mm, wave.inner_mm)
+    flat = outer if wave.outer_mm == widest else inner
+    steps = np.diff(flat)
+    assert np.median(steps[steps < widest + 1]) == pytest.approx(widest / columns, abs=0.5)
 
 
 def edges_of(mesh: Mesh, face: str):

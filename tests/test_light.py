@@ -10,7 +10,7 @@ from fastgen.classes import CONTAINER_ID, SPREADER_ID
 from fastgen.openness import encoded, open_sky, sky_directions
 from fastgen.sky_probe import Lit, SkyProbe
 from tests.sky_samples import texel_grid
-from tests.test_sun import write_exr
+from tests.test_environment import write_exr
 
 GREY = "#808080"
 

@@ -190,6 +190,22 @@ def test_sunlight_falls_where_the_sun_stands_in_the_open_half(yaw_deg):
     assert not half_open(normals, sun).sunlight(Sky(light_of(even), yaw_deg)).any()
 
 
+def test_sunlight_of_several_suns_adds_up():
+    lamps = (
+        Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),
+        Sun((0.0, 0.8, 0.6), (0.5, 1.0, 2.0), 0.005),
+        Sun((0.0, -0.28, 0.96), (0.1, 0.1, 0.4), 0.005),
+    )
+    openness = half_open(facing(50), np.array([0.6, 0.64, 0.48]))
+
+    def lit_by(suns):
+        return openness.sunlight(Sky(replace(light_of(even), suns=suns), 20.0))
+
+    each = [lit_by((lamp,)) for lamp in lamps]
+    assert all(found.max() > 0.05 for found in each)
+    np.testing.assert_allclose(lit_by(lamps), sum(each), atol=1e-6)
+
+
 def test_a_black_sky_leaves_no_light_undefined():
     normals = facing(50)
     black = Sky(light_of(lambda d: np.zeros(d.shape)), 0.0)

@@ -16,7 +16,7 @@ from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
 from fastgen.sensor.light import displayed, light_of
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from fastgen.sensor.weather import _streaks, foggy, rained
-from tests.test_sun import write_exr
+from tests.test_environment import write_exr
 
 SIZE = (160, 120)
 
