@@ -4,7 +4,7 @@ Maps keep back faces (those turned away from the light) rather than front ones: 
 then no occluder of itself.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -34,6 +34,9 @@ class Body:
         """Lowest and highest coordinates [3] of all vertices."""
         return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
 
+
+Tile = tuple[int, int, int, int]
+"""A part of a map: its first texels along and across, and how many they are."""
 
 Solid = Body | Mesh
 """A mesh stands in the way as it is."""
@@ -102,21 +105,19 @@ class DepthMap:
         self.depth = ctx.depth_texture(size)
         self._target = ctx.framebuffer([], self.depth)
 
-    def draw(
-        self, bodies: Iterable[DrawnBody], to_map: Array, tile: tuple[int, int, int, int]
-    ) -> None:
-        """Show what a map_matrix sees of bodies in a part of the map: its first texels along and
-        across, and how many they are."""
+    def draw(self, bodies: Sequence[DrawnBody], views: Iterable[tuple[Array, Tile]]) -> None:
+        """Show what map_matrices see of bodies, each in a tile of its own, and nothing beside."""
         ctx = self._ctx
         self._target.use()
-        self._target.viewport = tile
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face, ctx.cull_face = "ccw", "front"
-        self._target.clear(depth=1.0, viewport=tile)
-        self._program["to_map"] = tuple(to_map.T.ravel())
-        for body in bodies:
-            body.array.render(moderngl.TRIANGLES)
+        self._target.clear(depth=1.0)
+        for to_map, tile in views:
+            self._target.viewport = tile
+            self._program["to_map"] = tuple(to_map.T.ravel())
+            for body in bodies:
+                body.array.render(moderngl.TRIANGLES)
         ctx.cull_face = "back"
 
     def release(self) -> None:

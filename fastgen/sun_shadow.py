@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import Mesh
-from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, core_of, map_matrix
+from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, Tile, core_of, map_matrix
 from fastgen.scene import Damage
 from fastgen.sun import MOST_SUNS, Sun
 
@@ -77,14 +77,12 @@ class ShadowMap:
         self.toward = toward
         self._to_map = np.stack([map_matrix(way, low, high) for way in toward])
         tiles = _tiles(len(toward))
-        whole = np.array(self.depth.size)
-        for tile, to_tile in zip(tiles, self._to_map, strict=True):
-            place, size = np.array(tile).reshape(2, 2)
-            to_tile[:2] *= (1 - 2 * _EDGE_TEXELS / size)[:, None]
-            self._map.draw(drawn, to_tile, tile)
-            to_tile[:2] *= (size / whole)[:, None]
-            to_tile[:2, 3] += (2 * place + size) / whole - 1
         first, size = np.split(np.array(tiles), 2, axis=1)
+        self._to_map[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
+        self._map.draw(drawn, zip(self._to_map, tiles, strict=True))
+        whole = np.array(self.depth.size)
+        self._to_map[:, :2] *= (size / whole)[..., None]
+        self._to_map[:, :2, 3] += (2 * first + size) / whole - 1
         self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(whole, 2)
         for body in drawn:
             body.release()
@@ -103,8 +101,8 @@ class ShadowMap:
         self._map.release()
 
 
-def _tiles(suns: int) -> list[tuple[int, int, int, int]]:
-    """First texel and size, both along and across, of each sun's part of the map."""
+def _tiles(suns: int) -> list[Tile]:
+    """Each sun's part of the map."""
     along, across = OTHERS_SIZE
     width = along // max(suns - 1, 1)
     others = [(k * width, FIRST_SIZE[1], width, across) for k in range(suns - 1)]

@@ -156,10 +156,14 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
     vec2 place = place_of(sample_at);
     vec3 from_eye = depth * view_ray(place);
-    for (int i = 0; i < SUNS; ++i) {
-        // before a sun behind the wall stands the whole container, too close to a groove for the map
+    // before a sun behind the wall stands the whole container, too close to a groove for the map
+    if (dot(p.surface.outward, sun_toward[0].xyz) >= 0.0) {
+        sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);
+        sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky, 0);
+    }
+    for (int i = 1; i < SUNS; ++i) {
         if (i < sun_count && dot(p.surface.outward, sun_toward[i].xyz) >= 0.0) {
-            sun_seen[i] = sun_share(from_eye, normal, depth * pixel_angle, i);
+            sun_seen[i] = sun_at(from_eye, i);
             sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);
         }
     }

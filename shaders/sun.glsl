@@ -1,13 +1,23 @@
 // Of sun i, the sun itself or a lamp:
 // vec3 sunlit(Reflector r, int i): its radiance reflected toward the eye, unshadowed;
-// float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i): how much of it gets there, 0..1;
+// float sun_at(vec3 from_eye, int i): how much of it gets there, 0..1;
+// float first_sun_share(vec3 from_eye, vec3 normal, float footprint_m): the same over a pixel, i = 0;
 // vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i): what it throws on what hides the sky.
+// from_eye: to the point, in m.
 
 uniform sampler2DShadow sun_shadow;   // a tile for each
 
-// 1 where sun i gets to, 0 in the shade; all that lies beyond its tile is lit, as the tile's edge is
-float sun_at(vec3 at, int i) {
+vec3 shadow_place(vec3 from_eye, int i) {
+    return (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
+}
+
+// all that lies beyond a tile is lit, as its edge is
+float sun_at_place(vec3 at, int i) {
     return textureLod(sun_shadow, vec3(clamp(at.xy, sun_tile[i].xy, sun_tile[i].zw), at.z), 0.0);
+}
+
+float sun_at(vec3 from_eye, int i) {
+    return sun_at_place(shadow_place(from_eye, i), i);
 }
 
 vec3 sunlit(Reflector r, int i) {
@@ -33,12 +43,11 @@ vec3 sunlit(Reflector r, int i) {
 }
 
 // Percentage-closer filtering (Reeves et al. 1987) over the pixel's footprint, and no less than hides
-// the map's texels; the first is the brightest sun, and the others, fainter, have one lookup each.
-// from_eye: to the point, in m.
-float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i) {
-    vec3 at = (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
-    if (i > 0) return sun_at(at, i);
-    mat3 axes = transpose(mat3(ray_to_shadow[i]));   // the map's, in its units a metre
+// the map's texels; the first sun is the brightest, others have one lookup each. Not a matter of i in
+// one function: it would be too large for Mesa to unroll the loop over suns.
+float first_sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
+    vec3 at = shadow_place(from_eye, 0);
+    mat3 axes = transpose(mat3(ray_to_shadow[0]));   // the map's, in its units a metre
     vec3 squared = vec3(dot(axes[0], axes[0]), dot(axes[1], axes[1]), dot(axes[2], axes[2]));
     vec2 texels = SHADOW_TEXELS / vec2(textureSize(sun_shadow, 0));
     vec2 reach = max(texels, min(0.22 * footprint_m, 0.03) * sqrt(squared.xy));
@@ -49,7 +58,8 @@ float sun_share(vec3 from_eye, vec3 normal, float footprint_m, int i) {
     vec2 slope = plane.xy / min(plane.z, -1e-3);
     u.z = -dot(slope, u.xy);
     v.z = -dot(slope, v.xy);
-    return 0.25 * (sun_at(at + u, i) + sun_at(at - u, i) + sun_at(at + v, i) + sun_at(at - v, i));
+    return 0.25 * (sun_at_place(at + u, 0) + sun_at_place(at - u, 0) +
+                   sun_at_place(at + v, 0) + sun_at_place(at - v, 0));
 }
 
 // Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a
@@ -62,6 +72,6 @@ vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i) {
     float walled = length(toward - normal * dot(normal, toward)) / PI;
     float facing = mix(walled, max(dot(aside, toward), 0.0) / max(most, 1e-3),
                        smoothstep(0.0, 0.1, most));
-    vec3 at = (ray_to_shadow[i] * vec4(from_eye + 0.02 * sky.direction, 1.0)).xyz;
-    return sky.rim * sky.rim * facing * sun_at(at, i) * sun_light[i].rgb;
+    float lit = sun_at(from_eye + 0.02 * sky.direction, i);
+    return sky.rim * sky.rim * facing * lit * sun_light[i].rgb;
 }
