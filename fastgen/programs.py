@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastgen import damage as fields
 from fastgen import environment, tone
 from fastgen.artwork import ART_SIZE, GLYPH_TILE_SIZE
-from fastgen.classes import CONTAINER_ID, DAMAGE_CLASSES, SOUND_CONTAINER, SPREADER_ID
+from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS, TILE_RANGE_CAPS
 from fastgen.mesh import MATERIALS, MAX_ZONES
 from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
@@ -176,14 +176,15 @@ DAMAGE_BLOCK = Block(
     "DamageBlock",
     2,
     (
-        ("vec4", "damage_origin", MAX_DAMAGES),  # position, kind
+        ("vec4", "damage_origin", MAX_DAMAGES),  # position, squared reach
         ("vec4", "damage_along", MAX_DAMAGES),  # axis, half length
         ("vec4", "damage_across", MAX_DAMAGES),  # axis, half width
         ("vec4", "damage_inward", MAX_DAMAGES),  # axis, depth
         ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape, and last the mask value
         ("int", "damage_count"),
         ("int", "hole_count"),  # perforations come first,
-        ("int", "dent_end"),  # then dents up to here
+        ("int", "dent_end"),  # then dents up to here,
+        ("int", "bowl_end"),  # and what is concave; bent edges are the rest
         ("float", "damage_threshold_mm"),
         ("int", "inner_row"),  # first row of the inner view in the sample targets
     ),
@@ -277,7 +278,6 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "ZONE_SMALL": ZONE_SMALL,
         "ZONE_LEVEL": ZONE_LEVEL,
         **RUST_DEFINES,
-        **{f"DAMAGE_{name.upper()}": i for i, name in enumerate(DAMAGE_CLASSES)},
         "SUNS": suns,
         "SHADOW_TEXELS": SHADOW_TEXELS,
         "CABLES": CABLES,

@@ -45,7 +45,7 @@ from fastgen.shapes import Shapes, shadow_casters
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, shader_suns, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
-from fastgen.targets import Region, Targets, bands
+from fastgen.targets import Region, Targets, bands, merged
 from fastgen.textures import art_texture, data_texture, mipmapped_array, noise_texture
 from fastgen.uniforms import Block
 
@@ -147,7 +147,7 @@ class Renderer:
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
-        near = [_region(view, corners_mm(item)) for item in damages]
+        touched = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
         cables: list[Region | None] = []
         if spreader is not None:
@@ -155,9 +155,10 @@ class Renderer:
             boxes = [np.concatenate([*boxes, frame]), *above]
             cables = [_region(view, above[-1])]
         regions = bands([_region(view, box) for box in boxes])
-        holes = [
-            part for part, item in zip(near, damages, strict=True) if item.kind == "perforation"
-        ]
+        near = merged(touched)
+        holes = merged(
+            [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
+        )
         targets.begin_samples(bands([*regions, *near]), holes)
         self._bind_surface(scene, mesh, spreader)
         self._sample(targets, holes, view, camera, damages, mesh, spreader)
@@ -183,7 +184,7 @@ class Renderer:
         mesh: GpuMesh,
         spreader: GpuMesh | None,
     ) -> None:
-        """Draw the geometry into the empty sample targets; holes: pixels that each may touch."""
+        """Draw the geometry into the empty sample targets; holes: pixels that they may touch."""
         damage = variant(damages)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._lobes.use(UNITS["lobe_masks"])

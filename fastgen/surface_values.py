@@ -5,11 +5,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen.classes import DAMAGE_CLASSES
 from fastgen.container_layout import KINDS
-from fastgen.damage import mask_values
+from fastgen.damage import mask_values, reach_mm
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import DIELECTRIC_F0, SPREADER_ZONE, noise_deviation
+from fastgen.programs import DIELECTRIC_F0, REACH_MARGIN_MM, SPREADER_ZONE, noise_deviation
 from fastgen.reflectance import mean_specular_albedo
 from fastgen.rust import rusted
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
@@ -108,7 +107,7 @@ def damage_values(
         row[: len(damage.shape)] = damage.shape
         row[11] = value
     return {
-        "damage_origin": [(*d.origin_mm, DAMAGE_CLASSES.index(d.kind)) for d in damages],
+        "damage_origin": [(*d.origin_mm, _squared_reach(d)) for d in damages],
         "damage_along": [(*d.along, d.size_mm[0] / 2) for d in damages],
         "damage_across": [(*d.across, d.size_mm[1] / 2) for d in damages],
         "damage_inward": [(*d.inward, d.depth_mm) for d in damages],
@@ -116,9 +115,15 @@ def damage_values(
         "damage_count": len(damages),
         "hole_count": sum(damage.kind == "perforation" for damage in damages),
         "dent_end": sum(damage.kind in ("perforation", "dented") for damage in damages),
+        "bowl_end": sum(damage.kind != "axis" for damage in damages),
         "damage_threshold_mm": threshold_mm,
         "inner_row": inner_row,
     }
+
+
+def _squared_reach(damage: Damage) -> float:
+    """Of a ball that holds all pixels that it may change, in mm^2."""
+    return float(np.square(np.array(reach_mm(damage)) + REACH_MARGIN_MM).sum())
 
 
 def cable_values(

@@ -47,6 +47,28 @@ def bands(regions: Sequence[Region | None]) -> list[Region | None]:
     return found
 
 
+def merged(regions: Sequence[Region | None]) -> list[Region | None]:
+    """Disjoint regions that hold all of `regions`, those that overlap within the least rectangle
+    about them; None is the whole image."""
+    found: list[Region] = []
+    for region in regions:
+        if region is None:
+            return [None]
+        x, y, width, height = region
+        left, top, right, bottom = x, y, x + width, y + height
+        while touched := [
+            (a, b, w, h)
+            for a, b, w, h in found
+            if a < right and left < a + w and b < bottom and top < b + h
+        ]:
+            found = [other for other in found if other not in touched]
+            left, top = min(left, *(a for a, *_ in touched)), min(top, *(t[1] for t in touched))
+            right = max(right, *(a + w for a, _, w, _ in touched))
+            bottom = max(bottom, *(b + h for _, b, _, h in touched))
+        found.append((left, top, right - left, bottom - top))
+    return list(found)
+
+
 class Targets:
     """Framebuffers for (width, height) images with `samples_per_axis` squared samples a pixel.
 

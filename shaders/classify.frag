@@ -38,7 +38,8 @@ void main() {
 #if DAMAGED
     vec3 rest_mm = texelFetch(rest_points, middle, 0).xyz;
     int near = 0;   // 1 near a damage, 2 near a hole
-    for (int i = 0; i < damage_count; ++i)
+    for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
+         i = next_near(i + 1, damage_count, rest_mm))
         if (key != 0u && within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
     if (near > 0) found = mixed ? CLASS_MIXED_DAMAGED : CLASS_DAMAGED;
 #if HOLED

@@ -9,6 +9,17 @@ vec3 damage_local(int i, vec3 p) {
     return vec3(dot(q, damage_along[i].xyz), dot(q, damage_across[i].xyz), dot(q, damage_inward[i].xyz));
 }
 
+// The first damage from i on, before `end`, that may move or mark the surface at p or a pixel beside
+// it; `end` for none. A driver that runs all sides of a branch skips nothing but a loop's turns: what
+// is far away is passed over here.
+int next_near(int i, int end, vec3 p) {
+    for (; i < end; ++i) {
+        vec3 q = p - damage_origin[i].xyz;
+        if (dot(q, q) < damage_origin[i].w) break;
+    }
+    return i;
+}
+
 float fold_path(vec4 a, vec4 b, float u) {
     float turn = smoothstep(-0.25, 0.25, sin(PI * u / b.y + b.x));
     return a.z * turn * sin(2.0 * PI * u / a.w);
@@ -33,10 +44,11 @@ bool in_hole(int i, vec3 p) {
 // which perforation has torn away rest point p, -1 for none
 int hole_at(vec3 p) {
     int found = -1;
-    int i = 0;
+    int i = next_near(0, hole_count, p);
     do {
         if (in_hole(i, p) && i < hole_count) found = i;
-    } while (++i < hole_count);
+        i = next_near(i + 1, hole_count, p);
+    } while (i < hole_count);
     return found;
 }
 
@@ -46,7 +58,7 @@ bool within_reach(int i, vec3 p) {
     vec3 reach = vec3(damage_along[i].w, damage_across[i].w, DAMAGE_FADE_END_MM);
     if (i < hole_count) reach.xy = reach.xy * HOLE_REACH + damage_shape[3 * i].x;
     else if (i < dent_end) reach.y += damage_shape[3 * i].z;   // its path swings
-    else if (int(damage_origin[i].w) == DAMAGE_AXIS) reach.z = reach.y;
+    else if (i >= bowl_end) reach.z = reach.y;
     return all(lessThan(q, reach + REACH_MARGIN_MM));
 }
 
@@ -60,7 +72,6 @@ struct Field {
 
 Field damage_field(int i, vec3 p) {
     vec3 q = damage_local(i, p);
-    int kind = int(damage_origin[i].w);
     float half_length = damage_along[i].w;
     float half_width = damage_across[i].w;
     float depth = damage_inward[i].w;
@@ -68,20 +79,20 @@ Field damage_field(int i, vec3 p) {
     float hill = bump(q.x / half_length);
     float hill_slope = bump_slope(q.x / half_length) / half_length;
     float fade = 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(q.z));
-    if (kind == DAMAGE_AXIS) {
+    if (i >= bowl_end) {
         float r = max(length(q.yz), 1e-3);
         float reach = bump(r / half_width);
         float reach_slope = bump_slope(r / half_width) / half_width;
         vec3 slope = depth * vec3(hill_slope * reach, hill * reach_slope * q.yz / r);
         return Field(depth * hill * reach, slope, 0.35 * hill * hill * reach * reach);
     }
-    if (kind == DAMAGE_CONCAVE) {
+    if (i >= dent_end) {
         float across = bump(q.y / half_width);
         float across_slope = bump_slope(q.y / half_width) / half_width;
         vec3 slope = depth * fade * vec3(hill_slope * across, hill * across_slope, 0.0);
         return Field(depth * hill * across * fade, slope, 0.0);
     }
-    if (kind == DAMAGE_DENTED) {
+    if (i >= hole_count) {
         vec4 more = damage_shape[3 * i + 1];
         float path = fold_path(shape, more, q.x);
         float path_slope = (fold_path(shape, more, q.x + 2.0) - path) * 0.5;
@@ -115,14 +126,13 @@ float sheet_fade(float w) {
 // sides of a branch would otherwise do four kinds' work for every damage.
 vec3 deformed(vec3 p) {
     vec3 moved = p;
-    int i = 0;
-    for (; i < hole_count; ++i) {
+    for (int i = next_near(0, hole_count, p); i < hole_count; i = next_near(i + 1, hole_count, p)) {
         vec3 q = damage_local(i, p);
         float outside = length(q.xy) - hole_radius(i, atan(q.y, q.x));
         float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
         moved += damage_inward[i].w * rim * rim * sheet_fade(q.z) * damage_inward[i].xyz;
     }
-    for (; i < dent_end; ++i) {
+    for (int i = next_near(hole_count, dent_end, p); i < dent_end; i = next_near(i + 1, dent_end, p)) {
         vec3 q = damage_local(i, p);
         vec4 shape = damage_shape[3 * i];
         float away = abs(q.y - fold_path(shape, damage_shape[3 * i + 1], q.x));
@@ -132,9 +142,10 @@ vec3 deformed(vec3 p) {
         float depth = damage_inward[i].w * max(1.0 - along * along, 0.0) * sheet_fade(q.z);
         moved += depth * profile * damage_inward[i].xyz;
     }
-    for (; i < damage_count; ++i) {
+    for (int i = next_near(dent_end, damage_count, p); i < damage_count;
+         i = next_near(i + 1, damage_count, p)) {
         vec3 q = damage_local(i, p);
-        bool axis = int(damage_origin[i].w) == DAMAGE_AXIS;
+        bool axis = i >= bowl_end;
         float reach = (axis ? length(q.yz) : q.y) / damage_across[i].w;
         float depth = damage_inward[i].w * bump(q.x / damage_along[i].w) * bump(reach);
         moved += (axis ? depth : depth * sheet_fade(q.z)) * damage_inward[i].xyz;
@@ -151,7 +162,8 @@ struct Damaged {
 Damaged damage_at(vec3 p) {
     Damaged d = Damaged(mat3(1.0), 0.0, 0u);
     float most = damage_threshold_mm;
-    int i = 0;   // there is one at least
+    // there is one at least, and nothing comes of one that is far away
+    int i = min(next_near(0, damage_count, p), damage_count - 1);
     do {
         Field f = damage_field(i, p);
         vec3 slope = f.slope.x * damage_along[i].xyz + f.slope.y * damage_across[i].xyz +
@@ -162,7 +174,8 @@ Damaged damage_at(vec3 p) {
             most = abs(f.amount);
             d.value = uint(damage_shape[3 * i + 2].w);
         }
-    } while (++i < damage_count);
+        i = next_near(i + 1, damage_count, p);
+    } while (i < damage_count);
     return d;
 }
 

@@ -31,7 +31,7 @@ def gl():
 
 def scenes_with(*kinds):
     """Three scenes; about each of their damages, points as far out as twice its reach."""
-    damage = {"probability": 1.0, "count": [2, 4], "kinds": list(kinds)}
+    damage = {"probability": 1.0, "count": [2, 12], "kinds": list(kinds)}
     generator = Generator(Config.from_values({"damage": damage}), seed=3)
     rng = np.random.default_rng(0)
     found = []

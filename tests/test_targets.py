@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.targets import bands
+from fastgen.targets import bands, merged
 
 
 def painted(regions, size=(40, 30)):
@@ -29,3 +29,20 @@ def test_one_region_stays_whole_and_an_unknown_one_is_the_image():
     assert bands([(3, 4, 5, 6)]) == [(3, 4, 5, 6)]
     assert bands([(3, 4, 5, 6), (3, 10, 5, 2)]) == [(3, 4, 5, 8)]
     assert bands([(3, 4, 5, 6), None]) == [None]
+
+
+def test_merged_regions_hold_all_and_no_pixel_twice():
+    rng = np.random.default_rng(4)
+    fewer = 0
+    for _ in range(300):
+        low = rng.integers(0, [30, 20], (rng.integers(1, 9), 2))
+        regions = [(*map(int, a), *map(int, rng.integers(1, 10, 2))) for a in low]
+        asked, given = painted(regions), painted(merged(regions))
+        assert given.max() == 1
+        assert (given[asked > 0] == 1).all()
+        if asked.max() == 1:
+            assert set(merged(regions)) == set(regions)
+        fewer += len(merged(regions)) < len(regions)
+    assert fewer > 50
+    assert merged([(3, 4, 5, 6), None]) == [None]
+    assert merged([]) == []
