@@ -89,10 +89,14 @@ def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
 
 def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]:
     """Rest points [..., 3] to where all damages together move them, mm [..., 3]."""
-    moved = np.array(points_mm, np.float64)
+    rest = np.asarray(points_mm, np.float64).reshape(-1, 3)
+    moved = rest.copy()
     for damage in damages:
-        moved += amount_mm(damage, points_mm)[..., None] * np.array(damage.inward)
-    return moved
+        q = rest - np.array(damage.origin_mm)
+        near = np.einsum("pc,pc->p", q, q) < np.square(reach_mm(damage)).sum()
+        if near.any():  # what lies farther away than all it reaches does not move
+            moved[near] += amount_mm(damage, rest[near])[:, None] * np.array(damage.inward)
+    return moved.reshape(np.shape(points_mm))
 
 
 def reach_mm(damage: Damage) -> tuple[float, float, float]:

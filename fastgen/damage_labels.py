@@ -91,7 +91,15 @@ def _distinct(cells: NDArray[np.int64]) -> int:
     return int(np.count_nonzero(met))
 
 
-@lru_cache(maxsize=16)
 def _facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
     """The cameras of a scene share them."""
-    return damage_facets(scene, mesh, damage, 0)
+    kept = _kept_facets(scene, mesh)
+    if damage not in kept:
+        kept[damage] = damage_facets(scene, mesh, damage, 0)
+    return kept[damage]
+
+
+@lru_cache(maxsize=2)
+def _kept_facets(scene: Scene, mesh: Mesh) -> dict[Damage, Facets]:
+    """Of this scene's damages, those that were asked for."""
+    return {}

@@ -70,7 +70,7 @@ class Shading:
         regions: disjoint, and outside them there is only sky; None stands for all pixels.
         damage: one of programs.DAMAGE_VARIANTS. near_damage: the pixels that damages may touch,
         disjoint, None where that is not known. cables: likewise, of bundles of them. suns: as many
-        as sun_shadow.shader_suns tells, their shadow map bound. bent: whether a lens bends the view.
+        as sun_shadow.shader_suns tells, their shadow map bound. bent: if a lens bends the view.
         """
         image = targets.image
         image.use()
