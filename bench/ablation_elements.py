@@ -211,9 +211,10 @@ ELEMENTS = (
         "shadow of the sun",
         text=(
             (
-                "sun_seen[i] = sun_share(from_eye, normal, depth * pixel_angle, i);",
-                "sun_seen[i] = 1.0;",
+                "sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);",
+                "sun_seen[0] = 1.0;",
             ),
+            ("sun_seen[i] = sun_at(from_eye, i);", "sun_seen[i] = 1.0;"),
         ),
     ),
     Element(
@@ -230,7 +231,10 @@ ELEMENTS = (
     Element(
         "light",
         "the sun's light from walls in recesses",
-        text=(("sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);", ""),),
+        text=(
+            ("sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky, 0);", ""),
+            ("sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);", ""),
+        ),
     ),
     Element(
         "light",

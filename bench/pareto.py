@@ -65,12 +65,15 @@ class Variant:
     def entered(self) -> Iterator[None]:
         """Generators that are made and used in here render this way."""
         named = {element.name: element for element in ELEMENTS}
+        absences = [Absence(named[name]) for name in self.absent]
         with ExitStack() as stack:
-            for name in self.absent:
-                stack.enter_context(Absence(named[name]).gone())
+            for absence in absences:
+                stack.enter_context(absence.gone())
             for owner, attribute, value in self.patches():
                 stack.enter_context(mock.patch.object(owner, attribute, value))
             yield
+        for absence in absences:
+            absence.check()
 
 
 def _coarse_mesh() -> Patches:
