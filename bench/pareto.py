@@ -20,7 +20,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,18 +62,14 @@ class Variant:
     patches: Callable[[], Patches] = list
 
     @contextmanager
-    def entered(self) -> Iterator[None]:
-        """Generators that are made and used in here render this way."""
-        named = {element.name: element for element in ELEMENTS}
-        absences = [Absence(named[name]) for name in self.absent]
+    def entered(self, absences: Sequence[Absence]) -> Iterator[None]:
+        """Generators that are used in here render this way. absences: of `absent`."""
         with ExitStack() as stack:
             for absence in absences:
                 stack.enter_context(absence.gone())
             for owner, attribute, value in self.patches():
                 stack.enter_context(mock.patch.object(owner, attribute, value))
             yield
-        for absence in absences:
-            absence.check()
 
 
 def _coarse_mesh() -> Patches:
@@ -136,11 +132,13 @@ def spent(generator: Generator, scene: Scene, camera: Camera) -> float:
 def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats: int) -> Measured:
     """A variant over all cases, in turns with a Generator of nothing but presets."""
     errors, seconds = [], []
+    named = {element.name: element for element in ELEMENTS}
+    absences = [Absence(named[name]) for name in variant.absent]
     with Generator(Config.preset(), SEED, SIZE, quality=variant.quality) as generator:
         for case in chosen:
             reference = load(case.number)
             scene, camera = reference.scene, reference.scene.camera(case.camera)
-            with variant.entered():
+            with variant.entered(absences):
                 image = generator.render(scene=scene, camera=camera).image / 255.0
                 exposure = generator.exposure(scene, camera)
             expected = displayed(reference.radiance[FILTERS[variant.quality]], exposure)
@@ -149,9 +147,11 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
             turns = []
             for _ in range(repeats):
                 beside = spent(balanced, scene, camera)
-                with variant.entered():
+                with variant.entered(absences):
                     turns.append((spent(generator, scene, camera), beside))
             seconds.append([statistics.median(each) for each in zip(*turns, strict=True)])
+    for absence in absences:
+        absence.check()
     means = [statistics.fmean(each) for each in zip(*seconds, strict=True)]
     return Measured(variant.name, statistics.fmean(errors), *means)
 
