@@ -105,7 +105,7 @@ def reach_mm(damage: Damage) -> tuple[float, float, float]:
     if damage.kind == "perforation":
         u = v = u * HOLE_REACH + damage.shape[0]
     if damage.kind == "dented":
-        v += damage.shape[2]  # its path swings
+        v = max(v, damage.shape[0]) + damage.shape[2]  # its path swings
     return u, v, v if damage.kind == "axis" else FADE_END_MM
 
 

@@ -57,7 +57,10 @@ bool within_reach(int i, vec3 p) {
     vec3 q = abs(damage_local(i, p));
     vec3 reach = vec3(damage_along[i].w, damage_across[i].w, DAMAGE_FADE_END_MM);
     if (i < hole_count) reach.xy = reach.xy * HOLE_REACH + damage_shape[3 * i].x;
-    else if (i < dent_end) reach.y += damage_shape[3 * i].z;   // its path swings
+    else if (i < dent_end) {
+        vec4 shape = damage_shape[3 * i];
+        reach.y = max(reach.y, shape.x) + shape.z;   // its path swings
+    }
     else if (i >= bowl_end) reach.z = reach.y;
     return all(lessThan(q, reach + REACH_MARGIN_MM));
 }

@@ -334,3 +334,17 @@ def test_scenes_with_damage_round_trip_through_json(many):
 def test_a_hundred_of_a_kind_is_refused():
     with pytest.raises(ConfigError, match=r"damage.count\[1\]: 100 is out of range; give 0 to 99"):
         Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
+
+
+def test_moves_of_damages_add_up_however_wide_a_crease_is(many):
+    dents = [d for scene in many for d in scene.damages if d.kind == "dented"][:4]
+    assert len(dents) == 4
+    rng = np.random.default_rng(2)
+    for dent in dents:
+        wide = replace(dent, shape=(900.0, *dent.shape[1:]))
+        points = np.array(dent.origin_mm) + rng.uniform(-1500, 1500, (3000, 3))
+        moved = sum(
+            fields.amount_mm(d, points)[:, None] * np.array(d.inward) for d in (wide, *dents)
+        )
+        assert np.abs(moved).max() > 5
+        np.testing.assert_allclose(fields.deform((wide, *dents), points), points + moved, atol=1e-9)

@@ -91,6 +91,18 @@ def test_reach_is_what_numpy_says(gl, damages):
             np.testing.assert_array_equal(seen[sure], (beyond < 0)[sure])
 
 
+def test_what_reaches_a_point_is_not_passed_over(gl, damages):
+    body = (
+        "vec4 f(vec4 x) { vec4 n = vec4(0.0); for (int i = 0; i < damage_count; ++i)"
+        " if (within_reach(i, x.xyz)) {"
+        " n.x += 1.0; n.y += next_near(i, damage_count, x.xyz) == i ? 0.0 : 1.0; } return n; }"
+    )
+    for scene, points in damages:
+        out, _ = asked(gl, scene, body, points)
+        assert out[:, 0].max() >= 1
+        assert out[:, 1].max() == 0
+
+
 def test_holes_are_where_numpy_has_them(gl, damages):
     holes = 0
     for scene, points in damages:
