@@ -22,7 +22,7 @@ MOST_SUNS = 4
 _APART_DEG = 2 * CAP_DEG
 """Between two suns, at least: their caps do not overlap."""
 
-_ROUNDS = 4  # until a cap stands about the centre of its light
+_ROUNDS = 4  # until a cap stands about the centre of a small light
 _SEARCH_WIDTH = 256  # texels around of the map that tells where to look
 
 Radiance = NDArray[np.float32]
@@ -46,8 +46,9 @@ def split_suns(radiance: Radiance) -> tuple[tuple[Sun, ...], Radiance]:
     """The suns of equirectangular radiance [H, 2H, 3], brightest first, and the radiance without.
 
     A sun is what exceeds the sky around it, channel by channel, within CAP_DEG of a place where it
-    gives MIN_SHARE of the light; all parts together hold the light of the whole. Of more than
-    MOST_SUNS those stay in the map that give the least share. Without any: (), and `radiance`
+    gives MIN_SHARE of the light; all parts together hold the light of the whole. Of two that stand
+    closer than twice that only one is, of a disc a little broader than the cap only a part. Of more
+    than MOST_SUNS those stay in the map that give the least share. Without any: (), and `radiance`
     itself.
     """
     places = _Places(radiance)
