@@ -16,15 +16,15 @@ from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, Tile, core_of, m
 from fastgen.scene import Damage
 from fastgen.sun import MOST_SUNS, Sun
 
-FIRST_SIZE = (4096, 1024)
+_EDGE_TEXELS = 1
+"""Nothing is drawn on a tile's edge: it stands for all that lies beyond."""
+
+FIRST_SIZE = (4096 + 2 * _EDGE_TEXELS, 1024 + 2 * _EDGE_TEXELS)
 """Texels along and across for the first sun: 3.5 mm for the longest container. A locking bar is
 34 mm wide."""
 
-OTHERS_SIZE = (4096, 512)
+OTHERS_SIZE = (FIRST_SIZE[0], 512 + 2 * _EDGE_TEXELS)
 """For all others, side by side: what each of them throws is fainter."""
-
-_EDGE_TEXELS = 1
-"""Nothing is drawn on a tile's edge: it stands for all that lies beyond."""
 
 _BIAS_MM = 2.0
 

@@ -241,7 +241,7 @@ def test_edges_of_shadows_have_no_teeth(tmp_path, others):
     ends = ((light[:, None] - strip) / (light - shade)[:, None]).sum(axis=1)
     rows = np.arange(len(ends))
     apart = ends - np.polyval(np.polyfit(rows, ends, 1), rows)
-    assert apart.std() < 0.4
+    assert apart.std() < 0.33
 
 
 LAMPS = np.array([[0.9, 0.3, 0.3], [0.7, 0.6, 0.2], [0.6, -0.7, 0.4], [0.5, 0.2, 0.8]])
@@ -294,7 +294,7 @@ def test_light_of_several_lamps_adds_up(by_night, view):
     if view == "Cr":
         inside &= ~edges
     together, apart = light["0123"][inside], sum(light[name][inside] for name in "0123")
-    assert inside.sum() > 1000
+    assert inside.sum() > (5000 if view == "Cr" else 1000)
     assert all((light[name][inside] > 0.02).mean() > 0.1 for name in "0123")
     # in steps of 255, of which the sum has four times as many
     assert np.percentile(np.abs(together - apart), 90) < 0.015 * apart.mean()
