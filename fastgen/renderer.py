@@ -214,8 +214,7 @@ class Renderer:
             "background_light": light.background,
             "dfg_table": self._dfg,
         }
-        if targets.rest is not None:
-            textures["rest_points"] = targets.rest
+        textures |= zip(("rest_x", "rest_y", "rest_z"), targets.rest, strict=False)
         if shadow is not None:
             textures["sun_shadow"] = shadow.depth
         for name, texture in textures.items():

@@ -23,12 +23,14 @@ UNITS = {
     "decal_grid": 10,
     "decal_table": 11,
     "glyph_table": 12,
-    "rest_points": 13,
+    "rest_x": 13,
     "sheet_depths": 14,
     "openness_points": 15,
     "sun_shadow": 16,
     "lobe_masks": 17,
     "light_points": 18,
+    "rest_y": 19,
+    "rest_z": 20,
 }
 
 

@@ -103,14 +103,15 @@ class Targets:
             )
         self.to_samples = self._lattice.to_clip(size)
         self.keys = ctx.texture(stored, 1, dtype="u4")
-        # two textures of two and one numbers are cheaper to draw to than one of four
+        # llvmpipe takes three times as long for four numbers a texel as for four textures of one,
+        # and twice as long for bytes as for a number that holds four of them
         self.points = ctx.texture(stored, 2, dtype="f4")
         self.depths = ctx.texture(stored, 1, dtype="f4")
-        self.openness = ctx.texture(stored, 4)
-        self.light = ctx.texture(stored, 4)
-        self.rest = ctx.texture(stored, 4, dtype="f4") if damage != "sound" else None
-        always = [self.keys, self.points, self.depths, self.openness, self.light]
-        attached = [*always, self.rest] if self.rest is not None else always
+        self.openness = ctx.texture(stored, 1, dtype="u4")
+        self.light = ctx.texture(stored, 1, dtype="u4")
+        rest = 3 if damage != "sound" else 0  # x, y and z
+        self.rest = [ctx.texture(stored, 1, dtype="f4") for _ in range(rest)]
+        attached = [self.keys, self.points, self.depths, self.openness, self.light, *self.rest]
         for texture in attached:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth = ctx.depth_texture(stored)

@@ -8,10 +8,10 @@
 #include "keys_around.glsl"
 #if DAMAGED
 #include "damage.glsl"
+#include "rest.glsl"
 #endif
 
 uniform sampler2D sheet_points;
-uniform sampler2D rest_points;
 
 bool bears_decals(uint key, ivec2 sample_at) {
     return key != 0u && cell_at(key_zone(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
@@ -36,7 +36,7 @@ void main() {
     int found = mixed ? CLASS_MIXED : key == 0u ? CLASS_SKY : CLASS_PLAIN;
     if (decal) ++found;   // programs.PIXEL_CLASSES has the one with decals next
 #if DAMAGED
-    vec3 rest_mm = texelFetch(rest_points, middle, 0).xyz;
+    vec3 rest_mm = rest_at(middle);
     int near = 0;   // 1 near a damage, 2 near a hole
     for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
          i = next_near(i + 1, damage_count, rest_mm))

@@ -25,14 +25,13 @@
 #if WITH_DAMAGE
 #include "damage.glsl"
 #include "inside.glsl"
-
-uniform sampler2D rest_points;
+#include "rest.glsl"
 #endif
 
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
-uniform sampler2D openness_points;
-uniform sampler2D light_points;
+uniform usampler2D openness_points;   // four bytes each
+uniform usampler2D light_points;
 
 struct Shaded {
     vec3 color;   // exposed radiance; of a single layer, what is displayed
@@ -44,10 +43,10 @@ struct Shaded {
 
 // as openness.py encodes it; interreflection.py has found what surfaces throw on the spreader
 Openness openness_at(ivec2 sample_at, uint zone) {
-    vec4 stored = texelFetch(openness_points, sample_at, 0);
+    vec4 stored = unpackUnorm4x8(texelFetch(openness_points, sample_at, 0).r);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec4 encoded = texelFetch(light_points, sample_at, 0);
+    vec4 encoded = unpackUnorm4x8(texelFetch(light_points, sample_at, 0).r);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces, vec3(0.0));
@@ -114,7 +113,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     p.depth = texelFetch(sheet_depths, sample_at, 0).r;
     p.scar = 0.0;
 #if WITH_DAMAGE
-    Damaged d = damage_at(texelFetch(rest_points, sample_at, 0).xyz);
+    Damaged d = damage_at(rest_at(sample_at));
     if (d.value != 0u) p.damage = d.value;
     p.scar = d.scar;
     p.bend = d.bend;
@@ -198,7 +197,7 @@ Shaded single_surface(ivec2 pixel) {
 Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
     uint inner_key = key_at(inner_at);
-    vec3 rest_mm = texelFetch(rest_points, inner_at, 0).xyz;
+    vec3 rest_mm = rest_at(inner_at);
     float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);
     if (inner_key != 0u) {

@@ -25,7 +25,7 @@ void main() {
         if (keys[i] == 0u) sky_weight += FILTER_WEIGHT[i];
         else left |= 1u << i;
 #if WITH_HOLES
-        int hole = hole_at(texelFetch(rest_points, middle + FILTER_OFFSET[i], 0).xyz);
+        int hole = hole_at(rest_at(middle + FILTER_OFFSET[i]));
         if (keys[i] != 0u && hole >= 0 && !before_sheet(key_zone(keys[i])))
             keys[i] = (PORTAL_ZONE + 1u) | (uint(hole) << 10);
 #endif

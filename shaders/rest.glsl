@@ -1,0 +1,10 @@
+// vec3 rest_at(ivec2): where a sample's point lies while nothing is damaged, in mm.
+
+uniform sampler2D rest_x;
+uniform sampler2D rest_y;
+uniform sampler2D rest_z;
+
+vec3 rest_at(ivec2 sample_at) {
+    return vec3(texelFetch(rest_x, sample_at, 0).r, texelFetch(rest_y, sample_at, 0).r,
+                texelFetch(rest_z, sample_at, 0).r);
+}
