@@ -194,11 +194,11 @@ DAMAGE_BLOCK = Block(
 def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
     """The classes of scattered pixels that such a frame may hold; they are shaded from lists.
 
-    damage: one of DAMAGE_VARIANTS. The other classes, sky, plain and cable, are drawn.
+    damage: one of DAMAGE_VARIANTS. The other classes, sky and cable, are drawn.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if name in ("sky", "plain", "cable") or (
+        if name in ("sky", "cable") or (
             samples_per_axis == 1 and name.startswith("mixed")
         ):
             return False

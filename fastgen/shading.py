@@ -94,7 +94,6 @@ class Shading:
             targets.lists.begin(name)
             self._run("list", name, "sound", regions)
         image.color_mask = _mask(True)
-        self._run("shade", "plain", "sound", regions, suns)
         if self._samples_per_axis > 1:
             self._run("shade", "cable", "sound", cables, suns)
         self._draw_sky(bent)

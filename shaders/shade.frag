@@ -1,4 +1,4 @@
-// Shades the pixels of one class that see a single surface, only the sky, or only cables before it.
+// Shades the pixels of one class that see only the sky, or only cables before it.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
@@ -49,10 +49,8 @@ void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
 #if CLASS == CLASS_SKY
     Shaded s = sky(view_ray(vec2(pixel) + 0.5));
-#elif CLASS == CLASS_CABLE
-    Shaded s = cable(pixel);
 #else
-    Shaded s = single_surface(pixel);
+    Shaded s = cable(pixel);
 #endif
     out_color = vec4(developed(s.color), s.cover);
     out_labels = s.id | (s.damage << 16);
