@@ -23,8 +23,8 @@ from results import parse_size
 
 from fastgen import Config, Generator
 from fastgen.gpu_mesh import GpuMesh
+from fastgen.sample_targets import SampleTargets
 from fastgen.shading import Shading
-from fastgen.targets import Targets
 
 
 class PassTimer:
@@ -39,7 +39,7 @@ class PassTimer:
         self._within = False
 
     def __enter__(self) -> "PassTimer":
-        self._wrap(Targets, "begin_samples", lambda *_: "clear")
+        self._wrap(SampleTargets, "begin", lambda *_: "clear")
         self._wrap(GpuMesh, "draw", lambda *_: "geometry")
         self._wrap(GpuMesh, "draw_inside", lambda *_: "inside")
         self._wrap(Shading, "_run", lambda stage, name, *_: name if stage == "shade" else stage)

@@ -93,7 +93,7 @@ class Reference:
     openness: Array
 
 
-FILTERS = {"draft": "box", "balanced": "tent", "high": "box"}
+FILTERS = {"draft": "box", "balanced": "box", "high": "box"}
 """The pixel filter of each quality: a box is the pixel's square, a tent reaches one pixel to each
 side. `draft` has none and is held to the box."""
 

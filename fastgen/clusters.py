@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera import NEAR_M, View
 from fastgen.mesh import UNIT_CUBE, Mesh
-from fastgen.targets import Region
+from fastgen.sample_targets import Region
 
 _SIZE = 64
 """Triangles in a run. Neighbours in the order of a mesh mostly are neighbours on its sheets."""

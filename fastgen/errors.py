@@ -14,7 +14,7 @@ class AssetError(FastgenError):
 
 
 class ContextError(FastgenError):
-    """This machine gives no OpenGL context or too small textures, or CUDA no access to what it
+    """This machine gives no OpenGL context, or CUDA no access to what it
     draws."""
 
 

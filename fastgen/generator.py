@@ -43,8 +43,8 @@ from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 
-QUALITY = {"draft": 1, "balanced": 2, "high": 3}
-"""Samples along each axis of a pixel by quality."""
+QUALITY = {"draft": (1, 1), "balanced": (3, 2), "high": (5, 5)}
+"""Samples along each axis of a pixel, and lookups of the material layers in it, by quality."""
 
 
 _BRIGHTEST_AIR = 0.65
@@ -70,13 +70,14 @@ class Generator:
 
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
-    in place of the bundled ones. quality: draft (one sample a pixel), balanced (four, filtered
-    with the neighbours'), or high (nine, and materials from five points or more).
+    in place of the bundled ones. quality: draft (one sample a pixel, its materials looked up once),
+    balanced (nine, materials looked up twice), or high (25, and five times). `high` takes nine
+    samples of images of more than about a megapixel or 1638 rows, as 25 of a scene with holes take
+    2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
+    four, filtered with the neighbours', of images of more than 2730 rows.
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
-    first that works. Threads may share it, and draw in turn; make one in each process. Where a
-    driver's textures end at 16384 texels, as Mesa's do, `high` draws scenes with holes up to a
-    height of 2730 only. An image much taller than wide takes more memory than one lying, see
-    sample_lattice.py.
+    first that works. Threads may share it, and draw in turn; make one in each process. An image
+    much taller than wide takes more memory than one lying, see sample_lattice.py.
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that
     was dropped unclosed held is freed when the next opens one.
@@ -132,7 +133,8 @@ class Generator:
             partial(
                 Renderer,
                 light=partial(_load_light, self._hdris),
-                samples_per_axis=QUALITY[quality],
+                samples_per_axis=QUALITY[quality][0],
+                lookups=QUALITY[quality][1],
                 mask_threshold_mm=self.config.damage.mask_threshold_mm,
             ),
         )

@@ -92,10 +92,18 @@ of them would pass 255: below spreaders the ground is dark and the sunlit roof t
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""
 
-LOOKUP_PX = {1: 1.0, 2: 1.3, 3: 0.45}
-"""Width of a lookup of the layers by samples along each axis of a pixel: of one lookup the pixel's
-square, or about the tent that reaches into the neighbours; less where the layers are the mean of
-five lookups or more. Narrower or wider, finer renders averaged down are farther off."""
+LOOKUP_PX = {1: 0.92, 2: 0.6, 5: 0.45}
+"""Width of each of a pixel's lookups of the layers, by how many there are, where the pixel is
+filtered as a square; a wider filter asks for wider ones. Found by the distance to path-traced
+references."""
+
+LOOKUP_PLACES = {
+    1: ((0.0, 0.0),),
+    2: ((0.25, 0.1), (-0.25, -0.1)),
+    # Gauss's points about the centre
+    5: ((0.0, 0.0), *itertools.product((-((1 / 12) ** 0.5), (1 / 12) ** 0.5), repeat=2)),
+}
+"""Where in a pixel that sees one surface they are, in pixels from its centre."""
 
 DECAL_CELL_MM = 64.0
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
@@ -192,15 +200,13 @@ DAMAGE_BLOCK = Block(
 
 
 def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
-    """The classes of scattered pixels that such a frame may hold; they are shaded from lists.
+    """The classes of pixels that such a frame may hold and that are shaded from lists.
 
     damage: one of DAMAGE_VARIANTS. The other classes, sky and cable, are drawn.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if name in ("sky", "cable") or (
-            samples_per_axis == 1 and name.startswith("mixed")
-        ):
+        if name in ("sky", "cable") or (samples_per_axis == 1 and name.startswith("mixed")):
             return False
         if "HOLES" in traits:
             return damage == "holed"
@@ -214,13 +220,18 @@ def noise_deviation() -> NDArray[np.float32]:
     return noise_tiles().lost_deviation.reshape(-1, 4)
 
 
-def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str, suns: int) -> str:
+def _constants(
+    samples_per_axis: int, lookups: int, layer: str, pixel_class: str, damage: str, suns: int
+) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
         f" + clamp((roughness - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
         for a, b in itertools.pairwise(levels)
     )
     lattice = SampleLattice(samples_per_axis)
+    # prints are filtered by themselves and cost most, and damages share their classes: a second
+    # lookup there gains little
+    lookups = 1 if lookups == 2 and "DECALS" in PIXEL_CLASSES[pixel_class] else lookups
     shown = {name: int(layer in ("all", "normals", "reflection", name)) for name in LAYERS}
     defines: dict[str, object] = {
         "MM": "0.001",
@@ -288,8 +299,9 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
         "SAMPLES_PER_AXIS": samples_per_axis,
         "SAMPLE_SLANT": lattice.slant,
         "SAMPLE_PAD": lattice.pad,
-        "FINE_LAYERS": int(samples_per_axis > 2),
-        "LOOKUP_PX": f"{LOOKUP_PX[samples_per_axis]}",
+        "LOOKUPS": lookups,
+        "FILTER_STEP": lattice.step,
+        "LOOKUP_PX": LOOKUP_PX[lookups] * lattice.spread,
     }
     # lets the vertex stage send an instance to the inner view
     lines = ["#extension GL_ARB_shader_viewport_layer_array : enable"] if damage == "holed" else []
@@ -298,6 +310,11 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
     lines.append(f"float specular_layer(float roughness) {{ return 0.0{steps}; }}")
     offsets = ", ".join(f"ivec2({x}, {y})" for x, y in lattice.filter)
     weights = ", ".join(f"{weight:.8f}" for weight in lattice.filter.values())
+    places = ", ".join(
+        f"vec2({lattice.spread * x:.8f}, {lattice.spread * y:.8f})"
+        for x, y in LOOKUP_PLACES[lookups]
+    )
+    lines.append(f"const vec2 LOOKUP_PLACE[LOOKUPS] = vec2[LOOKUPS]({places});")
     lines.append(f"#define FILTER_NEAR {lattice.near}")
     lines.append(f"#define FILTER_SAMPLES {len(lattice.filter)}")
     lines.append(f"const ivec2 FILTER_OFFSET[FILTER_SAMPLES] = ivec2[FILTER_SAMPLES]({offsets});")
@@ -308,6 +325,7 @@ def _constants(samples_per_axis: int, layer: str, pixel_class: str, damage: str,
 def expand(
     text: str,
     samples_per_axis: int = 1,
+    lookups: int = 1,
     layer: str = "all",
     pixel_class: str = "sky",
     damage: str = "sound",
@@ -317,7 +335,7 @@ def expand(
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
-            constants = _constants(samples_per_axis, layer, pixel_class, damage, suns)
+            constants = _constants(samples_per_axis, lookups, layer, pixel_class, damage, suns)
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)
         return included(shader_path(match[1]).read_text(encoding="utf-8"))

@@ -39,13 +39,15 @@ from fastgen.programs import (
 )
 from fastgen.reflectance import dfg_table
 from fastgen.sample import Frame
+from fastgen.sample_lattice import fitting
+from fastgen.sample_targets import Region, SampleTargets
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.shading import UNITS, Shading
 from fastgen.shapes import Shapes, shadow_casters
 from fastgen.spreader import tier_bounds_mm
 from fastgen.sun_shadow import ShadowMap, shader_suns, sun_values
 from fastgen.surface_values import cable_values, damage_values, scene_values
-from fastgen.targets import Region, Targets, bands, merged
+from fastgen.targets import Targets, bands, merged
 from fastgen.textures import art_texture, data_texture, mipmapped_array, noise_texture
 from fastgen.uniforms import Block
 
@@ -69,7 +71,9 @@ class _SceneDecals:
 class Renderer:
     """Draws scenes on one GL context. A context manager: leaving it frees all that it made.
 
-    gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2 or 3.
+    gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2, 3 or 5;
+    fewer for images whose samples the driver's textures have no room for. lookups: of the material
+    layers in a pixel, 1, 2 or 5; 1 of one sample.
     mask_threshold_mm: what moved by more counts as damaged.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
@@ -78,20 +82,22 @@ class Renderer:
         self,
         gl: GLContext,
         light: Callable[[str], EnvironmentLight],
-        samples_per_axis: int = 2,
+        samples_per_axis: int = 3,
+        lookups: int = 2,
         mask_threshold_mm: float = 5.0,
     ) -> None:
         self._gl = gl
         self._ctx = gl.ctx
         self._light_of = light
         self._samples_per_axis = samples_per_axis
+        self._lookups = lookups
         self._mask_threshold_mm = mask_threshold_mm
         self._geometry = {
             damage: link(self._ctx, "geometry.vert", "geometry.frag", UNITS, damage=damage)
             for damage in DAMAGE_VARIANTS
         }
         self._shading: Kept[Shading] = Kept(len(LAYERS))
-        self._targets: Kept[Targets] = Kept(3)
+        self._targets: Kept[Targets] = Kept(2)
         self._shapes = Shapes(self._ctx, self._geometry)
         self._lights: Kept[GpuLight] = Kept(24)
         self._scenes: Kept[_SceneDecals] = Kept(2)
@@ -130,22 +136,23 @@ class Renderer:
         view = view_of(camera, size)
         damages = seen_damages(scene.damages, camera.position_mm)
         damage = variant(damages)
-        targets = self._targets.get(
-            (size, damage), lambda: Targets(self._gl, size, self._samples_per_axis, damage)
-        )
+        limit = self._ctx.info["GL_MAX_TEXTURE_SIZE"]
+        per_axis = fitting(self._samples_per_axis, size, limit)
+        targets = self._targets.get(size, lambda: Targets(self._gl, size, per_axis))
+        samples = targets.samples
         light = self._light(scene.environment.name)
         mesh, spreader = self._shapes.of(scene, camera.lens is not None, light.ambient)
         shading = self._shading.get(
-            layer, lambda: Shading(self._ctx, self._samples_per_axis, layer)
+            (layer, per_axis), lambda: Shading(self._ctx, per_axis, self._lookups, layer)
         )
         shadow = self._shadow(scene)
-        seen = _view_values(scene, view, targets, self.exposure(scene, camera, size))
+        seen = _view_values(scene, view, samples, self.exposure(scene, camera, size))
         sunny = sun_values(light.ambient.suns, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
         hung = cable_values(scene, spreader.mesh if spreader else None, view.position_m)
         self._set(VIEW_BLOCK, {**seen, **sunny, **hung})
         if damage != "sound":
-            shapes = damage_values(scene, damages, self._mask_threshold_mm, targets.inner_row)
+            shapes = damage_values(scene, damages, self._mask_threshold_mm, samples.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
         touched = [_region(view, corners_mm(item)) for item in damages]
         boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
@@ -159,10 +166,10 @@ class Renderer:
         holes = merged(
             [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
         )
-        targets.begin_samples(bands([*regions, *near]), holes)
+        samples.begin(damage, bands([*regions, *near]), holes)
         self._bind_surface(scene, mesh, spreader)
-        self._sample(targets, holes, view, camera, damages, mesh, spreader)
-        self._bind_light(targets, light, shadow)
+        self._sample(samples, holes, view, camera, damages, mesh, spreader)
+        self._bind_light(samples, light, shadow)
         shading.draw(
             targets,
             regions,
@@ -176,7 +183,7 @@ class Renderer:
 
     def _sample(
         self,
-        targets: Targets,
+        samples: SampleTargets,
         holes: Sequence[Region | None],
         view: View,
         camera: Camera,
@@ -197,24 +204,26 @@ class Renderer:
         mesh.draw(camera.position_mm, damage, bent)
         moved_mm = sum(abs(d.depth_mm) for d in damages)
         for region in holes:
-            targets.limit_inside(region)
+            samples.limit_inside(region)
             mesh.draw_inside(mesh.clusters.seen_in(view, region, moved_mm))
-        targets.end_samples()
+        samples.end()
 
-    def _bind_light(self, targets: Targets, light: GpuLight, shadow: ShadowMap | None) -> None:
+    def _bind_light(
+        self, samples: SampleTargets, light: GpuLight, shadow: ShadowMap | None
+    ) -> None:
         """Bind the samples and what lights them."""
         textures: dict[str, Any] = {
-            "surface_keys": targets.keys,
-            "sheet_points": targets.points,
-            "sheet_depths": targets.depths,
-            "openness_points": targets.openness,
-            "light_points": targets.light,
+            "surface_keys": samples.keys,
+            "sheet_points": samples.points,
+            "sheet_depths": samples.depths,
+            "openness_points": samples.openness,
+            "light_points": samples.light,
             "specular_light": light.specular,
             "irradiance_light": light.irradiance,
             "background_light": light.background,
             "dfg_table": self._dfg,
         }
-        textures |= zip(("rest_x", "rest_y", "rest_z"), targets.rest, strict=False)
+        textures |= zip(("rest_x", "rest_y", "rest_z"), samples.rest, strict=False)
         if shadow is not None:
             textures["sun_shadow"] = shadow.depth
         for name, texture in textures.items():
@@ -349,11 +358,11 @@ def _box_corners(
 
 
 def _view_values(
-    scene: Scene, view: View, targets: Targets, exposure: float
+    scene: Scene, view: View, samples: SampleTargets, exposure: float
 ) -> dict[str, ArrayLike]:
     """All members of VIEW_BLOCK."""
     to_samples = np.eye(4)
-    to_samples[:2, :2] = targets.to_samples
+    to_samples[:2, :2] = samples.to_clip
     right, down, forward = view.rotation
     center_x, center_y = view.center_px
     yaw = np.deg2rad(scene.environment.yaw_deg)
@@ -366,5 +375,5 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
-        **view.lens_values(targets.to_samples),
+        **view.lens_values(samples.to_clip),
     }

@@ -7,8 +7,8 @@ S, which is what upright edges ask for, and those of a container are nearly all 
 they interlock almost like a honeycomb's cells. One sample lies exactly on each pixel's centre.
 shaders/samples.glsl is the twin of this.
 
-Targets are wider by as many texels as the image has rows: half as many texels again for a square
-one with S = 2, a third with S = 3. What lies beside the slanted image is cleared, and seen by
+Targets are wider by as many texels as the image has rows: a third as many texels again for a square
+one with S = 3, a fifth with S = 5. What lies beside the slanted image is cleared, and seen by
 nobody.
 """
 
@@ -20,9 +20,28 @@ from numpy.typing import NDArray
 Offset = tuple[int, int]
 """Texels to the right and down."""
 
+_PER_AXIS = (5, 3, 2, 1)
+
+_MOST_OF_25 = 1 << 26
+"""Texels of targets with 25 samples a pixel, at most: they take 40 bytes each."""
+
+
+def fitting(most: int, size: tuple[int, int], limit: int) -> int:
+    """Samples along each axis of a pixel, no more than `most`, with which targets of images of
+    `size` are no longer than `limit` texels along either side; those of scenes with holes, which
+    are twice as high, included, so that all images of a size are as fine. 1 at least, and 5 only
+    where memory allows."""
+
+    def fits(n: int) -> bool:
+        across, down = SampleLattice(n).texels(size)
+        held = across <= limit and SampleLattice(n).inner_row(size, limit) is not None
+        return held and (n < 5 or 2 * across * down <= _MOST_OF_25)
+
+    return next((n for n in _PER_AXIS if n <= most and fits(n)), 1)
+
 
 class SampleLattice:
-    """The samples of images of which each pixel has `per_axis` squared; 1, 2 or 3.
+    """The samples of images of which each pixel has `per_axis` squared; 1, 2, 3 or 5.
 
     slant: texels that a pixel begins to the right of the one above it. pad: columns on either side
     for what a filter asks for beyond the image.
@@ -40,6 +59,14 @@ class SampleLattice:
         width, height = size
         across = self.per_axis * width + self.slant * (height - 1) + self._border + 2 * self.pad
         return across, self.per_axis * height + self._border
+
+    def inner_row(self, size: tuple[int, int], limit: int) -> int | None:
+        """Where below an image's targets those of a second one can begin, None where both are
+        higher than `limit` together. They may share two rows, as at 4096 rows with S = 2 they must;
+        what a hole at the top of the image shows may then be wrong in its last."""
+        rows = self.texels(size)[1]
+        spare = max(2 * rows - limit, 0)
+        return rows - spare if spare <= 2 * self._border else None
 
     def to_clip(self, size: tuple[int, int]) -> NDArray[np.float64]:
         """Clip space of an image of `size` to that of its targets: x and y times this, [2, 2]."""
@@ -75,7 +102,7 @@ class SampleLattice:
     def filter(self) -> dict[Offset, float]:
         """Weights of the samples about a pixel's centre, which comes first; they add up to one.
 
-        2 per axis: a tent that falls to nothing one pixel to each side. 3: the pixel's square.
+        2 per axis: a tent that falls to nothing one pixel to each side. Others: the pixel's square.
         """
         reach = range(-self.per_axis, self.per_axis + 1)
         found: dict[Offset, float] = {}
@@ -88,12 +115,29 @@ class SampleLattice:
             if weight > 0:
                 found[offset] = weight
         total = sum(found.values())
-        near = sorted(found, key=lambda offset: np.hypot(*self.from_center(offset)))
-        return {offset: found[offset] / total for offset in near}
+
+        def order(offset: Offset) -> tuple[bool, float]:
+            return not self._is_near(offset), float(np.hypot(*self.from_center(offset)))
+
+        return {offset: found[offset] / total for offset in sorted(found, key=order)}
+
+    @property
+    def step(self) -> int:
+        """Texels between the nine samples that are `near`."""
+        return max(self.per_axis // 2, 1)
+
+    def _is_near(self, offset: Offset) -> bool:
+        return all(abs(v) <= self.step and v % self.step == 0 for v in offset)
 
     @property
     def near(self) -> int:
-        """So many samples of `filter`, the first ones and none more than a texel away, decide
-        whether a pixel sees a single surface. Each of a tent's four others counts for a
-        thirty-second only; they are asked where the nearer ones differ."""
-        return sum(weight > 1 / 32 for weight in self.filter.values())
+        """So many samples of `filter`, the first ones, decide whether a pixel sees a single
+        surface: nine about its centre, or the centre alone. The others are asked where these
+        differ: of a tent two that count for a thirty-second each, and of 25 those between them,
+        which in a pixel of some 20,000 see what no near one does."""
+        return sum(map(self._is_near, self.filter))
+
+    @property
+    def spread(self) -> float:
+        """The filter's standard deviation, in those of the pixel's square."""
+        return 2**0.5 if self.per_axis == 2 else 1.0

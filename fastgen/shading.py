@@ -7,7 +7,8 @@ import moderngl
 
 from fastgen.pixel_lists import PixelLists
 from fastgen.programs import CLASS_DEPTH_STEP, PIXEL_CLASSES, link, link_compute, listed_classes
-from fastgen.targets import Region, Targets
+from fastgen.sample_targets import Region
+from fastgen.targets import Targets
 
 UNITS = {
     "surface_keys": 0,
@@ -49,9 +50,12 @@ class Shading:
     They are linked when first needed, and scenes with and without damage share what they can.
     """
 
-    def __init__(self, ctx: moderngl.Context, samples_per_axis: int, layer: str) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, samples_per_axis: int, lookups: int, layer: str
+    ) -> None:
         self._ctx = ctx
         self._samples_per_axis = samples_per_axis
+        self._lookups = lookups
         self._layer = layer
         self._programs: list[moderngl.Program] = []
         self._arrays: dict[tuple[str, str, str, int], moderngl.VertexArray] = {}
@@ -158,6 +162,7 @@ class Shading:
     def _variant(self, pixel_class: str, damage: str, suns: int) -> dict[str, Any]:
         return {
             "samples_per_axis": self._samples_per_axis,
+            "lookups": self._lookups,
             "layer": self._layer,
             "pixel_class": pixel_class,
             "damage": damage,

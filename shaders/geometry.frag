@@ -26,9 +26,9 @@ layout(location = 6) out float out_rest_y;
 layout(location = 7) out float out_rest_z;
 #endif
 
-// packUnorm4x8 of what lies within 0..1, which needs no clamping
+// packUnorm4x8, for less
 uint four_bytes(vec4 v) {
-    ivec4 steps = ivec4(fma(v, vec4(255.0), vec4(0.5)));
+    ivec4 steps = clamp(ivec4(fma(v, vec4(255.0), vec4(0.5))), 0, 255);
     return uint(steps.x | (steps.y << 8) | (steps.z << 16) | (steps.w << 24));
 }
 

@@ -5,7 +5,7 @@ uniform usampler2D surface_keys;
 
 uint key_at(ivec2 middle) { return texelFetch(surface_keys, middle, 0).r; }
 
-#if SAMPLES_PER_AXIS > 1
+#if SAMPLES_PER_AXIS == 2 || SAMPLES_PER_AXIS == 3
 // none is more than a texel away; two gathers bring most at half the cost of fetches
 uint[FILTER_NEAR] keys_near(ivec2 middle) {
     vec2 corner = 1.0 / vec2(textureSize(surface_keys, 0));
@@ -21,7 +21,11 @@ uint[FILTER_NEAR] keys_near(ivec2 middle) {
     return keys;
 }
 #else
-uint[FILTER_NEAR] keys_near(ivec2 middle) { return uint[FILTER_NEAR](key_at(middle)); }
+uint[FILTER_NEAR] keys_near(ivec2 middle) {
+    uint keys[FILTER_NEAR];
+    for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = key_at(middle + FILTER_OFFSET[i]);
+    return keys;
+}
 #endif
 
 uint[FILTER_SAMPLES] keys_around(ivec2 middle) {

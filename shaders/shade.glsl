@@ -131,7 +131,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     return p;
 }
 
-#if FINE_LAYERS
+#if LOOKUPS > 1
 // the material of `p` at another point of its sheet goes into `sum`
 void add_layers(inout Material sum, Part p, uint zone, vec2 sheet_mm) {
     Material m = surface_at(zone, sheet_mm, p.footprint_mm, p.scar).material;
@@ -170,24 +170,24 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     return layer_color(p.surface.material, normal, view, sky, sun_seen);
 }
 
-// a pixel all of whose samples see the same surface
+// a pixel whose near samples all see the same surface
 Shaded single_surface(ivec2 pixel) {
     ivec2 middle = middle_of(pixel);
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     Part p = part_at(middle, key, view);
-#if FINE_LAYERS
-    // and at Gauss's points of the pixel; the sheet is all but flat between two of its samples
-    const mat2 pixels = mat2(from_center(vec2(1.0, 1.0)), from_center(vec2(1.0, -1.0)));
+#if LOOKUPS > 1
+    // the sheet is all but flat between the middle and two others of its near samples
+    const ivec2 one = ivec2(FILTER_STEP), other = ivec2(FILTER_STEP, -FILTER_STEP);
+    const mat2 pixels = mat2(from_center(vec2(one)), from_center(vec2(other)));
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
-    mat2 moved_mm = mat2(texelFetch(sheet_points, middle + ivec2(1, 1), 0).xy - sheet_mm,
-                         texelFetch(sheet_points, middle + ivec2(1, -1), 0).xy - sheet_mm);
+    mat2 moved_mm = mat2(texelFetch(sheet_points, middle + one, 0).xy - sheet_mm,
+                         texelFetch(sheet_points, middle + other, 0).xy - sheet_mm);
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
-    for (int i = 0; i < 4; ++i) {
-        vec2 place = 0.28867513 * vec2(ivec2((i & 1) * 2 - 1, (i & 2) - 1));
-        add_layers(p.surface.material, p, key_zone(key), sheet_mm + mm_of_pixel * place);
-    }
-    p.surface.material = mean_of(p.surface.material, 5.0);
+    Material sum = Material(vec3(0.0), 0.0, 0.0);
+    for (int i = 0; i < LOOKUPS; ++i)
+        add_layers(sum, p, key_zone(key), sheet_mm + mm_of_pixel * LOOKUP_PLACE[i]);
+    p.surface.material = mean_of(sum, float(LOOKUPS));
 #endif
     return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
 }

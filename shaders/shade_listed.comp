@@ -1,4 +1,4 @@
-// Shades the listed pixels of one class: for few pixels, scattered ones, and such as see several surfaces.
+// Shades the listed pixels of one class: all but those of the sky and of cables.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
@@ -50,15 +50,20 @@ void main() {
         vec3 ray = view_ray(center + from_center(vec2(offset)));
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
-#if FINE_LAYERS
-        float count = 1.0;
-        for (int i = 0; i < FILTER_SAMPLES; ++i)
-            if ((of_part & 1u << i) != 0u && FILTER_OFFSET[i] != offset) {
-                vec2 sheet_mm = texelFetch(sheet_points, middle + FILTER_OFFSET[i], 0).xy;
-                add_layers(p.surface.material, p, zone, sheet_mm);
-                count += 1.0;
-            }
-        p.surface.material = mean_of(p.surface.material, count);
+#if LOOKUPS > 1
+        // at the first of its samples; of two neither is the middle one, to lie on either side
+        uint others = of_part;
+        Material sum = Material(vec3(0.0), 0.0, 0.0);
+        for (int lookup = LOOKUPS == 2 ? -1 : 0; lookup < LOOKUPS; ++lookup) {
+            ivec2 at = offset;
+            uint bit = 0u;
+            for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
+                if ((others & 1u << i) != 0u) { at = FILTER_OFFSET[i]; bit = 1u << i; }
+            others &= ~bit;
+            if (lookup >= 0)
+                add_layers(sum, p, zone, texelFetch(sheet_points, middle + at, 0).xy);
+        }
+        p.surface.material = mean_of(sum, float(LOOKUPS));
 #endif
         bool at_center = part == 0 && !sees_sky;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth, 1.0);

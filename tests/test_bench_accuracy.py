@@ -71,7 +71,7 @@ def test_reference_comes_back_from_its_files(tmp_path):
     written = reference_set.Reference(
         case.drawn(),
         0.25,
-        {"box": 4 * smooth, "tent": 4 * smooth[::-1]},
+        {"box": 4 * smooth},
         inside,
         depth_m,
         1 - y / 2,
@@ -128,7 +128,7 @@ def test_every_text_that_an_ablation_changes_stands_in_a_shader():
     shaders = ("shade.frag", "shade_listed.comp")
     text = "".join(
         programs.expand(
-            shader_path(name).read_text(encoding="utf-8"), 2, "all", pixel_class, suns=1
+            shader_path(name).read_text(encoding="utf-8"), 3, pixel_class=pixel_class, suns=1
         )
         for name in shaders
         for pixel_class in ("plain", "mixed_decal")

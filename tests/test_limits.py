@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES, SPREADER_ID
-from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.generator import Generator
@@ -96,15 +95,21 @@ def test_the_largest_size_renders():
     assert (sample.ids > 0).mean() > 0.02
 
 
-def test_a_dataset_too_high_for_holes_is_refused_rather_than_made_without_them(tmp_path, capfd):
-    (tmp_path / "port.yaml").write_text("damage: {probability: 1, kinds: [perforation]}")
-    sized = ["--size", "64x2800", "--quality", "high", "--config", str(tmp_path / "port.yaml")]
-    code = main(["generate", str(tmp_path / "out"), "--images", "2", "--workers", "1", *sized])
-    if code == 0:
-        pytest.skip("this driver has larger textures")
-    assert code == 2
-    error = capfd.readouterr().err
-    assert "size: 64x2800 with 3 samples along a pixel needs textures of 16800 texels" in error
+def test_an_image_too_high_for_all_samples_of_its_quality_takes_fewer():
+    """In front of a hole, for which there are two views."""
+    holes = {"probability": 1, "count": [1, 1], "kinds": ["perforation"]}
+    config = Config.from_values({"damage": holes, "spreader": {"probability": 0}})
+    samples = []
+    for quality in ("high", "draft"):
+        with Generator(config, 8, (64, 2800), quality=quality) as generator:
+            scene = generator.scene(1)
+            (hole,) = scene.damages
+            eye = tuple(np.array(hole.origin_mm) - 3000 * np.array(hole.inward))
+            camera = Camera("close", eye, hole.origin_mm, 400.0)
+            samples.append(generator.render(scene=scene, camera=camera))
+            check(samples[-1])
+    assert (samples[0].damage == 501).sum() > 200
+    assert (samples[0].damage != samples[1].damage).mean() < 1e-3
 
 
 def test_nothing_in_view_has_objects_without_boxes():

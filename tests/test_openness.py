@@ -303,7 +303,7 @@ def test_what_mirrors_open_sky_is_what_rays_find(camera, index):
         scene = g.scene(index)
         sample = g.render(scene=scene, camera=camera, normals=True)
         targets = g._gpu.renderer().draw(scene, scene.camera(camera), size)
-        stored = np.frombuffer(targets.openness.read(), np.uint8).reshape(*size[::-1], 4)
+        stored = np.frombuffer(targets.samples.openness.read(), np.uint8).reshape(*size[::-1], 4)
         found = stored[..., 3] / 255
         mesh = g._gpu.renderer().mesh(scene.container)
     start, rays = sample.view.rays()
