@@ -94,8 +94,8 @@ class Reference:
 
 
 FILTERS = {"draft": "box", "balanced": "box", "high": "box"}
-"""The pixel filter of each quality: a box is the pixel's square, a tent reaches one pixel to each
-side. `draft` has none and is held to the box."""
+"""The pixel filter of each quality at SIZE: a box is the pixel's square; `draft` has none and is
+held to it. A tent reaches a pixel to each side; only images too large for nine samples have it."""
 
 DEPTH_STEP = 8
 

@@ -14,8 +14,7 @@ class AssetError(FastgenError):
 
 
 class ContextError(FastgenError):
-    """This machine gives no OpenGL context, or CUDA no access to what it
-    draws."""
+    """This machine gives no OpenGL context, or CUDA no access to what it draws."""
 
 
 class OutputError(FastgenError):
