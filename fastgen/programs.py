@@ -17,7 +17,7 @@ from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
 from fastgen.lettering import TILE_CAPS, TILE_RANGE_CAPS
 from fastgen.mesh import MATERIALS, MAX_ZONES
 from fastgen.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
-from fastgen.reflectance import MIN_ROUGHNESS
+from fastgen.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, MIN_ROUGHNESS
 from fastgen.resources import shader_path
 from fastgen.rust import DEFINES as RUST_DEFINES
 from fastgen.sample_lattice import SampleLattice
@@ -116,10 +116,6 @@ INSIDE_ALBEDO = {"wood": (0.22, 0.14, 0.08), "primer": (0.30, 0.31, 0.29)}
 
 INSIDE_LIGHT = 0.1
 """Share of the light around that reaches the inside through a hole; chosen by eye."""
-
-DIELECTRIC_F0 = 0.04
-"""Reflectance of what is no metal, head on: that of a refractive index of 1.5 (Fresnel's equations,
-((n - 1) / (n + 1))^2), usual for paints and plastics."""
 
 _NOISE_LEVELS = NOISE_SIZE.bit_length()
 
@@ -242,6 +238,7 @@ def _constants(
         "SPREADER_ZONE": f"{SPREADER_ZONE}u",
         "MIN_ROUGHNESS": MIN_ROUGHNESS,
         "DIELECTRIC_F0": DIELECTRIC_F0,
+        "DIELECTRIC_INDEX": DIELECTRIC_INDEX,
         "INSIDE_LIGHT": INSIDE_LIGHT,
         "TONE_FRESNEL": tone.FRESNEL,
         "TONE_SHOULDER": tone.SHOULDER,

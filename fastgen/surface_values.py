@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen.container_layout import KINDS
 from fastgen.damage import mask_values, reach_mm
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.programs import DIELECTRIC_F0, REACH_MARGIN_MM, SPREADER_ZONE, noise_deviation
-from fastgen.reflectance import mean_specular_albedo
+from fastgen.programs import REACH_MARGIN_MM, SPREADER_ZONE, noise_deviation
+from fastgen.reflectance import DIELECTRIC_F0, mean_specular_albedo
 from fastgen.rust import rusted
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 from fastgen.spreader_parts import CABLE_CHART, CABLE_LENGTH_MM, CABLES, Hang, cable_feet_mm

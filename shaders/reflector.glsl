@@ -22,6 +22,14 @@ struct Reflector {
     vec3 diffuse;      // of what it lets through, the share that comes back
 };
 
+// as in fastgen/reflectance.py
+float fresnel_climb(float cosine) {
+    float g = sqrt(fma(cosine, cosine, DIELECTRIC_INDEX * DIELECTRIC_INDEX - 1.0));
+    float away = (g - cosine) / (g + cosine);
+    float ratio = (cosine * (g + cosine) - 1.0) / (cosine * (g - cosine) + 1.0);
+    return (0.5 * away * away * (1.0 + ratio * ratio) - DIELECTRIC_F0) / (1.0 - DIELECTRIC_F0);
+}
+
 Reflector reflector(Material m, vec3 normal, vec3 view) {
     float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
     vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;

@@ -35,7 +35,7 @@ vec3 sunlit(Reflector r, int i) {
     float distribution = a2 / (d * d);   // times pi, for sun_light is irradiance / pi
     float masking = 0.5 / (n_dot_l * sqrt(fma(n_dot_v * n_dot_v, 1.0 - a2, a2)) +
                            n_dot_v * sqrt(fma(n_dot_l * n_dot_l, 1.0 - a2, a2)) + 1e-5);
-    float grazing = pow(1.0 - clamp(dot(r.view, half_way), 0.0, 1.0), 5.0);
+    float grazing = fresnel_climb(clamp(dot(r.view, half_way), 0.0, 1.0));
     vec3 metal = mix(m.albedo, vec3(1.0), grazing) * (1.0 + m.albedo * r.gain);
     float dielectric = mix(DIELECTRIC_F0, 1.0, grazing) * (1.0 + DIELECTRIC_F0 * r.gain);
     vec3 specular = mix(vec3(dielectric), metal, m.metallic) * (distribution * masking);

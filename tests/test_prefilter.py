@@ -186,6 +186,14 @@ def test_the_background_is_as_sharp_as_the_hdri():
     assert seen[::2].mean() - seen[1::2].mean() > 0.6
 
 
+def unpolarized(cosine, index=1.5):
+    """What Fresnel's equations and Snell's law reflect of light from air at this cosine."""
+    inside = np.sqrt(1 - (1 - cosine**2) / index**2)
+    across = (cosine - index * inside) / (cosine + index * inside)
+    along = (inside - index * cosine) / (inside + index * cosine)
+    return (across**2 + along**2) / 2
+
+
 @pytest.mark.parametrize(("row", "column"), [(12, 2), (12, 28), (20, 10), (31, 31), (25, 0)])
 def test_dfg_equals_brute_force_over_light_directions(row, column):
     alpha, n_dot_v = ((row + 0.5) / 32) ** 2, (column + 0.5) / 32
@@ -206,8 +214,8 @@ def test_dfg_equals_brute_force_over_light_directions(row, column):
     )
     cell = np.sin(theta)[:, None] * (np.pi / 2 / steps) * (2 * np.pi / steps)
     integrand = spread * visible * z * cell
-    schlick = (1 - v_dot_h) ** 5
-    expected = ((1 - schlick) * integrand).sum(), (schlick * integrand).sum()
+    climb = (unpolarized(v_dot_h) - 0.04) / 0.96
+    expected = ((1 - climb) * integrand).sum(), (climb * integrand).sum()
     np.testing.assert_allclose(dfg_table()[row, column], expected, atol=1e-3)
 
 
@@ -218,7 +226,10 @@ def test_smooth_surfaces_reflect_all_light_and_rough_ones_never_more():
 
 
 @pytest.mark.parametrize("f0", [0.0, 0.04, 0.5, 1.0])
-def test_a_smooth_surface_mirrors_the_mean_of_schlicks_fresnel(f0):
-    """The integral of 2 c (f0 + (1 - f0) (1 - c)^5) over c in 0..1 is f0 + (1 - f0) / 21."""
-    assert mean_specular_albedo(f0, 0.05) == pytest.approx(f0 + (1 - f0) / 21, abs=0.003)
+def test_a_smooth_surface_mirrors_the_mean_of_fresnels_equations(f0):
+    """Over the cosine-weighted hemisphere; that of F0 = 0.04 is 0.092 (Walsh 1926)."""
+    cosine = (np.arange(10000) + 0.5) / 10000
+    climb = (unpolarized(cosine) - 0.04) / 0.96
+    mean = np.mean(2 * cosine * (f0 + (1 - f0) * climb))
+    assert mean_specular_albedo(f0, 0.05) == pytest.approx(mean, abs=0.003)
     assert mean_specular_albedo(f0, 0.9) < mean_specular_albedo(f0, 0.05)
