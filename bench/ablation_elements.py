@@ -222,7 +222,7 @@ ELEMENTS = (
         "bounces in occluded places",
         text=(
             (
-                "return 0.75 * (clamp(((share * a + b) * share + c) * share, share, 1.0) - share);",
+                "return min(fit * (0.75 + max(0.75 - 1.5 * sky.rim, 0.0)), 1.0 - share);",
                 "return vec3(0.0);",
             ),
         ),
@@ -239,7 +239,7 @@ ELEMENTS = (
     Element(
         "light",
         "reflections lean away from what hides the sky",
-        text=(("fma(vec3(lean), aside, mirror), width * mix(0.7, 1.0, open)", "mirror, width"),),
+        text=(("fma(vec3(lean), aside, mirror), width", "mirror, width"),),
     ),
     Element(
         "light",

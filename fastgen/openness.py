@@ -20,9 +20,9 @@ VERTEX_BYTES = 8 + DIRECTIONS // 8
 """What the shader reads of a vertex: a cone, filled up to four bytes, four of the light that comes
 in, and a bit for each direction."""
 
-_LOBE = 4
-"""Directions about a mirrored ray: as many as a cap of 24 degrees radius holds. With more or fewer
-path-traced containers are farther off."""
+_LOBE = 8
+"""Directions about a mirrored ray: as many as a cap of 34 degrees holds. Four or 14 tell less
+well which share of a lobe is open."""
 
 _DARK = 1e-20  # instead of no light at all, which has no ratios
 _FIELD_BITS = 21  # of a channel, three of which share a number

@@ -37,7 +37,8 @@ vec3 background(vec3 direction) {
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
 // its irradiance from there, relative to that of a whole sky about that direction, the share that is
 // open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
-// 1 or 0, and irradiance / pi that the suns throw on what hides it and faces here, times its share
+// 1 or 0, irradiance / pi that the suns throw on what hides it and faces here, times its share, and the
+// albedo of what hides it
 struct Openness {
     vec3 direction;
     float rim;
@@ -45,6 +46,7 @@ struct Openness {
     float mirrored;
     float bounces;
     vec3 sun;
+    vec3 beside;
 };
 
 // along the surface, away from what hides the sky most; 0 where it is hidden all round alike
@@ -52,24 +54,26 @@ vec3 leaning(Openness sky, vec3 normal) {
     return sky.direction - normal * dot(normal, sky.direction);
 }
 
-// Light that gets here by way of what hides the sky, which is taken for the same paint: Jimenez et
-// al. 2016, Practical Realtime Strategies for Accurate Indirect Occlusion, section 4. Three
-// quarters of their fit come nearest to path-traced containers.
-vec3 bounced(Openness sky, vec3 albedo) {
+// Light that gets here by way of what hides the sky: Jimenez et al. 2016, Practical Realtime
+// Strategies for Accurate Indirect Occlusion, section 4. Path-traced containers have three quarters of
+// their fit in corners, and more where little is hidden: that stands in the open itself.
+vec3 bounced(Openness sky) {
     float share = 1.0 - sky.rim * sky.rim;
-    vec3 a = 2.0404 * albedo - 0.3324;
-    vec3 b = -4.7951 * albedo + 0.6417;
-    vec3 c = 2.7552 * albedo + 0.6903;
-    return 0.75 * (clamp(((share * a + b) * share + c) * share, share, 1.0) - share);
+    vec3 a = 2.0404 * sky.beside - 0.3324;
+    vec3 b = -4.7951 * sky.beside + 0.6417;
+    vec3 c = 2.7552 * sky.beside + 0.6903;
+    vec3 fit = clamp(((share * a + b) * share + c) * share, share, 1.0) - share;
+    return min(fit * (0.75 + max(0.75 - 1.5 * sky.rim, 0.0)), 1.0 - share);
 }
 
-// Share of a lobe about `mirror` that meets open sky. Within a cone it is fitted to sampled GGX lobes
-// over random roughness, view and cones within the hemisphere; the more is hidden, the less is what is
-// open a cone, and the more it is asked for just where the mirror points.
+// Share of a lobe about `mirror` that meets open sky, by the cone and by what is open just where the
+// mirror points. Fitted, as are the bend, the width and the lean of lobes below, to GGX lobes of 96
+// rays from the pixels of 32 scenes.
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
-    float within = smoothstep(sky.rim - 0.03 - 0.64 * roughness, sky.rim - 0.13 + 1.4 * roughness,
+    float within = smoothstep(0.58 * sky.rim - 0.55, 0.58 * sky.rim + 0.69 + 0.76 * roughness,
                               dot(mirror, sky.direction));
-    return mix(within, sky.mirrored, sky.rim);
+    within = mix(1.0, within, min(sky.rim / 0.3, 1.0));   // nothing hides the sky of what has no rim
+    return mix(within, sky.mirrored, 0.22 + 0.32 * sky.rim);
 }
 
 vec3 lit(Reflector r, Openness sky) {
@@ -77,20 +81,19 @@ vec3 lit(Reflector r, Openness sky) {
     vec3 metal = (m.albedo * r.dfg.x + r.dfg.y) * (1.0 + m.albedo * r.gain);
     vec3 specular = mix(vec3(r.dielectric), metal, m.metallic);
 
-    // rough lobes lean to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
-    // from aslant; both fitted to the mean of directions of sampled GGX lobes
-    vec3 mirror = reflect(-r.view, r.normal);
-    mirror = normalize(mix(mirror, r.normal, m.roughness * m.roughness * m.roughness));
-    float width = m.roughness * (1.0 - (0.65 - 0.71 * m.roughness) * (1.0 - r.n_dot_v));
-    vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky, m.albedo));
-    around += sky.sun * mix(m.albedo, material_base[SHEET_MATERIAL].rgb, 0.5);
-    // where the sky is hidden the mirror shows the paint that hides it; what is left of a lobe leans
-    // away from there and is narrower, by how much path-traced containers tell
+    // rough lobes bend to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
+    // from aslant
+    float aslant = 1.0 - r.n_dot_v;
+    float bend = m.roughness * m.roughness * (1.47 * m.roughness - 0.54 + 0.39 * aslant);
+    vec3 mirror = normalize(mix(reflect(-r.view, r.normal), r.normal, bend));
+    float width = m.roughness * (1.025 - (0.79 - 0.415 * m.roughness) * aslant);
+    vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky));
+    around += sky.sun * mix(sky.beside, material_base[SHEET_MATERIAL].rgb, 0.5);
+    // where the sky is hidden the mirror shows what hides it; the rest of a lobe leans away from there
     float open = open_lobe(sky, mirror, m.roughness);
     vec3 aside = leaning(sky, r.normal);
     float most = length(aside);
-    float lean = 1.5 * m.roughness * (1.0 - open) * smoothstep(0.0, 0.2, most) / max(most, 1e-3);
-    vec3 mirrored = mix(m.albedo * around,
-                        prefiltered(fma(vec3(lean), aside, mirror), width * mix(0.7, 1.0, open)), open);
+    float lean = 1.12 * m.roughness * (1.0 - open) * smoothstep(0.0, 0.2, most) / max(most, 1e-3);
+    vec3 mirrored = mix(sky.beside * around, prefiltered(fma(vec3(lean), aside, mirror), width), open);
     return r.diffuse * around + specular * mirrored;
 }

@@ -4,6 +4,7 @@ struct SurfacePoint {
     Material material;
     uint decal_id;
     vec3 outward;   // as in the table of zones
+    float printed;   // share that a decal covers
 };
 
 // footprint_mm: width of the lookup on the sheet; scar: how much damage has worked the steel, 0..1
@@ -32,6 +33,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     SurfacePoint s;
     s.decal_id = 0u;
     s.outward = part.yzw;
+    s.printed = 0.0;
     vec3 albedo = base.rgb;
     float roughness = base.a;
 
@@ -44,7 +46,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     s.decal_id = decal.id;
 #if SHOWN(DECALS)
     albedo = decal.albedo;
-    decal_alpha = decal.alpha;
+    decal_alpha = s.printed = decal.alpha;
     roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
 #endif
 #endif

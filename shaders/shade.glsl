@@ -49,7 +49,8 @@ Openness openness_at(ivec2 sample_at, uint zone) {
     vec4 encoded = unpackUnorm4x8(texelFetch(light_points, sample_at, 0).r);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
-    return Openness(cone / size, clamp(2.0 - 2.0 * size, 0.0, 1.0), light, stored.w, bounces, vec3(0.0));
+    float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);
+    return Openness(cone / size, rim, light, stored.w, bounces, vec3(0.0), vec3(0.0));
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -150,6 +151,8 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
+    // the paint of the place, for much rust seldom stands alone, but never a print's
+    sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
     vec4 sun_seen = vec4(0.0);
 #if SUNS && LAYER == LAYER_ALL
     float depth = texelFetch(sheet_depths, sample_at, 0).r;

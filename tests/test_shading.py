@@ -6,7 +6,7 @@ import pytest
 from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
 from fastgen.gl import open_context
 from fastgen.noise import noise_tiles
-from fastgen.reflectance import dfg_table
+from fastgen.reflectance import dfg_table, fresnel_climb
 from fastgen.textures import noise_texture
 from tests.glsl import blocks, run
 
@@ -49,7 +49,7 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0))), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0))), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     np.testing.assert_allclose(out[:, :3], 1.0, atol=0.01)
@@ -64,12 +64,42 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0))), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0))), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     assert (out[:, 0] <= 1.01).all()
     assert (out[:, 0] >= 0).all()
     del kept
+
+
+def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
+    """Under a white sky, a part of which is hidden: the brighter what hides it, the brighter the
+    surface, up to what the whole sky gives, whatever the surface's own paint."""
+    kept = blocks(gl, yaw=(1, 0), background_size=16)
+    rng = np.random.default_rng(3)
+    rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, paint, rim
+    body = (
+        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+        "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
+        " float share = 1.0 - x.w * x.w;"
+        " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
+        " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, vec3(0.0),"
+        " vec3(0.0, 0.5, 1.0))), 1.0); }"
+    )
+    black, grey, white = run(gl, body, rows, white_light(gl))[:, :3].T
+    assert (black <= grey + 1e-6).all()
+    assert (grey <= white + 1e-6).all()
+    assert (white <= 1.01).all()
+    bright, hidden = rows[:, 2] > 0.5, rows[:, 3] > 0.5
+    assert (white - black)[bright & hidden].mean() > 0.1
+    del kept
+
+
+def test_fresnels_equations_equal_their_numpy_twin(gl):
+    cosine = np.linspace(0, 1, 200)
+    body = '#include "reflector.glsl"\nvec4 f(vec4 x) { return vec4(fresnel_climb(x.x), 0, 0, 0); }'
+    out = run(gl, body, np.repeat(cosine[:, None], 4, 1), white_light(gl))
+    np.testing.assert_allclose(out[:, 0], fresnel_climb(cosine), atol=1e-5)
 
 
 def test_octahedral_mapping_equals_its_numpy_twin(gl):
