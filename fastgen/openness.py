@@ -24,6 +24,9 @@ _LOBE = 8
 """Directions about a mirrored ray: as many as a cap of 34 degrees holds. Four or 14 tell less
 well which share of a lobe is open."""
 
+_ABOUT_SUN = 4
+"""Directions that tell how open a sun is: a cap of 24 degrees."""
+
 _DARK = 1e-20  # instead of no light at all, which has no ratios
 _FIELD_BITS = 21  # of a channel, three of which share a number
 _WHOLE = 1 << (
@@ -167,10 +170,10 @@ class Openness:
         found = np.zeros((len(self._number), 3), np.float32)
         for sun in sky.light.suns:
             toward = to_map_frame(sun.direction, -sky.yaw_deg)
-            nearest = np.argsort(-sky_directions() @ toward)[:_LOBE]
+            nearest = np.argsort(-sky_directions() @ toward)[:_ABOUT_SUN]
             bits = [self._open_to[k >> 3] >> (7 - (k & 7)) & 1 for k in nearest.tolist()]
             cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
-            share = cosine[self._number] * np.sum(bits, axis=0, dtype=np.float32) / _LOBE
+            share = cosine[self._number] * np.mean(bits, axis=0, dtype=np.float32)
             found += share[:, None] * np.array(sun.light, np.float32)
         return found
 

@@ -25,8 +25,8 @@ def fresnel_climb(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
     cosine: of the angle between light and normal, 0..1. Fresnel's equations for unpolarized light
     on the dielectric of DIELECTRIC_INDEX, as Cook and Torrance 1982 write them (A Reflectance
-    Model for Computer Graphics, section 4). Between 40 and 60 degrees Schlick's power of five lies
-    a fifth below. What is no dielectric climbs alike.
+    Model for Computer Graphics). At 50 to 60 degrees the reflectance by Schlick's power of five is
+    a fifth too low. What is no dielectric is taken to climb alike.
     """
     g = np.sqrt(cosine**2 + DIELECTRIC_INDEX**2 - 1)
     ratio = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)

@@ -72,7 +72,7 @@ vec3 bounced(Openness sky) {
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
     float within = smoothstep(0.58 * sky.rim - 0.55, 0.58 * sky.rim + 0.69 + 0.76 * roughness,
                               dot(mirror, sky.direction));
-    within = mix(1.0, within, min(sky.rim / 0.3, 1.0));   // nothing hides the sky of what has no rim
+    within = mix(1.0, within, min(sky.rim / 0.3, 1.0));   // no rim, nothing that hides
     // a lobe at a roof under a spreader goes by one gap or none
     float pointed = 0.22 + 0.32 * sky.rim + 0.4 * smoothstep(0.6, 0.9, sky.rim);
     return mix(within, sky.mirrored, pointed);
@@ -86,7 +86,7 @@ vec3 lit(Reflector r, Openness sky) {
     // rough lobes bend to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
     // from aslant
     float aslant = 1.0 - r.n_dot_v;
-    float bend = m.roughness * m.roughness * (1.47 * m.roughness - 0.54 + 0.39 * aslant);
+    float bend = min(m.roughness * m.roughness * (1.47 * m.roughness - 0.54 + 0.39 * aslant), 1.0);
     vec3 mirror = normalize(mix(reflect(-r.view, r.normal), r.normal, bend));
     float width = m.roughness * (1.025 - (0.79 - 0.415 * m.roughness) * aslant);
     vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky));

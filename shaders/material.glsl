@@ -4,7 +4,7 @@ struct SurfacePoint {
     Material material;
     uint decal_id;
     vec3 outward;   // as in the table of zones
-    float printed;   // share that a decal covers
+    float printed;   // share that shows a decal
 };
 
 // footprint_mm: width of the lookup on the sheet; scar: how much damage has worked the steel, 0..1
@@ -86,6 +86,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif
+    s.printed *= 1.0 - rusty;
     float metallic = trait.x * (1.0 - rusty);
     wet(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
     s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS), metallic);

@@ -133,14 +133,20 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 }
 
 #if LOOKUPS > 1
-// the material of `p` at another point of its sheet goes into `sum`
-void add_layers(inout Material sum, Part p, uint zone, vec2 sheet_mm) {
-    Material m = surface_at(zone, sheet_mm, p.footprint_mm, p.scar).material;
-    sum = Material(sum.albedo + m.albedo, sum.roughness + m.roughness, sum.metallic + m.metallic);
+// what all lookups of a pixel have in common, the layers at none
+SurfacePoint no_layers(SurfacePoint first) {
+    first.material = Material(vec3(0.0), 0.0, 0.0);
+    first.printed = 0.0;
+    return first;
 }
 
-Material mean_of(Material sum, float count) {
-    return Material(sum.albedo / count, sum.roughness / count, sum.metallic / count);
+// the layers of `p` at another point of its sheet go into `sum`, the mean of `count` of them
+void add_layers(inout SurfacePoint sum, Part p, uint zone, vec2 sheet_mm, float count) {
+    SurfacePoint s = surface_at(zone, sheet_mm, p.footprint_mm, p.scar);
+    sum.material.albedo += s.material.albedo / count;
+    sum.material.roughness += s.material.roughness / count;
+    sum.material.metallic += s.material.metallic / count;
+    sum.printed += s.printed / count;
 }
 #endif
 
@@ -187,10 +193,10 @@ Shaded single_surface(ivec2 pixel) {
     mat2 moved_mm = mat2(texelFetch(sheet_points, middle + one, 0).xy - sheet_mm,
                          texelFetch(sheet_points, middle + other, 0).xy - sheet_mm);
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
-    Material sum = Material(vec3(0.0), 0.0, 0.0);
+    SurfacePoint mean = no_layers(p.surface);
     for (int i = 0; i < LOOKUPS; ++i)
-        add_layers(sum, p, key_zone(key), sheet_mm + mm_of_pixel * LOOKUP_PLACE[i]);
-    p.surface.material = mean_of(sum, float(LOOKUPS));
+        add_layers(mean, p, key_zone(key), sheet_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
+    p.surface = mean;
 #endif
     return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
 }

@@ -53,7 +53,7 @@ void main() {
 #if LOOKUPS > 1
         // at the first of its samples; of two neither is the middle one, to lie on either side
         uint others = of_part;
-        Material sum = Material(vec3(0.0), 0.0, 0.0);
+        SurfacePoint mean = no_layers(p.surface);
         for (int lookup = LOOKUPS == 2 ? -1 : 0; lookup < LOOKUPS; ++lookup) {
             ivec2 at = offset;
             uint bit = 0u;
@@ -61,9 +61,9 @@ void main() {
                 if ((others & 1u << i) != 0u) { at = FILTER_OFFSET[i]; bit = 1u << i; }
             others &= ~bit;
             if (lookup >= 0)
-                add_layers(sum, p, zone, texelFetch(sheet_points, middle + at, 0).xy);
+                add_layers(mean, p, zone, texelFetch(sheet_points, middle + at, 0).xy, float(LOOKUPS));
         }
-        p.surface.material = mean_of(sum, float(LOOKUPS));
+        p.surface = mean;
 #endif
         bool at_center = part == 0 && !sees_sky;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth, 1.0);

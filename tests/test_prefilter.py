@@ -11,7 +11,7 @@ from fastgen.environment import (
     prefilter_environment,
 )
 from fastgen.prefilter import octahedral_decode, octahedral_encode, sample_octahedral, shrink
-from fastgen.reflectance import dfg_table, mean_specular_albedo
+from fastgen.reflectance import dfg_table, fresnel_climb, mean_specular_albedo
 from fastgen.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
 
@@ -194,6 +194,15 @@ def unpolarized(cosine, index=1.5):
     return (across**2 + along**2) / 2
 
 
+def test_reflectance_climbs_by_snell_and_fresnel():
+    cosine = np.linspace(0, 1, 101)
+    expected = (unpolarized(cosine) - 0.04) / 0.96
+    np.testing.assert_allclose(fresnel_climb(cosine), expected, atol=1e-12)
+    # Walsh 1926: what even light from all around gives back at an index of 1.5
+    middles = (np.arange(10000) + 0.5) / 10000
+    assert np.mean(2 * middles * unpolarized(middles)) == pytest.approx(0.0918, abs=1e-4)
+
+
 @pytest.mark.parametrize(("row", "column"), [(12, 2), (12, 28), (20, 10), (31, 31), (25, 0)])
 def test_dfg_equals_brute_force_over_light_directions(row, column):
     alpha, n_dot_v = ((row + 0.5) / 32) ** 2, (column + 0.5) / 32
@@ -227,7 +236,7 @@ def test_smooth_surfaces_reflect_all_light_and_rough_ones_never_more():
 
 @pytest.mark.parametrize("f0", [0.0, 0.04, 0.5, 1.0])
 def test_a_smooth_surface_mirrors_the_mean_of_fresnels_equations(f0):
-    """Over the cosine-weighted hemisphere; that of F0 = 0.04 is 0.092 (Walsh 1926)."""
+    """Over the cosine-weighted hemisphere."""
     cosine = (np.arange(10000) + 0.5) / 10000
     climb = (unpolarized(cosine) - 0.04) / 0.96
     mean = np.mean(2 * cosine * (f0 + (1 - f0) * climb))

@@ -90,6 +90,9 @@ def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
     assert (black <= grey + 1e-6).all()
     assert (grey <= white + 1e-6).all()
     assert (white <= 1.01).all()
+    # in the depth of a recess there is no other light, whatever the surface's own paint
+    deep = np.c_[rows[:, :3], np.full(len(rows), 1.0)]
+    assert run(gl, body, deep, white_light(gl))[:, 0].max() < 0.06
     bright, hidden = rows[:, 2] > 0.5, rows[:, 3] > 0.5
     assert (white - black)[bright & hidden].mean() > 0.1
     del kept
