@@ -105,6 +105,35 @@ def test_fresnels_equations_equal_their_numpy_twin(gl):
     np.testing.assert_allclose(out[:, 0], fresnel_climb(cosine), atol=1e-5)
 
 
+@pytest.mark.parametrize("slope_deg", [10, 50, 60])
+def test_black_paint_mirrors_of_a_sun_what_it_mirrors_toward_it(gl, slope_deg):
+    """All that comes back of one direction's light, over all views, is by Helmholtz's reciprocity
+    what comes back in that direction of light from all around: the split-sum table's."""
+    slope, roughness, steps = np.deg2rad(slope_deg), 0.31, 120
+    toward = np.tile([np.sin(slope), 0, np.cos(slope), 0], (4, 1))
+    kept = blocks(gl, yaw=(1, 0), sun_toward=toward, sun_light=np.ones((4, 4)))
+    theta, phi = np.meshgrid(
+        (np.arange(steps) + 0.5) / steps * np.pi / 2, (np.arange(steps) + 0.5) / steps * np.pi
+    )
+    views = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    ).reshape(-1, 3)
+    body = (
+        '#include "reflector.glsl"\n#include "ibl.glsl"\n#include "sun.glsl"\n'
+        f"vec4 f(vec4 x) {{ Material black = Material(vec3(0.0), {roughness}, 0.0);"
+        " return vec4(sunlit(reflector(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
+    )
+    radiance = run(gl, body, np.c_[views, np.zeros(len(views))], white_light(gl))[:, 0]
+    cell = np.sin(theta).ravel() * (np.pi / 2 / steps) * (2 * np.pi / steps)
+    found = (radiance * views[:, 2] * cell).sum() / (np.pi * np.cos(slope))
+    column = np.cos(slope) * 32 - 0.5
+    scale, bias = (
+        np.interp(column, np.arange(32), dfg_table()[int(roughness * 32), :, k]) for k in (0, 1)
+    )
+    assert found == pytest.approx(0.04 * scale + bias, rel=0.03)
+    del kept
+
+
 def test_octahedral_mapping_equals_its_numpy_twin(gl):
     from fastgen.prefilter import octahedral_encode
 
