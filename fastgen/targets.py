@@ -65,7 +65,7 @@ def merged(regions: Sequence[Region | None]) -> list[Region | None]:
 class Targets:
     """The shaded image of (width, height) = size, and the samples it is made from.
 
-    samples_per_axis, inner_row: see SampleTargets.
+    samples_per_axis: see SampleTargets.
     """
 
     def __init__(self, gl: GLContext, size: tuple[int, int], samples_per_axis: int) -> None:

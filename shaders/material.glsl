@@ -33,7 +33,6 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     SurfacePoint s;
     s.decal_id = 0u;
     s.outward = part.yzw;
-    s.printed = 0.0;
     vec3 albedo = base.rgb;
     float roughness = base.a;
 
@@ -46,7 +45,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     s.decal_id = decal.id;
 #if SHOWN(DECALS)
     albedo = decal.albedo;
-    decal_alpha = s.printed = decal.alpha;
+    decal_alpha = decal.alpha;
     roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
 #endif
 #endif
@@ -86,7 +85,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif
-    s.printed *= 1.0 - rusty;
+    s.printed = decal_alpha * (1.0 - rusty);
     float metallic = trait.x * (1.0 - rusty);
     wet(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
     s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS), metallic);
