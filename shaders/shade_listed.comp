@@ -52,17 +52,17 @@ void main() {
         Part p = part_at(middle + offset, first_key, view);
 #if LOOKUPS > 1
         // at the first of its samples; of two neither is the middle one, to lie on either side
-        uint others = of_part;
+        int found = bitCount(of_part);
+        uint others = LOOKUPS == 2 && found > 2 ? of_part & (of_part - 1u) : of_part;
         SurfacePoint mean = no_layers(p.surface);
-        for (int lookup = LOOKUPS == 2 ? -1 : 0; lookup < LOOKUPS; ++lookup) {
+        int lookup = 0, lookups = min(found, LOOKUPS);
+        do {
             ivec2 at = offset;
-            uint bit = 0u;
             for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
-                if ((others & 1u << i) != 0u) { at = FILTER_OFFSET[i]; bit = 1u << i; }
-            others &= ~bit;
-            if (lookup >= 0)
-                add_layers(mean, p, zone, texelFetch(sheet_points, middle + at, 0).xy, float(LOOKUPS));
-        }
+                if ((others & 1u << i) != 0u) at = FILTER_OFFSET[i];
+            others &= others - 1u;   // less the lowest bit
+            add_layers(mean, p, zone, texelFetch(sheet_points, middle + at, 0).xy, float(lookups));
+        } while (++lookup < lookups);
         p.surface = mean;
 #endif
         bool at_center = part == 0 && !sees_sky;
