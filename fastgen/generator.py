@@ -43,7 +43,7 @@ from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 
-QUALITY = {"draft": (1, 1), "balanced": (3, 2), "high": (5, 5)}
+QUALITY = {"draft": (1, 1), "balanced": (3, 2), "high": (5, 25)}
 """Samples along each axis of a pixel, and lookups of the material layers in it, by quality."""
 
 
@@ -71,7 +71,7 @@ class Generator:
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
     in place of the bundled ones. quality: draft (one sample a pixel, its materials looked up once),
-    balanced (nine, materials looked up twice), or high (25, and five times). `high` takes nine
+    balanced (nine, materials looked up twice), or high (25, looked up at each). `high` takes nine
     samples of images of more than about a megapixel or 1638 rows, as 25 of a scene with holes take
     2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
     four, filtered with the neighbours', of images of more than 2730 rows.

@@ -92,7 +92,7 @@ of them would pass 255: below spreaders the ground is dark and the sunlit roof t
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""
 
-LOOKUP_PX = {1: 0.92, 2: 0.6, 5: 0.45}
+LOOKUP_PX = {1: 0.92, 2: 0.6, 25: 0.2}
 """Width of each of a pixel's lookups of the layers, by how many there are, where the pixel is
 filtered as a square; a wider filter asks for wider ones. Found by the distance to path-traced
 references."""
@@ -100,8 +100,7 @@ references."""
 LOOKUP_PLACES = {
     1: ((0.0, 0.0),),
     2: ((0.25, 0.1), (-0.25, -0.1)),
-    # Gauss's points about the centre
-    5: ((0.0, 0.0), *itertools.product((-((1 / 12) ** 0.5), (1 / 12) ** 0.5), repeat=2)),
+    25: tuple(itertools.product((-0.4, -0.2, 0.0, 0.2, 0.4), repeat=2)),
 }
 """Where in a pixel that sees one surface they are, in pixels from its centre."""
 

@@ -73,7 +73,7 @@ class Renderer:
 
     gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2, 3 or 5;
     fewer for images whose samples the driver's textures have no room for. lookups: of the material
-    layers in a pixel, 1, 2 or 5; 1 of one sample.
+    layers in a pixel, 1, 2 or 25; 1 of one sample.
     mask_threshold_mm: what moved by more counts as damaged.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
