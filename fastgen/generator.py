@@ -71,7 +71,7 @@ class Generator:
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
     in place of the bundled ones. quality: draft (one sample a pixel, its materials looked up once),
-    balanced (nine, materials looked up twice), or high (25, looked up at each). `high` takes nine
+    balanced (nine, materials looked up twice), or high (25, and as often). `high` takes nine
     samples of images of more than about a megapixel or 1638 rows, as 25 of a scene with holes take
     2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
     four, filtered with the neighbours', of images of more than 2730 rows.

@@ -51,7 +51,8 @@ void main() {
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
 #if LOOKUPS > 1
-        // at the first of its samples; of two neither is the middle one, to lie on either side
+        // at the first of its samples; of two lookups neither is at the first of three samples or
+        // more, the middle one where it has that, so that they lie on either side
         int found = bitCount(of_part);
         uint others = LOOKUPS == 2 && found > 2 ? of_part & (of_part - 1u) : of_part;
         SurfacePoint mean = no_layers(p.surface);
