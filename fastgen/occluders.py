@@ -105,7 +105,7 @@ class DepthMap:
         self.depth = ctx.depth_texture(size)
         self._target = ctx.framebuffer([], self.depth)
 
-    def draw(self, bodies: Sequence[DrawnBody], views: Iterable[tuple[Array, Tile]]) -> None:
+    def draw(self, views: Iterable[tuple[Sequence[DrawnBody], Array, Tile]]) -> None:
         """Show what map_matrices see of bodies, each in a tile of its own, and nothing beside."""
         ctx = self._ctx
         self._target.use()
@@ -113,7 +113,7 @@ class DepthMap:
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face, ctx.cull_face = "ccw", "front"
         self._target.clear(depth=1.0)
-        for to_map, tile in views:
+        for bodies, to_map, tile in views:
             self._target.viewport = tile
             self._program["to_map"] = tuple(to_map.T.ravel())
             for body in bodies:

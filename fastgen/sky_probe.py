@@ -200,7 +200,7 @@ class SkyProbe:
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
             to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-            depths.draw(drawn, [(to_map, (0, 0, *size))])
+            depths.draw([(drawn, to_map, (0, 0, *size))])
             nearest = np.frombuffer(depths.depth.read(alignment=1), np.float32)
             at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
             texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)

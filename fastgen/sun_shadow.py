@@ -5,13 +5,14 @@ Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.damage import corners_mm, deform
-from fastgen.mesh import Mesh
+from fastgen.mesh import UNIT_CUBE, Mesh
 from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, Tile, core_of, map_matrix
 from fastgen.scene import Damage
 from fastgen.sun import MOST_SUNS, Sun
@@ -19,16 +20,56 @@ from fastgen.sun import MOST_SUNS, Sun
 _EDGE_TEXELS = 1
 """Nothing is drawn on a tile's edge: it stands for all that lies beyond."""
 
-FIRST_SIZE = (4096 + 2 * _EDGE_TEXELS, 1024 + 2 * _EDGE_TEXELS)
-"""Texels along and across for the first sun: 3.5 mm for the longest container. A locking bar is
-34 mm wide."""
+_FIRST_SIZE = (2048 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
+"""Texels along and across for the first sun: 7 mm for the longest container."""
 
-OTHERS_SIZE = (FIRST_SIZE[0], 512 + 2 * _EDGE_TEXELS)
-"""For all others, side by side: what each of them throws is fainter."""
+_DOOR_SIZE = (1280, 1280)
+_DOOR_TEXEL_MM = 2.5
+_DOOR_DEPTH_MM = 450.0
+"""The first sun has another tile for the door end, to as far behind its castings as damage pushes
+leaves: texels no finer than needed, for a locking bar is 34 mm wide."""
+
+_DOOR_BORDER_MM = 60.0
+"""Around the part of it that is asked for: lookups of a filtered shadow reach that far."""
+
+_OTHERS_SIZE = (1024 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
+"""For each of the others: what they throw is fainter."""
+
+_LEFT, _BELOW = max(_DOOR_SIZE[0], _OTHERS_SIZE[0]), _FIRST_SIZE[1]
+_MAP_SIZE = (
+    max(_FIRST_SIZE[0], _LEFT + _OTHERS_SIZE[0]),
+    _BELOW + max(_DOOR_SIZE[1], 2 * _OTHERS_SIZE[1]) + _OTHERS_SIZE[1],
+)
+_FIRST_TILE: Tile = (0, 0, *_FIRST_SIZE)
+_OTHER_TILES: tuple[Tile, ...] = tuple(
+    (x, y, *_OTHERS_SIZE)
+    for x, y in (
+        (_LEFT, _BELOW),
+        (_LEFT, _BELOW + _OTHERS_SIZE[1]),
+        (0, _MAP_SIZE[1] - _OTHERS_SIZE[1]),
+    )
+)
 
 _BIAS_MM = 2.0
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class DoorTile:
+    """Where the first sun's map is drawn again, finer, for what lies beyond from_x_mm.
+
+    to_tile: (scale u, v, offset u, v) from a place (u, v) in the first tile to that in this one.
+    inner: (u, v) of the lowest and of the highest place in it to ask for; lookups around them stay
+    in the tile.
+    """
+
+    to_tile: Array
+    inner: Array
+    from_x_mm: float
+
+
+_NO_DOOR = DoorTile(np.zeros(4), np.array([1.0, 1.0, 0.0, 0.0]), 0.0)
 
 
 class ShadowMap:
@@ -37,7 +78,7 @@ class ShadowMap:
     Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
     made anew for each, freed ones would stay with the process in pieces. toward: unit vectors
     [S, 3] to the suns. tiles: [S, 4], where in the texture each has its own part, from the centre
-    (u, v) of the first texel to that of the last.
+    (u, v) of the first texel to that of the last. door: the first sun's finer part.
     """
 
     def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
@@ -47,8 +88,8 @@ class ShadowMap:
         self.toward = np.zeros((0, 3))
         self._to_map = np.zeros((0, 4, 4))
         self.tiles = np.zeros((0, 4))
-        size = (FIRST_SIZE[0], FIRST_SIZE[1] + OTHERS_SIZE[1])
-        self._map = DepthMap(ctx, program, size)
+        self.door = _NO_DOOR
+        self._map = DepthMap(ctx, program, _MAP_SIZE)
         self.depth = self._map.depth
         self.depth.compare_func = "<="
         self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -73,17 +114,25 @@ class ShadowMap:
             bodies.append(spreader)
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
-        drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
-        self.toward = toward
-        self._to_map = np.stack([map_matrix(way, low, high) for way in toward])
-        tiles = _tiles(len(toward))
+        tiles = [_FIRST_TILE, *_OTHER_TILES[: len(toward) - 1]]
+        to_tiles = np.stack([map_matrix(way, low, high) for way in toward])
         first, size = np.split(np.array(tiles), 2, axis=1)
-        self._to_map[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
-        self._map.draw(drawn, zip(self._to_map, tiles, strict=True))
-        whole = np.array(self.depth.size)
-        self._to_map[:, :2] *= (size / whole)[..., None]
-        self._to_map[:, :2, 3] += (2 * first + size) / whole - 1
-        self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(whole, 2)
+        to_tiles[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
+        drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
+        views = [(drawn, matrix, tile) for matrix, tile in zip(to_tiles, tiles, strict=True)]
+        self.toward = toward
+        self._to_map = _in_map(to_tiles, np.array(tiles))
+        self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(_MAP_SIZE, 2)
+        self.door = _NO_DOOR
+        if toward[0, 0] > 0:
+            # what shades a point there stands still farther out
+            from_x_mm = float(container.bounds_mm[1][0]) - _DOOR_DEPTH_MM
+            ends = [_beyond(body, from_x_mm) for body in bodies]
+            self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
+            outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
+            views.append((outer, matrix, tile))
+            drawn = drawn + outer
+        self._map.draw(views)
         for body in drawn:
             body.release()
 
@@ -101,12 +150,50 @@ class ShadowMap:
         self._map.release()
 
 
-def _tiles(suns: int) -> list[Tile]:
-    """Each sun's part of the map."""
-    along, across = OTHERS_SIZE
-    width = along // max(suns - 1, 1)
-    others = [(k * width, FIRST_SIZE[1], width, across) for k in range(suns - 1)]
-    return [(0, 0, *FIRST_SIZE), *others]
+def _in_map(to_tiles: Array, tiles: NDArray[np.int64]) -> Array:
+    """Of matrices [S, 4, 4] to clip space of `tiles` [S, 4]: to that of the whole map."""
+    first, size = np.split(tiles, 2, axis=1)
+    found = to_tiles.copy()
+    found[:, :2] *= (size / _MAP_SIZE)[..., None]
+    found[:, :2, 3] += (2 * first + size) / _MAP_SIZE - 1
+    return found
+
+
+def _door(
+    to_first: Array, first_to_map: Array, ends: Sequence[Body], from_x_mm: float
+) -> tuple[DoorTile, Array, Tile]:
+    """The tile of the door end, and the view of `ends`, as of _beyond, to draw in it. to_first: to
+    clip space of the first tile; first_to_map: of the whole map, through it."""
+    corners = np.concatenate([body.positions_mm[body.triangles.ravel()] for body in ends])
+    low, high = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
+    low[0] = from_x_mm
+    seen = (low + UNIT_CUBE * (high - low)) @ to_first[:2, :3].T + to_first[:2, 3]
+    units = np.linalg.norm(to_first[:2, :3], axis=1)  # a millimetre
+    least = seen.min(axis=0) - _DOOR_BORDER_MM * units
+    most = seen.max(axis=0) + _DOOR_BORDER_MM * units
+    texels = np.ceil((most - least) / units / _DOOR_TEXEL_MM)
+    width, height = np.minimum(texels, _DOOR_SIZE).astype(int).tolist()
+    tile = (0, _BELOW, width, height)
+    to_tile = to_first.copy()
+    to_tile[:2, 3] -= (least + most) / 2
+    to_tile[:2] *= (2 / (most - least))[:, None]
+
+    (to_map,) = _in_map(to_tile[None], np.array([tile]))
+    units = np.linalg.norm(to_map[:2, :3], axis=1)
+    scale = units / np.linalg.norm(first_to_map[:2, :3], axis=1)
+    offset = to_map[:2, 3] - scale * first_to_map[:2, 3]
+    # places run from 0 to 1, clip space from -1 to 1; half of the border is for lookups
+    place = np.concatenate([scale, (offset + 1 - scale) / 2])
+    border = _DOOR_BORDER_MM / 2 * units / 2
+    first, size = np.split(np.array(tile), 2)
+    inner = np.concatenate([first / _MAP_SIZE + border, (first + size) / _MAP_SIZE - border])
+    return DoorTile(place, inner, from_x_mm), to_tile, tile
+
+
+def _beyond(body: Solid, x_mm: float) -> Body:
+    """The triangles of a body that reach beyond x_mm."""
+    outer = (body.positions_mm[:, 0] > x_mm)[body.triangles].any(axis=1)
+    return Body(body.positions_mm, body.triangles[outer])
 
 
 def _bent(container: Mesh, damages: tuple[Damage, ...]) -> Solid:
@@ -131,9 +218,13 @@ def shader_suns(suns: Sequence[Sun]) -> int:
 def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
     """Members of VIEW_BLOCK about the suns for a camera at eye_m [3]; shadow: None without any."""
     lit = [] if shadow is None else [*zip(shadow.toward, suns, strict=True)]
+    door = _NO_DOOR if shadow is None else shadow.door
     return {
         "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
         "sun_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
+        "to_door_tile": door.to_tile,
+        "door_tile": door.inner,
+        "door_from": door.from_x_mm / 1000 - eye_m[0],
         "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
         "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
         "sun_count": len(lit),

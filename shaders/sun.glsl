@@ -12,12 +12,30 @@ vec3 shadow_place(vec3 from_eye, int i) {
 }
 
 // all that lies beyond a tile is lit, as its edge is
-float sun_at_place(vec3 at, int i) {
-    return textureLod(sun_shadow, vec3(clamp(at.xy, sun_tile[i].xy, sun_tile[i].zw), at.z), 0.0);
+float sun_at_place(vec3 at, vec4 tile) {
+    return textureLod(sun_shadow, vec3(clamp(at.xy, tile.xy, tile.zw), at.z), 0.0);
+}
+
+// where the first sun's map is asked: in the tile of the door end, if a point lies there
+struct FirstPlace {
+    vec3 at;
+    vec2 scale;   // how much larger than in the other tile things are in this one
+    vec4 tile;    // lookups stay within
+};
+
+FirstPlace first_place(vec3 from_eye) {
+    vec3 at = shadow_place(from_eye, 0);
+    vec2 fine = fma(at.xy, to_door_tile.xy, to_door_tile.zw);
+    bool door = all(greaterThan(fine, door_tile.xy)) && all(lessThan(fine, door_tile.zw)) &&
+                from_eye.x > door_from;
+    return door ? FirstPlace(vec3(fine, at.z), to_door_tile.xy, vec4(0.0, 0.0, 1.0, 1.0))
+                : FirstPlace(at, vec2(1.0), sun_tile[0]);
 }
 
 float sun_at(vec3 from_eye, int i) {
-    return sun_at_place(shadow_place(from_eye, i), i);
+    if (i > 0) return sun_at_place(shadow_place(from_eye, i), sun_tile[i]);
+    FirstPlace place = first_place(from_eye);
+    return sun_at_place(place.at, place.tile);
 }
 
 vec3 sunlit(Reflector r, int i) {
@@ -46,8 +64,11 @@ vec3 sunlit(Reflector r, int i) {
 // the map's texels; the first sun is the brightest, others have one lookup each. Not a matter of i in
 // one function: it would be too large for Mesa to unroll the loop over suns.
 float first_sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
-    vec3 at = shadow_place(from_eye, 0);
+    FirstPlace place = first_place(from_eye);
+    vec3 at = place.at;
     mat3 axes = transpose(mat3(ray_to_shadow[0]));   // the map's, in its units a metre
+    axes[0] *= place.scale.x;
+    axes[1] *= place.scale.y;
     vec3 squared = vec3(dot(axes[0], axes[0]), dot(axes[1], axes[1]), dot(axes[2], axes[2]));
     vec2 texels = SHADOW_TEXELS / vec2(textureSize(sun_shadow, 0));
     vec2 reach = max(texels, min(0.22 * footprint_m, 0.03) * sqrt(squared.xy));
@@ -58,8 +79,8 @@ float first_sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
     vec2 slope = plane.xy / min(plane.z, -1e-3);
     u.z = -dot(slope, u.xy);
     v.z = -dot(slope, v.xy);
-    return 0.25 * (sun_at_place(at + u, 0) + sun_at_place(at - u, 0) +
-                   sun_at_place(at + v, 0) + sun_at_place(at - v, 0));
+    return 0.25 * (sun_at_place(at + u, place.tile) + sun_at_place(at - u, place.tile) +
+                   sun_at_place(at + v, place.tile) + sun_at_place(at - v, place.tile));
 }
 
 // Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a

@@ -59,15 +59,21 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, suns):
 def check_against_rays(container, spreader, toward, depth, matrix, eye_m):
     lit = np.flatnonzero(container.normals @ toward > 0.1)
     picked = np.random.default_rng(0).choice(lit, 3000, replace=False)
+    at = (probe_points(container)[picked] / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
+    assert agreement(container, spreader, toward, depth, picked, at, 10) > 0.98
+
+
+def agreement(container, spreader, toward, depth, picked, at, texel_mm):
+    """How often rays to the sun from vertices `picked` say what the map does, looked up `at` places
+    [K, 3], away from a shadow's border."""
     points = probe_points(container)[picked]
-    at = (points / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
     column, row = (at[:, :2] * depth.shape[::-1]).astype(int).T
     found = at[:, 2] <= depth[row, column]
 
     # around each point too: within a texel of a shadow's border the map may say either
     aside = np.cross(container.normals[picked], toward)
     steps = (aside, np.cross(container.normals[picked], aside))
-    around = [np.zeros(3), *(sign * 10 * step for sign in (-1, 1) for step in steps)]
+    around = [np.zeros(3), *(sign * texel_mm * step for sign in (-1, 1) for step in steps)]
     rays = np.concatenate([points + step for step in around])
     free = np.ones(len(rays), bool)
     solid = tier_of_vertices(spreader) != CABLE_TIER
@@ -84,7 +90,28 @@ def check_against_rays(container, spreader, toward, depth, matrix, eye_m):
     buried = RayMeshIntersector(body).intersects_any(points, container.normals[picked])
     clear = (free == free[0]).all(axis=0) & ~buried
     assert 0.05 < free[0, clear].mean() < 0.95
-    assert (found == free[0])[clear].mean() > 0.98
+    return (found == free[0])[clear].mean()
+
+
+@pytest.mark.parametrize("toward", [(0.75, -0.6, 0.2), (0.3, 0.4, 0.8), (0.9, 0.3, 0.3)])
+def test_shadows_of_the_door_gear_are_those_of_rays(gl, toward):
+    """To three millimetres, in the tile that the door end has for itself."""
+    toward = np.array(toward) / np.linalg.norm(toward)
+    container, spreader = build_container("40"), build_spreader("40")
+    shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
+    shadow.cast(container, without_cables(spreader), toward[None])
+    depth = depth_in(shadow)
+    eye_m = np.array([9.0, 1.0, 2.0])
+    (matrix,) = shadow.from_ray(eye_m)
+    end = container.positions_mm[:, 0] > shadow.door.from_x_mm
+    picked = np.flatnonzero(end & (container.normals @ toward > 0.1))
+    at = (probe_points(container)[picked] / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
+    fine = at.copy()
+    fine[:, :2] = at[:, :2] * shadow.door.to_tile[:2] + shadow.door.to_tile[2:]
+    assert ((fine[:, :2] > shadow.door.inner[:2]) & (fine[:, :2] < shadow.door.inner[2:])).all()
+    found = agreement(container, spreader, toward, depth, picked, fine, 3)
+    assert found > 0.98
+    shadow.release()
 
 
 def test_a_dent_shades_itself_as_rays_say(gl):
