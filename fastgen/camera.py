@@ -57,8 +57,11 @@ class View:
 
     def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
         """World points [..., 3] in mm to view space [..., 3] in metres."""
-        points_m = np.asarray(points_mm, np.float64) * MM
-        return (points_m - self.position_m) @ self.rotation.T
+        points = np.asarray(points_mm, np.float64)
+        # in one product: of a stack of small matrices NumPy takes one after the other
+        turned = points.reshape(-1, 3) @ (MM * self.rotation.T)
+        turned -= self.rotation @ self.position_m
+        return turned.reshape(points.shape)
 
     def project(
         self, points_mm: NDArray[np.floating]
@@ -68,12 +71,13 @@ class View:
         Depth is along the optical axis; pixels of points at or behind the camera mean nothing.
         """
         view = self.to_view(points_mm)
-        depth = view[..., 2]
-        safe = np.where(depth > 1e-9, depth, np.nan)
-        plane = view[..., :2] / safe[..., None]
+        depth = view[..., 2].copy()
+        plane = view[..., :2] * (1 / np.where(depth > 1e-9, depth, np.nan))[..., None]
         if self.distortion:
             plane = self.distortion.apply(plane)
-        return plane * self.focal_px + np.array(self.center_px), depth
+        plane *= self.focal_px
+        plane += self.center_px
+        return plane, depth
 
     def rays(
         self, pixels: NDArray[np.floating] | None = None
