@@ -39,9 +39,9 @@ _OCTAHEDRON = 24
 """Corners of its eight triangles."""
 
 
-def _mask(write: bool) -> Any:
-    """For all three attachments; moderngl's annotation knows the mask of a single one."""
-    return [(write,) * 4] * 3
+def _mask(color: bool, labels: bool) -> Any:
+    """Of colour, and of labels and depth; moderngl's annotation knows the mask of a single one."""
+    return [(color,) * 4, (labels,) * 4, (labels,) * 4]
 
 
 class Shading:
@@ -80,24 +80,25 @@ class Shading:
         """
         image = targets.image
         image.use()
-        targets.clear_classes()
+        targets.clear_to_sky()
+        image.color_mask = _mask(color=False, labels=True)
         self._ctx.enable_only(moderngl.DEPTH_TEST)
         image.depth_mask = True
         self._ctx.depth_func = "1"  # always
         self._run("classify", "sky", "sound", regions)
         for part in near_damage:
             self._run("classify", "sky", damage, [part] if part else regions)
+        image.color_mask = _mask(color=False, labels=False)
         if self._samples_per_axis > 1:
             self._ctx.depth_func = ">"
             self._run("cables", "cable", "sound", cables)
         image.depth_mask = False
         self._ctx.depth_func = "=="
         listed = listed_classes(self._samples_per_axis, damage)
-        image.color_mask = _mask(False)
         for name in listed:
             targets.lists.begin(name)
             self._run("list", name, "sound", regions)
-        image.color_mask = _mask(True)
+        image.color_mask = _mask(color=True, labels=False)
         if self._samples_per_axis > 1:
             self._run("shade", "cable", "sound", cables, suns)
         self._draw_sky(bent)
@@ -108,6 +109,7 @@ class Shading:
             self._dispatch(name, targets.lists, suns)
         self._ctx.memory_barrier()
         image.depth_mask = True
+        image.color_mask = _mask(color=True, labels=True)
         self._ctx.depth_func = "<"
 
     def _run(

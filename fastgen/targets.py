@@ -14,8 +14,10 @@ from fastgen.programs import listed_classes
 from fastgen.sample import Frame
 from fastgen.sample_targets import Region, SampleTargets
 
-_GL_DEPTH = 0x1801
-_SKY = (ctypes.c_float * 1)(0.0)
+_GL_COLOR, _GL_DEPTH = 0x1800, 0x1801
+_SKY_CLASS = (ctypes.c_float * 4)(0.0)
+_NO_LABELS = (ctypes.c_uint * 4)(0)
+_VOID_DEPTH = (ctypes.c_float * 4)(np.inf)
 
 
 def bands(regions: Sequence[Region | None]) -> list[Region | None]:
@@ -80,13 +82,16 @@ class Targets:
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
         self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, "holed"))
-        self._clear_float = gl.function(
-            "glClearBufferfv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
+        self._clear_float, self._clear_uint = (
+            gl.function(name, None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p)
+            for name in ("glClearBufferfv", "glClearBufferuiv")
         )
 
-    def clear_classes(self) -> None:
-        """Mark all pixels of the bound image framebuffer as sky, class 0."""
-        self._clear_float(_GL_DEPTH, 0, _SKY)
+    def clear_to_sky(self) -> None:
+        """Mark all pixels of the bound image framebuffer as sky, class 0, without any object."""
+        self._clear_float(_GL_DEPTH, 0, _SKY_CLASS)
+        self._clear_uint(_GL_COLOR, 1, _NO_LABELS)
+        self._clear_float(_GL_COLOR, 2, _VOID_DEPTH)
 
     def bind_images(self) -> None:
         """Let compute shaders write the colour, label and depth images, units 0 to 2."""

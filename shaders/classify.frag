@@ -1,4 +1,5 @@
-// Writes each pixel's class as its depth, so that the depth test picks who is shaded by what.
+// Writes each pixel's class as its depth, so that the depth test picks who is shaded by what, and what
+// is known of its labels already: decals, damages and holes are found where they are shaded.
 // llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
 #version 430 core
 #include "blocks.glsl"
@@ -12,6 +13,10 @@
 #endif
 
 uniform sampler2D sheet_points;
+uniform sampler2D sheet_depths;
+
+layout(location = 1) out uint out_labels;   // object id | damage value << 16
+layout(location = 2) out float out_depth;   // m
 
 bool bears_decals(uint key, ivec2 sample_at) {
     return key != 0u && cell_at(key_zone(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
@@ -47,4 +52,8 @@ void main() {
 #endif
 #endif
     gl_FragDepth = CLASS_DEPTH_STEP * float(found);
+    out_labels = key == 0u                        ? 0u
+                 : key_zone(key) >= SPREADER_ZONE ? SPREADER_ID
+                                                  : CONTAINER_ID | (SOUND_CONTAINER << 16);
+    out_depth = key == 0u ? VOID_DEPTH : texelFetch(sheet_depths, middle, 0).r;
 }

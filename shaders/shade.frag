@@ -7,8 +7,6 @@
 #endif
 
 layout(location = 0) out vec4 out_color;
-layout(location = 1) out uint out_labels;   // object id | damage value << 16
-layout(location = 2) out float out_depth;
 
 #if CLASS == CLASS_CABLE
 // steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye
@@ -36,11 +34,6 @@ Shaded cable(ivec2 pixel) {
     Shaded s = sky(ray);
     s.cover = cables_cover(center);
     s.color = mix(s.color, color, s.cover);
-    ivec2 middle = middle_of(pixel);
-    if (key_at(middle) != 0u) {
-        s.id = SPREADER_ID;
-        s.depth = texelFetch(sheet_depths, middle, 0).r;
-    }
     return s;
 }
 #endif
@@ -53,6 +46,4 @@ void main() {
     Shaded s = cable(pixel);
 #endif
     out_color = vec4(developed(s.color), s.cover);
-    out_labels = s.id | (s.damage << 16);
-    out_depth = s.depth;
 }

@@ -100,6 +100,11 @@ void main() {
     vec3 color = s.color;
 #endif
     imageStore(color_image, pixel, vec4(developed(color), s.cover));
+    // of other pixels classify.frag knew it
+#if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
+#endif
+#if WITH_HOLES
     imageStore(depth_image, pixel, vec4(s.depth));
+#endif
 }

@@ -8,12 +8,8 @@ uniform sampler2D background_light;   // as in ibl.glsl
 in vec2 map_uv;
 
 layout(location = 0) out vec4 out_color;
-layout(location = 1) out uint out_labels;
-layout(location = 2) out float out_depth;
 
 void main() {
     vec3 radiance = textureLod(background_light, map_uv, 0.0).rgb;
     out_color = vec4(srgb_encode(neutral_tone(exposure * radiance)), 0.0);
-    out_labels = 0u;
-    out_depth = VOID_DEPTH;
 }
