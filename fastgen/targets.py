@@ -14,7 +14,7 @@ from fastgen.programs import listed_classes
 from fastgen.sample import Frame
 from fastgen.sample_targets import Region, SampleTargets
 
-_GL_COLOR, _GL_DEPTH = 0x1800, 0x1801
+_GL_COLOR, _GL_DEPTH, _GL_R32UI = 0x1800, 0x1801, 0x8236
 _SKY_CLASS = (ctypes.c_float * 4)(0.0)
 _NO_LABELS = (ctypes.c_uint * 4)(0)
 _VOID_DEPTH = (ctypes.c_float * 4)(np.inf)
@@ -94,9 +94,12 @@ class Targets:
         self._clear_float(_GL_COLOR, 2, _VOID_DEPTH)
 
     def bind_images(self) -> None:
-        """Let compute shaders write the colour, label and depth images, units 0 to 2."""
-        for unit, texture in enumerate(self._image):
-            texture.bind_to_image(unit, read=False, write=True)
+        """Let compute shaders write the colour, label and depth images, units 0 to 2, colours in
+        numbers of four bytes."""
+        color, labels, depth = self._image
+        color.bind_to_image(0, read=False, write=True, format=_GL_R32UI)
+        labels.bind_to_image(1, read=False, write=True)
+        depth.bind_to_image(2, read=False, write=True)
 
     def read(self) -> Frame:
         """Copy the shaded image out."""

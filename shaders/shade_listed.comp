@@ -6,7 +6,7 @@
 
 layout(local_size_x = LIST_GROUP) in;
 
-layout(rgba8, binding = 0) writeonly uniform image2D color_image;
+layout(r32ui, binding = 0) writeonly uniform uimage2D color_image;   // four bytes, stored as one number
 layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
 layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 
@@ -99,7 +99,7 @@ void main() {
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
 #endif
-    imageStore(color_image, pixel, vec4(developed(color), s.cover));
+    imageStore(color_image, pixel, uvec4(packUnorm4x8(vec4(developed(color), s.cover))));
     // of other pixels classify.frag knew it
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
