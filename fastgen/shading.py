@@ -80,10 +80,10 @@ class Shading:
         """
         image = targets.image
         image.use()
-        targets.clear_to_sky()
         image.color_mask = _mask(color=False, labels=True)
-        self._ctx.enable_only(moderngl.DEPTH_TEST)
         image.depth_mask = True
+        targets.clear_to_sky()
+        self._ctx.enable_only(moderngl.DEPTH_TEST)
         self._ctx.depth_func = "1"  # always
         self._run("classify", "sky", "sound", regions)
         for part in near_damage:

@@ -125,9 +125,10 @@ class ShadowMap:
         self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(_MAP_SIZE, 2)
         self.door = _NO_DOOR
         if toward[0, 0] > 0:
-            # what shades a point there stands still farther out
             from_x_mm = float(container.bounds_mm[1][0]) - _DOOR_DEPTH_MM
-            ends = [_beyond(body, from_x_mm) for body in bodies]
+            # what shades a point there stands still farther out, but for lookups around it
+            ends = [_beyond(body, from_x_mm - _DOOR_BORDER_MM) for body in bodies]
+            ends = [end for end in ends if len(end.triangles)]  # cores end short of deep damage
             self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
             outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
             views.append((outer, matrix, tile))
