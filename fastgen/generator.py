@@ -163,9 +163,10 @@ class Generator:
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
         key = (self.config, self.seed, whole("index", index))
-        if self._latest is None or self._latest[0] != key:
-            self._latest = key, sample_scene(*key, self.environments)
-        return self._latest[1]
+        latest = self._latest  # another thread may replace it
+        if latest is None or latest[0] != key:
+            self._latest = latest = key, sample_scene(*key, self.environments)
+        return latest[1]
 
     def render(
         self,
