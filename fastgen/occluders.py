@@ -106,7 +106,7 @@ class DepthMap:
         self._target = ctx.framebuffer([], self.depth)
 
     def draw(self, views: Iterable[tuple[Sequence[DrawnBody], Array, Tile]]) -> None:
-        """Show what map_matrices see of bodies, each in a tile of its own, and nothing beside."""
+        """Show views and nothing beside: bodies, the map_matrix that sees them, and its tile."""
         ctx = self._ctx
         self._target.use()
         ctx.scissor = None

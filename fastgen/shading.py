@@ -80,6 +80,7 @@ class Shading:
         """
         image = targets.image
         image.use()
+        self._ctx.scissor = None
         image.color_mask = _mask(color=False, labels=True)
         image.depth_mask = True
         targets.clear_to_sky()

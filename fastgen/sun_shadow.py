@@ -18,19 +18,20 @@ from fastgen.scene import Damage
 from fastgen.sun import MOST_SUNS, Sun
 
 _EDGE_TEXELS = 1
-"""Nothing is drawn on a tile's edge: it stands for all that lies beyond."""
+"""Nothing is drawn on a sun's tile's edge: it stands for all that lies beyond."""
 
 _FIRST_SIZE = (2048 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
-"""Texels along and across for the first sun: 7 mm for the longest container."""
+"""Texels along and across for the first sun: up to 7 mm along, 10 mm across."""
 
 _DOOR_SIZE = (1280, 1280)
 _DOOR_TEXEL_MM = 2.5
 _DOOR_DEPTH_MM = 450.0
 """The first sun has another tile for the door end, to as far behind its castings as damage pushes
-leaves: texels no finer than needed, for a locking bar is 34 mm wide."""
+leaves: texels no finer than that, as a locking bar is 34 mm wide, up to 3.6 mm where the tile is
+full."""
 
 _DOOR_BORDER_MM = 60.0
-"""Around the part of it that is asked for: lookups of a filtered shadow reach that far."""
+"""Around the part of it that is asked for: more than lookups of a filtered shadow reach."""
 
 _OTHERS_SIZE = (1024 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
 """For each of the others: what they throw is fainter."""
@@ -107,7 +108,7 @@ class ShadowMap:
         shown = (container, spreader, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
             return
-        self._shown = shown
+        self._shown = ()  # until it does, whatever happens
         deepest = max((damage.depth_mm for damage in damages), default=0.0)
         bodies = [_bent(container, damages), core_of(container, deepest)]
         if spreader is not None:
@@ -128,14 +129,16 @@ class ShadowMap:
             from_x_mm = float(container.bounds_mm[1][0]) - _DOOR_DEPTH_MM
             # what shades a point there stands still farther out, but for lookups around it
             ends = [_beyond(body, from_x_mm - _DOOR_BORDER_MM) for body in bodies]
-            ends = [end for end in ends if len(end.triangles)]  # cores end short of deep damage
-            self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
-            outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
-            views.append((outer, matrix, tile))
-            drawn = drawn + outer
+            ends = [end for end in ends if len(end.triangles)]  # deep damage may leave none
+            if ends:
+                self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
+                outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
+                views.append((outer, matrix, tile))
+                drawn = drawn + outer
         self._map.draw(views)
         for body in drawn:
             body.release()
+        self._shown = shown
 
     def from_ray(self, eye_m: Array) -> Array:
         """From a vector in metres, from the eye to a point, to (u, v, depth) in the map of each

@@ -5,7 +5,7 @@
 // vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i): what it throws on what hides the sky.
 // from_eye: to the point, in m.
 
-uniform sampler2DShadow sun_shadow;   // a tile for each
+uniform sampler2DShadow sun_shadow;   // a tile for each, and the first sun's of the door end
 
 vec3 shadow_place(vec3 from_eye, int i) {
     return (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
