@@ -109,8 +109,6 @@ class Shading:
         for name in listed:
             self._dispatch(name, targets.lists, suns)
         self._ctx.memory_barrier()
-        image.depth_mask = True
-        image.color_mask = _mask(color=True, labels=True)
         self._ctx.depth_func = "<"
 
     def _run(

@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastgen.camera import MM
 from fastgen.damage import corners_mm, deform
 from fastgen.mesh import UNIT_CUBE, Mesh
 from fastgen.occluders import Body, DepthMap, DrawnBody, Solid, Tile, core_of, map_matrix
@@ -183,12 +184,12 @@ def _door(
     to_tile[:2] *= (2 / (most - least))[:, None]
 
     (to_map,) = _in_map(to_tile[None], np.array([tile]))
-    units = np.linalg.norm(to_map[:2, :3], axis=1)
-    scale = units / np.linalg.norm(first_to_map[:2, :3], axis=1)
+    units_in_map = np.linalg.norm(to_map[:2, :3], axis=1)
+    scale = units_in_map / np.linalg.norm(first_to_map[:2, :3], axis=1)
     offset = to_map[:2, 3] - scale * first_to_map[:2, 3]
     # places run from 0 to 1, clip space from -1 to 1; half of the border is for lookups
     place = np.concatenate([scale, (offset + 1 - scale) / 2])
-    border = _DOOR_BORDER_MM / 2 * units / 2
+    border = _DOOR_BORDER_MM / 2 * units_in_map / 2
     first, size = np.split(np.array(tile), 2)
     inner = np.concatenate([first / _MAP_SIZE + border, (first + size) / _MAP_SIZE - border])
     return DoorTile(place, inner, from_x_mm), to_tile, tile
@@ -228,7 +229,7 @@ def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> d
         "sun_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
         "to_door_tile": door.to_tile,
         "door_tile": door.inner,
-        "door_from": door.from_x_mm / 1000 - eye_m[0],
+        "door_from": MM * door.from_x_mm - eye_m[0],
         "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
         "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
         "sun_count": len(lit),

@@ -10,9 +10,8 @@ layout(location = 0) out vec4 out_color;
 
 #if CLASS == CLASS_CABLE
 // steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye
-// sees two, each as wide as it faces the eye
-Shaded cable(ivec2 pixel) {
-    vec2 center = vec2(pixel) + 0.5;
+// sees two, each as wide as it faces the eye. What is exposed, and the share of the pixel that it covers
+vec4 cable(vec2 center) {
     vec3 ray = view_ray(center);
     vec3 view = -normalize(ray);
     vec4 base = material_base[CABLE_MATERIAL];
@@ -31,19 +30,17 @@ Shaded cable(ivec2 pixel) {
         color += abs(view[axis]) * layer_color(steel, normal, view, whole, vec4(1.0));
     }
     color /= max(abs(view.x) + abs(view.y), 1e-6);
-    Shaded s = sky(ray);
-    s.cover = cables_cover(center);
-    s.color = mix(s.color, color, s.cover);
-    return s;
+    float cover = cables_cover(center);
+    return vec4(mix(sky(ray).color, color, cover), cover);
 }
 #endif
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 center = gl_FragCoord.xy;
 #if CLASS == CLASS_SKY
-    Shaded s = sky(view_ray(vec2(pixel) + 0.5));
+    vec4 shaded = vec4(sky(view_ray(center)).color, 0.0);
 #else
-    Shaded s = cable(pixel);
+    vec4 shaded = cable(center);
 #endif
-    out_color = vec4(developed(s.color), s.cover);
+    out_color = vec4(developed(shaded.rgb), shaded.a);
 }
