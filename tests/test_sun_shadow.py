@@ -187,23 +187,6 @@ def test_door_tiles_are_for_suns_before_the_door(gl):
     shadow.release()
 
 
-def test_pictures_of_a_door_ask_its_own_tile(tmp_path):
-    """Shadows of bars have finer edges there, and lie where the other tile has them."""
-    toward = np.array([0.75, -0.6, 0.2])
-    sky = np.full((512, 1024, 3), 0.2, np.float32)
-    write_exr(tmp_path / "low.exr", sky + one_light(toward / np.linalg.norm(toward), 3e5, 512))
-    config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
-    with Generator(config, 1, (480, 480), "auto", tmp_path, "draft") as generator:
-        scene = generator.scene(0)
-        scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
-        fine = generator.render(scene=scene, camera="Cr")
-        shadow = generator._gpu.renderer()._sun_shadow
-        shadow.door = replace(shadow.door, inner=np.array([1.0, 1.0, 0.0, 0.0]))
-        coarse = generator.render(scene=scene, camera="Cr")
-    apart = np.abs(fine.image.astype(int) - coarse.image).max(axis=2)[fine.ids > 0]
-    assert 0.002 < (apart > 8).mean() < 0.1
-
-
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
 def test_a_sun_along_an_axis_lights_what_is_outermost(gl, axis):
     container = build_container("20")
@@ -237,6 +220,23 @@ def test_what_has_the_container_before_the_sun_lies_in_its_shade(gl, toward):
     assert behind.sum() > 500
     assert (at[:, 2] > depth[row, column]).all()
     shadow.release()
+
+
+def test_pictures_of_a_door_ask_its_own_tile(tmp_path):
+    """Shadows of bars have finer edges there, and lie where the other tile has them."""
+    toward = np.array([0.75, -0.6, 0.2])
+    sky = np.full((512, 1024, 3), 0.2, np.float32)
+    write_exr(tmp_path / "low.exr", sky + one_light(toward / np.linalg.norm(toward), 3e5, 512))
+    config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
+    with Generator(config, 1, (480, 480), "auto", tmp_path, "draft") as generator:
+        scene = generator.scene(0)
+        scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
+        fine = generator.render(scene=scene, camera="Cr")
+        shadow = generator._gpu.renderer()._sun_shadow
+        shadow.door = replace(shadow.door, inner=np.array([1.0, 1.0, 0.0, 0.0]))
+        coarse = generator.render(scene=scene, camera="Cr")
+    apart = np.abs(fine.image.astype(int) - coarse.image).max(axis=2)[fine.ids > 0]
+    assert 0.002 < (apart > 8).mean() < 0.1
 
 
 def test_no_sunlight_leaks_through_a_wall(tmp_path):
