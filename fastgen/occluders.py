@@ -16,7 +16,13 @@ from fastgen.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
 from fastgen.spreader import CABLE_TIER, tier_of_vertices
 
 _CORE_MM = 200.0
-"""So far behind a container's sides, and behind what dents push in, its core begins."""
+"""So far behind a container's sides its core begins."""
+
+_SUNK_MM = 50.0
+"""So far behind the front faces of a thick body light is stopped: less than a container's frame is
+thick, and more than what lookups beside their place find nearer to the light on the same face. Chosen
+by rays to suns all round: 30 mm let a fifth less light through, and shade a fifth more of what lies
+in it at a grazing angle."""
 
 Array = NDArray[np.float64]
 
@@ -32,7 +38,8 @@ class Body:
     @cached_property
     def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Lowest and highest coordinates [3] of all vertices."""
-        return self.positions_mm.min(axis=0), self.positions_mm.max(axis=0)
+        columns = np.ascontiguousarray(self.positions_mm.T)  # a tenth of the time along rows
+        return columns.min(axis=1), columns.max(axis=1)
 
 
 Tile = tuple[int, int, int, int]
@@ -51,14 +58,14 @@ def without_cables(spreader: Mesh) -> Body:
     return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
 
 
-def core_of(container: Mesh, deepest_mm: float = 0.0) -> Body:
-    """A box within a container whose damages reach deepest_mm.
+def core_of(container: Mesh) -> Body:
+    """A box within a container.
 
     It stands in the way as well: maps that keep back faces lack the side that the light meets, and
     through the far one, thin as it is, light leaks along creases, within a texel and the bias.
     """
     low, high = container.bounds_mm
-    inset = np.minimum(_CORE_MM + deepest_mm, (high - low) / 3)
+    inset = np.minimum(_CORE_MM, (high - low) / 3)
     corners = low + inset + UNIT_CUBE * (high - low - 2 * inset)
     return Body(corners.astype(np.float32), UNIT_CUBE_TRIANGLES)
 
@@ -94,6 +101,18 @@ class DrawnBody:
             item.release()
 
 
+@dataclass(frozen=True, eq=False)
+class MapView:
+    """What a part of a map shows: bodies, as the map_matrix `to_map` sees them. thick: those of
+    them whose front faces are kept as well, sunk into them; near the edge of a thick body a texel
+    may hold no back face that stands in the way of what lies beside it."""
+
+    bodies: Sequence[DrawnBody]
+    to_map: Array
+    tile: Tile
+    thick: Sequence[DrawnBody] = ()
+
+
 class DepthMap:
     """A depth texture of (along, across) = size texels. program: of occluder.vert, the owner's."""
 
@@ -105,20 +124,29 @@ class DepthMap:
         self.depth = ctx.depth_texture(size)
         self._target = ctx.framebuffer([], self.depth)
 
-    def draw(self, views: Iterable[tuple[Sequence[DrawnBody], Array, Tile]]) -> None:
-        """Show views and nothing beside: bodies, the map_matrix that sees them, and its tile."""
+    def draw(self, views: Iterable[MapView]) -> None:
+        """Show views and nothing beside."""
         ctx = self._ctx
         self._target.use()
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        ctx.front_face, ctx.cull_face = "ccw", "front"
+        ctx.front_face = "ccw"
         self._target.clear(depth=1.0)
-        for bodies, to_map, tile in views:
-            self._target.viewport = tile
-            self._program["to_map"] = tuple(to_map.T.ravel())
-            for body in bodies:
-                body.array.render(moderngl.TRIANGLES)
-        ctx.cull_face = "back"
+        for view in views:
+            self._target.viewport = view.tile
+            ctx.cull_face = "front"
+            self._show(view.bodies, view.to_map)
+            sunk = view.to_map.copy()
+            sunk[2, 3] += _SUNK_MM * np.linalg.norm(sunk[2, :3])
+            ctx.cull_face = "back"
+            ctx.polygon_offset = 1.0, 0.0  # and what a face falls within a texel
+            self._show(view.thick, sunk)
+            ctx.polygon_offset = 0.0, 0.0
+
+    def _show(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
+        self._program["to_map"] = tuple(to_map.T.ravel())
+        for body in bodies:
+            body.array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
         """Free all but the program."""

@@ -235,7 +235,8 @@ class Renderer:
         if not suns:
             return None
         toward = to_map_frame([sun.direction for sun in suns], -scene.environment.yaw_deg)
-        self._sun_shadow.cast(*shadow_casters(scene), toward, scene.damages)
+        container, outline, spreader = shadow_casters(scene)
+        self._sun_shadow.cast(container, spreader, toward, scene.damages, outline)
         return self._sun_shadow
 
     def preload(self, scenes: Iterable[Scene], lens: bool) -> None:

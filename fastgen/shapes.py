@@ -102,13 +102,14 @@ def spreader_outline(scene: Scene, bent: bool) -> Mesh | None:
     return spreader_mesh(scene, CUT_MM if bent else np.inf)
 
 
-def shadow_casters(scene: Scene) -> tuple[Mesh, Body | None]:
-    """A scene's container at rest, and its spreader if it has one, of as few triangles as their
-    shadow can be drawn from: damage bends fine ones only."""
+def shadow_casters(scene: Scene) -> tuple[Mesh, Mesh, Body | None]:
+    """A scene's container at rest, the same of as few triangles as can be, and its spreader if it
+    has one: damage bends fine triangles only."""
     box = scene.container
-    shape = build_container if scene.damages else container_outline
+    outline = container_outline(box.kind, box.profiles)
+    shape = build_container(box.kind, box.profiles) if scene.damages else outline
     spreader = spreader_outline(scene, bent=False)
-    return shape(box.kind, box.profiles), None if spreader is None else without_cables(spreader)
+    return shape, outline, None if spreader is None else without_cables(spreader)
 
 
 def _shading_spreader(scene: Scene, cut_mm: float = CUT_MM) -> Mesh | None:

@@ -14,7 +14,15 @@ from fastgen import cache
 from fastgen.interreflection import Cells, FormFactors, form_factors
 from fastgen.kept import Recent
 from fastgen.mesh import MATERIALS, Mesh
-from fastgen.occluders import DepthMap, DrawnBody, Solid, core_of, map_matrix, without_cables
+from fastgen.occluders import (
+    DepthMap,
+    DrawnBody,
+    MapView,
+    Solid,
+    core_of,
+    map_matrix,
+    without_cables,
+)
 from fastgen.openness import DIRECTIONS, Array, Directions, Openness, Sky, encoded, sky_directions
 from fastgen.programs import link
 
@@ -200,7 +208,7 @@ class SkyProbe:
         corner = np.array(size) - 1
         for i, toward in enumerate(sky_directions()):
             to_map = map_matrix(toward, low.astype(np.float64), high.astype(np.float64))
-            depths.draw([(drawn, to_map, (0, 0, *size))])
+            depths.draw([MapView(drawn, to_map, (0, 0, *size))])
             nearest = np.frombuffer(depths.depth.read(alignment=1), np.float32)
             at = points_mm @ to_map[:3, :3].T + to_map[:3, 3]
             texel = np.clip((at[:, :2] + 1) / 2 * size, 0, corner).astype(np.int64)

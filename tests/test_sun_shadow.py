@@ -265,6 +265,35 @@ def test_no_sunlight_leaks_through_a_wall(tmp_path):
     assert wall.max() < 2 * np.median(wall)
 
 
+@pytest.mark.parametrize("side", [-1, 1])
+def test_no_sunlight_leaks_along_a_post(tmp_path, side):
+    """Nothing of the end that faces away from a low sun, almost along the axis, is in its light;
+    flanks of its posts would be but for what is thick behind them. Deep dents in both sides."""
+    toward = np.array([-0.982, side * 0.053, 0.183])
+    sky = np.full((512, 1024, 3), 0.2, np.float32)
+    write_exr(tmp_path / "low.exr", sky + one_light(toward, 3e5, 512))
+    length, width, height = KINDS["20"].size_mm
+    dents = tuple(
+        Damage("concave", "back" if y > 0 else "front", (700.0, y * width / 2, 1300.0),
+               (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -y, 0.0), (2000.0, 1500.0), 230.0)
+        for y in (-1.0, 1.0)
+    )  # fmt: skip
+    camera = Camera("end", (length / 2 + 6000, 0, height / 2), (0, 0, height / 2), 50.0)
+    config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
+    with Generator(config, 1, (900, 900), "auto", tmp_path, "draft") as generator:
+        scene = generator.scene(0)
+        assert load_environment(tmp_path / "low.exr").suns
+        scene = replace(
+            scene, environment=EnvironmentView("low", 0.0), decals=(), damages=dents,
+            container=replace(scene.container, kind="20"), spreader=Spreader(),
+        )  # fmt: skip
+        sample = generator.render(scene=scene, camera=camera)
+    end = cv2.erode((sample.ids == CONTAINER_ID).astype(np.uint8), np.ones((9, 9))) > 0
+    shade = sample.image[end].astype(float).mean(axis=-1)
+    assert end.sum() > 1e5
+    assert np.percentile(shade, 99.99) < 2 * np.median(shade)
+
+
 @pytest.mark.parametrize("quality", ["balanced", "high"])
 def test_shadows_fall_where_they_do_without_antialiasing(quality):
     """Away from edges; looked up beside their place they would move by up to half the image."""
