@@ -15,7 +15,8 @@ from typing import NoReturn
 
 import fastgen
 from fastgen import doctor, stats
-from fastgen.config import Config
+from fastgen.config import PRESETS, Config
+from fastgen.config_text import as_yaml
 from fastgen.encode import jpeg, png, write
 from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb
@@ -172,10 +173,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     make.set_defaults(run=_generate)
 
+    config = commands.add_parser("config", help="print every key of a configuration")
+    config.set_defaults(run=_print_config)
+
     show = commands.add_parser("show", help="render one image")
     show.add_argument("--index", type=int, required=True, metavar="I")
     show.add_argument("--camera", help="default: the first of the rig")
-    show.add_argument("--layer", default="all", metavar="|".join(SHOWN_LAYERS))
+    show.add_argument(
+        "--layer",
+        default="all",
+        metavar="|".join(SHOWN_LAYERS),
+        help="normals in the container's frame: red, green, blue for x, y, z",
+    )
     show.add_argument("--overlay", action="store_true", help="draw boxes, names and damage")
     show.add_argument("--size", default="640x640", metavar="WxH")
     show.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
@@ -191,10 +200,12 @@ def _parser() -> argparse.ArgumentParser:
 
     for command in (make, show, export):
         command.add_argument("--seed", type=int, default=0, metavar="S")
-        command.add_argument("--preset", default="seafront")
-        command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
         _add_hdri(command)
         command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
+
+    for command in (make, config, show, export):
+        command.add_argument("--preset", default="seafront", metavar="|".join(PRESETS))
+        command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
 
     for command in (make, show):
         command.add_argument("--quality", default="balanced", metavar="|".join(QUALITY))
@@ -274,6 +285,11 @@ def _workers(options: argparse.Namespace) -> int:
     return len(os.sched_getaffinity(0)) if given is None else given
 
 
+def _print_config(options: argparse.Namespace) -> int:
+    print(as_yaml(_config(options)), end="")
+    return 0
+
+
 def _show(options: argparse.Namespace) -> int:
     layer = options.layer
     check_known("layer", layer, SHOWN_LAYERS)
@@ -326,7 +342,9 @@ def _stats(options: argparse.Namespace) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     if options.repair:
-        faults, hint = repair(options.out, _workers(options), options.hdri), ""
+        mended, faults = repair(options.out, _workers(options), options.hdri)
+        print("".join(f"mended: {fault}\n" for fault in mended), end="")
+        hint = ""
     else:
         found = examine(options.out)
         faults = found.faults

@@ -31,7 +31,24 @@ ROUGHNESS = bounds(MIN_ROUGHNESS, 1.0)
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Paint and its ageing, seafront.txt section 3.2; one block of ranges per layer of Fig. 5."""
+    """Paint and its ageing, seafront.txt section 3.2; one block of ranges per layer of Fig. 5.
+
+    colors: of sound paint, by a name of your own, each as likely as any other.
+    roughness: of sound paint; GGX, perceptual.
+    tone_variation: how much the paint's tone varies over a side.
+    ageing_strength: of the darkening toward the corners of each panel.
+    ageing_reach_mm: how far from a corner it reaches.
+    dirt_strength: of the deposit along edges.
+    dirt_reach_mm: how far from an edge it reaches.
+    dirt_color: of that deposit.
+    rust_coverage: share of the sheet that is rusty; squared in the draw, so that low ones prevail.
+    rust_scale_mm: size of the patches.
+    rust_colors: each as likely as any other.
+    rust_roughness: GGX, perceptual.
+    scratch_coverage: share of the sheet under fine bright scratches.
+    wear_strength: how unevenly the paint reflects.
+    wear_scale_mm: size of the noise of wear, scratches and dirt.
+    """
 
     colors: dict[str, str] = field(
         default_factory=lambda: {
@@ -62,7 +79,7 @@ class SurfaceConfig:
     dirt_strength: Range = field(default=Range(0.05, 0.55), metadata=UNIT)
     dirt_reach_mm: Range = field(default=Range(60, 320), metadata=REACH)
     dirt_color: str = "#a8a59c"
-    rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)  # squared: mostly low
+    rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)
     rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
     rust_colors: tuple[str, ...] = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
     rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=ROUGHNESS)
@@ -82,7 +99,13 @@ class SurfaceConfig:
 
 @dataclass(frozen=True)
 class ContainerConfig:
-    """Which containers come, and how much their corrugation differs from the nominal profile."""
+    """Which containers come, and how much their corrugation differs from the nominal profile.
+
+    kinds: weight of 20, 40, 40HC and 45HC in the draw.
+    profiles: corrugation of the walls.
+    depth_scale: factors of the corrugations' depth, each as likely as any other; no range, as every
+        one is a mesh of its own.
+    """
 
     kinds: dict[str, float] = field(
         default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1},
@@ -110,11 +133,18 @@ class ContainerConfig:
 class CameraConfig:
     """One camera of the rig: it looks at the middle of a face from a varied position.
 
-    azimuth_deg turns the camera about the vertical through that middle (0: straight at the face,
-    positive: it stands to the right, seen from the camera); elevation_deg lifts it. roll_deg turns
-    the image from where a wall stands upright, or the length of roof or underside lies across.
-    lens: its distortion, none for a pinhole; a fisheye's focal_mm is what an angle of one radian
-    spans.
+    face: front, back, door, no_door, roof or underside.
+    focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
+    distance_mm: from the middle of the face.
+    azimuth_deg: turns the camera about the vertical through that middle; 0 looks straight at the
+        face, and where it is positive the camera stands to the right, seen from itself.
+    elevation_deg: lifts the camera, which goes on looking at the face.
+    roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
+        lies across.
+    target_shift_mm: how far beside the middle it looks, along each axis of the face.
+    sensor_width_mm: width of the image on the sensor.
+    exposure_ev: from the exposure that suits the light.
+    lens: its distortion, null for a pinhole.
     """
 
     face: str
@@ -145,10 +175,12 @@ def _seafront_rig() -> dict[str, CameraConfig]:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The light. names: HDRIs to choose from, all alike, by file name without ending.
+    """The light.
 
-    Without names all that --hdri finds come, or of the bundled ones all but the interiors, ports
-    more often than others.
+    names: HDRIs to choose from, all alike, by file name without ending. Without names all that
+        --hdri finds come, or of the bundled ones all but the interiors, ports more often than
+        others.
+    yaw_deg: how the environment is turned about the vertical.
     """
 
     names: tuple[str, ...] = ()
@@ -157,7 +189,12 @@ class EnvironmentConfig:
 
 @dataclass(frozen=True)
 class SplitConfig:
-    """Fractions of the scenes that go to train, val and test; they are normalised to sum to 1."""
+    """Fractions of the scenes that go to each part; they are normalised to sum to 1.
+
+    train: to learn from.
+    val: to choose by.
+    test: to report on.
+    """
 
     train: float = field(default=0.7, metadata=UNIT)
     val: float = field(default=0.15, metadata=UNIT)
@@ -168,8 +205,10 @@ class SplitConfig:
 class SpreaderConfig:
     """How often a container hangs on a crane's spreader, and what that looks like.
 
-    flippers_down: probability of each side that its gather guides are lowered. gap_mm: from the
-    castings to the spreader, drawn in whole steps of 10 mm.
+    probability: of a spreader; the container floats without.
+    colors: of its paint, each as likely as any other.
+    flippers_down: probability of each side that its gather guides are lowered.
+    gap_mm: from the castings to the spreader, drawn in whole steps of 10 mm.
     """
 
     probability: float = field(default=0.9, metadata=UNIT)
@@ -186,10 +225,10 @@ class SpreaderConfig:
 class LabelConfig:
     """What becomes of objects that are hard to see.
 
-    min_visible_px, min_visible_fraction: objects with fewer visible pixels, or a smaller visible
-    part of what they would cover alone, are marked ignored: formats with ignore regions list them
-    as such, others leave them out. min_text_px: height in pixels below which a text is no legible
-    crop.
+    min_visible_px: objects with fewer visible pixels are marked ignored: formats with ignore
+        regions list them as such, others leave them out.
+    min_visible_fraction: so are those with a smaller visible part of what they would cover alone.
+    min_text_px: height below which a text is no legible crop.
     """
 
     min_visible_px: int = field(default=12, metadata=bounds(1, 1e6, "pixels"))
@@ -199,7 +238,11 @@ class LabelConfig:
 
 @dataclass(frozen=True)
 class Config:
-    """All that decides a distribution of scenes and the labels made from them."""
+    """All that decides a distribution of scenes and the labels made from them.
+
+    cameras: the rig, by names of your own. What is given is all of it; a camera named as one of the
+        preset's inherits what is left out.
+    """
 
     container: ContainerConfig = field(default_factory=ContainerConfig)
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
@@ -249,6 +292,8 @@ class Config:
     @staticmethod
     def from_values(data: Any, base: "Config | None" = None) -> "Config":
         """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
+        if not isinstance(base, Config | None):
+            raise ConfigError(f"base: {base!r} is no Config; take what Config.preset gives")
         return from_plain(Config, data, base=Config.preset() if base is None else base)
 
     @staticmethod
@@ -295,11 +340,14 @@ class _Loader(yaml.SafeLoader):
         return node
 
 
-_Loader.add_implicit_resolver(
+JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
     "tag:yaml.org,2002:float",
     re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
 )
+"""What PyYAML resolves as a number once it is told."""
+
+_Loader.add_implicit_resolver(*JSON_FLOATS)
 
 
 PRESETS: dict[str, dict[str, Any]] = {

@@ -48,8 +48,16 @@ _SHORTEST_MM = 40.0
 
 @dataclass(frozen=True)
 class Wave:
-    """A trapezoidal corrugation in mm. pitch = outer flat + 2 slopes + inner flat, along the wall;
-    depth is across it. Raises ConfigError for widths that do not add up or cannot be built."""
+    """A trapezoidal corrugation.
+
+    pitch_mm: of a whole wave: outer_mm + 2 slope_mm + inner_mm.
+    depth_mm: across the wall.
+    outer_mm: width of the outer flat.
+    slope_mm: width of a slope, along the wall.
+    inner_mm: width of the inner flat.
+
+    Raises ConfigError for widths that do not add up or cannot be built.
+    """
 
     pitch_mm: float
     depth_mm: float
@@ -79,7 +87,12 @@ class Wave:
 
 @dataclass(frozen=True)
 class WallProfiles:
-    """Corrugation of the side walls, the front end wall and the roof; common makers' figures."""
+    """Corrugation of the walls; common makers' figures.
+
+    side: of both long sides.
+    end: of the front end.
+    roof: of the roof.
+    """
 
     side: Wave = field(default_factory=lambda: Wave(278.0, 36.0, 72.0, 68.0, 70.0))
     end: Wave = field(default_factory=lambda: Wave(250.0, 46.0, 110.0, 18.0, 104.0))

@@ -17,7 +17,12 @@ MAX_INSTANCES = 99
 
 @dataclass(frozen=True)
 class AxisConfig:
-    """An edge or corner post pushed in. reach_mm: how far its neighbours are dragged along."""
+    """An edge or corner post pushed in.
+
+    length_mm: along the edge.
+    reach_mm: how far its neighbours are dragged along.
+    depth_mm: at its deepest.
+    """
 
     length_mm: Range = field(default=Range(700, 1900), metadata=EXTENT)
     reach_mm: Range = field(default=Range(320, 650), metadata=EXTENT)
@@ -26,7 +31,13 @@ class AxisConfig:
 
 @dataclass(frozen=True)
 class ConcaveConfig:
-    """A whole area of a face bowed. outward: probability that it bulges instead."""
+    """A whole area of a face bowed.
+
+    length_mm: across the face.
+    width_mm: up the face.
+    depth_mm: at its deepest.
+    outward: probability that it bulges instead.
+    """
 
     length_mm: Range = field(default=Range(900, 2600), metadata=EXTENT)
     width_mm: Range = field(default=Range(800, 2000), metadata=EXTENT)
@@ -36,8 +47,18 @@ class ConcaveConfig:
 
 @dataclass(frozen=True)
 class DentedConfig:
-    """A fine fold along a path. crease_mm: half width of the crease; sink_share: part of the depth
-    that the surroundings sink by; turn_deg: angle of the path against the horizontal."""
+    """A fine fold along a path.
+
+    length_mm: of the path.
+    width_mm: of what sinks along it.
+    depth_mm: of the crease, where it is deepest.
+    crease_mm: half width of the crease.
+    sink_share: part of the depth that the surroundings sink by.
+    amplitude_mm: how far the path swings where it does.
+    wavelength_mm: of its swings.
+    stretch_mm: it swings and runs straight by turns of this length.
+    turn_deg: angle of the path against the horizontal.
+    """
 
     length_mm: Range = field(default=Range(600, 1700), metadata=EXTENT)
     width_mm: Range = field(default=Range(180, 420), metadata=EXTENT)
@@ -52,7 +73,13 @@ class DentedConfig:
 
 @dataclass(frozen=True)
 class PerforationConfig:
-    """A torn hole. lobes: how far its outline strays from a circle, as a share of the radius."""
+    """A torn hole.
+
+    diameter_mm: on the mean.
+    rim_mm: width of the sheet around it that is bent in.
+    depth_mm: how far it is, at the edge.
+    lobes: how far the outline strays from a circle, as a share of the radius, five times over.
+    """
 
     diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
     rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
@@ -62,7 +89,14 @@ class PerforationConfig:
 
 @dataclass(frozen=True)
 class DamageConfig:
-    """How often a container is damaged and how. count and kind are drawn uniformly (Table 2)."""
+    """How often a container is damaged and how (seafront.txt, Table 2).
+
+    probability: of a container that is damaged.
+    count: how many damages it has then, each number as likely.
+    kinds: axis, concave, dented, perforation; each as likely as any other.
+    faces: of what is done to a face: front, back, door, no_door, roof.
+    mask_threshold_mm: the mask of a damage is where it moved the sheet farther than this.
+    """
 
     probability: float = field(default=0.4, metadata=UNIT)
     count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, MAX_INSTANCES))

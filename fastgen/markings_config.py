@@ -11,19 +11,35 @@ from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_orde
 class MarkingsConfig:
     """Markers, identifiers, brands and stickers; seafront.txt 3.3.3, Algorithms A1 and A2.
 
-    markers_per_face: how many, drawn uniformly, on each of marker_faces. marker_side_mm: side of
-    the square (IMDG Code 5.2.2.2.1.1 asks for 250 mm on containers). second_identifier:
-    probability of another identifier on the same long side. brand and main_text: th_alpha and
-    th_beta of Algorithm A1, by face.
+    marker_faces: that have dangerous-goods markers: front, back, door, no_door, roof.
+    markers_per_face: how many are asked for on each, every number as likely. The pattern takes as
+        many as find room: on doors, beside texts and plates, often fewer.
+    marker_side_mm: side of the square; IMDG Code 5.2.2.2.1.1 asks for 250 mm on containers.
+    marker_gap_mm: between markers.
+    marker_tilt_deg: how askew each is stuck.
+    marker_wear: how faded and torn.
+    fonts: of the container's lettering, by name; all that are shipped where the list is empty.
+    cap_mm: height of an identifier's capitals; ISO 6346 asks for 100 mm.
+    weights_cap_mm: height of the capitals of the weights on the door; ISO 6346 asks for 50 mm.
+    text_wear: how worn identifiers and weights are.
+    second_identifier: probability of another identifier on the same long side.
+    vertical: probability that an identifier runs downward.
+    colored_lettering: probability of lettering in a color; else it is white or black.
+    brand: probability of a brand by face, th_alpha of Algorithm A1.
+    main_text: probability of a further large text by face, th_beta of Algorithm A1.
+    brand_cap_mm: height of a brand's capitals; under half of it on the ends.
+    stickers_per_face: how many signs and stickers, beside the plates that always come.
+    sticker_wear: how faded and torn they are.
+    height_marks: probability of the striped marks of high cubes.
     """
 
     marker_faces: tuple[str, ...] = ("front", "back", "door", "no_door")
     markers_per_face: tuple[int, int] = field(default=(1, 6), metadata=bounds(0, 300))
-    marker_side_mm: Range = field(default=Range(250, 300), metadata=bounds(20, 5000, "mm"))
+    marker_side_mm: Range = field(default=Range(250, 300), metadata=bounds(40, 5000, "mm"))
     marker_gap_mm: Range = field(default=Range(8, 40), metadata=LENGTH)
     marker_tilt_deg: Range = field(default=Range(-2.5, 2.5), metadata=bounds(-45, 45, "degrees"))
     marker_wear: Range = field(default=Range(0.0, 0.35), metadata=UNIT)
-    fonts: tuple[str, ...] = ()  # empty: all that are shipped
+    fonts: tuple[str, ...] = ()
     cap_mm: Range = field(default=Range(100, 165), metadata=bounds(100, 2000, "mm"))
     weights_cap_mm: Range = field(default=Range(50, 62), metadata=bounds(50, 1000, "mm"))
     text_wear: Range = field(default=Range(0.0, 0.4), metadata=UNIT)

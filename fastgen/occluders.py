@@ -20,9 +20,9 @@ _CORE_MM = 200.0
 
 _SUNK_MM = 50.0
 """So far behind the front faces of a thick body light is stopped: less than a container's frame is
-thick, and more than what lookups beside their place find nearer to the light on the same face. Chosen
-by rays to suns all round: 30 mm let a fifth less light through, and shade a fifth more of what lies
-in it at a grazing angle."""
+thick, and more than what lookups beside their place find nearer to the light on the same face. By
+rays to suns all round, 30 mm let a fifth less light through, and shade a fifth more of what lies in
+it at a grazing angle."""
 
 Array = NDArray[np.float64]
 

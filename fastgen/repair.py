@@ -12,20 +12,22 @@ from fastgen.storage import storage_of
 from fastgen.verify import examine
 
 
-def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> list[str]:
+def repair(
+    out: str, worker_count: int, hdri_dir: str | Path | None = None
+) -> tuple[list[str], list[str]]:
     """Make again every shard with a file that is not as it was written, and scenes that failed, or
     finish what was begun.
 
     hdri_dir: where the HDRIs are that the dataset was made with, None for the bundled ones.
-    Returns the faults that are left. Raises OutputError where dataset.json does not tell what to
-    make, or the settings that it names cannot be had here.
+    Returns the faults that were mended and those that are left. Raises OutputError where
+    dataset.json does not tell what to make, or the settings that it names cannot be had here.
     """
     found = examine(out)
     if not found.manifest:
         raise OutputError(f"{out}: {found.faults[0]}")
     finished = "digest" in found.manifest  # else this may be the rest of a repair
     if finished and not found.broken and not found.manifest["failed"]:
-        return found.faults
+        return [], found.faults
     job = _job(out, found.manifest, hdri_dir)
     check_goes_on(job, worker_count)  # before anything is removed
     storage = storage_of(out)
@@ -33,7 +35,8 @@ def repair(out: str, worker_count: int, hdri_dir: str | Path | None = None) -> l
         for path in sorted(found.broken):
             storage.remove(path)  # `generate` makes what is missing, but reads no file's content
     generate(job, worker_count)
-    return examine(out).faults
+    left = examine(out).faults
+    return [fault for fault in found.faults if fault not in left], left
 
 
 def _job(out: str, manifest: dict[str, Any], hdri_dir: str | Path | None) -> Job:

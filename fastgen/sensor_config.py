@@ -16,8 +16,9 @@ CORNERS = tuple(f"{level} {side}" for level in ("top", "bottom") for side in ("l
 class LensConfig:
     """A lens's distortion by OpenCV's coefficients, which differ a little between lenses of a kind.
 
-    model: brown_conrady takes k1, k2, k3, p1 and p2, fisheye (Kannala-Brandt) k1 to k4. See
-    sensor.parts.Lens.
+    model: brown_conrady takes k1, k2, k3, p1 and p2, fisheye (Kannala-Brandt) k1 to k4.
+    k1, k2, k3, k4: radial.
+    p1, p2: tangential.
     """
 
     model: str = "brown_conrady"
@@ -45,7 +46,12 @@ class LensConfig:
 
 @dataclass(frozen=True)
 class NoiseConfig:
-    """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons."""
+    """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons.
+
+    probability: of an image that has it.
+    full_well_e: electrons that make white.
+    read_noise_e: standard deviation without light.
+    """
 
     probability: float = field(default=0.0, metadata=UNIT)
     full_well_e: Range = field(default=Range(2500, 12000), metadata=bounds(50, 1e6, "electrons"))
@@ -54,7 +60,13 @@ class NoiseConfig:
 
 @dataclass(frozen=True)
 class StampConfig:
-    """Date and time burnt in. years: first and last; height: of capitals, share of the image's."""
+    """Date and time burnt in.
+
+    probability: of an image that has it.
+    years: of the date.
+    corners: where it may stand: top left, top right, bottom left, bottom right.
+    height: of its capitals, as a share of the image's.
+    """
 
     probability: float = field(default=0.0, metadata=UNIT)
     years: tuple[int, int] = field(default=(2019, 2027), metadata=bounds(1970, 2100))
@@ -72,7 +84,12 @@ class StampConfig:
 
 @dataclass(frozen=True)
 class DefocusConfig:
-    """A focus that misses the container: focused at this share of the distance to the target."""
+    """A focus that misses the container.
+
+    probability: of an image that has it.
+    focus: what is sharp, as a share of the distance to the target.
+    f_number: of the aperture.
+    """
 
     probability: float = field(default=0.0, metadata=UNIT)
     focus: Range = field(default=Range(0.25, 0.8), metadata=bounds(0.01, 100.0))
@@ -81,7 +98,11 @@ class DefocusConfig:
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Camera and load move while the shutter is open. extent: share of the image's width."""
+    """Camera and load move while the shutter is open.
+
+    probability: of an image that has it.
+    extent: how far, as a share of the image's width.
+    """
 
     probability: float = field(default=0.0, metadata=UNIT)
     extent: Range = field(default=Range(0.001, 0.012), metadata=bounds(0.0, 0.2))
@@ -91,8 +112,9 @@ class MotionConfig:
 class SensorConfig:
     """What cameras do to their images; applies to each camera of the rig.
 
-    vignetting: light lost in the corners. exposure_error_ev: beyond the rig's exposure_ev, after
-    the lens, clipping included. white_balance_ev: by which red and blue stray from green.
+    vignetting: share of the light that is lost in the corners.
+    exposure_error_ev: beyond the rig's exposure_ev, after the lens, clipping included.
+    white_balance_ev: by which red and blue stray from green.
     jpeg_quality: of the camera's own encoder, 0 for none.
     """
 
@@ -114,8 +136,14 @@ class SensorConfig:
 class WeatherConfig:
     """How often there is fog or rain, and how wet what was rained on is.
 
+    fog_probability: of a scene in fog.
     visibility_mm: distance at which fog leaves 2 % of a contrast (Koschmieder); fog is below 1 km.
-    wetness: of paint while it rains, and in wet_probability of the scenes without rain.
+    rain_probability: of a scene in rain.
+    rate_mm_h: of water that falls.
+    shutter_s: for how long a drop draws its streak.
+    wind: speed of drops across the image over that of their fall.
+    wet_probability: of a scene that is wet without rain.
+    wetness: of paint in rain or after it.
     """
 
     fog_probability: float = field(default=0.0, metadata=UNIT)

@@ -20,6 +20,7 @@ from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
         (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
+        (["generate", "{out}", "--images", "2", "--also", "x"], "from bop, depth, ids, kitti, nor"),
         (["generate", "{out}", "--images", "2", "--hdri", ""], "'': names no folder"),
         (["generate", "{out}", "--images", "2", "--shard", "0"], "shard: 0 is out of range"),
         (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),

@@ -119,6 +119,8 @@ def test_errors_about_names_name_the_file(tmp_path):
             "container.profiles.side.pitch_mm: 278 is",
         ),
         ("damage: {count: 2}", "damage.count: expected a list of 2 values, got 2"),
+        ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \[dented\]"),
+        ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),
         ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
         ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),
         ("cameras: {010: {face: front}, 8: {face: back}}", ".*'8' stands twice"),
@@ -129,6 +131,16 @@ def test_errors_about_names_name_the_file(tmp_path):
         path.write_text(text)
         with pytest.raises(ConfigError, match=f"{path}: {words}"):
             Config.load(path)
+
+
+@pytest.mark.parametrize("base", ["crane", {}])
+def test_a_base_that_is_no_configuration_is_refused(base, tmp_path):
+    path = tmp_path / "port.yaml"
+    path.write_text("damage: {probability: 0.5}")
+    with pytest.raises(ConfigError, match=r"base: .* is no Config; take what Config.preset"):
+        Config.from_values({}, base)
+    with pytest.raises(ConfigError, match=r"base: .* is no Config"):
+        Config.load(path, base)
 
 
 def test_cameras_may_share_values_by_an_anchor(tmp_path):

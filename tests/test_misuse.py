@@ -45,7 +45,10 @@ def test_repair_makes_again_what_resuming_cannot_see(dataset, copy, capsys, name
         capsys.readouterr()
         assert main(["verify", str(copy)]) == 1
         assert f"fastgen verify {copy} --repair" in capsys.readouterr().out
+    broken = name.startswith(("images", "scenes"))
+    capsys.readouterr()
     assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
+    assert ("mended: " in capsys.readouterr().out) == broken
     assert content(copy) == content(dataset)
 
 

@@ -129,7 +129,8 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     """Formats by name. Raises ConfigError for an unknown one."""
     known = known_formats()
     for name in names:
-        check_known("also", name, known)
+        if name not in known:
+            check_known("also", name, set(known) - set(SEAFRONT))
     return [known[name] for name in names]
 
 

@@ -1,0 +1,76 @@
+"""The whole configuration as commented YAML, read by PyYAML and by hand."""
+
+import dataclasses
+import typing
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fastgen.cli import main
+from fastgen.config import PRESETS, Config
+from fastgen.config_text import as_yaml, meanings
+from fastgen.errors import ConfigError
+
+OWN = {
+    "cameras": {"gate": {"face": "door", "focal_mm": 35, "distance_mm": 4000}},
+    "surface": {"colors": {"no": "#102030", "schön": "#ffffff"}},
+    "environment": {"names": ["1e3", "park"]},
+    "weather": {"shutter_s": 1e-5},
+}
+"""Values that YAML is known to misread where they are written carelessly."""
+
+CONFIGS = {**{name: Config.preset(name) for name in PRESETS}, "own": Config.from_values(OWN)}
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_what_is_printed_reads_back(name, tmp_path):
+    text = as_yaml(CONFIGS[name])
+    (tmp_path / "all.yaml").write_text(text, encoding="utf-8")
+    assert Config.load(tmp_path / "all.yaml", Config.preset("crane")) == CONFIGS[name]
+    assert yaml.safe_load(text) == CONFIGS[name].to_plain()  # as any other reader does
+
+
+def test_the_command_prints_a_file_over_a_preset(tmp_path, capsys):
+    (tmp_path / "mine.yaml").write_text("damage: {probability: 0.75}")
+    assert main(["config", "--preset", "crane", "--config", str(tmp_path / "mine.yaml")]) == 0
+    printed = yaml.safe_load(capsys.readouterr().out)
+    assert printed["damage"]["probability"] == 0.75
+    assert printed["cameras"]["A"]["lens"]["model"] == "fisheye"
+
+
+def records(cls):
+    """A dataclass and all that its fields hold, whatever way."""
+    yield cls
+    for hint in typing.get_type_hints(cls).values():
+        for part in (hint, *typing.get_args(hint)):
+            if dataclasses.is_dataclass(part):
+                yield from records(part)
+
+
+@pytest.mark.parametrize("cls", sorted(set(records(Config)), key=lambda cls: cls.__name__))
+def test_every_key_is_explained(cls):
+    about, words = meanings(cls)
+    hints = typing.get_type_hints(cls)
+    plain = {name for name, hint in hints.items() if not dataclasses.is_dataclass(hint)}
+    assert about
+    assert plain <= words.keys()
+    assert "Raises" not in " ".join([about, *words.values()])
+
+
+def test_limits_are_told_beside_values():
+    """Those that are refused beyond."""
+    (line,) = (line for line in as_yaml(Config.preset()).splitlines() if "rust_scale_mm" in line)
+    assert "range, 50 to 100000 mm" in line
+    for value, good in ((50, True), (49.9, False), (1e5, True), (100001, False)):
+        try:
+            Config.from_values({"surface": {"rust_scale_mm": value}})
+            taken = True
+        except ConfigError:
+            taken = False
+        assert taken == good
+
+
+def test_the_page_shows_what_the_command_prints():
+    page = Path("docs/configuration.md").read_text(encoding="utf-8")
+    assert f"```yaml\n{as_yaml(Config.preset())}```\n" in page
