@@ -21,7 +21,7 @@ from fastgen.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
 from fastgen.sun import Sun, split_suns
 
-PREFILTER_VERSION = 11
+PREFILTER_VERSION = 12
 """Part of the cache key: count up whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
@@ -78,10 +78,10 @@ class EnvironmentLight(Ambient):
     """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS;
     without the suns, as `irradiance`."""
     background: NDArray[np.uint32]
-    """[B, B] radiance as it is, as rgb9e5.py packs it; B is a power of two from 512 to 2048 near
-    twice the width, for as much as that is needed to look as sharp as the HDRI itself, and 4096
-    where that is wider than 4096: a finer one shows in no picture of a usual size, but takes
-    67 MB."""
+    """[B, B] radiance as it is, as rgb9e5.py packs it, by prefilter.levelled directions. B is a
+    power of two from 512 to 2048 near twice the width, for as much as that is needed to look as
+    sharp as the HDRI itself, and 4096 where that is wider than 4096: a finer one shows in no
+    picture of a usual size, but takes 67 MB."""
 
 
 def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> EnvironmentLight:
@@ -98,7 +98,7 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     # a texel has sqrt(4 pi) / B radians a side, one of the source at most 2 pi / W
     samples = 1 if source.shape[1] <= 1.5 * background_size else 2
     poles = prefilter.smooth_poles(source)
-    background = prefilter.resample_octahedral(poles, background_size, samples)
+    background = prefilter.resample_octahedral(poles, background_size, samples, level=True)
 
     # about a texel and a half of the layers; wider lobes do with half of it
     narrow = prefilter.shrink(source, _SUN_WIDTH)

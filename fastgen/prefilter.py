@@ -7,7 +7,7 @@ Conventions. World z is up. An equirectangular map [H, W, 3] has u = 0.5 - atan2
 is a quarter turn to the left of it. An octahedral map (Cigolle et al. 2014, A Survey of Efficient
 Representations for Independent Unit Vectors, JCGT 3(2), section 3.2) has row 0 at v = 0 and a
 border of one texel, so that uv maps to (1 + uv * (N - 2)) / N of the texture and bilinear lookup is
-seamless over the whole sphere.
+seamless over the whole sphere. A levelled one is of (y, z, x) in place of (x, y, z).
 """
 
 from collections.abc import Callable
@@ -104,13 +104,20 @@ def smooth_poles(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
     return smooth
 
 
+def levelled(direction: ArrayLike) -> NDArray[np.float64]:
+    """Directions [..., 3] as those to look up in a map that was resampled with level=True."""
+    return np.roll(np.asarray(direction, np.float64), -1, axis=-1)
+
+
 def resample_octahedral(
-    radiance: NDArray[np.float32], size: int, samples: int
+    radiance: NDArray[np.float32], size: int, samples: int, level: bool = False
 ) -> NDArray[np.float32]:
     """Equirectangular radiance [H, 2H, 3] as a bordered octahedral map [size, size, 3].
 
     size: even. samples: each texel is the mean of samples x samples bilinear lookups spread over
-    it; choose it so that they lie no further apart than a texel of the source.
+    it; choose it so that they lie no further apart than a texel of the source. level: the map is
+    turned so that the horizon lies along its rows and columns, y and z being its axes and x its
+    middle: along its diagonals, an edge as of a bright sky gets teeth where it is enlarged.
     """
     assert size % 2 == 0, "the quarters of a map are alike"
     height, width = radiance.shape[:2]
@@ -133,19 +140,26 @@ def resample_octahedral(
         last = min(first + band, half)
         across = along[first * samples : last * samples, None]
         # octahedral_decode, without the unit length that no angle needs
-        z = 1.0 - along - across
-        folded = np.maximum(-z, 0.0)
-        dx, dy = along - folded, across - folded
+        middle = 1.0 - along - across
+        folded = np.maximum(-middle, 0.0)
+        dx, dy, dz = along - folded, across - folded, middle
+        if level:
+            dx, dy, dz = dz, dx, dy
         turn = np.arctan2(dy, dx) * np.float32(width / (2 * np.pi))
         # arctan2 gives acos(z), exact at the poles
-        y = np.arctan2(np.hypot(dx, dy), z) * np.float32(height / np.pi) + np.float32(0.5)
-        y = np.concatenate([y[:, ::-1], y], axis=1)
+        top = np.arctan2(np.hypot(dx, dy), dz) * np.float32(height / np.pi) + np.float32(0.5)
         over, under = inside[half + first : half + last], inside[half - last : half - first][::-1]
-        for rows, left, right in (
-            (over, np.float32(0.5) + turn, ahead - turn),
-            (under, behind - turn, ahead + turn),
-        ):
+        if level:
+            sides = (ahead + turn, ahead - turn)
+            places = ((over, sides, top), (under, sides, np.float32(height + 1) - top))
+        else:
+            places = (
+                (over, (np.float32(0.5) + turn, ahead - turn), top),
+                (under, (behind - turn, ahead + turn), top),
+            )
+        for rows, (left, right), y in places:
             x = np.concatenate([left[:, ::-1], right], axis=1)
+            y = np.concatenate([y[:, ::-1], y], axis=1)
             taken = cv2.remap(padded, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             rows[:] = _resize(np.asarray(taken, np.float32), last - first, 2 * half)
     fill_border(result)

@@ -2,7 +2,7 @@
 
 uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
 uniform sampler2D irradiance_light;      // irradiance / pi, 1-texel border
-uniform sampler2D background_light;      // radiance, 1-texel border
+uniform sampler2D background_light;      // radiance, x in its middle, 1-texel border
 
 vec3 to_environment(vec3 d) {
     return vec3(fma(yaw.x, d.x, yaw.y * d.y), fma(yaw.x, d.y, -yaw.y * d.x), d.z);
@@ -30,7 +30,7 @@ vec3 diffuse_radiance(vec3 normal) {
 
 // the direction may have any length
 vec3 background(vec3 direction) {
-    vec2 uv = bordered(octahedral(to_environment(direction)), background_size);
+    vec2 uv = bordered(octahedral(to_environment(direction).yzx), background_size);
     return textureLod(background_light, uv, 0.0).rgb;
 }
 

@@ -12,8 +12,8 @@ void main() {
     vec3 toward = vec3(face & 1, (face >> 1) & 1, face >> 2) * 2.0 - 1.0;
     vec3 corner = vec3(0.0);
     corner[gl_VertexID % 3] = toward[gl_VertexID % 3];
-    // the lowest corner is unfolded to all four of the map's, see octahedral.glsl
-    vec2 unfolded = corner.z < 0.0 ? toward.xy : corner.xy;
+    // the corner behind is unfolded to all four of the map's, see octahedral.glsl
+    vec2 unfolded = corner.x < 0.0 ? toward.yz : corner.yz;
     float texel = 1.0 / background_size;
     map_uv = (unfolded * 0.5 + 0.5) * (1.0 - 2.0 * texel) + texel;
 

@@ -10,7 +10,13 @@ from fastgen.environment import (
     irradiance_at,
     prefilter_environment,
 )
-from fastgen.prefilter import octahedral_decode, octahedral_encode, sample_octahedral, shrink
+from fastgen.prefilter import (
+    levelled,
+    octahedral_decode,
+    octahedral_encode,
+    sample_octahedral,
+    shrink,
+)
 from fastgen.reflectance import dfg_table, fresnel_climb, mean_specular_albedo
 from fastgen.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
@@ -75,9 +81,9 @@ def test_a_light_appears_in_the_direction_where_it_stands():
     row, column = np.unravel_index(
         unpacked(light.background)[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2)
     )
-    # the layout of the module docstring, spelt out for z > 0
-    x, y = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
-    found = np.array([x, y, 1 - abs(x) - abs(y)])
+    # the layout of the module docstring, spelt out for what lies ahead, x > 0
+    y, z = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
+    found = np.array([1 - abs(y) - abs(z), y, z])
     assert found @ toward / np.linalg.norm(found) > np.cos(np.deg2rad(3))
     (sun,) = light.suns
     assert np.dot(sun.direction, toward) > np.cos(np.deg2rad(1))
@@ -181,9 +187,23 @@ def test_the_background_is_as_sharp_as_the_hdri():
     background = unpacked(prefilter_environment("stripes", stripes).background)
     middle = 2 * np.pi * (np.arange(512) + 0.5) / 512
     along = np.stack([-np.cos(middle), np.sin(middle), np.full(512, 1e-3)], axis=1)
-    seen = sample_octahedral(background, along)[:, 0]
+    seen = sample_octahedral(background, levelled(along))[:, 0]
     # with as many texels as the HDRI has columns, under half of it was left
     assert seen[::2].mean() - seen[1::2].mean() > 0.6
+
+
+def test_a_level_edge_stays_level_in_the_background():
+    """Where a bright sky ends above dark land, nothing changes within three degrees of azimuth."""
+    sky = np.full((256, 512, 3), 0.1, np.float32)
+    sky[:128], sky[120:127] = 20.0, 5.0
+    background = unpacked(prefilter_environment("level", sky).background)
+    angle = np.linspace(0, 2 * np.pi, 20000, endpoint=False)
+    for elevation in np.deg2rad(np.linspace(-3, 8, 221)):
+        ring = np.stack([np.cos(angle), np.sin(angle), np.full(20000, np.tan(elevation))], axis=1)
+        seen = sample_octahedral(background, levelled(ring))[:, 0]
+        waves = np.fft.rfft(seen)
+        teeth = np.fft.irfft(np.where(np.arange(len(waves)) < 120, 0, waves))
+        assert teeth.std() < 0.05 * seen.mean()  # 0.33 where the horizon is a diagonal
 
 
 def unpolarized(cosine, index=1.5):
