@@ -1,7 +1,7 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain, product
@@ -275,9 +275,9 @@ class Generator:
             checked = self._check(scene)
             return renderer.exposure(checked, check_camera(camera, checked.container), self.size)
 
-    def preload(self) -> None:
+    def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
-        later."""
+        later. on_step: called before each of them, which takes seconds the first time."""
         scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
         names = self.config.environment.names or drawn
@@ -293,7 +293,9 @@ class Generator:
                 _ = build_container(made.kind, made.profiles).triangle_bounds_mm
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
-            renderer.preload(chain(lit, shaped), lens)
+            for each in chain(lit, shaped):
+                on_step()
+                renderer.preload(each, lens)
             lights = {shader_suns(renderer.ambient(name).suns): name for name in names}
         # programs and targets: every way to draw, every container
         ways = list(product(one_damage_each(self.config), lights.values()))
@@ -310,6 +312,7 @@ class Generator:
                 ): camera
                 for camera in shown.cameras
             }
+            on_step()
             for camera in alike.values():
                 self.render(scene=shown, camera=camera)
 

@@ -186,12 +186,13 @@ class _Actor:
         return reports, failure
 
     def _report(self, kind: str, value: Any) -> None:
-        """Pass a scene's turn on before it begins; the rest goes along with the next."""
+        """Pass on at once that it turns to a scene or is busy; the rest goes along."""
         if (kind, value) == ("at", self._scene):
             return
         self._reports.append((kind, value))
         if kind == "at":
             self._scene = value
+        if kind in ("at", "busy"):
             _ray().get(self._board.tell.remote(self._number, self._reports))
             self._reports = []
 

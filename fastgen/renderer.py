@@ -7,7 +7,7 @@ ids, damage and depth at the pixel centre. Ids are never filtered: a sample lies
 pixel centre.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import moderngl
@@ -239,12 +239,11 @@ class Renderer:
         self._sun_shadow.cast(container, spreader, toward, scene.damages, outline)
         return self._sun_shadow
 
-    def preload(self, scenes: Iterable[Scene], lens: bool) -> None:
-        """Make the light and the shapes of scenes, so that drawing them takes neither time nor
+    def preload(self, scene: Scene, lens: bool) -> None:
+        """Make the light and the shapes of a scene, so that drawing it takes neither time nor
         memory for that; lens: whether one bends what is drawn."""
-        for scene in scenes:
-            light = self.ambient(scene.environment.name)
-            self._shapes.zone_table(*self._shapes.of(scene, lens, light))
+        light = self.ambient(scene.environment.name)
+        self._shapes.zone_table(*self._shapes.of(scene, lens, light))
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(

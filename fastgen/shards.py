@@ -39,7 +39,7 @@ ATTEMPTS = 3
 """A scene that failed so often is given up."""
 
 Report = Callable[[str, Any], None]
-"""Tells the parent process: 'at' a scene's index, 'images' made."""
+"""Tells the parent process: 'at' a scene's index, 'images' made; 'busy' with what precedes them."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Maker:
             quality=job.quality,
         )
         if job.images > _PRELOAD_IMAGES:
-            self._generator.preload()
+            self._generator.preload(lambda: report("busy", None))
         names = (self._generator.used_backend, self._generator.renderer_name)
         self._made_by = dict(zip(MADE_BY, names, strict=True))
 

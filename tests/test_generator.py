@@ -191,7 +191,9 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         {"container": {"kinds": {"20": 1}}, "environment": {"names": ["park", "venice"]}}
     )
     with Generator(config, seed=4, size=SIZE) as generator:
-        generator.preload()
+        steps = []
+        generator.preload(lambda: steps.append(1))
+        assert len(steps) > 10  # lights, shapes and ways to draw, each a sign of life
 
         def never(*_: object, **__: object) -> None:
             raise AssertionError("made after all")

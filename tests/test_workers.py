@@ -1,5 +1,6 @@
 """Worker processes that end when nobody expects it."""
 
+import contextlib
 import os
 import threading
 import time
@@ -18,6 +19,32 @@ class DiesAfterItsTask:
     def __call__(self, task):
         self._report("images", task)
         threading.Timer(0.3, os._exit, (9,)).start()
+
+
+class StartsSlowly:
+    """Takes longer to begin than a worker may be silent; speaks up meanwhile, or does not."""
+
+    def __init__(self, speaks, report):
+        for _ in range(8):
+            time.sleep(0.25)
+            if speaks:
+                report("busy", None)
+
+    def __call__(self, task):
+        pass
+
+
+@pytest.mark.parametrize("speaks", [True, False])
+def test_a_slow_start_is_no_hang_where_it_says_so(speaks):
+    ends = []
+
+    def on_death(task, place, ended):
+        ends.append(ended)
+        raise KeyboardInterrupt
+
+    with contextlib.suppress(KeyboardInterrupt):
+        workers.run(StartsSlowly, (speaks,), [1], 1, lambda *_: None, on_death, hang_s=1.0)
+    assert ends == ([] if speaks else ["no sign of life for 1 s"])
 
 
 @pytest.mark.parametrize("tasks", [[1], [1, 2, 3]])
