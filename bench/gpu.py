@@ -55,7 +55,7 @@ def main() -> None:
             reason = "this build of PyTorch, or its driver, has no CUDA"
         tensors = None if reason else tensor_rate(generator, options.images)
     print(f"{about}; {driver}; {options.images} images of {options.size}")
-    disk = whole_run("egl", options.size, options.images, options.workers)
+    disk = whole_run("egl", options.size, options.images, options.workers).whole
     print(f"to disk, {options.workers} worker(s)  {disk:8.1f} images/s")
     print(f"to a CUDA tensor  {f'{tensors:8.1f} images/s' if tensors else 'none: ' + reason}")
     figures = {"to_disk": disk, "to_cuda_tensor": tensors, "reason": reason}

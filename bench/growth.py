@@ -143,7 +143,7 @@ def workers(images: int) -> Table:
     cores = len(os.sched_getaffinity(0))
     counts = sorted({1, 2, cores, 2 * cores})
     fill_caches("auto", images)
-    rates = [whole_run("auto", "640x640", images, count) for count in counts]
+    rates = [whole_run("auto", "640x640", images, count).whole for count in counts]
     return {"workers": [float(c) for c in counts], "images_per_s": rates}
 
 

@@ -2,8 +2,13 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import fastgen
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "bench" / "results"
@@ -29,10 +34,12 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def save(name: str, figures: dict[str, Any]) -> None:
-    """Write bench/results/NAME.json, from which the charts in docs/ can be drawn again."""
+    """Write bench/results/NAME.json, from which the charts in docs/ can be drawn again, and what
+    version of fastgen the figures are of."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
-    path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    told = {"fastgen": fastgen.__version__, **figures}
+    path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
 
 
 def write_section(

@@ -2,12 +2,14 @@
 
     python bench/throughput.py [--images 200] [--scenes 12] [--sizes 320x320,640x640,...]
 
-For each size, on EGL and OSMesa: core-milliseconds an image by stage in one process (warm: every
-HDRI and mesh was used before), and images a second of `fastgen generate` from start to finish.
-Leaves bench/results/throughput.json and docs/throughput.png. `bench/peers.py` measures other tools.
+For each size, on EGL and OSMesa, and for each quality at 640x640: core-milliseconds an image by
+stage in one process (warm: every HDRI and mesh was used before), and images a second of `fastgen
+generate`, from start to finish and once it runs. Leaves bench/results/throughput.json,
+docs/throughput.png and a table in README.md. `bench/peers.py` measures other tools.
 """
 
 import argparse
+import json
 import os
 import statistics
 import subprocess
@@ -16,7 +18,7 @@ import tempfile
 import time
 from collections import defaultdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 # one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
 os.environ.setdefault("LP_NUM_THREADS", "0")
@@ -24,8 +26,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import matplotlib.pyplot as plt
 import numpy as np
-from results import ROOT, machine, parse_size, save
+from results import ROOT, machine, parse_size, save, write_section
 
+import fastgen
 from fastgen import Config, Generator
 from fastgen.camera import view_of
 from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
@@ -39,15 +42,19 @@ STAGES = ("sample", "draw", "read", "label", "encode", "write")
 BACKENDS = ("egl", "osmesa")
 WORKERS = (1, 2)
 SIZES = "320x320,640x640,1333x800,1920x1080"
+USUAL = "640x640"
+OTHER_QUALITIES = ("draft", "high")
 
 
-def stages(backend: str, size: tuple[int, int], scenes: int) -> tuple[str, dict[str, float]]:
+def stages(
+    backend: str, size: tuple[int, int], scenes: int, quality: str
+) -> tuple[str, dict[str, float]]:
     """The driver's name, and mean core-milliseconds an image of each stage over all cameras."""
     times: dict[str, list[float]] = defaultdict(list)
     config = Config.preset()
     with (
         tempfile.TemporaryDirectory() as folder,
-        Generator(config, seed=7, size=size, backend=backend) as generator,
+        Generator(config, seed=7, size=size, backend=backend, quality=quality) as generator,
     ):
         storage, formats = Folder(Path(folder)), formats_of(SEAFRONT)
         for index in range(scenes):
@@ -98,10 +105,25 @@ def generate_command(out: str, images: int, workers: int, size: str, backend: st
     return command
 
 
-def whole_run(backend: str, size: str, images: int, workers: int) -> float:
-    """Images a second of the command, start-up and contact sheet included."""
+class Rate(NamedTuple):
+    """Images a second of a whole run, start-up and contact sheet included, and of its last two
+    thirds."""
+
+    whole: float
+    steady: float
+
+
+def whole_run(
+    backend: str, size: str, images: int, workers: int, quality: str = "balanced"
+) -> Rate:
+    """How fast the command makes a dataset."""
     with tempfile.TemporaryDirectory() as folder:
-        command = generate_command(f"{folder}/out", images, workers, size, backend)
+        out = Path(folder) / "out"
+        command = [
+            *generate_command(str(out), images, workers, size, backend),
+            "--quality",
+            quality,
+        ]
         began = time.perf_counter()
         subprocess.run(
             command,
@@ -110,7 +132,12 @@ def whole_run(backend: str, size: str, images: int, workers: int) -> float:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        return images / (time.perf_counter() - began)
+        taken = time.perf_counter() - began
+        shards = sorted((out / "shards").glob("*.json"), key=lambda path: path.stat().st_mtime)
+        made = np.cumsum([len(json.loads(path.read_text())["images"]) for path in shards])
+        first = int(np.searchsorted(made, images / 3))
+        spent = shards[-1].stat().st_mtime - shards[first].stat().st_mtime
+        return Rate(images / taken, float(made[-1] - made[first]) / spent)
 
 
 def fill_caches(backend: str, images: int) -> None:
@@ -118,30 +145,54 @@ def fill_caches(backend: str, images: int) -> None:
     whole_run(backend, "64x64", images, max(WORKERS))
 
 
-def measure(size: str, backend: str, images: int, scenes: int) -> dict[str, Any]:
+def measure(size: str, backend: str, images: int, scenes: int, quality: str) -> dict[str, Any]:
     """One row of the table, printed as soon as it is known."""
-    driver, found = stages(backend, parse_size(size), scenes)
-    rates = {str(workers): whole_run(backend, size, images, workers) for workers in WORKERS}
+    driver, found = stages(backend, parse_size(size), scenes, quality)
+    rates = {str(w): whole_run(backend, size, images, w, quality) for w in WORKERS}
     print(
-        f"{size:11}{backend:8}"
-        + "".join(f"{found[stage]:9.2f}" for stage in STAGES)
-        + f"{sum(found.values()):9.2f}"
-        + "".join(f"{rate:11.1f}" for rate in rates.values()),
+        f"{size:11}{backend:8}{quality:10}"
+        + "".join(f"{found[stage]:8.2f}" for stage in STAGES)
+        + f"{sum(found.values()):8.2f}"
+        + "".join(f"{whole:9.1f}{steady:9.1f}" for whole, steady in rates.values()),
         flush=True,
     )
     return {
         "size": size,
         "backend": backend,
+        "quality": quality,
         "driver": driver,
         "stages_ms": found,
-        "images_per_s": rates,
+        "images_per_s": {workers: rate.whole for workers, rate in rates.items()},
+        "steady_images_per_s": {workers: rate.steady for workers, rate in rates.items()},
     }
+
+
+def table(rows: list[dict[str, Any]], about: str, images: int) -> list[str]:
+    """Markdown of the rows on EGL."""
+    shown = [row for row in rows if row["backend"] == "egl"]
+    lines = [
+        "What a labelled image takes in core-milliseconds, and images a second of `fastgen",
+        f"generate` with two workers: over {images}, with all that its start takes, and once it",
+        f"runs (`python bench/throughput.py`, {about}, version {fastgen.__version__}):",
+        "",
+        "| quality | size | scene | draw | labels | files | core-ms | images/s, all | running |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in sorted(
+        shown, key=lambda row: (row["size"] != USUAL, sum(row["stages_ms"].values()))
+    ):
+        ms = row["stages_ms"]
+        parts = [ms["sample"], ms["draw"] + ms["read"], ms["label"], ms["encode"] + ms["write"]]
+        cells = [f"{part:.0f}" for part in (*parts, sum(parts))]
+        rates = [f"{row[kind]['2']:.1f}" for kind in ("images_per_s", "steady_images_per_s")]
+        lines.append("| " + " | ".join([f"`{row['quality']}`", row["size"], *cells, *rates]) + " |")
+    return lines
 
 
 def draw(rows: list[dict[str, Any]], caption: str, chart: Path) -> None:
     """Stacked stages on the left, images a second on the right."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
-    names = [f"{row['size']}\n{row['backend']}" for row in rows]
+    names = [f"{row['size']}\n{row['backend']}\n{row['quality']}" for row in rows]
     places = np.arange(len(rows))
     below = np.zeros(len(rows))
     for stage in STAGES:
@@ -173,20 +224,24 @@ def main() -> None:
     options = parser.parse_args()
     about = machine()
     print(f"{about}, no GPU unless the driver says so; {options.images} images a run\n")
-    rates = "".join(f"{f'{w} worker/s':>11}" for w in WORKERS)
-    print(f"{'core-ms':19}" + "".join(f"{s:>9}" for s in STAGES) + f"{'sum':>9}{rates}")
+    rates = "".join(f"{f'{w} work.':>9}{'running':>9}" for w in WORKERS)
+    print(f"{'core-ms':29}" + "".join(f"{s:>8}" for s in STAGES) + f"{'sum':>8}{rates}")
     for backend in BACKENDS:
         fill_caches(backend, options.images)
+    ways = [
+        *((s, b, "balanced") for s in options.sizes.split(",") for b in BACKENDS),
+        *((USUAL, BACKENDS[0], quality) for quality in OTHER_QUALITIES),
+    ]
     rows = [
-        measure(size, backend, options.images, options.scenes)
-        for size in options.sizes.split(",")
-        for backend in BACKENDS
+        measure(size, backend, options.images, options.scenes, quality)
+        for size, backend, quality in ways
     ]
     driver = ", ".join(sorted({row["driver"] for row in rows}))
     caption = f"{about}; {driver}; {options.images} images a run"
-    print(f"\n{driver}; N worker/s: images a second with N workers")
+    print(f"\n{driver}; N work.: images a second with N workers")
     save("throughput", {"machine": about, "images": options.images, "rows": rows})
     draw(rows, caption, options.chart)
+    write_section("throughput", table(rows, about, options.images), ROOT / "README.md")
 
 
 if __name__ == "__main__":
