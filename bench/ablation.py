@@ -28,7 +28,7 @@ from ablation_elements import ELEMENTS, Absence, Element
 from image_error import displayed, flip
 from numpy.typing import NDArray
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
-from results import machine, parse_size, save, write_section
+from results import machine, origin, parse_size, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.sample import Frame
@@ -189,7 +189,7 @@ def main() -> None:
     if options.only:
         return
     write_section("ablation", lines)
-    figures = {"machine": about, "size": options.size, "cases": len(chosen), "elements": rows}
+    figures = {**origin(), "size": options.size, "cases": len(chosen), "elements": rows}
     save("ablation", figures)
 
 

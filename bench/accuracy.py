@@ -33,7 +33,7 @@ from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
 from reference_set import DEPTH_STEP, FILTERS, SEED, SIZE, Case, Reference, cases, load, traced
-from results import ROOT, machine, save, write_section
+from results import ROOT, machine, origin, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
@@ -249,7 +249,7 @@ def main() -> None:
         quality: {f"{r.case.number:02d}": [*r.measures, r.seconds] for r in listed}
         for quality, listed in results.items()
     }
-    save("accuracy", {"machine": about, "measures": measures})
+    save("accuracy", {**origin(), "measures": measures})
     shown = results.get("balanced") or next(iter(results.values()))
     write_picture(
         options.picture, contact_picture([(r.case, r.panels) for r in shown[:CONTACT_CASES]])

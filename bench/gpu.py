@@ -12,7 +12,7 @@ import argparse
 import time
 
 import torch
-from results import machine, parse_size, save
+from results import machine, origin, parse_size, save
 from throughput import whole_run
 
 from fastgen import Config, Generator
@@ -59,7 +59,7 @@ def main() -> None:
     print(f"to disk, {options.workers} worker(s)  {disk:8.1f} images/s")
     print(f"to a CUDA tensor  {f'{tensors:8.1f} images/s' if tensors else 'none: ' + reason}")
     figures = {"to_disk": disk, "to_cuda_tensor": tensors, "reason": reason}
-    save("gpu", {"machine": about, "driver": driver, **vars(options), "images_per_s": figures})
+    save("gpu", {**origin(), "driver": driver, **vars(options), "images_per_s": figures})
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ import cv2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from results import RESULTS, ROOT, machine, parse_size, save
+from results import RESULTS, ROOT, machine, origin, parse_size, save
 from throughput import fill_caches, generate_command, whole_run
 
 from fastgen import Config, Generator
@@ -311,7 +311,7 @@ def main() -> None:
     print(machine())
     for name in wanted:
         table = measures[name]()
-        parts[name] = {"machine": machine(), "table": table}
+        parts[name] = {**origin(), "table": table}
         if name == "length":
             parts[name]["size"] = options.size
         show(name, table)

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import cv2
 import matplotlib.pyplot as plt
 import numpy as np
-from results import ROOT, machine, save
+from results import ROOT, origin, save
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -223,11 +223,11 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "label_accuracy.png")
     options = parser.parse_args()
-    about, counts = machine(), exactness(options.scenes, options.size)
+    counts = exactness(options.scenes, options.size)
     ways = against_the_paper(max(options.scenes // 10, 2), options.chart)
     save(
         "label_accuracy",
-        {"machine": about, **vars(options) | {"chart": ""}, "views": counts, **ways},
+        {**origin(), "scenes": options.scenes, "size": options.size, "views": counts, **ways},
     )
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import simplejpeg
 import torch
-from results import ROOT, machine, parse_size, save, write_section
+from results import ROOT, machine, origin, parse_size, save, write_section
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
@@ -166,7 +166,7 @@ def main() -> None:
                 for workers in WORKERS:
                     rows.append(run(net, source, data, workers, options.batch))
                     print(rows[-1], flush=True)
-    save("loader", {"machine": machine(), "rows": [asdict(row) for row in rows]})
+    save("loader", {**origin(), "rows": [asdict(row) for row in rows]})
     write_section("loader", table(rows, options), ROOT / "docs" / "training.md")
 
 

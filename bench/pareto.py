@@ -39,7 +39,7 @@ from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
 from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
-from results import ROOT, machine, save, write_section
+from results import ROOT, machine, origin, save, write_section
 
 from fastgen import Config, Generator, environment, shapes
 from fastgen.camera import view_of
@@ -262,7 +262,7 @@ def main() -> None:
         figures = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
         lines.append(f"| {point.renderer} | {point.setting} | {figures} |")
     write_section("pareto", lines)
-    save("pareto", {"machine": about, "points": [vars(point) for point in points]})
+    save("pareto", {**origin(), "points": [vars(point) for point in points]})
     draw(points, caption, options.chart)
 
 

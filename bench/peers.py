@@ -30,7 +30,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from peer_jobs import with_effort, write_jobs
-from results import ROOT, machine, parse_size, save
+from results import ROOT, machine, origin, parse_size, save
 
 from fastgen import Config, Generator
 
@@ -266,7 +266,7 @@ def main() -> None:
         caption += f"; a trial: Cycles at {options.samples} spp"
     print(caption)
     show(found)
-    save("peers", {"machine": about, "size": options.size, "views": len(truths), "peers": found})
+    save("peers", {**origin(), "size": options.size, "views": len(truths), "peers": found})
     draw(found, caption, options.chart)
 
 

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import matplotlib.pyplot as plt
 import numpy as np
-from results import ROOT, machine, parse_size, save, write_section
+from results import ROOT, machine, origin, parse_size, save, write_section
 
 import fastgen
 from fastgen import Config, Generator
@@ -107,7 +107,7 @@ def generate_command(out: str, images: int, workers: int, size: str, backend: st
 
 class Rate(NamedTuple):
     """Images a second of a whole run, start-up and contact sheet included, and of its last two
-    thirds."""
+    thirds; the same for both where all came at once."""
 
     whole: float
     steady: float
@@ -137,7 +137,8 @@ def whole_run(
         made = np.cumsum([len(json.loads(path.read_text())["images"]) for path in shards])
         first = int(np.searchsorted(made, images / 3))
         spent = shards[-1].stat().st_mtime - shards[first].stat().st_mtime
-        return Rate(images / taken, float(made[-1] - made[first]) / spent)
+        whole = images / taken
+        return Rate(whole, float(made[-1] - made[first]) / spent if spent > 0 else whole)
 
 
 def fill_caches(backend: str, images: int) -> None:
@@ -239,7 +240,7 @@ def main() -> None:
     driver = ", ".join(sorted({row["driver"] for row in rows}))
     caption = f"{about}; {driver}; {options.images} images a run"
     print(f"\n{driver}; N work.: images a second with N workers")
-    save("throughput", {"machine": about, "images": options.images, "rows": rows})
+    save("throughput", {**origin(), "images": options.images, "rows": rows})
     draw(rows, caption, options.chart)
     write_section("throughput", table(rows, about, options.images), ROOT / "README.md")
 

@@ -1,7 +1,7 @@
 """Config: every parameter of the distributions that scenes are drawn from, validated, with units.
 
 A preset is a Config made here; a YAML or JSON file changes single values of it. Ranges are drawn
-uniformly unless their comment says otherwise. Lengths are millimetres, angles degrees, colours
+uniformly unless their docstring says otherwise. Lengths are millimetres, angles degrees, colours
 sRGB hex in files (people pick them on screens) and linear albedo in scenes.
 """
 
@@ -102,7 +102,6 @@ class ContainerConfig:
     """Which containers come, and how much their corrugation differs from the nominal profile.
 
     kinds: weight of 20, 40, 40HC and 45HC in the draw.
-    profiles: corrugation of the walls.
     depth_scale: factors of the corrugations' depth, each as likely as any other; no range, as every
         one is a mesh of its own.
     """
@@ -135,10 +134,10 @@ class CameraConfig:
 
     face: front, back, door, no_door, roof or underside.
     focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
-    distance_mm: from the middle of the face.
-    azimuth_deg: turns the camera about the vertical through that middle; 0 looks straight at the
+    distance_mm: from the point that it looks at.
+    azimuth_deg: turns the camera about the vertical through that point; 0 looks straight at the
         face, and where it is positive the camera stands to the right, seen from itself.
-    elevation_deg: lifts the camera, which goes on looking at the face.
+    elevation_deg: lifts the camera, which goes on looking there.
     roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
         lies across.
     target_shift_mm: how far beside the middle it looks, along each axis of the face.
@@ -345,7 +344,7 @@ JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
     re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
 )
-"""What PyYAML resolves as a number once it is told."""
+"""Arguments of add_implicit_resolver, by which PyYAML takes 1e-05 for a number."""
 
 _Loader.add_implicit_resolver(*JSON_FLOATS)
 

@@ -85,7 +85,7 @@ class _Text:
         name = f"{_plain(key)}:"
         if dataclasses.is_dataclass(value):
             if type(value) not in self._told:
-                words = meanings(type(value))[0]
+                words = f"{words} {meanings(type(value))[0]}".strip()
             yield from _explained(name, words)
             yield from _indented(self.fields(value))
         elif isinstance(value, Mapping):
@@ -112,10 +112,8 @@ def _comment(words: str) -> Iterator[str]:
 
 
 def _plain(value: Any) -> str:
-    """A scalar or a list of them, as YAML has it on one line."""
-    text: str = yaml.dump(
-        value, Dumper=_Dumper, default_flow_style=True, width=math.inf, allow_unicode=True
-    )
+    """A scalar or a list of them, as YAML has it on one line, in ASCII for any terminal."""
+    text: str = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, width=math.inf)
     return text.removesuffix("...\n").strip()
 
 
@@ -124,7 +122,7 @@ def _kind(value: Any, hint: Any) -> str:
         return "range"
     if isinstance(value, tuple):
         any_length = typing.get_args(hint)[-1] is Ellipsis
-        return "list" if any_length else "[lowest, highest], whole"
+        return "list" if any_length else "two whole numbers"
     return "whole" if hint is int else ""
 
 

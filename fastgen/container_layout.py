@@ -50,8 +50,8 @@ _SHORTEST_MM = 40.0
 class Wave:
     """A trapezoidal corrugation.
 
-    pitch_mm: of a whole wave: outer_mm + 2 slope_mm + inner_mm.
-    depth_mm: across the wall.
+    pitch_mm: of a whole wave, 40 to 1000: outer_mm + 2 slope_mm + inner_mm.
+    depth_mm: across the wall, over 0, at most 120; what a wall's frame has room for.
     outer_mm: width of the outer flat.
     slope_mm: width of a slope, along the wall.
     inner_mm: width of the inner flat.

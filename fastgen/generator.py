@@ -277,7 +277,8 @@ class Generator:
 
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
         """Make every light and shape that scenes may have, so that neither time nor memory grows
-        later. on_step: called before each of them, which takes seconds the first time."""
+        later. on_step: called before each of them and each way to draw, which take seconds the
+        first time."""
         scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
         names = self.config.environment.names or drawn
@@ -287,6 +288,7 @@ class Generator:
             for container, spreader in possible_shapes(self.config)
         ]
         for shape in shaped:  # what shadows and labels ask of meshes
+            on_step()
             shadow_casters(shape)
             if self.config.damage.probability > 0:
                 made = shape.container

@@ -23,7 +23,8 @@ class MarkingsConfig:
     weights_cap_mm: height of the capitals of the weights on the door; ISO 6346 asks for 50 mm.
     text_wear: how worn identifiers and weights are.
     second_identifier: probability of another identifier on the same long side.
-    vertical: probability that an identifier runs downward.
+    vertical: probability that an identifier runs downward; more often on the front end, never on
+        the roof.
     colored_lettering: probability of lettering in a color; else it is white or black.
     brand: probability of a brand by face, th_alpha of Algorithm A1.
     main_text: probability of a further large text by face, th_beta of Algorithm A1.

@@ -1,7 +1,7 @@
 """What stands in the way of light, as depth maps that light from far away in one direction sees.
 
 Maps keep back faces (those turned away from the light) rather than front ones: a lit surface is
-then no occluder of itself.
+then no occluder of itself. Of thick bodies they keep front faces as well, sunk into them.
 """
 
 from collections.abc import Iterable, Sequence
@@ -38,7 +38,7 @@ class Body:
     @cached_property
     def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Lowest and highest coordinates [3] of all vertices."""
-        columns = np.ascontiguousarray(self.positions_mm.T)  # a tenth of the time along rows
+        columns = np.ascontiguousarray(self.positions_mm.T)  # rows take ten times as long
         return columns.min(axis=1), columns.max(axis=1)
 
 
@@ -136,12 +136,19 @@ class DepthMap:
             self._target.viewport = view.tile
             ctx.cull_face = "front"
             self._show(view.bodies, view.to_map)
-            sunk = view.to_map.copy()
-            sunk[2, 3] += _SUNK_MM * np.linalg.norm(sunk[2, :3])
-            ctx.cull_face = "back"
-            ctx.polygon_offset = 1.0, 0.0  # and what a face falls within a texel
-            self._show(view.thick, sunk)
-            ctx.polygon_offset = 0.0, 0.0
+            if view.thick:
+                self._show_sunk(view.thick, view.to_map)
+        ctx.cull_face = "back"
+
+    def _show_sunk(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
+        sunk = to_map.copy()
+        sunk[2, 3] += _SUNK_MM * np.linalg.norm(sunk[2, :3])
+        self._ctx.cull_face = "back"
+        self._ctx.polygon_offset = 1.0, 0.0  # and by what a face falls within a texel
+        try:
+            self._show(bodies, sunk)
+        finally:
+            self._ctx.polygon_offset = 0.0, 0.0
 
     def _show(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
         self._program["to_map"] = tuple(to_map.T.ravel())

@@ -45,7 +45,7 @@ def run_on_ray(
     address: 'auto' or 'host:port' of a running cluster; None starts Ray on this machine, for as
     long as the run takes. A process that has joined a cluster already stays with it.
     count: how many actors at most; None for one on each CPU, also of nodes that come later.
-    hang_s: an actor that turned to no further scene for so long is replaced.
+    hang_s: an actor that has said nothing for so long is replaced.
     maker: called in the actor with the job, whether all cores are in use, and a report function.
 
     Raises OutputError where Ray is not installed. The runner raises it where no cluster answers, a

@@ -169,8 +169,8 @@ def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[A
     any_length = len(args) == 2 and args[1] is Ellipsis
     if not isinstance(value, (list, tuple)):
         many = "" if any_length else f" of {len(args)} values"
-        hint = f"; write [{value}]" if any_length and isinstance(value, str) else ""
-        raise ConfigError(f"{path}: expected a list{many}, got {_short(value)}{hint}")
+        instead = f"; write [{value!r}]" if any_length and isinstance(value, str) else ""
+        raise ConfigError(f"{path}: expected a list{many}, got {_short(value)}{instead}")
     if any_length:
         args = (args[0],) * len(value)
     if len(args) != len(value):

@@ -36,7 +36,7 @@ def repair(
             storage.remove(path)  # `generate` makes what is missing, but reads no file's content
     generate(job, worker_count)
     left = examine(out).faults
-    return [fault for fault in found.faults if fault not in left], left
+    return [fault for fault in found.faults if finished and fault not in left], left
 
 
 def _job(out: str, manifest: dict[str, Any], hdri_dir: str | Path | None) -> Job:

@@ -49,7 +49,7 @@ class NoiseConfig:
     """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons.
 
     probability: of an image that has it.
-    full_well_e: electrons that make white.
+    full_well_e: electrons that make white; drawn so that twice as many are as likely at any level.
     read_noise_e: standard deviation without light.
     """
 

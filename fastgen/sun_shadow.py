@@ -22,7 +22,7 @@ _EDGE_TEXELS = 1
 """Nothing is drawn on a sun's tile's edge: it stands for all that lies beyond."""
 
 _FIRST_SIZE = (1536 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
-"""Texels along and across for the first sun: up to 9 mm along, 10 mm across."""
+"""Texels along and across for the first sun: of up to 10 mm each way."""
 
 _DOOR_SIZE = (1280, 1280)
 _DOOR_TEXEL_MM = 2.5
@@ -108,7 +108,7 @@ class ShadowMap:
         """Draw the map if it does not show this. container: at rest; damages: done to it. toward:
         unit vectors [S, 3] to the suns in the container's frame, 1 to MOST_SUNS. outline: the same
         container of fewer triangles, for charts that no damage reaches."""
-        shown = (container, spreader, tuple(toward.ravel().tolist()), damages)
+        shown = (container, outline, spreader, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
             return
         self._shown = ()  # until it does, whatever happens
@@ -134,14 +134,14 @@ class ShadowMap:
         if toward[0, 0] > 0:
             from_x_mm = float(container.bounds_mm[1][0]) - _DOOR_DEPTH_MM
             # what shades a point there stands still farther out, but for lookups around it
-            ends = [_beyond(body, from_x_mm - _DOOR_BORDER_MM) for body in bodies]
-            ends = [end for end in ends if len(end.triangles)]  # deep damage may leave none
+            container_end, *others = (_beyond(body, from_x_mm - _DOOR_BORDER_MM) for body in bodies)
+            # deep damage may leave none
+            ends = [end for end in (container_end, *others) if len(end.triangles)]
             if ends:
                 self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
                 outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
-                views.append(
-                    MapView(outer, matrix, tile)
-                )  # hardly anything leaks at so fine a scale
+                thick = outer[:1] if ends[0] is container_end else []
+                views.append(MapView(outer, matrix, tile, thick))
                 drawn = drawn + outer
         self._map.draw(views)
         for body in drawn:
@@ -213,7 +213,7 @@ def _bent(container: Mesh, outline: Mesh, damages: tuple[Damage, ...]) -> Solid:
     if not damages:
         return outline
     moved = container.positions_mm.copy()
-    columns = np.ascontiguousarray(moved.T)  # a tenth of the time along rows
+    columns = np.ascontiguousarray(moved.T)  # comparisons along rows take ten times as long
     reached = np.zeros(len(container.charts), bool)
     for damage in damages:
         box = corners_mm(damage)

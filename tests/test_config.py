@@ -119,7 +119,7 @@ def test_errors_about_names_name_the_file(tmp_path):
             "container.profiles.side.pitch_mm: 278 is",
         ),
         ("damage: {count: 2}", "damage.count: expected a list of 2 values, got 2"),
-        ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \[dented\]"),
+        ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \['dented'\]"),
         ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),
         ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
         ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),

@@ -10,7 +10,7 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config, Generator
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.container import KINDS, build_container
+from fastgen.container import KINDS, build_container, container_outline
 from fastgen.damage import deform
 from fastgen.environment import load_environment
 from fastgen.gl import open_context
@@ -53,6 +53,26 @@ def test_shadows_of_the_spreader_are_those_of_rays(gl, suns):
     eye_m = np.array([3.0, -9.0, 2.0])
     for toward, matrix in zip(ways, shadow.from_ray(eye_m), strict=True):
         check_against_rays(container, spreader, toward, depth, matrix, eye_m)
+    shadow.release()
+
+
+def test_the_outline_throws_the_shadow_of_the_whole_mesh(gl):
+    """But for charts that a damage reaches, which it lacks the vertices to follow."""
+    toward = np.array([[-0.7, -0.6, 0.4]]) / np.linalg.norm([-0.7, -0.6, 0.4])
+    dent = Damage(
+        "concave", "front", (0.0, -KINDS["20"].size_mm[1] / 2, 1300.0), (1.0, 0.0, 0.0),
+        (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (900.0, 1400.0), 230.0,
+    )  # fmt: skip
+    whole, outline = build_container("20"), container_outline("20")
+    shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
+    depths = []
+    for damages, lesser in (((dent,), None), ((dent,), outline), ((), outline)):
+        shadow.cast(whole, None, toward, damages, lesser)
+        depths.append(depth_in(shadow).copy())
+    spans_mm = 2 / np.linalg.norm(shadow.from_ray(np.zeros(3))[0, 2, :3]) * 500
+    apart = np.abs(depths[1] - depths[0]) * spans_mm
+    assert (apart > 5).mean() < 5e-4  # along the edges of facets
+    assert (np.abs(depths[2] - depths[0]) * spans_mm > 20).mean() > 0.001
     shadow.release()
 
 
@@ -157,7 +177,7 @@ def test_a_dent_shades_itself_as_rays_say(gl):
 
 @pytest.mark.parametrize(("across_mm", "depth_mm"), [(1200.0, 260.0), (20000.0, 900.0)])
 def test_a_door_pushed_in_deep_is_lit(gl, across_mm, depth_mm):
-    """As deep as the container's core, or the whole end: nothing stands before what is left."""
+    """Deeper than front faces are sunk, or the whole end: nothing stands before what is left."""
     container = build_container("20")
     half_length = KINDS["20"].size_mm[0] / 2
     dent = Damage(
