@@ -166,9 +166,9 @@ VIEW_BLOCK = Block(
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
         ("mat4", "ray_to_shadow", MOST_SUNS),  # from the eye to a point in m, to a place in its map
         ("vec4", "sun_tile", MOST_SUNS),  # the part of the map that is its own, centres of texels
-        ("vec4", "to_door_tile"),  # from a place in the first sun's tile: scale, offset
-        ("vec4", "door_tile"),  # from and up to where it is asked for the door end,
-        ("float", "door_from"),  # which lies that much farther along x than the eye, in m
+        ("vec4", "to_end_tile"),  # from a place in the first sun's tile: scale, offset
+        ("vec4", "end_tile"),  # from and up to where it is asked for the end that it shines on:
+        ("vec2", "end_from"),  # toward 1 or -1 along x, and that much farther than the eye, in m
         ("vec4", "sun_toward", MOST_SUNS),  # unit vector to it, angular radius
         ("vec4", "sun_light", MOST_SUNS),  # irradiance / pi on what faces it
         ("int", "sun_count"),

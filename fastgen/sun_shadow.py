@@ -24,23 +24,23 @@ _EDGE_TEXELS = 1
 _FIRST_SIZE = (1536 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
 """Texels along and across for the first sun: of up to 10 mm each way."""
 
-_DOOR_SIZE = (1280, 1280)
-_DOOR_TEXEL_MM = 2.5
-_DOOR_DEPTH_MM = 450.0
-"""The first sun has another tile for the door end, to as far behind its castings as damage pushes
-leaves: texels no finer than that, as a locking bar is 34 mm wide, up to 3.6 mm where the tile is
-full."""
+_END_SIZE = (1280, 1280)
+_END_TEXEL_MM = 2.5
+_END_DEPTH_MM = 450.0
+"""The first sun has another tile for the end that it shines on, to as far behind its castings as
+damage pushes leaves: texels no finer than that, as a locking bar is 34 mm wide, up to 3.6 mm where
+the tile is full."""
 
-_DOOR_BORDER_MM = 60.0
+_END_BORDER_MM = 60.0
 """Around the part of it that is asked for: more than lookups of a filtered shadow reach."""
 
 _OTHERS_SIZE = (1024 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
 """For each of the others: what they throw is fainter."""
 
-_LEFT, _BELOW = max(_DOOR_SIZE[0], _OTHERS_SIZE[0]), _FIRST_SIZE[1]
+_LEFT, _BELOW = max(_END_SIZE[0], _OTHERS_SIZE[0]), _FIRST_SIZE[1]
 _MAP_SIZE = (
     max(_FIRST_SIZE[0], _LEFT + _OTHERS_SIZE[0]),
-    _BELOW + max(_DOOR_SIZE[1], 2 * _OTHERS_SIZE[1]) + _OTHERS_SIZE[1],
+    _BELOW + max(_END_SIZE[1], 2 * _OTHERS_SIZE[1]) + _OTHERS_SIZE[1],
 )
 _FIRST_TILE: Tile = (0, 0, *_FIRST_SIZE)
 _OTHER_TILES: tuple[Tile, ...] = tuple(
@@ -58,8 +58,9 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class DoorTile:
-    """Where the first sun's map is drawn again, finer, for what lies beyond from_x_mm.
+class EndTile:
+    """Where the first sun's map is drawn again, finer, for the end toward `side` along x, 1 or -1:
+    for what lies farther than from_mm that way.
 
     to_tile: (scale u, v, offset u, v) from a place (u, v) in the first tile to that in this one.
     inner: (u, v) of the lowest and of the highest place in it to ask for; lookups around them stay
@@ -68,10 +69,11 @@ class DoorTile:
 
     to_tile: Array
     inner: Array
-    from_x_mm: float
+    side: float
+    from_mm: float
 
 
-_NO_DOOR = DoorTile(np.zeros(4), np.array([1.0, 1.0, 0.0, 0.0]), 0.0)
+_NO_END = EndTile(np.zeros(4), np.array([1.0, 1.0, 0.0, 0.0]), 1.0, 0.0)
 
 
 class ShadowMap:
@@ -80,7 +82,7 @@ class ShadowMap:
     Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
     made anew for each, freed ones would stay with the process in pieces. toward: unit vectors
     [S, 3] to the suns. tiles: [S, 4], where in the texture each has its own part, from the centre
-    (u, v) of the first texel to that of the last. door: the first sun's finer part.
+    (u, v) of the first texel to that of the last. end: the first sun's finer part.
     """
 
     def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
@@ -90,7 +92,7 @@ class ShadowMap:
         self.toward = np.zeros((0, 3))
         self._to_map = np.zeros((0, 4, 4))
         self.tiles = np.zeros((0, 4))
-        self.door = _NO_DOOR
+        self.end = _NO_END
         self._map = DepthMap(ctx, program, _MAP_SIZE)
         self.depth = self._map.depth
         self.depth.compare_func = "<="
@@ -130,15 +132,19 @@ class ShadowMap:
         self.toward = toward
         self._to_map = _in_map(to_tiles, np.array(tiles))
         self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(_MAP_SIZE, 2)
-        self.door = _NO_DOOR
-        if toward[0, 0] > 0:
-            from_x_mm = float(container.bounds_mm[1][0]) - _DOOR_DEPTH_MM
+        self.end = _NO_END
+        side = float(np.sign(toward[0, 0]))
+        if side:
+            from_mm = float(np.abs(container.bounds_mm[int(side > 0)][0])) - _END_DEPTH_MM
             # what shades a point there stands still farther out, but for lookups around it
-            container_end, *others = (_beyond(body, from_x_mm - _DOOR_BORDER_MM) for body in bodies)
+            from_border = from_mm - _END_BORDER_MM
+            container_end, *others = (_beyond(body, side, from_border) for body in bodies)
             # deep damage may leave none
             ends = [end for end in (container_end, *others) if len(end.triangles)]
             if ends:
-                self.door, matrix, tile = _door(to_tiles[0], self._to_map[0], ends, from_x_mm)
+                self.end, matrix, tile = _end_tile(
+                    to_tiles[0], self._to_map[0], ends, side, from_mm
+                )
                 outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
                 thick = outer[:1] if ends[0] is container_end else []
                 views.append(MapView(outer, matrix, tile, thick))
@@ -171,20 +177,22 @@ def _in_map(to_tiles: Array, tiles: NDArray[np.int64]) -> Array:
     return found
 
 
-def _door(
-    to_first: Array, first_to_map: Array, ends: Sequence[Body], from_x_mm: float
-) -> tuple[DoorTile, Array, Tile]:
-    """The tile of the door end, and the view of `ends`, as of _beyond, to draw in it. to_first: to
-    clip space of the first tile; first_to_map: of the whole map, through it."""
+def _end_tile(
+    to_first: Array, first_to_map: Array, ends: Sequence[Body], side: float, from_mm: float
+) -> tuple[EndTile, Array, Tile]:
+    """The tile of the end toward `side`, and the view of `ends`, as of _beyond, to draw in it.
+
+    to_first: to clip space of the first tile; first_to_map: of the whole map, through it.
+    """
     corners = np.concatenate([body.positions_mm[body.triangles.ravel()] for body in ends])
     low, high = corners.min(axis=0).astype(np.float64), corners.max(axis=0).astype(np.float64)
-    low[0] = from_x_mm
+    (low if side > 0 else high)[0] = side * from_mm
     seen = (low + UNIT_CUBE * (high - low)) @ to_first[:2, :3].T + to_first[:2, 3]
     units = np.linalg.norm(to_first[:2, :3], axis=1)  # a millimetre
-    least = seen.min(axis=0) - _DOOR_BORDER_MM * units
-    most = seen.max(axis=0) + _DOOR_BORDER_MM * units
-    texels = np.ceil((most - least) / units / _DOOR_TEXEL_MM)
-    width, height = np.minimum(texels, _DOOR_SIZE).astype(int).tolist()
+    least = seen.min(axis=0) - _END_BORDER_MM * units
+    most = seen.max(axis=0) + _END_BORDER_MM * units
+    texels = np.ceil((most - least) / units / _END_TEXEL_MM)
+    width, height = np.minimum(texels, _END_SIZE).astype(int).tolist()
     tile = (0, _BELOW, width, height)
     to_tile = to_first.copy()
     to_tile[:2, 3] -= (least + most) / 2
@@ -196,15 +204,15 @@ def _door(
     offset = to_map[:2, 3] - scale * first_to_map[:2, 3]
     # places run from 0 to 1, clip space from -1 to 1; half of the border is for lookups
     place = np.concatenate([scale, (offset + 1 - scale) / 2])
-    border = _DOOR_BORDER_MM / 2 * units_in_map / 2
+    border = _END_BORDER_MM / 2 * units_in_map / 2
     first, size = np.split(np.array(tile), 2)
     inner = np.concatenate([first / _MAP_SIZE + border, (first + size) / _MAP_SIZE - border])
-    return DoorTile(place, inner, from_x_mm), to_tile, tile
+    return EndTile(place, inner, side, from_mm), to_tile, tile
 
 
-def _beyond(body: Solid, x_mm: float) -> Body:
-    """The triangles of a body that reach beyond x_mm."""
-    outer = (body.positions_mm[:, 0] > x_mm)[body.triangles].any(axis=1)
+def _beyond(body: Solid, side: float, from_mm: float) -> Body:
+    """The triangles of a body that reach farther than from_mm toward `side` along x."""
+    outer = (side * body.positions_mm[:, 0] > from_mm)[body.triangles].any(axis=1)
     return Body(body.positions_mm, body.triangles[outer])
 
 
@@ -238,13 +246,13 @@ def shader_suns(suns: Sequence[Sun]) -> int:
 def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
     """Members of VIEW_BLOCK about the suns for a camera at eye_m [3]; shadow: None without any."""
     lit = [] if shadow is None else [*zip(shadow.toward, suns, strict=True)]
-    door = _NO_DOOR if shadow is None else shadow.door
+    end = _NO_END if shadow is None else shadow.end
     return {
         "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
         "sun_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
-        "to_door_tile": door.to_tile,
-        "door_tile": door.inner,
-        "door_from": MM * door.from_x_mm - eye_m[0],
+        "to_end_tile": end.to_tile,
+        "end_tile": end.inner,
+        "end_from": (end.side, MM * end.from_mm - end.side * eye_m[0]),
         "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
         "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
         "sun_count": len(lit),

@@ -5,7 +5,7 @@
 // vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i): what it throws on what hides the sky.
 // from_eye: to the point, in m.
 
-uniform sampler2DShadow sun_shadow;   // a tile for each, and the first sun's of the door end
+uniform sampler2DShadow sun_shadow;   // a tile for each, and the first sun's of the end that it shines on
 
 vec3 shadow_place(vec3 from_eye, int i) {
     return (ray_to_shadow[i] * vec4(from_eye, 1.0)).xyz;
@@ -16,7 +16,7 @@ float sun_at_place(vec3 at, vec4 tile) {
     return textureLod(sun_shadow, vec3(clamp(at.xy, tile.xy, tile.zw), at.z), 0.0);
 }
 
-// where the first sun's map is asked: in the tile of the door end, if a point lies there
+// where the first sun's map is asked: in the tile of the end that it shines on, if a point lies there
 struct FirstPlace {
     vec3 at;
     vec2 scale;   // how much larger than in the other tile things are in this one
@@ -25,11 +25,11 @@ struct FirstPlace {
 
 FirstPlace first_place(vec3 from_eye) {
     vec3 at = shadow_place(from_eye, 0);
-    vec2 fine = fma(at.xy, to_door_tile.xy, to_door_tile.zw);
-    bool door = all(greaterThan(fine, door_tile.xy)) && all(lessThan(fine, door_tile.zw)) &&
-                from_eye.x > door_from;
-    return door ? FirstPlace(vec3(fine, at.z), to_door_tile.xy, vec4(0.0, 0.0, 1.0, 1.0))
-                : FirstPlace(at, vec2(1.0), sun_tile[0]);
+    vec2 fine = fma(at.xy, to_end_tile.xy, to_end_tile.zw);
+    bool end = all(greaterThan(fine, end_tile.xy)) && all(lessThan(fine, end_tile.zw)) &&
+               end_from.x * from_eye.x > end_from.y;
+    return end ? FirstPlace(vec3(fine, at.z), to_end_tile.xy, vec4(0.0, 0.0, 1.0, 1.0))
+               : FirstPlace(at, vec2(1.0), sun_tile[0]);
 }
 
 float sun_at(vec3 from_eye, int i) {

@@ -68,11 +68,12 @@ def test_the_outline_throws_the_shadow_of_the_whole_mesh(gl):
     depths = []
     for damages, lesser in (((dent,), None), ((dent,), outline), ((), outline)):
         shadow.cast(whole, None, toward, damages, lesser)
-        depths.append(depth_in(shadow).copy())
+        columns, rows = (shadow.tiles[0, 2:] * shadow.depth.size).astype(int)  # of the first tile
+        depths.append(depth_in(shadow)[:rows, :columns].copy())
     spans_mm = 2 / np.linalg.norm(shadow.from_ray(np.zeros(3))[0, 2, :3]) * 500
     apart = np.abs(depths[1] - depths[0]) * spans_mm
-    assert (apart > 5).mean() < 5e-4  # along the edges of facets
-    assert (np.abs(depths[2] - depths[0]) * spans_mm > 20).mean() > 0.001
+    assert (apart > 5).mean() < 2e-4  # along the edges of facets
+    assert (np.abs(depths[2] - depths[0]) * spans_mm > 20).mean() > 0.01
     shadow.release()
 
 
@@ -113,9 +114,11 @@ def agreement(container, spreader, toward, depth, picked, at, texel_mm):
     return (found == free[0])[clear].mean()
 
 
-@pytest.mark.parametrize("toward", [(0.75, -0.6, 0.2), (0.3, 0.4, 0.8), (0.9, 0.3, 0.3)])
-def test_shadows_of_the_door_gear_are_those_of_rays(gl, toward):
-    """To four millimetres, in the tile that the door end has for itself."""
+@pytest.mark.parametrize(
+    "toward", [(0.75, -0.6, 0.2), (0.3, 0.4, 0.8), (0.9, 0.3, 0.3), (-0.6, -0.75, 0.25)]
+)
+def test_shadows_on_an_end_are_those_of_rays(gl, toward):
+    """To four millimetres, in the tile that the end has for itself."""
     toward = np.array(toward) / np.linalg.norm(toward)
     container, spreader = build_container("40"), build_spreader("40")
     shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
@@ -123,12 +126,12 @@ def test_shadows_of_the_door_gear_are_those_of_rays(gl, toward):
     depth = depth_in(shadow)
     eye_m = np.array([9.0, 1.0, 2.0])
     (matrix,) = shadow.from_ray(eye_m)
-    end = container.positions_mm[:, 0] > shadow.door.from_x_mm
+    end = shadow.end.side * container.positions_mm[:, 0] > shadow.end.from_mm
     picked = np.flatnonzero(end & (container.normals @ toward > 0.1))
     at = (probe_points(container)[picked] / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
     fine = at.copy()
-    fine[:, :2] = at[:, :2] * shadow.door.to_tile[:2] + shadow.door.to_tile[2:]
-    assert ((fine[:, :2] > shadow.door.inner[:2]) & (fine[:, :2] < shadow.door.inner[2:])).all()
+    fine[:, :2] = at[:, :2] * shadow.end.to_tile[:2] + shadow.end.to_tile[2:]
+    assert ((fine[:, :2] > shadow.end.inner[:2]) & (fine[:, :2] < shadow.end.inner[2:])).all()
     found = agreement(container, spreader, toward, depth, picked, fine, 4)
     assert found > 0.98
     shadow.release()
@@ -189,8 +192,8 @@ def test_a_door_pushed_in_deep_is_lit(gl, across_mm, depth_mm):
     (matrix,) = shadow.from_ray(np.zeros(3))
     middle = np.array([[half_length - depth_mm + 10.0, 0.0, 1300.0]])
     at = middle / 1000 @ matrix[:3, :3].T + matrix[:3, 3]
-    if shadow.door.from_x_mm < middle[0, 0]:
-        at[:, :2] = at[:, :2] * shadow.door.to_tile[:2] + shadow.door.to_tile[2:]
+    if shadow.end.from_mm < middle[0, 0]:
+        at[:, :2] = at[:, :2] * shadow.end.to_tile[:2] + shadow.end.to_tile[2:]
     depth = depth_in(shadow)
     column, row = (at[:, :2] * depth.shape[::-1]).astype(int).T
     assert (at[:, 2] <= depth[row, column]).all()
@@ -198,12 +201,13 @@ def test_a_door_pushed_in_deep_is_lit(gl, across_mm, depth_mm):
     shadow.release()
 
 
-def test_door_tiles_are_for_suns_before_the_door(gl):
+def test_the_tile_of_an_end_is_for_suns_before_it(gl):
     container = build_container("20")
     shadow = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}))
-    for toward, there in (((0.6, -0.64, 0.48), True), ((-0.6, -0.64, 0.48), False)):
-        shadow.cast(container, None, np.array([toward]))
-        assert (shadow.door.inner[:2] < shadow.door.inner[2:]).all() == there
+    for x, there in ((0.6, True), (0.0, False), (-0.6, True)):
+        shadow.cast(container, None, np.array([[x, -0.8, 0.6]]) / np.hypot(x, 1.0))
+        assert (shadow.end.inner[:2] < shadow.end.inner[2:]).all() == there
+        assert shadow.end.side == np.sign(x) or not there
     shadow.release()
 
 
@@ -242,19 +246,20 @@ def test_what_has_the_container_before_the_sun_lies_in_its_shade(gl, toward):
     shadow.release()
 
 
-def test_pictures_of_a_door_ask_its_own_tile(tmp_path):
-    """Shadows of bars have finer edges there, and lie where the other tile has them."""
-    toward = np.array([0.75, -0.6, 0.2])
+@pytest.mark.parametrize(("camera", "x"), [("Cr", 0.75), ("Cl", -0.75)])
+def test_pictures_of_an_end_ask_its_own_tile(tmp_path, camera, x):
+    """Shadows of bars and ribs have finer edges there, and lie where the other tile has them."""
+    toward = np.array([x, -0.6, 0.2])
     sky = np.full((512, 1024, 3), 0.2, np.float32)
     write_exr(tmp_path / "low.exr", sky + one_light(toward / np.linalg.norm(toward), 3e5, 512))
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
     with Generator(config, 1, (480, 480), "auto", tmp_path, "draft") as generator:
         scene = generator.scene(0)
         scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
-        fine = generator.render(scene=scene, camera="Cr")
+        fine = generator.render(scene=scene, camera=camera)
         shadow = generator._gpu.renderer()._sun_shadow
-        shadow.door = replace(shadow.door, inner=np.array([1.0, 1.0, 0.0, 0.0]))
-        coarse = generator.render(scene=scene, camera="Cr")
+        shadow.end = replace(shadow.end, inner=np.array([1.0, 1.0, 0.0, 0.0]))
+        coarse = generator.render(scene=scene, camera=camera)
     apart = np.abs(fine.image.astype(int) - coarse.image).max(axis=2)[fine.ids > 0]
     assert 0.002 < (apart > 8).mean() < 0.1
 
