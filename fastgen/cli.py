@@ -205,7 +205,9 @@ def _parser() -> argparse.ArgumentParser:
 
     for command in (make, config, show, export):
         command.add_argument("--preset", default="seafront", metavar="|".join(PRESETS))
-        command.add_argument("--config", type=Path, metavar="FILE", help="YAML over the preset")
+        command.add_argument(
+            "--config", type=Path, metavar="FILE", help="YAML or JSON over the preset"
+        )
 
     for command in (make, show):
         command.add_argument("--quality", default="balanced", metavar="|".join(QUALITY))

@@ -22,6 +22,7 @@ from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_pla
 from fastgen.reflectance import MIN_ROUGHNESS
 from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
+from fastgen.yaml_values import loaded
 
 REACH = bounds(1.0, 1e6, "mm")
 """What falls off over a reach is divided by it."""
@@ -41,11 +42,12 @@ class SurfaceConfig:
     dirt_strength: of the deposit along edges.
     dirt_reach_mm: how far from an edge it reaches.
     dirt_color: of that deposit.
-    rust_coverage: share of the sheet that is rusty; squared in the draw, so that low ones prevail.
+    rust_coverage: share of the sheet that is rusty, its runs not counted; squared in the draw, so
+        that low ones prevail.
     rust_scale_mm: size of the patches.
     rust_colors: each as likely as any other.
     rust_roughness: GGX, perceptual.
-    scratch_coverage: share of the sheet under fine bright scratches.
+    scratch_coverage: share of the sheet under fine bright scratches; above 0.1 no more is seen.
     wear_strength: how unevenly the paint reflects.
     wear_scale_mm: size of the noise of wear, scratches and dirt.
     """
@@ -103,7 +105,7 @@ class ContainerConfig:
 
     kinds: weight of 20, 40, 40HC and 45HC in the draw.
     depth_scale: factors of the corrugations' depth, each as likely as any other; no range, as every
-        one is a mesh of its own.
+        one is a mesh of its own. What does not fit the frame then is refused.
     """
 
     kinds: dict[str, float] = field(
@@ -136,8 +138,10 @@ class CameraConfig:
     focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
     distance_mm: from the point that it looks at.
     azimuth_deg: turns the camera about the vertical through that point; 0 looks straight at the
-        face, and where it is positive the camera stands to the right, seen from itself.
-    elevation_deg: lifts the camera, which goes on looking there.
+        face, and where it is positive the camera stands to the right, seen from itself. Of roof
+        and underside: how far it stands aside along the length.
+    elevation_deg: lifts the camera, which goes on looking there; of roof and underside: how far it
+        stands aside across the length.
     roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
         lies across.
     target_shift_mm: how far beside the middle it looks, along each axis of the face.
@@ -152,7 +156,7 @@ class CameraConfig:
     azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
     elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
     roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))
-    target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e5, 1e5, "mm"))
+    target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e4, 1e4, "mm"))
     sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
     exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
     lens: LensConfig | None = None
@@ -176,9 +180,9 @@ def _seafront_rig() -> dict[str, CameraConfig]:
 class EnvironmentConfig:
     """The light.
 
-    names: HDRIs to choose from, all alike, by file name without ending. Without names all that
-        --hdri finds come, or of the bundled ones all but the interiors, ports more often than
-        others.
+    names: HDRIs to choose from, all alike, by file name without ending; those that are bundled lie
+        in assets/hdri. Without names all that --hdri finds come, or of the bundled ones all but the
+        interiors, ports more often than others.
     yaw_deg: how the environment is turned about the vertical.
     """
 
@@ -207,7 +211,7 @@ class SpreaderConfig:
     probability: of a spreader; the container floats without.
     colors: of its paint, each as likely as any other.
     flippers_down: probability of each side that its gather guides are lowered.
-    gap_mm: from the castings to the spreader, drawn in whole steps of 10 mm.
+    gap_mm: from the castings to the spreader, rounded to 10 mm within the range.
     """
 
     probability: float = field(default=0.9, metadata=UNIT)
@@ -304,7 +308,7 @@ class Config:
         Raises ConfigError naming the file and the key or value that does not fit.
         """
         try:
-            data = yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+            data = loaded(Path(path).read_text(encoding="utf-8"))
         except (OSError, TypeError) as error:
             words = error.strerror if isinstance(error, OSError) else "give a path"
             raise ConfigError(f"{path}: cannot be read ({words})") from None
@@ -319,34 +323,6 @@ class Config:
         """The configuration as plain values, ready for JSON or YAML."""
         plain: dict[str, Any] = to_plain(self)
         return plain
-
-
-class _Loader(yaml.SafeLoader):
-    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses a key that
-    stands twice, of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2
-    and 3.2.1.1)."""
-
-    def compose_mapping_node(self, anchor: dict[Any, Any]) -> yaml.MappingNode:
-        node = super().compose_mapping_node(anchor)
-        seen: set[str] = set()
-        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
-            number = key.tag.endswith((":int", ":float"))
-            name = str(self.construct_object(key)) if number else key.value  # 010 is 8
-            if name in seen:
-                words = f"the key {name!r} stands twice in one mapping"
-                raise yaml.composer.ComposerError(None, None, words, key.start_mark)
-            seen.add(name)
-        return node
-
-
-JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
-    "tag:yaml.org,2002:float",
-    re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
-    list("-+.0123456789"),
-)
-"""Arguments of add_implicit_resolver, by which PyYAML takes 1e-05 for a number."""
-
-_Loader.add_implicit_resolver(*JSON_FLOATS)
 
 
 PRESETS: dict[str, dict[str, Any]] = {

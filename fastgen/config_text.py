@@ -15,8 +15,9 @@ from typing import Any
 
 import yaml
 
-from fastgen.config import JSON_FLOATS, Config
+from fastgen.config import Config
 from fastgen.records import Range
+from fastgen.yaml_values import Dumper
 
 _HEAD = (
     "Every key. A file of your own needs only those that it changes; --config reads it. A range "
@@ -53,13 +54,6 @@ def meanings(cls: type) -> tuple[str, dict[str, str]]:
         elif line:
             about.append(line)
     return " ".join(about), of
-
-
-class _Dumper(yaml.SafeDumper):
-    """Quotes text that Config.load would take for a number."""
-
-
-_Dumper.add_implicit_resolver(*JSON_FLOATS)
 
 
 class _Text:
@@ -113,7 +107,11 @@ def _comment(words: str) -> Iterator[str]:
 
 def _plain(value: Any) -> str:
     """A scalar or a list of them, as YAML has it on one line, in ASCII for any terminal."""
-    text: str = yaml.dump(value, Dumper=_Dumper, default_flow_style=True, width=math.inf)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_plain, value))}]"
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    text: str = yaml.dump(value, Dumper=Dumper, default_flow_style=True, width=math.inf)
     return text.removesuffix("...\n").strip()
 
 

@@ -90,7 +90,7 @@ class WallProfiles:
     """Corrugation of the walls; common makers' figures.
 
     side: of both long sides.
-    end: of the front end.
+    end: of no_door, the end without doors.
     roof: of the roof.
     """
 

@@ -94,7 +94,8 @@ class DamageConfig:
     probability: of a container that is damaged.
     count: how many damages it has then, each number as likely.
     kinds: axis, concave, dented, perforation; each as likely as any other.
-    faces: of what is done to a face: front, back, door, no_door, roof.
+    faces: front, back, door, no_door, roof; where all but axis happen, which takes any edge.
+        Lengths and widths below are cut to what a face has room for.
     mask_threshold_mm: the mask of a damage is where it moved the sheet farther than this.
     """
 

@@ -104,8 +104,9 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
     Raises ConfigError naming the field, the value and what would be right.
     """
     if not isinstance(data, Mapping):
+        instead = "; remove the key, or write {}" if data is None and path else ""
         raise ConfigError(
-            f"{path or cls.__name__}: expected a mapping of fields, got {_short(data)}"
+            f"{path or cls.__name__}: expected a mapping of fields, got {_short(data)}{instead}"
         )
     hints = typing.get_type_hints(cls)
     fields = {f.name: f for f in dataclasses.fields(typing.cast(Any, cls))}
@@ -167,6 +168,8 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
 def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
     args = typing.get_args(hint)
     any_length = len(args) == 2 and args[1] is Ellipsis
+    if args == (int, int) and isinstance(value, (int, float)):
+        value = [value, value]
     if not isinstance(value, (list, tuple)):
         many = "" if any_length else f" of {len(args)} values"
         instead = f"; write [{value!r}]" if any_length and isinstance(value, str) else ""

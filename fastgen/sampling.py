@@ -21,7 +21,7 @@ from fastgen.errors import ConfigError
 from fastgen.hdri import hours_of
 from fastgen.markings import sample_decals
 from fastgen.mesh import SHEET_FACES, Mesh
-from fastgen.records import Range
+from fastgen.records import Range, nearest
 from fastgen.scene import (
     Ageing,
     Camera,
@@ -158,7 +158,7 @@ def _environment(
     for name in wanted:
         if name not in environments:
             raise ConfigError(
-                f"environment.names: no HDRI {name!r} here; there are {', '.join(environments)}"
+                f"environment.names: no HDRI {name!r} here{nearest(name, environments)}"
             )
     weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
     share = np.array(list(weights.values())) / sum(weights.values())

@@ -118,7 +118,11 @@ def test_errors_about_names_name_the_file(tmp_path):
             "container: {profiles: {side: {slope_mm: 1}}}",
             "container.profiles.side.pitch_mm: 278 is",
         ),
-        ("damage: {count: 2}", "damage.count: expected a list of 2 values, got 2"),
+        ("damage: {count: a}", "damage.count: expected a list of 2 values, got 'a'"),
+        ("damage: {count: 2.5}", r"damage.count\[0\]: expected a whole number, got 2.5"),
+        ("damage:\n", "damage: expected a mapping of fields, got None; remove the key"),
+        ("markings: {marker_faces: [door, door]}", "markings.marker_faces: one stands twice"),
+        ("cameras: {A: {target_shift_mm: 20000}}", "cameras.A.target_shift_mm: 20000 is out"),
         ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \['dented'\]"),
         ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),
         ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
@@ -172,6 +176,27 @@ def test_numbers_are_read_as_json_and_yaml_write_them(tmp_path, number):
     path = tmp_path / "weather.yaml"
     path.write_text(f"weather: {{shutter_s: [{number}, 1e-1]}}")
     assert Config.load(path).weather.shutter_s == (float(number), 0.1)
+
+
+def test_one_number_stands_for_both_of_a_pair():
+    assert Config.from_values({"damage": {"count": 3}}).damage.count == (3, 3)
+
+
+@pytest.mark.parametrize("escaped", [True, False])
+def test_names_may_be_of_any_script(escaped, tmp_path):
+    """JSON escapes what lies beyond the first plane of Unicode as two halves (RFC 8259, 7)."""
+    colors = {"Gr\u00f6\u00dfe \U0001f6a2": "#ff0000"}
+    path = tmp_path / "port.json"
+    text = json.dumps({"surface": {"colors": colors}}, ensure_ascii=escaped)
+    path.write_text(text, encoding="utf-8")
+    assert Config.load(path).surface.colors == colors
+
+
+def test_half_a_letter_is_refused(tmp_path):
+    path = tmp_path / "port.json"
+    path.write_text('{"surface": {"colors": {"\\ud83d": "#ff0000"}}}')
+    with pytest.raises(ConfigError, match=r"not a YAML file .*half of a letter"):
+        Config.load(path)
 
 
 def test_a_configuration_comes_back_from_json(tmp_path):

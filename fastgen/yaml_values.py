@@ -1,0 +1,53 @@
+"""YAML as people and other programs write it, JSON among it: what PyYAML leaves undone."""
+
+import re
+from typing import Any
+
+import yaml
+
+_JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
+"""Arguments of add_implicit_resolver, by which PyYAML takes 1e-05 for a number."""
+
+
+def loaded(text: str) -> Any:
+    """The value of a YAML or JSON text. Raises yaml.YAMLError, and ValueError or RecursionError for
+    what PyYAML itself stumbles over."""
+    return yaml.load(text, _Loader)
+
+
+class _Loader(yaml.SafeLoader):
+    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses a key that
+    stands twice, of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2
+    and 3.2.1.1)."""
+
+    def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> Any:
+        text = super().construct_scalar(node)
+        try:  # JSON escapes some letters as two halves (RFC 8259, section 7), which PyYAML keeps
+            return str(text).encode("utf-16", "surrogatepass").decode("utf-16")
+        except UnicodeDecodeError:
+            words = "a text holds half of a letter"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
+
+    def compose_mapping_node(self, anchor: dict[Any, Any]) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
+            number = key.tag.endswith((":int", ":float"))
+            name = str(self.construct_object(key)) if number else key.value  # 010 is 8
+            if name in seen:
+                words = f"the key {name!r} stands twice in one mapping"
+                raise yaml.composer.ComposerError(None, None, words, key.start_mark)
+            seen.add(name)
+        return node
+
+
+class Dumper(yaml.SafeDumper):
+    """Quotes text that `loaded` would take for a number."""
+
+
+_Loader.add_implicit_resolver(*_JSON_FLOATS)
+Dumper.add_implicit_resolver(*_JSON_FLOATS)
