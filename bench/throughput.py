@@ -192,7 +192,7 @@ def table(rows: list[dict[str, Any]], about: str, images: int) -> list[str]:
 
 def draw(rows: list[dict[str, Any]], caption: str, chart: Path) -> None:
     """Stacked stages on the left, images a second on the right."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(15, 4.6))
     names = [f"{row['size']}\n{row['backend']}\n{row['quality']}" for row in rows]
     places = np.arange(len(rows))
     below = np.zeros(len(rows))
