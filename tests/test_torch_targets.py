@@ -67,7 +67,7 @@ def test_damage_boxes_and_areas_are_those_of_their_masks():
 
 
 def test_an_image_without_anything_has_empty_targets_of_the_right_shape():
-    rig = {"face": "front", "focal_mm": 2000, "distance_mm": 1e5, "target_shift_mm": 1e5}
+    rig = {"face": "front", "focal_mm": 2000, "distance_mm": 1e5, "target_shift_mm": 1e4}
     away = Config.from_values({"cameras": {"A": rig}})
     (_, target), _ = view("damage", size=SMALL, config=away)
     assert target["boxes"].shape == (0, 4)
