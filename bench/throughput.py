@@ -98,10 +98,13 @@ def stages(
     return driver, {stage: statistics.fmean(times[stage]) * 1e3 for stage in STAGES}
 
 
-def generate_command(out: str, images: int, workers: int, size: str, backend: str) -> list[str]:
+def generate_command(
+    out: str, images: int, workers: int, size: str, backend: str, quality: str = "balanced"
+) -> list[str]:
     """The command line that makes a dataset of `images` images in the folder `out`."""
     command = [sys.executable, "-m", "fastgen", "generate", out, "--images", str(images)]
-    command += ["--size", size, "--seed", "7", "--workers", str(workers), "--backend", backend]
+    command += ["--size", size, "--seed", "7", "--workers", str(workers)]
+    command += ["--backend", backend, "--quality", quality]
     return command
 
 
@@ -119,11 +122,7 @@ def whole_run(
     """How fast the command makes a dataset."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        command = [
-            *generate_command(str(out), images, workers, size, backend),
-            "--quality",
-            quality,
-        ]
+        command = generate_command(str(out), images, workers, size, backend, quality)
         began = time.perf_counter()
         subprocess.run(
             command,

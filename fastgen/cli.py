@@ -345,7 +345,8 @@ def _stats(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     if options.repair:
         mended, faults = repair(options.out, _workers(options), options.hdri)
-        print("".join(f"mended: {fault}\n" for fault in mended), end="")
+        for fault in mended:
+            print(f"mended: {fault}")
         hint = ""
     else:
         found = examine(options.out)

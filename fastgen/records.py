@@ -156,7 +156,7 @@ def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any
 
 
 def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
-    pair = [value, value] if isinstance(value, (int, float)) else value
+    pair = _both(value)
     if not isinstance(pair, (list, tuple)) or len(pair) != 2:
         got = f"{_short(value)}{_as_number(value)}"
         raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
@@ -165,11 +165,16 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
     return Range(lo, hi)
 
 
+def _both(value: Any) -> Any:
+    """One number stands for both of a pair."""
+    return [value, value] if isinstance(value, (int, float)) else value
+
+
 def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
     args = typing.get_args(hint)
     any_length = len(args) == 2 and args[1] is Ellipsis
-    if args == (int, int) and isinstance(value, (int, float)):
-        value = [value, value]
+    if args == (int, int):
+        value = _both(value)
     if not isinstance(value, (list, tuple)):
         many = "" if any_length else f" of {len(args)} values"
         instead = f"; write [{value!r}]" if any_length and isinstance(value, str) else ""
