@@ -9,11 +9,12 @@ from unittest import mock
 
 import numpy as np
 
-from fastgen import openness, programs, shapes
-from fastgen.interreflection import FormFactors
-from fastgen.mesh import FACE_AXES, Mesh
+from fastgen.drawing import programs, shapes
+from fastgen.geometry.mesh import FACE_AXES, Mesh
+from fastgen.light import openness
+from fastgen.light.interreflection import FormFactors
+from fastgen.light.sky_probe import Lit, SkyProbe
 from fastgen.scene import Scene, Spreader
-from fastgen.sky_probe import Lit, SkyProbe
 
 MeshEdit = Callable[[Mesh], Mesh]
 

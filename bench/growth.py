@@ -33,7 +33,7 @@ from throughput import fill_caches, generate_command, whole_run
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
 from fastgen.environment import load_environment
-from fastgen.hdri import bundled_hdris, load_radiance
+from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.scene import Decal, Scene
 
 SIZES = ("320x320", "640x640", "1024x768", "1333x800", "1920x1080", "2560x1440")

@@ -31,7 +31,7 @@ from results import ROOT, origin, save
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import build_container
-from fastgen.mesh import Mesh
+from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Camera, Decal, Scene
 from tests import oracle
 

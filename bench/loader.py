@@ -23,7 +23,7 @@ from torch import nn
 from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
 
-from fastgen.encode import jpeg, write
+from fastgen.files.encode import jpeg, write
 from fastgen.torch import ContainerDataset, class_names, collate_yolo
 
 WARM_STEPS = 40

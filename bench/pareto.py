@@ -41,8 +41,9 @@ from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import ROOT, machine, origin, save, write_section
 
-from fastgen import Config, Generator, environment, shapes
+from fastgen import Config, Generator, environment
 from fastgen.camera import view_of
+from fastgen.drawing import shapes
 from fastgen.export import export_glb
 from fastgen.scene import Camera, Scene
 

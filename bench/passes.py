@@ -22,9 +22,9 @@ import moderngl
 from results import parse_size
 
 from fastgen import Config, Generator
-from fastgen.gpu_mesh import GpuMesh
-from fastgen.sample_targets import SampleTargets
-from fastgen.shading import Shading
+from fastgen.drawing.gpu_mesh import GpuMesh
+from fastgen.drawing.sample_targets import SampleTargets
+from fastgen.drawing.shading import Shading
 
 
 class PassTimer:

@@ -21,10 +21,10 @@ from fastgen import Generator
 from fastgen.camera import MM, View
 from fastgen.container import build_container
 from fastgen.damage import deform
-from fastgen.decal_tables import object_ids
+from fastgen.drawing.decal_tables import object_ids
 from fastgen.export import export_glb
-from fastgen.hdri import bundled_hdris, load_radiance
-from fastgen.mesh import Mesh
+from fastgen.geometry.mesh import Mesh
+from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.resources import asset_path
 from fastgen.scene import Decal, Scene, Spreader
 

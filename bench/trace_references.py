@@ -23,7 +23,7 @@ from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases, load, traced
 
 from fastgen import Generator
 from fastgen.export import export_glb
-from fastgen.hdri import bundled_hdris
+from fastgen.light.hdri import bundled_hdris
 
 SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
 BACKGROUND_SAMPLES = 16

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fastgen import Config, Generator
-from fastgen.encode import jpeg, write
+from fastgen.files.encode import jpeg, write
 from fastgen.scene import Camera, Scene
 from fastgen.sensor.electronics import stamped
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather

@@ -21,7 +21,7 @@ from torch.nn import functional
 from torch.utils.data import Dataset
 
 from fastgen.errors import ConfigError
-from fastgen.identifier import check_digit
+from fastgen.prints.identifier import check_digit
 from fastgen.torch import ContainerDataset
 
 PLANS = {

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.whole_file import ASIDE_FILES, whole_file
+from fastgen.files.whole_file import ASIDE_FILES, whole_file
 
 T = TypeVar("T")
 
@@ -93,11 +93,11 @@ def computed(
 
 
 def _code_digest(folder: Path) -> str:
-    """Of the modules in a folder, and of the versions of what they compute with: a number that
+    """Of the modules in a folder and below, and of the versions of what they compute with: a number that
     somebody must raise would be forgotten."""
     versions = np.__version__, cv2.__version__, importlib.metadata.version("scipy")
     digest = hashlib.sha256(repr(versions).encode())
-    for module in sorted(folder.glob("*.py")):
+    for module in sorted(folder.rglob("*.py")):
         digest.update(module.read_bytes())
     return digest.hexdigest()
 

@@ -14,24 +14,25 @@ from pathlib import Path
 from typing import NoReturn
 
 import fastgen
-from fastgen import doctor, stats
+from fastgen import doctor
 from fastgen.config import PRESETS, Config
-from fastgen.config_text import as_yaml
-from fastgen.encode import jpeg, png, write
+from fastgen.dataset import stats
+from fastgen.dataset.on_ray import run_on_ray
+from fastgen.dataset.repair import repair
+from fastgen.dataset.shards import FORMATS, SHARD_SCENES, Job
+from fastgen.dataset.verify import examine
+from fastgen.distributions.config_text import as_yaml
+from fastgen.drawing.programs import LAYERS
 from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb
+from fastgen.files.encode import jpeg, png, write
 from fastgen.formats import SEAFRONT, known_formats
 from fastgen.generate import CONTACT_SHEET, generate, parse_split
 from fastgen.generator import QUALITY, Generator, find_camera
 from fastgen.gl import BACKENDS
-from fastgen.on_ray import run_on_ray
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
-from fastgen.programs import LAYERS
+from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
 from fastgen.records import check_known
-from fastgen.repair import repair
-from fastgen.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.stopping import STOPPED
-from fastgen.verify import examine
 
 SHOWN_LAYERS = (*LAYERS, "ids", "damage")
 

@@ -12,17 +12,17 @@ from typing import Any
 
 import yaml
 
-from fastgen import srgb
 from fastgen.container import KINDS, WallProfiles
-from fastgen.damage_config import DamageConfig
+from fastgen.distributions.damage_config import DamageConfig
+from fastgen.distributions.markings_config import MarkingsConfig
+from fastgen.distributions.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.errors import ConfigError
-from fastgen.markings_config import MarkingsConfig
-from fastgen.mesh import FACES
+from fastgen.files.yaml_values import loaded
+from fastgen.geometry.mesh import FACES
+from fastgen.light import srgb
+from fastgen.light.reflectance import MIN_ROUGHNESS
 from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
-from fastgen.reflectance import MIN_ROUGHNESS
-from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.spreader import GAP_LIMITS_MM
-from fastgen.yaml_values import loaded
 
 REACH = bounds(1.0, 1e6, "mm")
 """What falls off over a reach is divided by it."""

@@ -23,17 +23,17 @@ With the usual profiles and max_edge_mm = 150:
 
 from functools import lru_cache
 
-from fastgen.container_castings import castings
-from fastgen.container_layout import KINDS, ContainerKind, Layout, WallProfiles, Wave
-from fastgen.container_parts import base, frame
-from fastgen.container_walls import panels
-from fastgen.door import leaves
-from fastgen.door_gear import gear
 from fastgen.errors import ConfigError
-from fastgen.mesh import Mesh
+from fastgen.geometry.container_castings import castings
+from fastgen.geometry.container_layout import KINDS, ContainerKind, Layout, WallProfiles, Wave
+from fastgen.geometry.container_parts import base, frame
+from fastgen.geometry.container_walls import panels
+from fastgen.geometry.door import leaves
+from fastgen.geometry.door_gear import gear
+from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.stored_mesh import stored
+from fastgen.geometry.unfold import assemble
 from fastgen.records import check_known
-from fastgen.stored_mesh import stored
-from fastgen.unfold import assemble
 
 __all__ = [
     "KINDS",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, SEGMENTATION_CLASSES
-from fastgen.mesh import UNIT_CUBE
+from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.scene import Damage, Vec3
 
 Array = NDArray[np.floating]

@@ -15,11 +15,12 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen import cache, prefilter, rgb9e5
+from fastgen import cache
 from fastgen.errors import AssetError
-from fastgen.hdri import HALF_MAX, load_radiance
+from fastgen.light import prefilter, rgb9e5
+from fastgen.light.hdri import HALF_MAX, load_radiance
+from fastgen.light.sun import Sun, split_suns
 from fastgen.scene import REC_709
-from fastgen.sun import Sun, split_suns
 
 PREFILTER_VERSION = 12
 """Part of the cache key: count up whenever the prefiltered arrays change."""

@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 
 import fastgen
-from fastgen.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.camera import MM, view_of
 from fastgen.container import build_container
 from fastgen.damage import variant
-from fastgen.damaged_mesh import DamagedMesh, damaged_mesh
-from fastgen.encode import png, write
+from fastgen.drawing.bake import Atlas, atlas_size, least_texel_mm
+from fastgen.drawing.programs import INSIDE_ALBEDO
+from fastgen.drawing.shapes import spreader_mesh
 from fastgen.errors import OutputError
+from fastgen.files.encode import png, write
+from fastgen.files.gltf import Glb
 from fastgen.formats import view_values
 from fastgen.generator import Generator
-from fastgen.gltf import Glb
-from fastgen.programs import INSIDE_ALBEDO
+from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
 from fastgen.records import to_plain
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene
-from fastgen.shapes import spreader_mesh
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""

@@ -13,23 +13,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from fastgen import workers
-from fastgen.coco import trained_on
 from fastgen.config import Config, SplitConfig
-from fastgen.contact_sheet import contact_sheet
-from fastgen.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
-from fastgen.encode import png
-from fastgen.environment import load_environment
-from fastgen.errors import ConfigError, OutputError
-from fastgen.formats import SEAFRONT, Record, formats_of
-from fastgen.generator import Generator
-from fastgen.gl import BACKENDS
-from fastgen.hdri import find_hdris
-from fastgen.progress import Progress
-from fastgen.records import check_known, nearest
-from fastgen.sampling import SPLITS
-from fastgen.seal import digest, seal
-from fastgen.shards import (
+from fastgen.dataset import workers
+from fastgen.dataset.contact_sheet import contact_sheet
+from fastgen.dataset.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
+from fastgen.dataset.progress import Progress
+from fastgen.dataset.shards import (
     FORMATS,
     MADE_BY,
     Job,
@@ -39,7 +28,18 @@ from fastgen.shards import (
     manifest_path,
     stem_of,
 )
-from fastgen.storage import Folder, Remote, storage_of
+from fastgen.environment import load_environment
+from fastgen.errors import ConfigError, OutputError
+from fastgen.files.encode import png
+from fastgen.files.seal import digest, seal
+from fastgen.files.storage import Folder, Remote, storage_of
+from fastgen.formats import SEAFRONT, Record, formats_of
+from fastgen.generator import Generator
+from fastgen.gl import BACKENDS
+from fastgen.labelling.coco import trained_on
+from fastgen.light.hdri import find_hdris
+from fastgen.records import check_known, nearest
+from fastgen.sampling import SPLITS
 
 CONTACT_SHEET = "contact_sheet.png"
 

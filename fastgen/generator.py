@@ -11,19 +11,22 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.bake import Atlas
 from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.container import build_container
-from fastgen.cuda import CudaFrame, cuda_reason
 from fastgen.damage import seen_damages, variant
+from fastgen.drawing.bake import Atlas
+from fastgen.drawing.cuda import CudaFrame, cuda_reason
+from fastgen.drawing.opened import Opened
+from fastgen.drawing.programs import LAYERS
+from fastgen.drawing.shapes import shadow_casters, spreader_outline
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.errors import ConfigError
 from fastgen.gl import BACKENDS, open_context
-from fastgen.hdri import bundled_hdris, bundled_weights, hdris_by_name
+from fastgen.labelling.visibility import Shot
 from fastgen.labels import label
-from fastgen.opened import Opened
-from fastgen.programs import LAYERS
+from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
+from fastgen.light.sun_shadow import shader_suns
 from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
@@ -37,9 +40,6 @@ from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
 from fastgen.sensor.sampling import extreme_lenses
-from fastgen.shapes import shadow_casters, spreader_outline
-from fastgen.sun_shadow import shader_suns
-from fastgen.visibility import Shot
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 

@@ -10,13 +10,13 @@ from typing import Any, Self
 
 import moderngl
 
-from fastgen import gl_forks
-from fastgen.egl import EGL_PACKAGES, Egl, EglContext, EglDevice
+from fastgen.contexts import gl_forks
+from fastgen.contexts.egl import EGL_PACKAGES, Egl, EglContext, EglDevice
+from fastgen.contexts.native_context import NativeContext
+from fastgen.contexts.osmesa import OSMesaContext
+from fastgen.contexts.shader_cache import spare_full_disk
 from fastgen.errors import ConfigError, ContextError
-from fastgen.native_context import NativeContext
-from fastgen.osmesa import OSMesaContext
 from fastgen.records import check_known
-from fastgen.shader_cache import spare_full_disk
 
 BACKENDS = ("auto", "egl", "osmesa")
 

@@ -10,16 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 from fastgen.camera import MM, NEAR_M
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
 from fastgen.container import KINDS
-from fastgen.coverage import boxes, covers, project
 from fastgen.damage import deform
-from fastgen.damage_labels import damage_objects
-from fastgen.decal_tables import object_ids
-from fastgen.divided_mesh import as_drawn
-from fastgen.facets import Facets, decal_facets, mesh_facets
-from fastgen.mesh import Mesh
+from fastgen.drawing.decal_tables import object_ids
+from fastgen.geometry.divided_mesh import as_drawn
+from fastgen.geometry.mesh import Mesh
+from fastgen.labelling.coverage import boxes, covers, project
+from fastgen.labelling.damage_labels import damage_objects
+from fastgen.labelling.facets import Facets, decal_facets, mesh_facets
+from fastgen.labelling.visibility import Shot, float_box, mask_box, visibility
 from fastgen.sample import Box, Keypoint, Object
 from fastgen.scene import Decal, Scene
-from fastgen.visibility import Shot, float_box, mask_box, visibility
 
 _EDGE_POINTS = 16
 """Points along each side of a decal's outline, which follows the corrugation."""

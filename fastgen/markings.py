@@ -6,15 +6,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fastgen.artwork import Brand, Font, brands, glyph_tiles, stickers
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import KINDS
-from fastgen.identifier import Identifier, sample_identifier
-from fastgen.lettering import layout
-from fastgen.markings_config import MarkingsConfig
+from fastgen.distributions.markings_config import MarkingsConfig
+from fastgen.prints.artwork import Brand, Font, brands, glyph_tiles, stickers
+from fastgen.prints.identifier import Identifier, sample_identifier
+from fastgen.prints.lettering import layout
+from fastgen.prints.weights import parts, weight_lines
 from fastgen.records import Range
 from fastgen.scene import REC_709, Color, Decal, Vec2
-from fastgen.weights import parts, weight_lines
 
 Streams = Callable[[str], np.random.Generator]
 Flats = Mapping[str, Sequence[tuple[float, float]]]

@@ -14,20 +14,12 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastgen.artwork import art_images, glyph_coverage, glyph_tiles
-from fastgen.bake import Atlas, bake_atlas
 from fastgen.camera import NEAR_M, View, view_of
 from fastgen.damage import corners_mm, seen_damages, variant
-from fastgen.decal_tables import DecalTables, pack_decals
-from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
-from fastgen.exposure import metered_exposure
-from fastgen.gl import GLContext
-from fastgen.gpu_light import GpuLight
-from fastgen.gpu_mesh import GpuMesh
-from fastgen.kept import Kept
-from fastgen.mesh import UNIT_CUBE, Mesh
-from fastgen.openness import lobe_masks
-from fastgen.programs import (
+from fastgen.drawing.bake import Atlas, bake_atlas
+from fastgen.drawing.decal_tables import DecalTables, pack_decals
+from fastgen.drawing.gpu_mesh import GpuMesh
+from fastgen.drawing.programs import (
     DAMAGE_BLOCK,
     DAMAGE_VARIANTS,
     LAYERS,
@@ -37,19 +29,27 @@ from fastgen.programs import (
     VIEW_BLOCK,
     link,
 )
-from fastgen.reflectance import dfg_table
+from fastgen.drawing.sample_lattice import fitting
+from fastgen.drawing.sample_targets import Region, SampleTargets
+from fastgen.drawing.shading import UNITS, Shading
+from fastgen.drawing.shapes import Shapes, shadow_casters
+from fastgen.drawing.surface_values import cable_values, damage_values, scene_values
+from fastgen.drawing.targets import Targets, bands, merged
+from fastgen.drawing.textures import art_texture, data_texture, mipmapped_array, noise_texture
+from fastgen.drawing.uniforms import Block
+from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
+from fastgen.geometry.mesh import UNIT_CUBE, Mesh
+from fastgen.gl import GLContext
+from fastgen.kept import Kept
+from fastgen.light.exposure import metered_exposure
+from fastgen.light.gpu_light import GpuLight
+from fastgen.light.openness import lobe_masks
+from fastgen.light.reflectance import dfg_table
+from fastgen.light.sun_shadow import ShadowMap, shader_suns, sun_values
+from fastgen.prints.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.sample import Frame
-from fastgen.sample_lattice import fitting
-from fastgen.sample_targets import Region, SampleTargets
 from fastgen.scene import Camera, Container, Damage, Scene
-from fastgen.shading import UNITS, Shading
-from fastgen.shapes import Shapes, shadow_casters
 from fastgen.spreader import tier_bounds_mm
-from fastgen.sun_shadow import ShadowMap, shader_suns, sun_values
-from fastgen.surface_values import cable_values, damage_values, scene_values
-from fastgen.targets import Targets, bands, merged
-from fastgen.textures import art_texture, data_texture, mipmapped_array, noise_texture
-from fastgen.uniforms import Block
 
 _BOW_STEPS = 17
 """Points along a line that a lens may bend, where bounds of it are asked for."""

@@ -16,11 +16,11 @@ import numpy as np
 from fastgen.camera import MM, NEAR_M, view_of
 from fastgen.config import CameraConfig, Config, ContainerConfig, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
-from fastgen.damage_sampling import sample_damages
+from fastgen.distributions.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
-from fastgen.hdri import hours_of
+from fastgen.geometry.mesh import SHEET_FACES, Mesh
+from fastgen.light.hdri import hours_of
 from fastgen.markings import sample_decals
-from fastgen.mesh import SHEET_FACES, Mesh
 from fastgen.records import Range, nearest
 from fastgen.scene import (
     Ageing,

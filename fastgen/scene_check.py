@@ -4,18 +4,18 @@ import math
 from collections import Counter
 from typing import Any
 
-from fastgen.artwork import art_images, glyph_tiles
 from fastgen.camera import FAR_M, MM, NEAR_M
 from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
-from fastgen.container_layout import KINDS
 from fastgen.damage import LOBE_LIMIT, LOBES
-from fastgen.damage_config import MAX_INSTANCES
+from fastgen.distributions.damage_config import MAX_INSTANCES
+from fastgen.distributions.sensor_config import CORNERS
+from fastgen.drawing.programs import DECAL_KINDS, MAX_DAMAGES
 from fastgen.errors import ConfigError
-from fastgen.mesh import SHEET_FACES
-from fastgen.programs import DECAL_KINDS, MAX_DAMAGES
+from fastgen.geometry.container_layout import KINDS
+from fastgen.geometry.mesh import SHEET_FACES
+from fastgen.prints.artwork import art_images, glyph_tiles
 from fastgen.records import check_fields, check_known
 from fastgen.scene import Camera, Container, Damage, Decal, Scene, Vec3
-from fastgen.sensor_config import CORNERS
 
 MAX_DECALS = 4096
 """Rows of a texture that every driver takes several times over."""

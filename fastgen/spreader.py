@@ -11,11 +11,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.container_layout import KINDS
 from fastgen.errors import ConfigError
-from fastgen.mesh import Mesh
-from fastgen.records import check_known
-from fastgen.spreader_parts import (
+from fastgen.geometry.container_layout import KINDS
+from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.spreader_parts import (
     CUT_MM,
     LOCKS_CHARTS,
     TIERS,
@@ -26,8 +25,9 @@ from fastgen.spreader_parts import (
     frame,
     headblock,
 )
-from fastgen.stored_mesh import stored
-from fastgen.unfold import assemble
+from fastgen.geometry.stored_mesh import stored
+from fastgen.geometry.unfold import assemble
+from fastgen.records import check_known
 
 CABLE_TIER = TIERS.index("cables")
 

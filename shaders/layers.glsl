@@ -35,7 +35,7 @@ float covered(float value, float threshold, float lost, float softness) {
     return clamp(0.5 + 0.5 * (value - threshold) / half_width, 0.0, 1.0);
 }
 
-// Above what a normal channel (fastgen/noise.py) lies for `share` of the sheet, in deviations: the
+// Above what a normal channel (fastgen/drawing/noise.py) lies for `share` of the sheet, in deviations: the
 // quantile of Abramowitz and Stegun 1964, 26.2.22.
 float normal_threshold(float share) {
     float rare = min(share, 1.0 - share);

@@ -1,4 +1,4 @@
-// What may hide the sky, seen in parallel from one direction: fastgen/sky_probe.py.
+// What may hide the sky, seen in parallel from one direction: fastgen/light/sky_probe.py.
 #version 430 core
 
 layout(location = 0) in vec3 in_position_mm;

@@ -22,7 +22,7 @@ struct Reflector {
     vec3 diffuse;      // of what it lets through, the share that comes back
 };
 
-// as in fastgen/reflectance.py
+// as in fastgen/light/reflectance.py
 float fresnel_climb(float cosine) {
     float g = sqrt(fma(cosine, cosine, DIELECTRIC_INDEX * DIELECTRIC_INDEX - 1.0));
     float away = (g - cosine) / (g + cosine);

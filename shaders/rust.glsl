@@ -7,7 +7,7 @@ struct Rust {
 };
 
 // edge_mm, narrow_mm: distance to the nearest edge, and width, of the zone; below_mm: distance to its
-// upper edge; steep: 0 where level, else 1. Constants and means: fastgen/rust.py
+// upper edge; steep: 0 where level, else 1. Constants and means: fastgen/drawing/rust.py
 Rust rust_at(
     float edge_mm, float narrow_mm, float below_mm, float steep, NoiseSample noise, float proneness
 ) {

@@ -1,6 +1,6 @@
 // Exposed linear radiance to what a screen shows, and sRGB encoding.
 
-// Khronos PBR Neutral (fastgen/tone.py): the identity less the Fresnel offset, then a shoulder that
+// Khronos PBR Neutral (fastgen/light/tone.py): the identity less the Fresnel offset, then a shoulder that
 // leans to white.
 vec3 neutral_tone(vec3 c) {
     const float start = TONE_SHOULDER - TONE_FRESNEL;

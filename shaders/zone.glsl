@@ -1,4 +1,4 @@
-// What is known of each zone of the atlas (fastgen/gpu_mesh.py). bool before_sheet(zone): whether it is
+// What is known of each zone of the atlas (fastgen/drawing/gpu_mesh.py). bool before_sheet(zone): whether it is
 // of the door's bars; vec2 upright(sheet_mm, code): turned so that +y is up in the world; float
 // to_upper_side(from_low, size, code): distance to the side of a zone that is up.
 

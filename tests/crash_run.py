@@ -17,10 +17,10 @@ import numpy as np
 import simplejpeg
 
 from fastgen.config import Config
+from fastgen.dataset.shards import Job, Maker, stem_of
+from fastgen.files.storage import storage_of
 from fastgen.generate import generate, run_here
 from fastgen.sampling import split_of
-from fastgen.shards import Job, Maker, stem_of
-from fastgen.storage import storage_of
 
 FAULTY_SCENE = 5
 

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.mesh import Mesh
+from fastgen.geometry.mesh import Mesh
 
 ISO_668 = {
     "20": (6058, 2438, 2591, "22G1"),

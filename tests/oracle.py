@@ -8,8 +8,8 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import damage as fields
 from fastgen.camera import View
-from fastgen.door_gear import is_gear
-from fastgen.mesh import Mesh
+from fastgen.geometry.door_gear import is_gear
+from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Decal, Scene
 from fastgen.spreader import build_spreader
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
 
-from fastgen.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
 from fastgen.classes import MARKER_CLASSES
+from fastgen.drawing.textures import art_texture
 from fastgen.gl import open_context
+from fastgen.prints.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
 from fastgen.resources import asset_path
-from fastgen.textures import art_texture
 
 RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125, 26)
 YELLOW, WHITE, BLACK = (246, 201, 0), (255, 255, 255), (16, 16, 16)

@@ -15,9 +15,10 @@ import pytest
 import reference_set
 from reference_set import FILTERS
 
-from fastgen import Config, Generator, programs
+from fastgen import Config, Generator
 from fastgen.container import build_container
-from fastgen.mesh import FACE_AXES
+from fastgen.drawing import programs
+from fastgen.geometry.mesh import FACE_AXES
 from fastgen.resources import shader_path
 from fastgen.spreader import build_spreader
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fastgen.camera import view_of
-from fastgen.clusters import Clusters
 from fastgen.config import Config
 from fastgen.container import build_container
+from fastgen.drawing.clusters import Clusters
 from fastgen.generator import Generator
 from fastgen.lens import Lens
 

@@ -6,7 +6,7 @@ import pytest
 
 from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
 from fastgen.cli import main
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
+from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from fastgen.container import (
     container_outline,
 )
 from fastgen.errors import ConfigError
-from fastgen.mesh import FACES, GROUP_SLACK_MM
+from fastgen.geometry.mesh import FACES, GROUP_SLACK_MM
 from tests.mesh_probe import (
     ISO_668,
     OUT,

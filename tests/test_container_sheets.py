@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fastgen.container import build_container
-from fastgen.container_layout import WallProfiles
-from fastgen.mesh import FACES, MATERIALS, Mesh
+from fastgen.geometry.container_layout import WallProfiles
+from fastgen.geometry.mesh import FACES, MATERIALS, Mesh
 from tests.mesh_probe import (
     ISO_668,
     OUT,

@@ -11,9 +11,9 @@ from fastgen import damage as fields
 from fastgen.camera import View
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
-from fastgen.coverage import covers
-from fastgen.facets import clip
 from fastgen.generator import Generator
+from fastgen.labelling.coverage import covers
+from fastgen.labelling.facets import clip
 from fastgen.labels import decal_of
 from fastgen.scene import Camera, Spreader
 from fastgen.spreader import build_spreader
@@ -169,7 +169,7 @@ def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
         camera = scene.camera("Cr")
         camera = dataclasses.replace(camera, target_mm=tuple(target.tolist()), focal_mm=120.0)
         wanted = small.render(scene=scene, camera=camera).objects
-        monkeypatch.setattr("fastgen.coverage._MOST_POINTS", 40_000)
+        monkeypatch.setattr("fastgen.labelling.coverage._MOST_POINTS", 40_000)
         found = large.render(scene=scene, camera=camera).objects
     pairs = [(a, b) for a, b in zip(wanted, found, strict=True) if a.class_name == "concave"]
     assert len(pairs) == 2

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastgen.artwork import glyph_tiles
-from fastgen.crops import text_crops
 from fastgen.generator import Generator
+from fastgen.labelling.crops import text_crops
 from fastgen.labels import decal_of
-from fastgen.lettering import layout
+from fastgen.prints.artwork import glyph_tiles
+from fastgen.prints.lettering import layout
 
 
 def letters_of(decal):

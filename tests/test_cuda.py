@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fastgen import Config, Generator, cuda
+from fastgen import Config, Generator
+from fastgen.drawing import cuda
 from fastgen.errors import ConfigError, ContextError
 
 SIZE = (101, 67)  # no row of any target is a multiple of 8 bytes

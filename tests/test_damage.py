@@ -13,9 +13,9 @@ from fastgen import damage as fields
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
 from fastgen.container import build_container
+from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.errors import ConfigError
 from fastgen.generator import QUALITY, Generator
-from fastgen.sample_targets import SampleTargets
 from fastgen.scene import Scene, Spreader
 from tests import oracle
 
@@ -179,7 +179,7 @@ def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeyp
     def made(gl, *rest):
         return SampleTargets(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
 
-    monkeypatch.setattr("fastgen.targets.SampleTargets", made)
+    monkeypatch.setattr("fastgen.drawing.targets.SampleTargets", made)
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         short = other.render(scene=scene, camera="close")
     assert (usual.depth > 3.5).sum() > 50

@@ -14,9 +14,9 @@ from fastgen.damage import (
     mask_values,
     reach_mm,
 )
+from fastgen.drawing.programs import REACH_MARGIN_MM
+from fastgen.drawing.surface_values import damage_values
 from fastgen.gl import open_context
-from fastgen.programs import REACH_MARGIN_MM
-from fastgen.surface_values import damage_values
 from tests.glsl import blocks, run
 
 THRESHOLD_MM = 5.0

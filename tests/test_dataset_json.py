@@ -151,7 +151,7 @@ def test_a_repair_that_was_stopped_goes_on(dataset, copy, capsys):
         raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fastgen.workers.run", stop)
+        patch.setattr("fastgen.dataset.workers.run", stop)
         assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 130
     assert main(["verify", str(copy)]) == 1
     assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
@@ -202,7 +202,7 @@ def test_an_extension_that_was_killed_is_not_finished(dataset, copy, tmp_path, c
         raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fastgen.workers.run", fall)
+        patch.setattr("fastgen.dataset.workers.run", fall)
         assert run(copy, "--images", "8") == 130
     capsys.readouterr()
     assert main(["verify", str(copy)]) == 1

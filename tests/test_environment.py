@@ -22,7 +22,7 @@ from fastgen.environment import (
     prefilter_environment,
 )
 from fastgen.errors import AssetError
-from fastgen.hdri import bundled_hdris, bundled_weights, find_hdris, load_radiance
+from fastgen.light.hdri import bundled_hdris, bundled_weights, find_hdris, load_radiance
 from fastgen.sampling import sample_scene
 from tests.sky_samples import patchwork, texel_grid
 

@@ -15,9 +15,9 @@ from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.damage import in_hole
-from fastgen.damaged_mesh import damaged_mesh
 from fastgen.export import export_glb
 from fastgen.generator import Generator
+from fastgen.geometry.damaged_mesh import damaged_mesh
 from fastgen.scene import Camera, Scene, Spreader
 from fastgen.sensor.parts import Lens
 

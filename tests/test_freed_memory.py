@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 PROGRAM = """
-from fastgen.freed_memory import return_freed_memory
+from fastgen.dataset.freed_memory import return_freed_memory
 
 def resident_kb():
     lines = open("/proc/self/status").read().splitlines()

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 import yaml
 
-from fastgen import shards
 from fastgen.cli import main
 from fastgen.config import Config
+from fastgen.dataset import shards
+from fastgen.dataset.shards import Job, Maker
+from fastgen.files.storage import storage_of
 from fastgen.generate import generate
 from fastgen.generator import Generator
 from fastgen.sampling import split_of
 from fastgen.scene import Scene
-from fastgen.shards import Job, Maker
-from fastgen.storage import storage_of
 from tests.folders import content
 
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]

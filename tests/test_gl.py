@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fastgen import doctor, gl
-from fastgen.egl import EGL_PACKAGES, EglDevice
+from fastgen.contexts.egl import EGL_PACKAGES, EglDevice
 from fastgen.errors import ConfigError, ContextError
 from tests.backends import BACKENDS, needs_osmesa
 

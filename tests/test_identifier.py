@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fastgen.errors import ConfigError
-from fastgen.identifier import check_digit, sample_identifier
+from fastgen.prints.identifier import check_digit, sample_identifier
 
 
 def slow_sum(text):

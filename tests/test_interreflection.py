@@ -7,18 +7,19 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import Config, Generator, interreflection
+from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container, container_outline
 from fastgen.environment import Ambient, prefilter_environment
+from fastgen.geometry.mesh import MATERIALS
 from fastgen.gl import open_context
-from fastgen.interreflection import Cells, form_factors
-from fastgen.mesh import MATERIALS
-from fastgen.occluders import without_cables
-from fastgen.openness import Sky, sky_directions
-from fastgen.sky_probe import Lit, SkyProbe, probe_points
+from fastgen.light import interreflection
+from fastgen.light.interreflection import Cells, form_factors
+from fastgen.light.occluders import without_cables
+from fastgen.light.openness import Sky, sky_directions
+from fastgen.light.sky_probe import Lit, SkyProbe, probe_points
+from fastgen.light.sun import Sun
 from fastgen.spreader import build_spreader
-from fastgen.sun import Sun
 
 KIND = "20"
 ROOF, BEAM = np.array([0.8, 0.4, 0.2]), np.array([0.1, 0.2, 0.3])

@@ -13,10 +13,10 @@ from fastgen import damage as fields
 from fastgen.camera import View, view_of
 from fastgen.config import Config
 from fastgen.container import KINDS, build_container
-from fastgen.divided_mesh import divided
 from fastgen.errors import ConfigError
 from fastgen.formats import view_values
 from fastgen.generator import Generator
+from fastgen.geometry.divided_mesh import divided
 from fastgen.gl import open_context
 from fastgen.labels import decal_of
 from fastgen.lens import Distortion

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.artwork import glyph_coverage, glyph_tiles
 from fastgen.gl import open_context
-from fastgen.lettering import layout
+from fastgen.prints.artwork import glyph_coverage, glyph_tiles
+from fastgen.prints.lettering import layout
 from tests.test_shading import blocks, run
 
 CAP_MM = 100.0

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen.artwork import brands, glyph_tiles
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
-from fastgen.lettering import layout
+from fastgen.light.srgb import DECODED
 from fastgen.markings import rhombus_offsets
+from fastgen.prints.artwork import brands, glyph_tiles
+from fastgen.prints.lettering import layout
+from fastgen.prints.weights import weight_lines
 from fastgen.sampling import sheet_sizes
-from fastgen.srgb import DECODED
-from fastgen.weights import weight_lines
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pycocotools.coco import COCO
 
 from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli import main
-from fastgen.hdri import bundled_hdris
+from fastgen.light.hdri import bundled_hdris
 from tests.folders import content
 
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]

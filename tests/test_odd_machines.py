@@ -10,14 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from fastgen import artwork, cache
-from fastgen.dataset_json import shard_numbers
+from fastgen import cache
+from fastgen.contexts.shader_cache import spare_full_disk
+from fastgen.dataset.dataset_json import shard_numbers
+from fastgen.dataset.progress import Progress
+from fastgen.dataset.workers import in_words
 from fastgen.errors import AssetError
-from fastgen.progress import Progress
+from fastgen.files.storage import Folder
+from fastgen.prints import artwork
 from fastgen.resources import asset_path
-from fastgen.shader_cache import spare_full_disk
-from fastgen.storage import Folder
-from fastgen.workers import in_words
 
 Disk = namedtuple("Disk", "f_bavail f_frsize")
 

@@ -10,9 +10,10 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.container import build_container
+from fastgen.drawing.shapes import spreader_mesh
 from fastgen.environment import Ambient, prefilter_environment, sky_irradiance
 from fastgen.gl import open_context
-from fastgen.openness import (
+from fastgen.light.openness import (
     Openness,
     Sky,
     encoded,
@@ -20,10 +21,9 @@ from fastgen.openness import (
     open_sky,
     sky_directions,
 )
-from fastgen.shapes import spreader_mesh
-from fastgen.sky_probe import SkyProbe, probe_points
+from fastgen.light.sky_probe import SkyProbe, probe_points
+from fastgen.light.sun import Sun
 from fastgen.spreader import build_spreader
-from fastgen.sun import Sun
 from tests.backends import needs_osmesa
 from tests.mesh_probe import behind_the_middle
 

@@ -10,15 +10,15 @@ from fastgen.environment import (
     irradiance_at,
     prefilter_environment,
 )
-from fastgen.prefilter import (
+from fastgen.light.prefilter import (
     levelled,
     octahedral_decode,
     octahedral_encode,
     sample_octahedral,
     shrink,
 )
-from fastgen.reflectance import dfg_table, fresnel_climb, mean_specular_albedo
-from fastgen.rgb9e5 import unpacked
+from fastgen.light.reflectance import dfg_table, fresnel_climb, mean_specular_albedo
+from fastgen.light.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
 
 

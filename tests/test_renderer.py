@@ -9,11 +9,11 @@ import pytest
 from fastgen.camera import view_of
 from fastgen.config import Config
 from fastgen.container import build_container
+from fastgen.drawing.gpu_mesh import facing_groups
 from fastgen.generator import QUALITY, Generator
-from fastgen.gpu_mesh import facing_groups
+from fastgen.light.srgb import DECODED
 from fastgen.scene import Spreader
 from fastgen.sensor.light import displayed, light_of
-from fastgen.srgb import DECODED
 from tests import oracle
 from tests.backends import needs_osmesa
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fastgen.gl import open_context
-from fastgen.rgb9e5 import LARGEST, packed, unpacked
+from fastgen.light.rgb9e5 import LARGEST, packed, unpacked
 from tests.backends import BACKENDS
 
 _RGB9_E5 = 0x8C3D

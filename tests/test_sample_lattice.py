@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from fastgen.config import Config
+from fastgen.drawing.sample_lattice import SampleLattice, fitting
 from fastgen.generator import Generator
-from fastgen.sample_lattice import SampleLattice, fitting
 
 
 def texels_of(lattice, places, size):

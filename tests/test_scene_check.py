@@ -8,7 +8,7 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.camera import view_of
-from fastgen.decal_tables import SceneError
+from fastgen.drawing.decal_tables import SceneError
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Scene
 from fastgen.scene_check import check_camera, check_scene

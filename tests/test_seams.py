@@ -7,7 +7,7 @@ import pytest
 
 from fastgen.container import KINDS, WallProfiles, build_container
 from fastgen.generator import Generator
-from fastgen.seams import stitched
+from fastgen.geometry.seams import stitched
 from fastgen.spreader import build_spreader
 from tests import oracle
 

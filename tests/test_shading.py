@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from fastgen.drawing.noise import noise_tiles
+from fastgen.drawing.textures import noise_texture
 from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
 from fastgen.gl import open_context
-from fastgen.noise import noise_tiles
-from fastgen.reflectance import dfg_table, fresnel_climb
-from fastgen.textures import noise_texture
+from fastgen.light.reflectance import dfg_table, fresnel_climb
 from tests.glsl import blocks, run
 
 
@@ -135,7 +135,7 @@ def test_black_paint_mirrors_of_a_sun_what_it_mirrors_toward_it(gl, slope_deg):
 
 
 def test_octahedral_mapping_equals_its_numpy_twin(gl):
-    from fastgen.prefilter import octahedral_encode
+    from fastgen.light.prefilter import octahedral_encode
 
     directions = np.random.default_rng(1).normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

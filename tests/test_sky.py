@@ -9,9 +9,9 @@ import pytest
 from fastgen import Generator
 from fastgen.camera import view_of
 from fastgen.environment import load_environment
-from fastgen.hdri import bundled_hdris
-from fastgen.prefilter import levelled, sample_octahedral
-from fastgen.rgb9e5 import unpacked
+from fastgen.light.hdri import bundled_hdris
+from fastgen.light.prefilter import levelled, sample_octahedral
+from fastgen.light.rgb9e5 import unpacked
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import psutil
 import pytest
 
 from fastgen.cli import main
-from fastgen.workers import undisturbed
+from fastgen.dataset.workers import undisturbed
 
 ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]
 STOPPED = "fastgen: stopped; run the same command again to go on"

@@ -14,11 +14,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from fastgen import storage
+from fastgen.dataset.workers import run
 from fastgen.errors import OutputError
+from fastgen.files import storage
+from fastgen.files.storage import Folder, storage_of
 from fastgen.formats import Same
-from fastgen.storage import Folder, storage_of
-from fastgen.workers import run
 from tests.crash_run import FAULTY_SCENE, make
 from tests.folders import content
 

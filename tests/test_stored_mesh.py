@@ -7,8 +7,8 @@ import pytest
 
 from fastgen import cache
 from fastgen.container import build_container
-from fastgen.mesh import Mesh
-from fastgen.stored_mesh import stored
+from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.stored_mesh import stored
 
 
 @pytest.fixture

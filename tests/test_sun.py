@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fastgen.environment import irradiance_at, load_environment, prefilter_environment
-from fastgen.sun import MIN_SHARE, MOST_SUNS, split_suns
+from fastgen.light.sun import MIN_SHARE, MOST_SUNS, split_suns
 from tests.sky_samples import even_directions, lamps_at_night, texel_grid
 from tests.test_environment import write_exr
 

@@ -7,13 +7,13 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen.container import KINDS, build_container, container_outline
 from fastgen.damage import deform
+from fastgen.drawing.programs import link
 from fastgen.gl import open_context
-from fastgen.occluders import without_cables
-from fastgen.programs import link
+from fastgen.light.occluders import without_cables
+from fastgen.light.sky_probe import probe_points
+from fastgen.light.sun_shadow import ShadowMap
 from fastgen.scene import Damage
-from fastgen.sky_probe import probe_points
 from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
-from fastgen.sun_shadow import ShadowMap
 from tests.mesh_probe import behind_the_middle
 
 

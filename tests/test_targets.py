@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.targets import bands, merged
+from fastgen.drawing.targets import bands, merged
 
 
 def painted(regions, size=(40, 30)):

@@ -8,8 +8,8 @@ from PIL import Image
 from fastgen import Config, Generator
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config import LabelConfig
+from fastgen.files.storage import Folder
 from fastgen.formats import SEAFRONT, Item, assemble, formats_of
-from fastgen.storage import Folder
 from fastgen.torch import (
     ContainerDataset,
     Loader,

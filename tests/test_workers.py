@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from fastgen import workers
+from fastgen.dataset import workers
 
 
 class DiesAfterItsTask:

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from fastgen import Config
 from fastgen.classes import MARKER_CLASSES
 from fastgen.container import build_container
-from fastgen.mesh import Mesh
-from fastgen.openness import open_sky
+from fastgen.geometry.mesh import Mesh
+from fastgen.light.openness import open_sky
+from fastgen.light.sky_probe import Lit, SkyProbe
 from fastgen.sample import Object, Sample
 from fastgen.sampling import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
-from fastgen.sky_probe import Lit, SkyProbe
 
 CAMERAS = ("Cl", "Cr")
 """They look at the ends, without doors and with them."""

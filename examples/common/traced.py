@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastgen import Generator
 from fastgen.export import export_glb
-from fastgen.hdri import bundled_hdris
+from fastgen.light.hdri import bundled_hdris
 from fastgen.scene import Scene
 from fastgen.sensor.light import displayed
 

@@ -2,7 +2,7 @@
 
 A format is one small class in a module of this package with an instance called FORMAT; adding one
 adds one file. Formats are pure: pixels and labels in, bytes out. Where the bytes go, and that they
-arrive whole, is storage.py's and shards.py's business.
+arrive whole, is the business of dataset/ and files/storage.py.
 """
 
 import importlib
@@ -15,15 +15,15 @@ from typing import Any
 
 import orjson
 
-from fastgen import coco
 from fastgen.camera import View
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.config import LabelConfig
-from fastgen.encode import jpeg
+from fastgen.files.encode import jpeg
+from fastgen.labelling import coco
+from fastgen.labelling.visibility import window
 from fastgen.records import check_known
 from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene
-from fastgen.visibility import window
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
 """The formats that `--format seafront` always writes: the paper's tasks, and the container."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fastgen.container import KINDS, WallProfiles, build_container
-from fastgen.encode import png
+from fastgen.files.encode import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
 from fastgen.sampling import SPLITS

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen import coco
 from fastgen.classes import DAMAGE_VALUES, SEGMENTATION_CLASSES
-from fastgen.encode import png
+from fastgen.files.encode import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records
 from fastgen.formats.yolo import line, outline
+from fastgen.labelling import coco
+from fastgen.labelling.visibility import mask_box, window
 from fastgen.sample import Box, Sample
-from fastgen.visibility import mask_box, window
 
 CATEGORIES = [
     {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-from fastgen import coco
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
 from fastgen.formats.yolo import detection_lines
+from fastgen.labelling import coco
+from fastgen.labelling.visibility import window
 from fastgen.sampling import SPLITS
-from fastgen.visibility import window
 
 CATEGORIES = [{"id": i + 1, "name": name} for i, name in enumerate(DETECTION_CLASSES)]
 

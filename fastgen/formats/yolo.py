@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fastgen import formats
 from fastgen.classes import DETECTION_CLASSES
+from fastgen.labelling.visibility import mask_box, window
 from fastgen.sample import Box, Object
-from fastgen.visibility import mask_box, window
 
 
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:

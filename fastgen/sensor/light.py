@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen import tone
-from fastgen.srgb import DECODED, ENCODED
+from fastgen.light import tone
+from fastgen.light.srgb import DECODED, ENCODED
 
 Light = NDArray[np.float32]
 """float32 [H, W, 3], linear Rec.709; 1 is what a white surface in metered light reflects, about."""

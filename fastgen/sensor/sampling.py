@@ -6,9 +6,9 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from fastgen.distributions.sensor_config import LensConfig, SensorConfig, WeatherConfig
 from fastgen.records import Range
 from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
-from fastgen.sensor_config import LensConfig, SensorConfig, WeatherConfig
 
 
 def sample_lens(config: LensConfig, rng: np.random.Generator) -> Lens:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config import LabelConfig
-from fastgen.crops import text_crops
 from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_number
+from fastgen.labelling.crops import text_crops
 from fastgen.records import check_known
 from fastgen.sample import Box, Sample
 

@@ -1,0 +1,1 @@
+"""What gl.py is made of: OpenGL contexts of EGL and OSMesa."""

@@ -1,0 +1,1 @@
+"""What renderer.py is made of: shader programs, buffers, textures, targets and passes."""

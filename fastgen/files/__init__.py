@@ -1,0 +1,1 @@
+"""Bytes: pixels and scenes encoded, hashed, and stored whole or not at all."""

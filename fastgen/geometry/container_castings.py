@@ -1,0 +1,112 @@
+"""The eight corner fittings with their apertures, ISO 1161.
+
+An aperture is a recessed pocket with a twelve-point outline: at 10 m through a 45 mm lens on a
+36 mm sensor 640 px wide, 1 px is 12.5 mm, so a 63 mm opening is 5 px and needs no rounder arc.
+"""
+
+import numpy as np
+
+from fastgen.geometry.container_layout import CASTING_MM, Array, Layout
+from fastgen.geometry.mesh import FACE_AXES, FACES
+from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon, sweep
+
+APERTURE_CENTER_MM = (101.5, 89.0, 59.0)
+"""Aperture centres from the end (x), the side (y) and the bottom or top (z)."""
+
+_APERTURES: dict[int, tuple[tuple[float, float], float]] = {
+    0: ((63.5, 51.0), 36.0),
+    1: ((79.0, 63.5), 50.0),
+    2: ((124.0, 63.5), 70.0),
+}
+"""By the face's axis: ((width, height) as seen, depth). No pocket reaches into another one."""
+
+
+def castings(layout: Layout) -> list[Sheet]:
+    """All sheets of the eight fittings."""
+    half = np.array([*layout.half, layout.top / 2])
+    sheets = []
+    for x_face in ("no_door", "door"):
+        for y_face in ("front", "back"):
+            for z_face in ("underside", "roof"):
+                name = f"casting.{x_face}.{y_face}.{z_face}"
+                signs = np.array([FACE_AXES[f].out for f in (x_face, y_face, z_face)]).sum(axis=0)
+                sheets.extend(_casting(name, (x_face, y_face, z_face), half, signs))
+    return sheets
+
+
+def _casting(name: str, faces: tuple[str, str, str], half: Array, signs: Array) -> list[Sheet]:
+    """signs: [3], which corner of the box with half sizes `half` [3] it stands in."""
+    size = np.array(CASTING_MM)
+    shift = np.array([0.0, 0.0, half[2]])
+    corner = signs * half + shift
+    far = corner - signs * size
+    holes_center = corner - signs * np.array(APERTURE_CENTER_MM)
+    sheets, plain = [], []
+    for axis, face in enumerate(faces):
+        axes = FACE_AXES[face]
+        center = holes_center.copy()
+        center[axis] = corner[axis]
+        right, up, out = (np.array(v, np.float64) for v in (axes.right, axes.up, axes.out))
+        (width, height), depth = _APERTURES[axis]
+        outline = center + _stadium(width, height) @ np.array([right, up])
+        rectangle = _rectangle(corner, far, axis, corner[axis])
+        front = _plate_with_hole(rectangle, outline, right, up)
+        closed = np.vstack([outline, outline[:1]])
+        walls = sweep(closed, (-depth, 0.0), out)
+        # the outline runs counter-clockwise, so swept outward its normals would face outward
+        walls = Patch(
+            walls.positions_mm,
+            -walls.normals,
+            walls.sheet_mm * (-1.0, 1.0),
+            walls.triangles[:, ::-1],
+        )
+        bottom = polygon(outline - depth * out, right, up)
+        sheets.append(Sheet(f"{name}.{face}", face, "casting", face, front))
+        sheets.append(Sheet(f"{name}.{face}.pocket", face, "rubber", face, beside([walls, bottom])))
+        opposite = FACE_AXES[_opposite(face)]
+        plain.append(polygon(_rectangle(corner, far, axis, far[axis]), opposite.right, opposite.up))
+    sheets.append(Sheet(f"{name}.inner", faces[0], "casting", "frame", beside(plain)))
+    return sheets
+
+
+def _opposite(face: str) -> str:
+    out = np.array(FACE_AXES[face].out)
+    return next(f for f in FACES if np.array_equal(np.array(FACE_AXES[f].out), -out))
+
+
+def _rectangle(corner: Array, far: Array, axis: int, level: float) -> Array:
+    """The four points [4, 3] of a casting's face at `level` along `axis`, in turn."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    points = np.empty((4, 3))
+    points[:, axis] = level
+    points[:, i] = (corner[i], far[i], far[i], corner[i])
+    points[:, j] = (corner[j], corner[j], far[j], far[j])
+    return points
+
+
+def _stadium(width: float, height: float) -> Array:
+    """Outline [12, 2] around the origin, counter-clockwise, with points on both axes."""
+    radius = height / 2
+    straight = width / 2 - radius
+    diagonal = radius * np.sqrt(0.5)
+    quarter = [(width / 2, 0.0), (straight + diagonal, diagonal), (straight, radius)]
+    x, y = np.array(quarter).T
+    second = np.column_stack([-x[:0:-1], y[:0:-1]])
+    upper = np.concatenate([np.column_stack([x, y]), [(0.0, radius)], second])
+    return np.concatenate([upper, -upper])
+
+
+def _plate_with_hole(rectangle: Array, outline: Array, right: Array, up: Array) -> Patch:
+    """The plate between four corners [4, 3] and an outline [12, 3] with points on both axes."""
+    seen = np.column_stack([rectangle @ right, rectangle @ up])
+    middle = seen.mean(axis=0)
+    turn = np.arctan2(seen[:, 1] - middle[1], seen[:, 0] - middle[0])
+    corners = rectangle[np.argsort(turn % (2 * np.pi))]
+    count = len(outline)
+    quarter = count // 4
+    triangles = []
+    for i in range(count):
+        triangles.append((count + i // quarter, (i + 1) % count, i))
+        if i % quarter == 0:
+            triangles.append((count + (i // quarter - 1) % 4, count + i // quarter, i))
+    return flat(np.concatenate([outline, corners]), triangles, right, up)

@@ -1,0 +1,243 @@
+"""Frame and base of a container: posts, rails, headers, sills, cross members, fork pockets."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fastgen.geometry.container_layout import (
+    BASE_RAIL_TOP_MM,
+    CASTING_MM,
+    DOOR_RING_MM,
+    FLOOR_MM,
+    FRONT_SILL_TOP_MM,
+    OVERLAP_MM,
+    RING_BOTTOM_MM,
+    RING_TOP_MM,
+    Array,
+    Layout,
+)
+from fastgen.geometry.container_walls import Panel
+from fastgen.geometry.mesh import FACE_AXES
+from fastgen.geometry.unfold import Patch, Sheet, breaks, coarsened, prism, sweep
+
+FORK_CENTERS_MM = (-1025.0, 1025.0)
+"""Fork pockets of a 20' container; ISO 1496-1 annex C: 2050 between centres, at least 355 wide and
+115 high, at least 20 above the base plane."""
+
+FORK_WIDTH_MM = 360.0
+FORK_Z_MM = (20.0, 136.0)
+
+DOOR_HEADER_MM = DOOR_SILL_MM = 120.0
+"""The door opening ends here from the top and from the bottom: flush with the castings."""
+
+DOOR_FACE_MM = 50.0
+"""Inset of the door header's and sill's faces; the locking bars pass in front of them."""
+
+_MEMBER_SPACING_MM = 300.0
+
+_FLOOR_CUT_MM, _MEMBER_CUT_MM = 280.0, 400.0
+"""The floor and the members below it are cut across so often: a lens bends corners only."""
+
+
+def frame(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
+    """Posts, rails, headers and sills. Their stations are those of the walls beside them."""
+    return [
+        *_posts(layout, walls),
+        *_top_rails(layout, walls),
+        *_bottom_rails(layout, walls),
+        *_front_beams(layout, walls["no_door"]),
+        *_door_beams(layout),
+    ]
+
+
+def ring(outline: Sequence[tuple[float, float]]) -> Array:
+    """The outline [N, 2] counter-clockwise."""
+    points = np.array(outline, np.float64)
+    x, y = points.T
+    area = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
+    return points if area > 0 else points[::-1]
+
+
+def _posts(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
+    half_length, half_width = layout.half
+    low, high = CASTING_MM[2] - OVERLAP_MM, layout.top - CASTING_MM[2] + OVERLAP_MM
+    stations = breaks(low, high, layout.max_edge_mm, walls["front"].rows_mm)
+    outer, front = layout.frame_recess_mm, layout.post_mm
+    depth, inner = layout.door_post_mm
+    step = inner - 42.0  # the hinges stand on this step
+    square = [(outer, outer), (front, outer), (front, front), (outer, front)]
+    stepped = [
+        (DOOR_RING_MM, outer), (depth, outer), (depth, inner),
+        (DOOR_FACE_MM, inner), (DOOR_FACE_MM, step), (DOOR_RING_MM, step),
+    ]  # fmt: skip
+    sheets = []
+    for face, x_sign, section in (("no_door", -1, square), ("door", 1, stepped)):
+        for side, y_sign in (("front", -1), ("back", 1)):
+            outline = [(x_sign * (half_length - d), y_sign * (half_width - e)) for d, e in section]
+            patch = prism(ring(outline), stations, 2, capped=(False, False))
+            sheets.append(Sheet(f"post.{face}.{side}", face, "paint_frame", "frame", patch))
+    return sheets
+
+
+def _top_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
+    _, half_width = layout.half
+    sheets = []
+    for side, y_sign in (("front", -1), ("back", 1)):
+        outer = y_sign * (half_width - layout.frame_recess_mm)
+        inner = y_sign * (half_width - layout.side_inner_mm)
+        bottom, top = layout.rail_bottom_mm, layout.top - RING_TOP_MM
+        outline = ring([(outer, bottom), (inner, bottom), (inner, top), (outer, top)])
+        stations = _side_stations(layout, walls[side])
+        patch = prism(outline, stations, 0, capped=(False, False))
+        sheets.append(Sheet(f"rail.top.{side}", side, "paint_frame", "frame", patch))
+    return sheets
+
+
+def _side_stations(layout: Layout, wall: Panel) -> Array:
+    """x from casting to casting, at knots of the side wall, so that both move as one."""
+    reach = layout.half[0] - CASTING_MM[0] + OVERLAP_MM
+    knots = np.sort(wall.knots_mm * FACE_AXES[wall.sheet.face].right[0])
+    inside = knots[(knots > -reach) & (knots < reach)]
+    return coarsened(np.concatenate([[-reach], inside, [reach]]), layout.max_edge_mm)
+
+
+def _bottom_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
+    half_length, half_width = layout.half
+    pockets = _fork_centers(layout)
+    long, _, high = CASTING_MM
+    edges = [x + s * FORK_WIDTH_MM / 2 for x in pockets for s in (-1, 1)]
+    sheets = []
+
+    def present(points: Array) -> np.ndarray:
+        x, _, z = np.moveaxis(points, -1, 0)
+        in_pocket = np.zeros(x.shape, bool)
+        for center in pockets:
+            in_pocket |= np.abs(x - center) < FORK_WIDTH_MM / 2
+        in_pocket &= (z > FORK_Z_MM[0]) & (z < FORK_Z_MM[1])
+        return ~in_pocket & layout.outside_castings(points)
+
+    for side, y_sign in (("front", -1), ("back", 1)):
+        outer = y_sign * (half_width - layout.frame_recess_mm)
+        inner = y_sign * (half_width - layout.side_inner_mm)
+        levels = breaks(RING_BOTTOM_MM, BASE_RAIL_TOP_MM, np.inf, (*FORK_Z_MM, high - OVERLAP_MM))
+        outline = [(outer, z) for z in levels[::-1]] + [(inner, z) for z in levels]
+        # outline runs down outside and up inside: counter-clockwise from +x for the front side
+        points = np.array(outline if y_sign < 0 else outline[::-1])
+        closed = np.vstack([points, points[:1]])
+        profile = np.column_stack([np.zeros(len(closed)), closed])
+        reach = (-half_length + layout.post_mm - OVERLAP_MM,
+                 half_length - layout.door_post_mm[0] + OVERLAP_MM)  # fmt: skip
+        castings = (-half_length + long - OVERLAP_MM, half_length - long + OVERLAP_MM)
+        stations = breaks(
+            *reach, layout.max_edge_mm, (*_side_stations(layout, walls[side]), *edges, *castings)
+        )
+        patch = sweep(profile, stations, (1, 0, 0), keep=present)
+        sheets.append(Sheet(f"rail.bottom.{side}", side, "paint_frame", "frame", patch))
+    return sheets
+
+
+def _front_beams(layout: Layout, wall: Panel) -> list[Sheet]:
+    """Header and sill of the front end. The sill's inner side reaches up past the floor."""
+    half_length, half_width = layout.half
+    reach = half_width - CASTING_MM[1] + OVERLAP_MM
+    inside = -wall.knots_mm[::-1]
+    inside = inside[np.abs(inside) < reach]
+    stations = coarsened(np.concatenate([[-reach], inside, [reach]]), layout.max_edge_mm)
+    outer, inner = -half_length + 6.0, -half_length + layout.end_inner_mm
+    top, bottom = layout.top - RING_TOP_MM, layout.rail_bottom_mm
+    header = [(outer, bottom), (outer, top), (inner, top), (inner, bottom), (outer, bottom)]
+    sill_inner_top = FLOOR_MM + OVERLAP_MM
+    sill = [(inner, sill_inner_top), (inner, RING_BOTTOM_MM), (outer, RING_BOTTOM_MM),
+            (outer, FRONT_SILL_TOP_MM), (inner, FRONT_SILL_TOP_MM)]  # fmt: skip
+    return [
+        _beam("header.no_door", "no_door", header, stations),
+        _beam("sill.no_door", "no_door", sill, stations),
+    ]
+
+
+def _door_beams(layout: Layout) -> list[Sheet]:
+    """Header with its rain gutter and sill with its lip: both reach out to the door's ring."""
+    half_length, half_width = layout.half
+    reach = half_width - CASTING_MM[1] + OVERLAP_MM
+    stations = breaks(-reach, reach, layout.max_edge_mm)
+    lip, face = half_length - DOOR_RING_MM, half_length - DOOR_FACE_MM
+    inner = half_length - layout.door_post_mm[0]
+    top, bottom = layout.top - RING_TOP_MM, layout.top - DOOR_HEADER_MM
+    header = [(inner, bottom), (inner, top), (lip, top), (lip, top - 22), (face, top - 22),
+              (face, bottom), (inner, bottom)]  # fmt: skip
+    sill = [(inner, DOOR_SILL_MM), (face, DOOR_SILL_MM), (face, 32.0), (lip, 32.0),
+            (lip, RING_BOTTOM_MM), (inner, RING_BOTTOM_MM),
+            (inner, FLOOR_MM + OVERLAP_MM)]  # fmt: skip
+    return [
+        _beam("header.door", "door", header, stations),
+        _beam("sill.door", "door", sill, stations),
+    ]
+
+
+def _profile(section: list[tuple[float, float]]) -> Array:
+    """A section (x, z) as points in space, to be swept along y."""
+    return np.array([(x, 0.0, z) for x, z in section])
+
+
+def _beam(name: str, face: str, section: list[tuple[float, float]], stations: Array) -> Sheet:
+    """A beam along y; its section (x, z) runs clockwise as seen from -y."""
+    patch = sweep(_profile(section), stations, (0, 1, 0))
+    return Sheet(name, face, "paint_frame", "frame", patch)
+
+
+def _fork_centers(layout: Layout) -> tuple[float, ...]:
+    return FORK_CENTERS_MM if layout.kind.length_mm < 7000 else ()
+
+
+def base(layout: Layout) -> list[Sheet]:
+    """Floor, cross members and fork pockets, seen from below."""
+    half_length, half_width = layout.half
+    reach_y = half_width - layout.side_inner_mm + OVERLAP_MM
+    start = -half_length + layout.end_inner_mm
+    end = half_length - layout.door_post_mm[0]
+    floor = sweep(
+        [(x, 0.0, FLOOR_MM) for x in breaks(start - OVERLAP_MM, end + OVERLAP_MM, _FLOOR_CUT_MM)],
+        breaks(-reach_y, reach_y, _FLOOR_CUT_MM),
+        FACE_AXES["underside"].up,
+    )
+    sheets = [Sheet("underside", "underside", "underside", "underside", floor)]
+    rows = breaks(-reach_y, reach_y, _MEMBER_CUT_MM)
+    pockets = _fork_centers(layout)
+    bays = max(round((end - start) / _MEMBER_SPACING_MM), 2)
+    for i, x in enumerate(np.linspace(start, end, bays + 1)[1:-1]):
+        if all(abs(x - center) > FORK_WIDTH_MM / 2 + 60 for center in pockets):
+            patch = _member(float(x), rows)
+            sheets.append(Sheet(f"member.{i}", "underside", "underside", "underside", patch))
+    outer = half_width - layout.frame_recess_mm
+    for i, center in enumerate(pockets):
+        sheets.append(
+            Sheet(f"fork.{i}", "underside", "underside", "frame", _fork_lining(center, outer))
+        )
+        low, high = center - FORK_WIDTH_MM / 2 - 4, center + FORK_WIDTH_MM / 2 + 4
+        shell = _profile([(high, FLOOR_MM + 2), (high, 13.0), (low, 13.0), (low, FLOOR_MM + 2)])
+        sheets.append(
+            Sheet(
+                f"fork.{i}.shell",
+                "underside",
+                "underside",
+                "underside",
+                sweep(shell, rows, (0, 1, 0)),
+            )
+        )
+    return sheets
+
+
+def _member(x: float, rows: Array) -> Patch:
+    """A C channel across: web, lower flange and the web's other side; the rest is in the floor."""
+    top, flange, lip = FLOOR_MM + 2, x + 45.0, 18.0
+    section = [(x + 5, top), (x + 5, lip), (flange, lip), (flange, 12.5), (x, 12.5), (x, top)]
+    return sweep(_profile(section), rows, (0, 1, 0))
+
+
+def _fork_lining(center: float, outer: float) -> Patch:
+    """The tunnel from side to side, seen from inside."""
+    low, high = center - FORK_WIDTH_MM / 2, center + FORK_WIDTH_MM / 2
+    bottom, top = FORK_Z_MM
+    section = [(low, bottom), (high, bottom), (high, top), (low, top), (low, bottom)]
+    rows = breaks(-outer, outer, 600.0)
+    return sweep(_profile(section), rows, (0, 1, 0))

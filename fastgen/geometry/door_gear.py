@@ -1,0 +1,142 @@
+"""Locking gear and hinges of the door end.
+
+A locking bar of 34 mm seen from 10 m through 45 mm on a 36 mm sensor 640 px wide (12.5 mm a
+pixel) is under 3 px wide, so eight sides are round enough; hinge knuckles of 28 mm get six.
+"""
+
+import numpy as np
+
+from fastgen.geometry.container_layout import DOOR_RING_MM, Layout
+from fastgen.geometry.container_parts import DOOR_FACE_MM
+from fastgen.geometry.door import LEAF_MM, SWAGE, Opening, opening
+from fastgen.geometry.mesh import Chart
+from fastgen.geometry.unfold import Patch, Sheet, beside, box, breaks, prism, regular
+
+BAR_RADIUS_MM = 17.0
+BAR_Y_MM = (-825.0, -275.0, 275.0, 825.0)
+
+_BAR_INSET_MM = 31.0
+_BAR_END_MM = 50.0
+"""The bars end this far from the castings' top and bottom planes."""
+
+_CAM_MM = 76.0
+"""Height of the bottom cams; the top ones hang as far below the top."""
+
+_BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
+"""What stands on a leaf reaches behind the deepest swage."""
+
+_FRONT_MM = DOOR_RING_MM + 0.5
+
+_BEND_MM = 80.0
+"""Blocks are cut as short, so that levers bend with a dented leaf and stay before it."""
+
+
+_ON_BARS = ("bar", "cams", "brackets", "handle")
+
+
+def is_gear(chart: Chart) -> bool:
+    """Whether a chart is of a locking bar or hangs on one: it stands before the leaves and is not
+    torn or scarred with them, though it bends as they do."""
+    name = chart.name.split(".")
+    return name[0] == "door" and len(name) > 1 and name[1] in _ON_BARS
+
+
+def gear(layout: Layout) -> list[Sheet]:
+    """Bars, cams, keepers, brackets, handles, catches and hinges."""
+    place = opening(layout)
+    sheets = []
+    for i, y in enumerate(BAR_Y_MM):
+        inner = np.sign(y) * -1 if abs(y) > 500 else np.sign(y)
+        parts = {
+            "bar": (beside([_bar(layout, place, y)]), "galvanized"),
+            "cams": (beside(_cams(layout, place, y, -np.sign(y))), "galvanized"),
+            "keepers": (beside(_keepers(layout, place, y)), "paint_frame"),
+            "brackets": (beside(_brackets(place, y)), "galvanized"),
+            "handle": (beside(_handle(place, y, float(inner))), "galvanized"),
+        }
+        for part, (patch, material) in parts.items():
+            sheets.append(Sheet(f"door.{part}.{i}", "door", material, "door", patch))
+    for name, sign in (("left", -1.0), ("right", 1.0)):
+        patches = _hinges(place, sign)
+        sheets.append(Sheet(f"door.hinges.{name}", "door", "paint_frame", "door", beside(patches)))
+    return sheets
+
+
+def _block(
+    place: Opening, y: tuple[float, float], z: tuple[float, float], inset: tuple[float, float]
+) -> Patch:
+    low, high = sorted(y)
+    return box((place.x - inset[1], low, z[0]), (place.x - inset[0], high, z[1]), _BEND_MM)
+
+
+def _bar(layout: Layout, place: Opening, y: float) -> Patch:
+    stations = breaks(_BAR_END_MM, layout.top - _BAR_END_MM, 2 * layout.max_edge_mm)
+    # unfolded from its back: there the sheet's borders, which rust like edges, are not seen
+    outline = np.roll(regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8), 4, axis=0)
+    return prism(outline, stations, 2, capped=(True, True))
+
+
+def _cams(layout: Layout, place: Opening, y: float, toward: float) -> list[Patch]:
+    """The forging at either end: a collar with a nose toward the middle of the door."""
+    x = place.x - _BAR_INSET_MM
+    nose = [(-16.0, -22.0), (16.0, -22.0), (18.0, 10.0), (10.0, 44.0), (-6.0, 44.0), (-18.0, 10.0)]
+    outline = np.array([(x + dx, y + toward * dy) for dx, dy in nose])
+    if toward < 0:
+        outline = outline[::-1]
+    patches = []
+    for z in (_CAM_MM, layout.top - _CAM_MM):
+        patches.append(prism(outline, (z - 18.0, z + 18.0), 2, capped=(True, True)))
+    return patches
+
+
+def _keepers(layout: Layout, place: Opening, y: float) -> list[Patch]:
+    """Two jaws on the sill and on the header, above and below each cam's nose."""
+    toward = -np.sign(y)
+    patches = []
+    for z in (_CAM_MM, layout.top - _CAM_MM):
+        for side in (-1.0, 1.0):
+            middle = z + side * 27.0
+            span = (y + toward * 22.0, y + toward * 58.0)
+            patches.append(_block(place, span, (middle - 7, middle + 7), (15.0, DOOR_FACE_MM + 4)))
+    return patches
+
+
+def _brackets(place: Opening, y: float) -> list[Patch]:
+    """Guides that hold the bar to the leaf: a plate and a saddle over the bar."""
+    patches = []
+    for share in (0.12, 0.5, 0.88):
+        z = place.low + share * (place.high - place.low)
+        patches.append(_block(place, (y - 50, y + 50), (z - 32, z + 32), (LEAF_MM - 8, _BACK_MM)))
+        patches.append(_block(place, (y - 25, y + 25), (z - 22, z + 22), (_FRONT_MM, LEAF_MM)))
+    return patches
+
+
+def _handle(place: Opening, y: float, toward: float) -> list[Patch]:
+    """Hub on the bar, lever along the leaf and the catch at its end.
+
+    Levers of neighbouring bars lie at different heights, so that they may pass each other.
+    """
+    z = 1120.0 if abs(y) > 500 else 980.0
+    end = y + toward * 470.0
+    return [
+        _block(place, (y - 23, y + 23), (z - 34, z + 34), (_FRONT_MM + 0.5, DOOR_FACE_MM)),
+        _block(place, (y, end), (z - 14, z + 14), (22.0, 34.0)),
+        _block(place, (end - 38, end + 38), (z - 45, z + 45), (LEAF_MM - 6, _BACK_MM)),
+        _block(place, (end - 12, end + 12), (z - 30, z + 24), (16.0, LEAF_MM)),
+    ]
+
+
+def _hinges(place: Opening, sign: float) -> list[Patch]:
+    """Five a leaf: a strap on the leaf, a knuckle over the gap, two lugs on the post's step."""
+    pin = sign * (place.half_width + 14.0)
+    strap_end = sign * (place.half_width - 150.0)
+    patches = []
+    for z in np.linspace(place.low + 160, place.high - 160, 5):
+        patches.append(_block(place, (strap_end, pin), (z - 42, z + 42), (40.0, LEAF_MM + 2)))
+        outline = regular((place.x - 32.0, pin), 14.0, 6)
+        patches.append(prism(outline, (z - 72, z + 72), 2, capped=(True, True)))
+        for side in (-1.0, 1.0):
+            span = (z + side * 57 - 11, z + side * 57 + 11)
+            lug = (sign * (place.half_width - 4), sign * (place.half_width + 40))
+            patches.append(_block(place, lug, span, (24.0, DOOR_FACE_MM + 4)))
+    return patches

@@ -1,0 +1,256 @@
+"""The members of a ship-to-shore crane's spreader: frame, end beams, flippers, headblock, cables.
+
+Sizes are those that makers' drawings of single-lift telescopic spreaders have in common, to a
+few centimetres; a camera at 10 m sees no more. Heights `above` count from the spreader's lower
+plane. `ends` are the signs of the container's ends (-1 no_door, 1 door), `sides` those of its long
+sides (-1 front, 1 back).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fastgen.geometry.container_castings import APERTURE_CENTER_MM
+from fastgen.geometry.container_layout import ContainerKind
+from fastgen.geometry.container_parts import ring
+from fastgen.geometry.unfold import Patch, Sheet, beside, box, prism, regular
+
+TIERS = ("frame", "headblock", "cables")
+"""What a spreader is made of from below, ever narrower: charts are named spreader.TIER.PART."""
+
+CABLE_LENGTH_MM = 12000.0
+"""What is drawn of the hoist cables: beyond the upper edge of every usual picture."""
+
+FLIPPER_REACH_MM = 330.0
+"""How far below the spreader's lower plane a lowered flipper ends."""
+
+FLIPPER_GAP_MM = 30.0
+"""A lowered flipper's least distance from the planes of the container's sides and ends."""
+
+_SIGNS = (-1.0, 1.0)
+
+_BEAM_Y_MM = 520.0
+"""The two main beams, and the sheaves above them, stand this far from the middle."""
+
+_FRAME_HALF_MM = 2650.0
+"""Half the main frame's length: what a spreader drawn in to 20 feet leaves room for."""
+
+CUT_MM = 150.0
+"""Members are cut across so often: light is interpolated between vertices, and they hide it from
+each other where they meet."""
+
+_TWISTLOCK_MM = (-45.0, 220.0)
+"""A twistlock's ends above the castings' upper plane: its head reaches into a casting, which is 70
+deep there; its stem ends in its housing, however wide the gap below that is."""
+
+_PIVOT_MM = 200.0
+"""Height about which flippers swing: raised ones are lowered ones mirrored there."""
+
+_HEADBLOCK_MM = (690.0, 1000.0)
+"""Lower and upper edge of the headblock's beams."""
+
+_SHEAVE_X_MM, _SHEAVE_Z_MM, _SHEAVE_RADIUS_MM = 950.0, 1250.0, 330.0
+_CABLE_RADIUS_MM = 15.0
+
+CABLES = 8
+CABLE_CHART = "spreader.cables.falls"
+
+LOCKS_CHARTS = {end: f"spreader.frame.locks.{end}" for end in ("no_door", "door")}
+"""Of the twistlocks at each end: what stays where it is when the rest is lifted."""
+
+CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
+"""A cable's four sides lie along x and y."""
+
+
+@dataclass(frozen=True)
+class Hang:
+    """Where a spreader hangs: over which container, gap_mm above its upper castings.
+
+    cut_mm: how often members are cut across.
+    """
+
+    kind: ContainerKind
+    gap_mm: float
+    cut_mm: float = CUT_MM
+
+    @property
+    def base(self) -> float:
+        """z of the spreader's lower plane in the container's frame."""
+        return self.kind.height_mm + self.gap_mm
+
+    def block(
+        self, x: tuple[float, float], y: tuple[float, float], above: tuple[float, float]
+    ) -> Patch:
+        """A box; x and y in either order."""
+        low, high = (min(x), min(y), self.base + above[0]), (max(x), max(y), self.base + above[1])
+        return box(low, high, self.cut_mm)
+
+
+def frame(hang: Hang) -> list[Sheet]:
+    """The main frame: two box beams and cross members."""
+    sheets = [
+        _painted(
+            f"spreader.frame.{name}",
+            hang.block(
+                (-_FRAME_HALF_MM, _FRAME_HALF_MM), _around(side * _BEAM_Y_MM, 150.0), (110.0, 560.0)
+            ),
+        )
+        for name, side in (("front", -1.0), ("back", 1.0))
+    ]
+    inner = (-_BEAM_Y_MM + 140.0, _BEAM_Y_MM - 140.0)
+    cross = [
+        hang.block(_around(x, 110.0), inner, (170.0, 500.0)) for x in (-2500.0, -850, 850, 2500)
+    ]
+    return [*sheets, _painted("spreader.frame.cross", beside(cross))]
+
+
+def ends(hang: Hang) -> list[Sheet]:
+    """Telescopic beams out of the main frame, end beams across, twistlocks in the castings."""
+    sheets = []
+    half_length, half_width = hang.kind.length_mm / 2, hang.kind.width_mm / 2
+    for name, end in (("no_door", -1.0), ("door", 1.0)):
+        drawn_out = (end * (_FRAME_HALF_MM - 400.0), end * (half_length - 200.0))
+        beams = [
+            hang.block(drawn_out, _around(side * _BEAM_Y_MM, 110.0), (160.0, 490.0))
+            for side in _SIGNS
+        ]
+        across = (20.0 - half_width, half_width - 20.0)
+        beam = hang.block((end * (half_length - 260), end * (half_length - 12)), across, (70, 450))
+        housings, locks = [], []
+        for side in _SIGNS:
+            x = end * (half_length - APERTURE_CENTER_MM[0])
+            y = side * (half_width - APERTURE_CENTER_MM[1])
+            housings.append(hang.block(_around(x, 106.0), _around(y, 95.0), (0.0, 300.0)))
+            stem = regular((x, y), 24.0, 8)
+            reach = [hang.kind.height_mm + z for z in _TWISTLOCK_MM]
+            locks.append(prism(stem, reach, 2, capped=(True, True)))
+        # plates that carry the end beam's load into the telescopic beams
+        gussets = [
+            hang.block(
+                (end * (half_length - 700), end * (half_length - 250)), _around(y, 20.0), (80, 620)
+            )
+            for y in (-_BEAM_Y_MM - 135, -_BEAM_Y_MM + 135, _BEAM_Y_MM - 135, _BEAM_Y_MM + 135)
+        ]
+        sheets += [
+            _painted(f"spreader.frame.{name}", beside([beam, *beams, *housings, *gussets])),
+            Sheet(LOCKS_CHARTS[name], "roof", "cable", "frame", beside(locks)),
+        ]
+    return sheets
+
+
+def flippers(hang: Hang, down: tuple[bool, bool]) -> list[Sheet]:
+    """Gather guides at the corners: bent plates beside side and end, lowered or raised.
+
+    down: those of the front and of the back side.
+    """
+    half = np.array([hang.kind.length_mm / 2, hang.kind.width_mm / 2])
+    patches: list[Patch] = []
+    for side, lowered in zip(_SIGNS, down, strict=True):
+        for end in _SIGNS:
+            for across in (0, 1):  # the axis that the plate stands across
+                patches.extend(_guide(hang, half, np.array([end, side]), across, lowered))
+    return [_painted("spreader.frame.flippers", beside(patches))]
+
+
+def headblock(hang: Hang) -> list[Sheet]:
+    """What the cables carry: two beams on four feet, the cable basket, four sheaves; and the
+    cabinets that stand on the frame beside it."""
+    low, high = _HEADBLOCK_MM
+    beams = [
+        hang.block((-1500.0, 1500.0), _around(side * _BEAM_Y_MM, 130.0), (low, high))
+        for side in _SIGNS
+    ]
+    feet = [
+        hang.block(_around(x, 120.0), _around(side * _BEAM_Y_MM, 105.0), (550.0, low + 10))
+        for x in (-1250.0, 1250.0)
+        for side in _SIGNS
+    ]
+    inner = (-_BEAM_Y_MM + 120.0, _BEAM_Y_MM - 120.0)
+    cross = [hang.block(_around(x, 150.0), inner, (low + 20, high - 20)) for x in (-1100.0, 1100)]
+    cabinets = [
+        hang.block(_around(-2050.0, 340.0), (-620.0, 620.0), (555.0, 1080.0)),
+        hang.block(_around(2080.0, 300.0), (-560.0, 560.0), (555.0, 920.0)),
+    ]
+    basket = prism(
+        regular((0.0, 0.0), 420.0, 12),
+        (hang.base + 480.0, hang.base + 1300.0),
+        2,
+        capped=(True, True),
+    )
+    cheeks, sheaves = [], []
+    z = hang.base + _SHEAVE_Z_MM
+    for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM):
+        for side in _SIGNS:
+            y = side * _BEAM_Y_MM
+            wheel = regular((z, x), _SHEAVE_RADIUS_MM, 16)
+            sheaves.append(prism(wheel, _around(y, 45.0), 1, capped=(True, True)))
+            foot = hang.base + high - 10
+            plate = [(foot, x - 300), (foot, x + 300), (z + 190, x + 130), (z + 190, x - 130)]
+            for middle in (y - 80.0, y + 80.0):
+                stations = _around(middle, 18.0)
+                cheeks.append(prism(ring(plate), stations, 1, capped=(True, True)))
+    return [
+        _painted("spreader.headblock.beams", beside([*beams, *cross, *feet, *cheeks])),
+        Sheet(
+            "spreader.headblock.boxes", "roof", "galvanized", "frame", beside([basket, *cabinets])
+        ),
+        Sheet("spreader.headblock.sheaves", "roof", "cable", "frame", beside(sheaves)),
+    ]
+
+
+def cables(hang: Hang) -> list[Sheet]:
+    """Eight falls, two from each sheave straight up; under a pixel thick, so four sides will do."""
+    falls = [
+        prism(
+            regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
+        )
+        for x, y, z in cable_feet_mm(hang)
+    ]
+    return [Sheet(CABLE_CHART, "roof", "cable", "frame", beside(falls))]
+
+
+def cable_feet_mm(hang: Hang) -> list[tuple[float, float, float]]:
+    """Lower ends of the axes of the CABLES cables in the container's frame."""
+    z = hang.base + _SHEAVE_Z_MM
+    return [
+        (x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM, z)
+        for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM)
+        for side in _SIGNS
+        for turn in _SIGNS
+    ]
+
+
+def _painted(name: str, patch: Patch) -> Sheet:
+    return Sheet(name, "roof", "spreader", "frame", patch)
+
+
+def _around(middle: float, half: float) -> tuple[float, float]:
+    return middle - half, middle + half
+
+
+def _guide(
+    hang: Hang, half: np.ndarray, signs: np.ndarray, across: int, lowered: bool
+) -> Iterable[Patch]:
+    """The plate at one corner that stands across axis 0 or 1, and the arm that holds it.
+
+    half: half length and width. signs: which corner. Profiles are (outward, above): how far
+    outside the container's plane, how high over the spreader's lower plane when lowered.
+    """
+    gap = FLIPPER_GAP_MM
+    straight = [(gap, 300.0), (gap + 25, 300), (gap + 25, -70), (gap, -70)]
+    splayed = [(gap, -60.0), (gap + 25, -60), (gap + 125, -FLIPPER_REACH_MM)]
+    splayed.append((gap + 98, -FLIPPER_REACH_MM))
+    arm = [(-20.0, 270.0), (gap + 10, 270), (gap + 10, 150), (-20, 150)]
+    along = 1 - across
+    corner = signs[along] * half[along]
+    widths = {"plate": (corner - signs[along] * 330.0, corner + signs[along] * 15.0)}
+    widths["arm"] = (corner - signs[along] * 180.0, corner - signs[along] * 40.0)
+    for part, profile in (("plate", straight), ("plate", splayed), ("arm", arm)):
+        outward, above = np.array(profile).T
+        place = signs[across] * (half[across] + outward)
+        height = hang.base + (above if lowered else 2 * _PIVOT_MM - above)
+        # a prism's outline is in the axes that follow its own: y, z for x; z, x for y
+        columns = (place, height) if along == 0 else (height, place)
+        outline = ring(list(zip(*columns, strict=True)))
+        yield prism(outline, sorted(widths[part]), along, capped=(True, True))

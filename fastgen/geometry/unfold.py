@@ -1,0 +1,361 @@
+"""Flat-faceted parts that are born with their unfolding: swept profiles, polygons, prisms.
+
+A Sheet is one chart before it has a place in the atlas; `assemble` packs sheets into a Mesh.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from heapq import heapify, heappop, heappush
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastgen.geometry.mesh import (
+    FACE_AXES,
+    FACES,
+    GROUP_SLACK_MM,
+    MATERIALS,
+    MAX_ZONES,
+    Chart,
+    Mesh,
+    Zone,
+)
+from fastgen.geometry.seams import stitched
+from fastgen.geometry.zones import zones_of
+
+Array = NDArray[np.float64]
+
+GUTTER_MM = 16.0
+"""Between charts: mip level 3 of a 2 mm texel does not mix neighbours."""
+
+_CLOSEST_MM = 0.01
+"""Stations closer than this are one."""
+
+_SPACE_MM = 4.0
+"""Between the pieces of one chart, which share a material."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Triangles with their unfolding. positions_mm, normals: [V, 3]; sheet_mm: [V, 2];
+    triangles: int [T, 3], counter-clockwise both in space from outside and on the sheet."""
+
+    positions_mm: Array
+    normals: Array
+    sheet_mm: Array
+    triangles: NDArray[np.int64]
+
+    @cached_property
+    def size_mm(self) -> Array:
+        """Width and height of the sheet's bounding box."""
+        return np.asarray(np.ptp(self.sheet_mm, axis=0))
+
+    def at(self, x: float, y: float) -> "Patch":
+        """The same with the sheet's lower left corner at (x, y)."""
+        return replace(self, sheet_mm=self.sheet_mm - self.sheet_mm.min(axis=0) + (x, y))
+
+    def turned(self) -> "Patch":
+        """The same with the sheet turned by 90 degrees."""
+        return replace(self, sheet_mm=self.sheet_mm @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """A chart-to-be. group: the face group its triangles belong to, or "frame", where outermost
+    facets still go to their face (see Mesh.groups)."""
+
+    name: str
+    face: str
+    material: str
+    group: str
+    patch: Patch
+
+
+def breaks(low: float, high: float, step: float, extra: Iterable[float] = ()) -> Array:
+    """Ascending stations from low to high, at most `step` apart, that meet all `extra` between."""
+    knots = [low]
+    for knot in sorted(extra):
+        if knots[-1] + _CLOSEST_MM < knot < high - _CLOSEST_MM:
+            knots.append(knot)
+    knots.append(high)
+    pieces = [
+        np.linspace(a, b, max(int(np.ceil((b - a) / step - 1e-9)), 1) + 1)[:-1]
+        for a, b in pairwise(knots)
+    ]
+    return np.append(np.concatenate(pieces), high)
+
+
+def coarsened(stations: Array, step: float) -> Array:
+    """A subset of ascending stations, both ends in it, with gaps of at most `step` if it can."""
+    kept = [0]
+    for i in range(1, len(stations) - 1):
+        if stations[i + 1] - stations[kept[-1]] > step:
+            kept.append(i)
+    return stations[[*kept, len(stations) - 1]]
+
+
+def sweep(
+    profile_mm: ArrayLike,
+    stations_mm: ArrayLike,
+    direction: ArrayLike,
+    *,
+    upright: bool = True,
+    keep: Callable[[Array], NDArray[np.bool_]] | None = None,
+    arc_mm: ArrayLike | None = None,
+) -> Patch:
+    """The surface that a polyline [K, 3] sweeps at stations [R] along a unit direction.
+
+    upright: the sheet's x runs along the polyline and y along the direction; otherwise the other
+    way round. Outward is x's direction cross y's. keep: which cells exist, from their centres
+    [K-1, R-1, 3]. arc_mm: [K], sheet coordinates of the polyline's points, instead of its arc
+    length.
+    """
+    profile, stations = np.asarray(profile_mm, np.float64), np.asarray(stations_mm, np.float64)
+    along = np.asarray(direction, np.float64)
+    edges = np.diff(profile, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    arc = np.append(0.0, np.cumsum(lengths)) if arc_mm is None else np.asarray(arc_mm, np.float64)
+    strips, rows = len(edges), len(stations)
+    ends = np.arange(strips)[:, None] + np.arange(2)
+    positions = profile[ends][:, :, None, :] + stations[:, None] * along
+    normal = _crossed(edges, along) * (1.0 if upright else -1.0) / lengths[:, None]
+    sheet = np.empty((strips, 2, rows, 2))
+    sheet[..., 0 if upright else 1] = arc[ends][:, :, None]
+    sheet[..., 1 if upright else 0] = stations - stations[0]
+    index = np.arange(strips * 2 * rows).reshape(strips, 2, rows)
+    a, b = index[:, 0, :-1], index[:, 1, :-1]
+    c, d = index[:, 1, 1:], index[:, 0, 1:]
+    order = (a, b, c, a, c, d) if upright else (a, d, c, a, c, b)
+    quads = np.stack(order, axis=-1).reshape(strips, rows - 1, 2, 3)
+    normals = np.broadcast_to(normal[:, None, None, :], positions.shape)
+    whole = Patch(
+        positions.reshape(-1, 3), normals.reshape(-1, 3), sheet.reshape(-1, 2), quads.reshape(-1, 3)
+    )
+    if keep is None:
+        return whole
+    middle = (profile[:-1] + profile[1:])[:, None] / 2
+    there = keep(middle + ((stations[:-1] + stations[1:]) / 2)[:, None] * along)
+    used, numbers = np.unique(quads[there].reshape(-1, 3), return_inverse=True)
+    return Patch(
+        whole.positions_mm[used],
+        whole.normals[used],
+        whole.sheet_mm[used],
+        numbers.reshape(-1, 3),
+    )
+
+
+def _crossed(vectors: Array, axis: Array) -> Array:
+    """Cross products of vectors [..., 3] with one [3]; np.cross takes five times as long."""
+    x, y, z = axis.tolist()
+    return vectors @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def flat(points_mm: ArrayLike, triangles: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
+    """Coplanar points [N, 3] as they are seen with the unit vectors right and up."""
+    points = np.asarray(points_mm, np.float64)
+    x, y = np.asarray(right, np.float64), np.asarray(up, np.float64)
+    sheet = np.stack([points @ x, points @ y], axis=1)
+    corners = np.array(triangles, np.int64)
+    a, b, c = sheet[corners].transpose(1, 0, 2)
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    mirrored = ux * vy - uy * vx < 0
+    corners[mirrored] = corners[mirrored][:, ::-1]
+    normals = np.broadcast_to(_crossed(x, y), points.shape)
+    return Patch(points, normals, sheet, corners)
+
+
+def polygon(points_mm: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
+    """A convex polygon [N, 3] in either sense, seen with right and up."""
+    count = len(np.asarray(points_mm))
+    fan = [(0, i, i + 1) for i in range(1, count - 1)]
+    return flat(points_mm, fan, right, up)
+
+
+def regular(center: tuple[float, float], radius: float, sides: int) -> Array:
+    """Corners [sides, 2] of a regular polygon, counter-clockwise, for `prism`.
+
+    Corners, not edges, lie on the radius: nothing stands out farther.
+    """
+    turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def beside(patches: Sequence[Patch]) -> Patch:
+    """Patches on one sheet, upright and side by side."""
+    x = 0.0
+    parts = []
+    for patch in patches:
+        placed = (patch.turned() if patch.size_mm[0] > patch.size_mm[1] else patch).at(x, 0.0)
+        parts.append(placed)
+        x += float(placed.size_mm[0]) + _SPACE_MM
+    return joined(parts)
+
+
+def joined(patches: Sequence[Patch]) -> Patch:
+    """Patches that already share one sheet's coordinates, as one."""
+    first = np.cumsum([0, *(len(p.positions_mm) for p in patches[:-1])])
+    return Patch(
+        np.concatenate([p.positions_mm for p in patches]),
+        np.concatenate([p.normals for p in patches]),
+        np.concatenate([p.sheet_mm for p in patches]),
+        np.concatenate([p.triangles + k for p, k in zip(patches, first, strict=True)]),
+    )
+
+
+def prism(
+    outline_mm: ArrayLike, stations_mm: ArrayLike, axis: int, *, capped: tuple[bool, bool]
+) -> Patch:
+    """A convex outline [N, 2] swept along axis 0, 1 or 2, with caps at its (low, high) end or not.
+
+    The outline is in the two following axes (y, z for x; z, x for y; x, y for z),
+    counter-clockwise seen from the axis' tip.
+    """
+    outline = np.asarray(outline_mm, np.float64)
+    stations = np.asarray(stations_mm, np.float64)
+    a, b, direction = np.roll(np.eye(3), -axis, axis=0)[[1, 2, 0]]
+    points = outline[:, :1] * a + outline[:, 1:] * b
+    patches = [sweep(np.vstack([points, points[:1]]), stations, direction)]
+    if capped[0]:
+        patches.append(polygon(points + stations[0] * direction, b, a))
+    if capped[1]:
+        patches.append(polygon(points + stations[-1] * direction, a, b))
+    return beside(patches)
+
+
+def box(low_mm: ArrayLike, high_mm: ArrayLike, step_mm: float = np.inf) -> Patch:
+    """All six faces of an axis-aligned box, unfolded around its longest edge and cut across it
+    every step_mm."""
+    low, high = np.asarray(low_mm, np.float64), np.asarray(high_mm, np.float64)
+    axis = int(np.argmax(high - low))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    outline = [(low[i], low[j]), (high[i], low[j]), (high[i], high[j]), (low[i], high[j])]
+    return prism(outline, breaks(low[axis], high[axis], step_mm), axis, capped=(True, True))
+
+
+def assemble(
+    sheets: Sequence[Sheet],
+    outer_size_mm: tuple[float, float, float] | None = None,
+    flats: Mapping[str, tuple[tuple[float, float], ...]] | None = None,
+) -> Mesh:
+    """Pack the sheets into one atlas and join them into a Mesh, triangles sorted by group.
+
+    outer_size_mm: length, width and height of the container, whose planes the groups refer to;
+    without it, all sheets keep the group they name.
+    """
+    assert all(s.material in MATERIALS and s.face in FACES for s in sheets)
+    packing = _packed(np.array([s.patch.size_mm for s in sheets]))
+    patches = [
+        (s.patch.turned() if turned else s.patch).at(x, y)
+        for s, turned, (x, y) in zip(sheets, packing.turned, packing.corners, strict=True)
+    ]
+    zones, zone = _zones(patches, [s.name in FACES for s in sheets])
+    assert len(zones) < MAX_ZONES
+    whole = joined(patches)
+    values = np.column_stack([whole.normals, whole.sheet_mm, zone])
+    positions, values, triangles, source = stitched(whole.positions_mm, values, whole.triangles)
+    group = np.concatenate([_groups(s, outer_size_mm) for s in sheets])[source]
+    order = np.argsort(group, kind="stable")
+    ends = np.searchsorted(group[order], np.arange(len(FACES) + 2))
+    names = (*FACES, "frame")
+    return Mesh(
+        positions_mm=positions.astype(np.float32),
+        normals=values[:, :3].astype(np.float32),
+        atlas_mm=values[:, 3:5].astype(np.float32),
+        zone=np.rint(values[:, 5]).astype(np.uint16),
+        triangles=triangles[order].astype(np.uint32),
+        charts=tuple(
+            Chart(s.name, s.face, s.material, (float(x), float(y), *p.size_mm.tolist()))
+            for s, p, (x, y) in zip(sheets, patches, packing.corners, strict=True)
+        ),
+        zones=zones,
+        atlas_size_mm=packing.size,
+        groups={n: slice(int(ends[i]), int(ends[i + 1])) for i, n in enumerate(names)},
+        flats=flats or {},
+    )
+
+
+def _zones(
+    patches: Sequence[Patch], panels: Sequence[bool]
+) -> tuple[tuple[Zone, ...], NDArray[np.int64]]:
+    """The zones of charts that have their place, and which of them each vertex is in."""
+    zones: list[Zone] = []
+    of_vertices = []
+    for chart, (patch, panel) in enumerate(zip(patches, panels, strict=True)):
+        heights, corners = patch.positions_mm[:, 2], patch.triangles
+        found, which = zones_of(chart, patch.sheet_mm, heights, patch.normals, corners, panel)
+        of_vertices.append(np.zeros(len(heights), np.int64))
+        of_vertices[-1][corners] = len(zones) + which[:, None]
+        zones += found
+    return tuple(zones), np.concatenate(of_vertices)
+
+
+def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> NDArray[np.int64]:
+    """Index into (*FACES, "frame") of each triangle.
+
+    A facet of the frame that looks straight out of a face, no deeper than the slack, is seen only
+    from in front of its own plane, so it belongs to that face.
+    """
+    patch = sheet.patch
+    if sheet.group != "frame":
+        return np.full(len(patch.triangles), FACES.index(sheet.group))
+    result = np.full(len(patch.triangles), len(FACES))
+    if outer_size_mm is None:
+        return result
+    length, width, height = outer_size_mm
+    half = np.array([length, width, height]) / 2
+    depth_center = patch.positions_mm - (0.0, 0.0, height / 2)
+    for i, face in enumerate(FACES):
+        out = np.array(FACE_AXES[face].out)
+        depth = np.abs(out) @ half - depth_center @ out
+        outer = (patch.normals @ out > 1 - 1e-9) & (depth <= GROUP_SLACK_MM + 1e-6)
+        result[outer[patch.triangles].all(axis=1)] = i
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Packing:
+    """corners: lower left [N, 2]. turned: bool [N], which lie on their side. size: of it all."""
+
+    corners: Array
+    turned: NDArray[np.bool_]
+    size: tuple[float, float]
+
+
+def _packed(sizes: Array) -> _Packing:
+    """Places for boxes [N, 2], of a few atlas widths the one nearest a square."""
+    padded = np.ceil(sizes + GUTTER_MM)
+    widest = float(padded.max())
+    tries = [_shelves(padded, width) for width in np.linspace(widest, 2 * widest, 31)]
+    best = min(tries, key=lambda packing: max(packing.size))
+    return replace(best, corners=best.corners + GUTTER_MM / 2)
+
+
+def _shelves(padded: Array, limit: float) -> _Packing:
+    """First fit on shelves of falling height, no wider than `limit`.
+
+    First-fit decreasing height (Coffman, Garey, Johnson and Tarjan 1980), but a long part that
+    finds no room upright beside others lies down and waits for its new turn.
+    """
+    corners = np.empty_like(padded)
+    turned = np.zeros(len(padded), bool)
+    waiting = [(-height, -width, i) for i, (width, height) in enumerate(padded.tolist())]
+    heapify(waiting)
+    shelves: list[list[float]] = []
+    top = 0.0
+    while waiting:
+        height, width, i = heappop(waiting)
+        height, width = -height, -width
+        shelf = next((s for s in shelves if s[0] + width <= limit), None)
+        if shelf is None and height > 2 * width and not turned[i]:
+            turned[i] = True
+            heappush(waiting, (-width, -height, i))
+            continue
+        if shelf is None:
+            shelf = [0.0, top]
+            shelves.append(shelf)
+            top += height
+        corners[i] = shelf
+        shelf[0] += width
+    return _Packing(corners, turned, (max(shelf[0] for shelf in shelves), top))

@@ -1,0 +1,1 @@
+"""What prints are made of, below markings.py: identifiers, figures, lettering, artwork."""
