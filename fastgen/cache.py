@@ -93,8 +93,8 @@ def computed(
 
 
 def _code_digest(folder: Path) -> str:
-    """Of the modules in a folder and below, and of the versions of what they compute with: a number that
-    somebody must raise would be forgotten."""
+    """Of the modules in a folder and below, and of the versions of what they compute with: a number
+    that somebody must raise would be forgotten."""
     versions = np.__version__, cv2.__version__, importlib.metadata.version("scipy")
     digest = hashlib.sha256(repr(versions).encode())
     for module in sorted(folder.rglob("*.py")):

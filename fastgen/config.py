@@ -13,12 +13,12 @@ from typing import Any
 import yaml
 
 from fastgen.container import KINDS, WallProfiles
+from fastgen.distributions.camera_config import CameraConfig, check_room, seafront_rig
 from fastgen.distributions.damage_config import DamageConfig
 from fastgen.distributions.markings_config import MarkingsConfig
-from fastgen.distributions.sensor_config import LensConfig, SensorConfig, WeatherConfig
+from fastgen.distributions.sensor_config import SensorConfig, WeatherConfig
 from fastgen.errors import ConfigError
 from fastgen.files.yaml_values import loaded
-from fastgen.geometry.mesh import FACES
 from fastgen.light import srgb
 from fastgen.light.reflectance import MIN_ROUGHNESS
 from fastgen.records import UNIT, Range, bounds, check_known, from_plain, to_plain
@@ -131,52 +131,6 @@ class ContainerConfig:
 
 
 @dataclass(frozen=True)
-class CameraConfig:
-    """One camera of the rig: it looks at the middle of a face from a varied position.
-
-    face: front, back, door, no_door, roof or underside.
-    focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
-    distance_mm: from the point that it looks at.
-    azimuth_deg: turns the camera about the vertical through that point; 0 looks straight at the
-        face, and where it is positive the camera stands to the right, seen from itself. Of roof
-        and underside: how far it stands aside along the length.
-    elevation_deg: lifts the camera, which goes on looking there; of roof and underside: how far it
-        stands aside across the length.
-    roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
-        lies across.
-    target_shift_mm: how far beside the middle it looks, along each axis of the face.
-    sensor_width_mm: width of the image on the sensor.
-    exposure_ev: from the exposure that suits the light.
-    lens: its distortion, null for a pinhole.
-    """
-
-    face: str
-    focal_mm: float = field(metadata=bounds(1.0, 2000.0, "mm"))
-    distance_mm: Range = field(metadata=bounds(300.0, 1.5e5, "mm"))  # camera.FAR_M ends sight
-    azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
-    elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
-    roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))
-    target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e4, 1e4, "mm"))
-    sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
-    exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
-    lens: LensConfig | None = None
-
-    def __post_init__(self) -> None:
-        """Hold the face to those that exist."""
-        check_known("face", self.face, FACES)
-
-
-def _seafront_rig() -> dict[str, CameraConfig]:
-    """The paper's four cameras (3.2 and Fig. 4); a 40' fills about 3/4 of A and B."""
-    return {
-        "A": CameraConfig("front", 14.5, Range(5600, 7400)),
-        "B": CameraConfig("back", 28.0, Range(10500, 13500)),
-        "Cl": CameraConfig("no_door", 45.0, Range(4600, 7200)),
-        "Cr": CameraConfig("door", 45.0, Range(4600, 7200)),
-    }
-
-
-@dataclass(frozen=True)
 class EnvironmentConfig:
     """The light.
 
@@ -253,7 +207,7 @@ class Config:
     damage: DamageConfig = field(default_factory=DamageConfig)
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
-    cameras: dict[str, CameraConfig] = field(default_factory=_seafront_rig)
+    cameras: dict[str, CameraConfig] = field(default_factory=seafront_rig)
     sensor: SensorConfig = field(default_factory=SensorConfig)
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
@@ -268,6 +222,9 @@ class Config:
                 raise ConfigError(
                     f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
                 )
+        kinds = [kind for kind, weight in self.container.kinds.items() if weight > 0]
+        for name, rig in self.cameras.items():
+            check_room(name, rig, kinds)
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")
 

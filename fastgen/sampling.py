@@ -13,9 +13,10 @@ from itertools import product
 
 import numpy as np
 
-from fastgen.camera import MM, NEAR_M, view_of
-from fastgen.config import CameraConfig, Config, ContainerConfig, SpreaderConfig, linear_color
+from fastgen.camera import view_of
+from fastgen.config import Config, ContainerConfig, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
+from fastgen.distributions.camera_config import CameraConfig, direction_from, face_frame
 from fastgen.distributions.damage_sampling import sample_damages
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import SHEET_FACES, Mesh
@@ -37,7 +38,6 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
-from fastgen.scene_check import mm_away
 from fastgen.sensor.sampling import sample_lens, sample_moment, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
@@ -223,31 +223,12 @@ def _whole_gap(c: SpreaderConfig, gap_mm: float) -> float:
 def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
     """A camera before the middle of its face, turned and shifted within the rig's ranges."""
     rng = streams(f"camera.{name}")
-    length, width, height = KINDS[kind].size_mm
-    outward, middle = {
-        "front": ((0, -1, 0), (0, -width / 2, height / 2)),
-        "back": ((0, 1, 0), (0, width / 2, height / 2)),
-        "door": ((1, 0, 0), (length / 2, 0, height / 2)),
-        "no_door": ((-1, 0, 0), (-length / 2, 0, height / 2)),
-        "roof": ((0, 0, 1), (0, 0, height)),
-        "underside": ((0, 0, -1), (0, 0, 0)),
-    }[rig.face]
-    axis = np.array(outward, float)
-    right = np.cross((0, 0, 1), axis) if axis[2] == 0 else np.array([1.0, 0.0, 0.0])
-    up = np.cross(axis, right)
-    azimuth = np.deg2rad(rig.azimuth_deg.draw(rng))
-    elevation = np.deg2rad(rig.elevation_deg.draw(rng))
-    direction = np.cos(elevation) * (np.cos(azimuth) * axis + np.sin(azimuth) * right)
-    direction += np.sin(elevation) * up
-    shift = rig.target_shift_mm.draw(rng) * right + rig.target_shift_mm.draw(rng) * up
-    target = np.array(middle) + shift
+    frame = face_frame(rig.face, kind)
+    azimuth_deg, elevation_deg = rig.azimuth_deg.draw(rng), rig.elevation_deg.draw(rng)
+    direction = direction_from(frame, azimuth_deg, elevation_deg)
+    shift = rig.target_shift_mm.draw(rng) * frame.right + rig.target_shift_mm.draw(rng) * frame.up
+    target = frame.middle_mm + shift
     position = _rounded(target + direction * rig.distance_mm.draw(rng))
-    if mm_away(position, kind) < NEAR_M / MM:
-        raise ConfigError(
-            f"cameras.{name}: may come nearer to the container than {NEAR_M / MM:g} mm, before "
-            "which nothing is drawn; give a larger distance_mm, or azimuth_deg and elevation_deg "
-            "nearer to 0"
-        )
     roll = rig.roll_deg.draw(rng)
     camera = Camera(
         name=name,
@@ -259,11 +240,11 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
         exposure_ev=round(rig.exposure_ev.draw(rng), 3),
         lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
     )
-    if axis[2] == 0:
+    if frame.outward[2] == 0:
         return camera
     # near the vertical "up" means nothing: there the face's own right stays the image's
     rows = view_of(replace(camera, roll_deg=0.0, lens=None), (1, 1)).rotation
-    level = math.degrees(math.atan2(-rows[1] @ right, rows[0] @ right))
+    level = math.degrees(math.atan2(-rows[1] @ frame.right, rows[0] @ frame.right))
     return replace(camera, roll_deg=round((roll + level + 180) % 360 - 180, 3))
 
 

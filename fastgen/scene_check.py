@@ -4,6 +4,8 @@ import math
 from collections import Counter
 from typing import Any
 
+import numpy as np
+
 from fastgen.camera import FAR_M, MM, NEAR_M
 from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.damage import LOBE_LIMIT, LOBES
@@ -11,11 +13,11 @@ from fastgen.distributions.damage_config import MAX_INSTANCES
 from fastgen.distributions.sensor_config import CORNERS
 from fastgen.drawing.programs import DECAL_KINDS, MAX_DAMAGES
 from fastgen.errors import ConfigError
-from fastgen.geometry.container_layout import KINDS
+from fastgen.geometry.container_layout import KINDS, mm_away
 from fastgen.geometry.mesh import SHEET_FACES
 from fastgen.prints.artwork import art_images, glyph_tiles
 from fastgen.records import check_fields, check_known
-from fastgen.scene import Camera, Container, Damage, Decal, Scene, Vec3
+from fastgen.scene import Camera, Container, Damage, Decal, Scene
 
 MAX_DECALS = 4096
 """Rows of a texture that every driver takes several times over."""
@@ -76,18 +78,10 @@ def check_camera(camera: Any, container: Container) -> Camera:
     return camera
 
 
-def mm_away(position_mm: Vec3, kind: str) -> float:
-    """How far a point is from the box around a container of a kind, below 0 inside of it."""
-    length, width, height = KINDS[kind].size_mm
-    x, y, z = position_mm
-    outside = abs(x) - length / 2, abs(y) - width / 2, abs(z - height / 2) - height / 2
-    return max(outside) if max(outside) < 0 else math.hypot(*(max(away, 0.0) for away in outside))
-
-
 def _check_camera(camera: Camera, path: str, container: Container) -> None:
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is where the camera itself stands")
-    away_mm = mm_away(camera.position_mm, container.kind)
+    away_mm = float(mm_away(np.array(camera.position_mm), container.kind))
     if away_mm < 0:
         raise ConfigError(
             f"{path}.position_mm: {camera.position_mm} is inside the container, of which only the "

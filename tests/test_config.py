@@ -7,8 +7,9 @@ import typing
 
 import pytest
 
-from fastgen.config import CameraConfig, Config
+from fastgen.config import Config
 from fastgen.damage import deform
+from fastgen.distributions.camera_config import CameraConfig
 from fastgen.errors import ConfigError
 from fastgen.records import Range
 from fastgen.sampling import possible_shapes, sample_scene

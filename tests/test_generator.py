@@ -200,7 +200,8 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
 
         for made in ("GpuMesh", "zone_table", "encoded"):
             monkeypatch.setattr(
-                f"fastgen.{'openness' if made == 'encoded' else 'shapes'}.{made}", never
+                f"fastgen.{'light.openness' if made == 'encoded' else 'drawing.shapes'}.{made}",
+                never,
             )
         monkeypatch.setattr("fastgen.renderer.GpuLight", never)
         for index in range(30):
@@ -337,14 +338,3 @@ def test_a_render_that_was_stopped_anywhere_spoils_none_after_it(monkeypatch):
         np.testing.assert_array_equal(sample.ids, wanted.ids)
         assert sample.objects == wanted.objects
     assert stopped == 2
-
-
-def test_a_rig_that_comes_too_near_is_refused_by_its_key():
-    beside = {"face": "front", "focal_mm": 20, "distance_mm": 3000, "azimuth_deg": [89, 89]}
-    beside |= {"elevation_deg": 0, "target_shift_mm": 0}
-    config = Config.from_values({"cameras": {"N": beside}})
-    with (
-        Generator(config, seed=0, size=(96, 64)) as generator,
-        pytest.raises(ConfigError, match=r"^cameras.N: may come nearer .* than 100 mm"),
-    ):
-        generator.render(index=0, camera="N")

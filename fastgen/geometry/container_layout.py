@@ -39,6 +39,17 @@ KINDS: Mapping[str, ContainerKind] = MappingProxyType(
     }
 )
 
+
+def mm_away(points_mm: Array, kind: str) -> Array:
+    """How far points [..., 3] are from the box around a container of a kind, below 0 inside of it;
+    [...]."""
+    length, width, height = KINDS[kind].size_mm
+    outside = np.abs(points_mm - (0.0, 0.0, height / 2)) - (length / 2, width / 2, height / 2)
+    most = outside.max(axis=-1)
+    away: Array = np.where(most < 0, most, np.linalg.norm(np.maximum(outside, 0), axis=-1))
+    return away
+
+
 _DEEPEST_MM = 120.0
 """A deeper wave would not fit between a wall's plane and the inner side of a casting."""
 
