@@ -5,7 +5,7 @@ MARKER_CLASSES = (
     *("C4.1", "C4.2", "C4.3", "C4.4", "C5.1", "C5.2", "C5.3", "C6.1", "C6.2"),
     *("C7.1", "C7.2", "C7.3", "C7.4", "C8.1", "C9.1"),
 )
-"""The 26 dangerous-goods markers; seafront.txt Fig. 3 and Table 9."""
+"""The 26 dangerous-goods markers; SeaFront paper, Fig. 3 and Table 9."""
 
 DETECTION_CLASSES = ("container", "text", *MARKER_CLASSES)
 """YOLO order of the marker task, 28 classes."""
@@ -16,7 +16,7 @@ SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 """COCO category i + 1 is SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance."""
 
 SOUND_CONTAINER = 101
-"""Mask value of undamaged container surface: category 1, instance 1 (seafront.txt 3.3.4)."""
+"""Mask value of undamaged container surface: category 1, instance 1 (SeaFront paper, 3.3.4)."""
 
 DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance, which are their ids as well."""

@@ -147,8 +147,9 @@ def _parser() -> argparse.ArgumentParser:
     make.add_argument(
         "out", type=_place, metavar="OUT", help="a folder, or an address such as s3://..."
     )
-    make.add_argument("--images", type=int, required=True, metavar="N")
-    make.add_argument("--size", default="640x640", metavar="WxH", help="each side 64 to 4096")
+    make.add_argument(
+        "--images", type=int, required=True, metavar="N", help="of all cameras together"
+    )
     make.add_argument("--cameras", metavar="A,B,Cl,Cr", help="default: all of the rig")
     make.add_argument(
         "--workers", type=int, metavar="K", help="default: one a core, with --ray of the cluster"
@@ -160,7 +161,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar="ADDRESS",
         help="on a Ray cluster: auto or HOST:PORT; OUT must be seen by all of its nodes",
     )
-    make.add_argument("--format", default=FORMATS[0], metavar="|".join(FORMATS))
+    make.add_argument(
+        "--format", default=FORMATS[0], metavar="|".join(FORMATS), help="default: %(default)s"
+    )
     extra = ",".join(sorted(set(known_formats()) - set(SEAFRONT)))
     make.add_argument(
         "--also",
@@ -168,7 +171,13 @@ def _parser() -> argparse.ArgumentParser:
         metavar=extra,
         help="further files for each image; bop not with webdataset",
     )
-    make.add_argument("--shard", type=int, metavar="SCENES", help="scenes committed together")
+    make.add_argument(
+        "--shard",
+        type=int,
+        metavar="SCENES",
+        help="scenes committed together; default: "
+        + ", ".join(f"{many} in {name}" for name, many in SHARD_SCENES.items()),
+    )
     make.add_argument(
         "--split", metavar="NAME|a,b,c", help="train, val or test for all, or three fractions"
     )
@@ -178,7 +187,7 @@ def _parser() -> argparse.ArgumentParser:
     config.set_defaults(run=_print_config)
 
     show = commands.add_parser("show", help="render one image")
-    show.add_argument("--index", type=int, required=True, metavar="I")
+    show.add_argument("--index", type=int, required=True, metavar="I", help="of the scene")
     show.add_argument("--camera", help="default: the first of the rig")
     show.add_argument(
         "--layer",
@@ -187,31 +196,46 @@ def _parser() -> argparse.ArgumentParser:
         help="normals in the container's frame: red, green, blue for x, y, z",
     )
     show.add_argument("--overlay", action="store_true", help="draw boxes, names and damage")
-    show.add_argument("--size", default="640x640", metavar="WxH")
     show.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
     show.set_defaults(run=_show)
 
     export = commands.add_parser("export", help="write one scene as a GLB file")
-    export.add_argument("--index", type=int, required=True, metavar="I")
+    export.add_argument("--index", type=int, required=True, metavar="I", help="of the scene")
     export.add_argument("--camera", help="default: all of the scene")
-    export.add_argument("--texel-mm", type=float, default=4.0, metavar="MM", help="of the textures")
-    export.add_argument("--size", default="640x640", metavar="WxH", help="what the cameras take")
+    export.add_argument(
+        "--texel-mm", type=float, default=4.0, metavar="MM", help="of the textures; default: 4"
+    )
     export.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
     export.set_defaults(run=_export)
 
     for command in (make, show, export):
-        command.add_argument("--seed", type=int, default=0, metavar="S")
+        command.add_argument(
+            "--size",
+            default="640x640",
+            metavar="WxH",
+            help="what the cameras take, each side 64 to 4096; default: %(default)s",
+        )
+        command.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
         _add_hdri(command)
-        command.add_argument("--backend", default="auto", metavar="|".join(BACKENDS))
+        command.add_argument(
+            "--backend", default="auto", metavar="|".join(BACKENDS), help="default: %(default)s"
+        )
 
     for command in (make, config, show, export):
-        command.add_argument("--preset", default="seafront", metavar="|".join(PRESETS))
+        command.add_argument(
+            "--preset", default="seafront", metavar="|".join(PRESETS), help="default: %(default)s"
+        )
         command.add_argument(
             "--config", type=Path, metavar="FILE", help="YAML or JSON over the preset"
         )
 
     for command in (make, show):
-        command.add_argument("--quality", default="balanced", metavar="|".join(QUALITY))
+        command.add_argument(
+            "--quality",
+            default="balanced",
+            metavar="|".join(QUALITY),
+            help="against speed; default: %(default)s",
+        )
 
     for name, run, words in (
         ("stats", _stats, "print what a dataset holds"),

@@ -32,7 +32,7 @@ ROUGHNESS = bounds(MIN_ROUGHNESS, 1.0)
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Paint and its ageing, seafront.txt section 3.2; one block of ranges per layer of Fig. 5.
+    """Paint and its ageing, SeaFront paper, section 3.2; one block of ranges per layer of Fig. 5.
 
     colors: of sound paint, by a name of your own, each as likely as any other.
     roughness: of sound paint; GGX, perceptual.

@@ -3,7 +3,7 @@
 A damage moves a rest point p (mm, container frame) by amount(p) along its `inward` direction. The
 shader evaluates the same fields (shaders/damage.glsl); this module is its slow, obvious twin and
 the one that labels, tests and the exporter use. Local coordinates of p: u along the damage, v
-across it, w inward from its origin. seafront.txt section 3.3.2 describes the four kinds.
+across it, w inward from its origin. Section 3.3.2 of the SeaFront paper describes the four kinds.
 """
 
 import numpy as np
@@ -151,7 +151,7 @@ def seen_damages(damages: tuple[Damage, ...], position_mm: Vec3) -> tuple[Damage
 
 
 def mask_values(damages: tuple[Damage, ...]) -> list[int]:
-    """Value of each damage in the damage target: category * 100 + instance (seafront.txt 3.3.4)."""
+    """Value of each damage in the damage target: category * 100 + instance (3.3.4 of the paper)."""
     counts = dict.fromkeys(DAMAGE_CLASSES, 0)
     values = []
     for damage in damages:

@@ -323,7 +323,7 @@ def _height_marks(
 def rhombus_offsets(count: int, width_mm: float, height_mm: float) -> list[Vec2]:
     """Centres of `count` markers in the two-row rhombus pattern, mm from the anchor.
 
-    seafront.txt 3.3.3: i runs from i_b = i_e - N up to i_e = N / 2 + 1, x_i = ceil(x + i w / 2)
+    SeaFront paper, 3.3.3: i runs from i_b = i_e - N up to i_e = N / 2 + 1, x_i = ceil(x + i w / 2)
     and y_i = y for even |i|, else y + h / 2. The text counts N + 1 values of i for N markers; the
     last is left out. Algorithm A2 differs (its y_i does not depend on y), the text is followed.
     """

@@ -77,12 +77,17 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
 
     Raises ConfigError that calls it `name` if not.
     """
-    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    is_number = _is_number(value)
     if is_number and least <= value <= most and value == int(value):
         return int(value)
     too_large = is_number and value > most
     wanted = f"{least} to {most}" if too_large or most < 2**63 - 1 else f"{least} or more"
     raise ConfigError(f"{name}: {_short(value)} is not a whole number of {wanted}")
+
+
+def _is_number(value: Any) -> bool:
+    """Also NumPy's; but True and False are none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def to_plain(value: Any) -> Any:
@@ -167,7 +172,7 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
 
 def _both(value: Any) -> Any:
     """One number stands for both of a pair."""
-    return [value, value] if isinstance(value, (int, float)) else value
+    return [value, value] if _is_number(value) else value
 
 
 def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -208,9 +213,10 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
     if hint is bool or hint is str:
         if not isinstance(value, hint):
             kind = "true or false" if hint is bool else "text"
-            raise ConfigError(f"{path}: expected {kind}, got {_short(value)}")
+            lost = "; YAML takes # for a comment, quote it" if hint is str and value is None else ""
+            raise ConfigError(f"{path}: expected {kind}, got {_short(value)}{lost}")
         return value
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if not _is_number(value):
         raise ConfigError(f"{path}: expected a number, got {_short(value)}{_as_number(value)}")
     lo, hi, wanted = _limits(meta)
     if not lo <= value <= hi:

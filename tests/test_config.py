@@ -5,6 +5,7 @@ import json
 import math
 import typing
 
+import numpy as np
 import pytest
 
 from fastgen.config import Config
@@ -101,6 +102,8 @@ def test_the_limits_of_every_field_give_scenes(path, hint, meta):
             continue  # weights and probabilities by name
         if path == ("container", "depth_scale"):
             given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave
+        if path[-1] in ("azimuth_deg", "elevation_deg"):  # so far aside even they leave room
+            base = Config.from_values({"cameras": {"A": {"distance_mm": 9000}}}, base)
         sampled(Config.from_values(nested(path, given), base), 1)
 
 
@@ -205,3 +208,18 @@ def test_a_configuration_comes_back_from_json(tmp_path):
     path = tmp_path / "config.json"
     path.write_text(json.dumps(config.to_plain()))
     assert Config.load(path) == config
+
+
+def test_numbers_of_numpy_are_numbers():
+    values = {"damage": {"probability": np.float32(0.5), "count": np.int64(2)}}
+    config = Config.from_values(values)
+    assert config.damage.probability == 0.5
+    assert type(config.damage.probability) is float
+    assert config.damage.count == (2, 2)
+
+
+def test_a_color_that_yaml_took_for_a_comment_is_told(tmp_path):
+    file = tmp_path / "rig.yaml"
+    file.write_text("surface:\n  dirt_color: #332211\n")
+    with pytest.raises(ConfigError, match=r"surface\.dirt_color: .* quote it"):
+        Config.load(file)

@@ -1,4 +1,4 @@
-"""Cameras of a rig, seafront.txt section 3.3.1: their ranges, and where within them one stands."""
+"""Cameras of a rig: their ranges (SeaFront paper, 3.3.1), and where within them one stands."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Ranges of the four kinds of damage, seafront.txt section 3.3.2; all lengths in millimetres."""
+"""Ranges of the four kinds of damage, SeaFront paper, section 3.3.2; all lengths in millimetres."""
 
 from dataclasses import dataclass, field
 
@@ -89,7 +89,7 @@ class PerforationConfig:
 
 @dataclass(frozen=True)
 class DamageConfig:
-    """How often a container is damaged and how (seafront.txt, Table 2).
+    """How often a container is damaged and how (SeaFront paper, Table 2).
 
     probability: of a container that is damaged.
     count: how many damages it has then, each number as likely.

@@ -10,7 +10,7 @@ from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_orde
 
 @dataclass(frozen=True)
 class MarkingsConfig:
-    """Markers, identifiers, brands and stickers; seafront.txt 3.3.3, Algorithms A1 and A2.
+    """Markers, identifiers, brands and stickers; SeaFront paper, 3.3.3, Algorithms A1 and A2.
 
     marker_faces: that have dangerous-goods markers: front, back, door, no_door, roof.
     markers_per_face: how many are asked for on each, every number as likely. The pattern takes as
