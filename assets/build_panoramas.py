@@ -29,7 +29,12 @@ Image = NDArray[np.float32]
 REC_709 = np.array((0.2126, 0.7152, 0.0722), np.float32)
 MEAN, PEAK = 0.7, 40000.0  # mean luminance by day; the sun stays a half float when compressed
 _MIST_M = 20000.0
+_DOWN_REACH = 1.52  # tangent to the edge of the view down: 45 degrees, and where it is blended
 _FAINT = 0.03  # irradiance below which the sun does not show through the clouds
+_EARTH_KM = 6371.0
+_TWILIGHT = np.array((0.67, 1.01, 1.91), np.float32)
+"""Light of a blue sky without the sun, of luminance 1: daylight of 25,000 K, the highest for which
+CIE 15:2004 (section 3.1) gives its chromaticity."""
 _DWA_LEVELS = (60.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 800.0)
 _MAX_BYTES = 1_100_000
 _MAX_CHANGE = 0.005  # of the light of the whole map, and of the brightest parts of it
@@ -71,12 +76,12 @@ def read_exr(path: Path) -> dict[str, Image]:
 
 
 def render(
-    width: int, samples: int, mist: bool, rows: tuple[float, float] = (0.0, 1.0)
+    size: tuple[int, int], samples: int, mist: bool, rows: tuple[float, float] = (0.0, 1.0)
 ) -> dict[str, Image]:
-    """Trace rows of the panorama, as shares of its height from the bottom, width wide."""
+    """Trace what the camera sees, `size` wide and high: rows of it, as shares from the bottom."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = width, width // 2
+    scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.use_border = scene.render.use_crop_to_border = True
     scene.render.border_min_x, scene.render.border_max_x = 0.0, 1.0
@@ -102,27 +107,47 @@ def render(
         return read_exr(Path(folder) / "view.exr")
 
 
-def trace(width: int, samples: int) -> dict[str, Image]:
-    """The whole panorama; what lies 45 degrees and more below the horizon at half the width."""
-    above = render(width, samples, True, (0.25, 1.0))
-    below = render(width // 2, samples, True, (0.0, 0.3125))
+def trace(width: int, samples: int, eye: tuple[float, float, float]) -> dict[str, Image]:
+    """The whole panorama; what lies 45 degrees and more below the horizon from a view straight
+    down, for denoising rows around a pole leaves spokes."""
+    add_camera(eye)
+    above = render((width, width // 2), samples, True, (0.25, 1.0))
+    add_camera(eye, down=True)
+    below = render((width // 4, width // 4), samples, True)
     joined, lap = {}, width // 32
     blend = np.linspace(1, 0, lap, dtype=np.float32)[:, None]
+    around = sky.directions(width // 2)[-(width // 8 + lap) :]
     for name, high in above.items():
-        low = enlarge(below[name][..., None], (width // 8 + lap, width))[..., 0]
+        low = seen_below(below[name], around)
         high[-lap:] = blend * high[-lap:] + (1 - blend) * low[:lap]
         joined[name] = np.concatenate([high, low[lap:]])
     return joined
 
 
-def add_camera(eye: tuple[float, float, float]) -> None:
-    """A camera that sees everything, its middle column along +x."""
+def seen_below(view: Image, toward: NDArray[np.float64]) -> Image:
+    """What a view straight down [N, N] of the tangent _DOWN_REACH shows in directions [..., 3]."""
+    side = view.shape[0]
+    x, y = (toward[..., :2] / (_DOWN_REACH * -toward[..., 2:])).transpose(2, 0, 1)
+    column, row = (x + 1) * side / 2 - 0.5, (1 - y) * side / 2 - 0.5
+    left, top = (np.clip(np.floor(at), 0, side - 2).astype(int) for at in (column, row))
+    right, low = (column - left).astype(np.float32), (row - top).astype(np.float32)
+    upper = view[top, left] * (1 - right) + view[top, left + 1] * right
+    lower = view[top + 1, left] * (1 - right) + view[top + 1, left + 1] * right
+    return upper * (1 - low) + lower * low
+
+
+def add_camera(eye: tuple[float, float, float], down: bool = False) -> None:
+    """A camera that sees everything, its middle column along +x; or straight down, +x to the right
+    and +y up."""
     camera = bpy.data.cameras.new("eye")
-    camera.type = "PANO"
-    camera.panorama_type = "EQUIRECTANGULAR"
     camera.clip_start, camera.clip_end = 0.05, 1e5
     thing = bpy.data.objects.new("eye", camera)
-    thing.location, thing.rotation_euler = eye, (np.pi / 2, 0.0, -np.pi / 2)
+    thing.location = eye
+    if down:
+        camera.angle = 2 * np.arctan(_DOWN_REACH)
+    else:
+        camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+        thing.rotation_euler = (np.pi / 2, 0.0, -np.pi / 2)
     bpy.context.scene.collection.objects.link(thing)
     bpy.context.scene.camera = thing
 
@@ -144,7 +169,7 @@ def bake_sky(v: Variant) -> tuple[Image, NDArray[np.float64]]:
     maps = []
     for disc in (False, True):
         node.sun_disc = disc
-        planes = render(1024, 24 if disc else 2, mist=False)
+        planes = render((1024, 512), 24 if disc else 2, mist=False)
         maps.append(np.stack([planes[f"Combined.{c}"] for c in "RGB"], -1))
     tree.nodes.remove(node)
     clear, with_sun = maps
@@ -166,16 +191,18 @@ def compose_sky(
     down = sky.directions(2 * half)[:half]
     base = enlarge(clear[:256], (half, 4 * half))
     if v.sun_deg[0] <= 0:  # single scattering leaves the sky opposite the sun black
-        base = base + 0.4 * base.mean((0, 1))
+        more = 0.3 - 0.12 * v.sun_deg[0]  # the deeper the sun, the less of the light is left of it
+        base = base + more * float((base @ REC_709).mean()) * _TWILIGHT
     mean_sky = (base * down[..., 2:]).mean((0, 1)) / down[..., 2].mean()
     sun_way = toward(*v.sun_deg)
     through = np.ones((half, 4 * half), np.float32)
     if v.clouds.cover:
         through, lit, ambient = sky.cloud_layer(v.clouds, 2 * half, sun_way)
         light = sun
-        if v.sun_deg[0] <= 0:  # the afterglow reaches clouds from low over the sun
+        if v.sun_deg[0] <= 0:  # the afterglow reaches clouds that stand out of the earth's shadow
+            shadow_km = _EARTH_KM * (1 / np.cos(np.radians(v.sun_deg[0])) - 1)
             glow = base[-12:, :].max((0, 1))
-            light = 2.5 * glow
+            light = 0.9 * glow * (v.clouds.base_km > shadow_km)
         distance = v.clouds.base_km / np.maximum(down[..., 2], 0.01)
         clear_air = np.exp(-distance / 45.0)[..., None]
         clouded = (
@@ -270,7 +297,7 @@ def bake(v: Variant, width: int, samples: int) -> Image:
     light_scene(v, around, sun)
     if sun.max() > _FAINT:
         check_sun(v)
-    planes = trace(width, samples)
+    planes = trace(width, samples, v.eye)
     seen = np.stack([planes[f"Combined.{c}"] for c in "RGB"], -1)
     alpha = np.clip(planes["Combined.A"], 0, 1)[..., None]
     depth = (planes.get("Mist.Z", planes.get("Mist.X")) - (1 - alpha[..., 0])) * _MIST_M
