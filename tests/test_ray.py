@@ -26,6 +26,7 @@ from tests.folders import content
 ROOT = str(Path(__file__).parent.parent)
 SCENES = 24
 HANGING_SCENE = 14
+HANG_S = 1.5
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
 
 
@@ -45,6 +46,19 @@ class FaultyMaker(QuickMaker):
         if index == HANGING_SCENE:
             time.sleep(3600)
         return super()._image(index, camera)
+
+
+class PreparingMaker(QuickMaker):
+    """Takes four times HANG_S ahead of its first shard, and says now and then that it lives."""
+
+    _prepared = False
+
+    def __call__(self, task):
+        for _ in range(0 if self._prepared else 16):
+            time.sleep(HANG_S / 4)
+            self._report("busy", None)
+        self._prepared = True
+        super().__call__(task)
 
 
 class BrokenMaker(QuickMaker):
@@ -119,7 +133,7 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
 
 def test_scenes_that_kill_or_hang_their_actors_are_given_up_and_no_other(cluster, whole, tmp_path):
     out = tmp_path / "out"
-    runner = run_on_ray(None, 2, hang_s=1.5, maker=FaultyMaker)
+    runner = run_on_ray(None, 2, hang_s=HANG_S, maker=FaultyMaker)
     made = generate(job_at(out, SCENES), 2, runner)
     failed = {each["scene"]: each["error"] for each in made["failed"]}
     assert failed.keys() == {FAULTY_SCENE, HANGING_SCENE}
@@ -127,6 +141,13 @@ def test_scenes_that_kill_or_hang_their_actors_are_given_up_and_no_other(cluster
     assert "no sign of life" in failed[HANGING_SCENE]
     assert sum(split["images"] for split in made["counts"].values()) == SCENES - 2
     assert content(out / "images").items() <= content(whole / "images").items()
+
+
+def test_an_actor_that_prepares_for_long_and_says_so_is_not_given_up(cluster, tmp_path):
+    runner = run_on_ray(None, 2, hang_s=HANG_S, maker=PreparingMaker)
+    made = generate(job_at(tmp_path / "out", 4), 2, runner)
+    assert not made["failed"]
+    assert sum(split["images"] for split in made["counts"].values()) == 4
 
 
 def test_an_actors_error_reaches_the_caller_in_its_own_words(cluster, tmp_path):
