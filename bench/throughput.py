@@ -31,8 +31,8 @@ from results import ROOT, machine, origin, parse_size, save, write_section
 import fastgen
 from fastgen import Config, Generator
 from fastgen.camera import view_of
+from fastgen.dataset.storage import Folder
 from fastgen.drawing.shapes import spreader_outline
-from fastgen.files.storage import Folder
 from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
 from fastgen.labelling.visibility import Shot
 from fastgen.labels import label

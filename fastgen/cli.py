@@ -16,12 +16,12 @@ from typing import NoReturn
 import fastgen
 from fastgen import doctor
 from fastgen.config import PRESETS, Config
+from fastgen.config_text import as_yaml
 from fastgen.dataset import stats
 from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.dataset.verify import examine
-from fastgen.distributions.config_text import as_yaml
 from fastgen.drawing.programs import LAYERS
 from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb

@@ -18,6 +18,7 @@ from fastgen.dataset import workers
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
 from fastgen.dataset.progress import Progress
+from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import (
     FORMATS,
     MADE_BY,
@@ -28,15 +29,14 @@ from fastgen.dataset.shards import (
     manifest_path,
     stem_of,
 )
+from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.environment import load_environment
 from fastgen.errors import ConfigError, OutputError
 from fastgen.files.encode import png
-from fastgen.files.seal import digest, seal
-from fastgen.files.storage import Folder, Remote, storage_of
 from fastgen.formats import SEAFRONT, Record, formats_of
+from fastgen.formats.coco import trained_on
 from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
-from fastgen.labelling.coco import trained_on
 from fastgen.light.hdri import find_hdris
 from fastgen.records import check_known, nearest
 from fastgen.sampling import SPLITS

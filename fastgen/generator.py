@@ -15,9 +15,9 @@ from fastgen.camera import View, view_of
 from fastgen.config import Config, LabelConfig
 from fastgen.container import build_container
 from fastgen.damage import seen_damages, variant
+from fastgen.distributions.sensor_sampling import extreme_lenses
 from fastgen.drawing.bake import Atlas
 from fastgen.drawing.cuda import CudaFrame, cuda_reason
-from fastgen.drawing.opened import Opened
 from fastgen.drawing.programs import LAYERS
 from fastgen.drawing.shapes import shadow_casters, spreader_outline
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
@@ -27,6 +27,7 @@ from fastgen.labelling.visibility import Shot
 from fastgen.labels import label
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.light.sun_shadow import shader_suns
+from fastgen.opened import Opened
 from fastgen.records import check_fields, check_known, nearest, whole
 from fastgen.renderer import Renderer
 from fastgen.sample import Frame, Sample
@@ -39,7 +40,6 @@ from fastgen.sampling import (
 from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene_check import check_camera, check_scene
 from fastgen.sensor.develop import develop, is_needed
-from fastgen.sensor.sampling import extreme_lenses
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 

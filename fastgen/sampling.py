@@ -18,6 +18,12 @@ from fastgen.config import Config, ContainerConfig, SpreaderConfig, linear_color
 from fastgen.container import KINDS, build_container
 from fastgen.distributions.camera_config import CameraConfig, direction_from, face_frame
 from fastgen.distributions.damage_sampling import sample_damages
+from fastgen.distributions.sensor_sampling import (
+    sample_lens,
+    sample_moment,
+    sample_sensor,
+    sample_weather,
+)
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import SHEET_FACES, Mesh
 from fastgen.light.hdri import hours_of
@@ -38,7 +44,6 @@ from fastgen.scene import (
     Vec3,
     Wear,
 )
-from fastgen.sensor.sampling import sample_lens, sample_moment, sample_sensor, sample_weather
 
 Streams = Callable[[str], np.random.Generator]
 

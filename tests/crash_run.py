@@ -18,7 +18,7 @@ import simplejpeg
 
 from fastgen.config import Config
 from fastgen.dataset.shards import Job, Maker, stem_of
-from fastgen.files.storage import storage_of
+from fastgen.dataset.storage import storage_of
 from fastgen.generate import generate, run_here
 from fastgen.sampling import split_of
 

@@ -9,7 +9,7 @@ import yaml
 
 from fastgen.cli import main
 from fastgen.config import PRESETS, Config
-from fastgen.distributions.config_text import as_yaml, meanings
+from fastgen.config_text import as_yaml, meanings
 from fastgen.errors import ConfigError
 
 OWN = {

@@ -18,7 +18,7 @@ from fastgen.cli import main
 from fastgen.config import Config
 from fastgen.dataset import shards
 from fastgen.dataset.shards import Job, Maker
-from fastgen.files.storage import storage_of
+from fastgen.dataset.storage import storage_of
 from fastgen.generate import generate
 from fastgen.generator import Generator
 from fastgen.sampling import split_of

@@ -14,9 +14,9 @@ from fastgen import cache
 from fastgen.contexts.shader_cache import spare_full_disk
 from fastgen.dataset.dataset_json import shard_numbers
 from fastgen.dataset.progress import Progress
+from fastgen.dataset.storage import Folder
 from fastgen.dataset.workers import in_words
 from fastgen.errors import AssetError
-from fastgen.files.storage import Folder
 from fastgen.prints import artwork
 from fastgen.resources import asset_path
 

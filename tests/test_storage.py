@@ -14,10 +14,10 @@ from pathlib import Path
 import psutil
 import pytest
 
+from fastgen.dataset import storage
+from fastgen.dataset.storage import Folder, storage_of
 from fastgen.dataset.workers import run
 from fastgen.errors import OutputError
-from fastgen.files import storage
-from fastgen.files.storage import Folder, storage_of
 from fastgen.formats import Same
 from tests.crash_run import FAULTY_SCENE, make
 from tests.folders import content

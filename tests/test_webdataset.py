@@ -15,7 +15,7 @@ from PIL import Image
 from s3fs import S3FileSystem
 
 from fastgen.cli import main
-from fastgen.files.storage import storage_of
+from fastgen.dataset.storage import storage_of
 
 ARGUMENTS = ["--images", "12", "--size", "96x80", "--seed", "3", "--format", "webdataset"]
 

@@ -8,10 +8,10 @@ import reprlib
 from collections.abc import Mapping
 from typing import Any
 
+from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.shards import Job, manifest_path, shard_of
+from fastgen.dataset.storage import Folder, Remote
 from fastgen.errors import OutputError
-from fastgen.files.seal import is_sealed
-from fastgen.files.storage import Folder, Remote
 
 MANIFEST = "dataset.json"
 

@@ -18,11 +18,11 @@ from typing import Any
 
 import fastgen
 from fastgen.dataset.dataset_json import MANIFEST
+from fastgen.dataset.seal import digest
 from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
+from fastgen.dataset.storage import storage_of
 from fastgen.dataset.workers import HANG_S, in_words
 from fastgen.errors import OutputError
-from fastgen.files.seal import digest
-from fastgen.files.storage import storage_of
 from fastgen.generate import Runner
 
 Reports = list[tuple[str, Any]]

@@ -6,9 +6,9 @@ from typing import Any
 from fastgen.config import Config
 from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.shards import Job
+from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
-from fastgen.files.storage import storage_of
 from fastgen.generate import check_goes_on, generate
 
 

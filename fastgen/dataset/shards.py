@@ -18,9 +18,9 @@ import orjson
 
 from fastgen.config import Config
 from fastgen.dataset.freed_memory import return_freed_memory
+from fastgen.dataset.seal import digest, seal
+from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
-from fastgen.files.seal import digest, seal
-from fastgen.files.storage import storage_of
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
 from fastgen.generator import Generator
 from fastgen.sampling import SPLITS, split_of

@@ -13,10 +13,10 @@ import numpy as np
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, read_manifest, told_by, without_manifest
+from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
-from fastgen.files.storage import storage_of
 from fastgen.formats import Record
-from fastgen.labelling.coco import trained_on
+from fastgen.formats.coco import trained_on
 from fastgen.sampling import SPLITS
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, without_manifest
+from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.shards import manifest_path
+from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.errors import FastgenError, OutputError
-from fastgen.files.seal import digest, is_sealed
-from fastgen.files.storage import Folder, Remote, storage_of
-from fastgen.formats import Record
+from fastgen.formats import Record, coco
 from fastgen.formats.yolo import pixel_box
-from fastgen.labelling import coco
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene

@@ -20,6 +20,7 @@ from fastgen.drawing.uniforms import Block
 from fastgen.geometry.mesh import MATERIALS, MAX_ZONES
 from fastgen.geometry.spreader_parts import CABLE_SIDE_MM, CABLES
 from fastgen.light import tone
+from fastgen.light.openness import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, MIN_ROUGHNESS
 from fastgen.light.sun import MOST_SUNS
 from fastgen.prints.artwork import ART_SIZE, GLYPH_TILE_SIZE
@@ -82,13 +83,6 @@ DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 
 REACH_MARGIN_MM = 40.0
 """Pixels are filtered with their neighbours: this far around a damage they are shaded with it."""
-
-LIGHT_STEPS = 127.0
-"""What of 255 stands for all the light of an open sky, see openness.py."""
-
-LIGHT_TIMES = 4.0
-"""What of 255 in a fourth channel stands for as much again as the others hold together, where one
-of them would pass 255: below spreaders the ground is dark and the sunlit roof throws light."""
 
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""

@@ -19,7 +19,7 @@ from fastgen.camera import View
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.config import LabelConfig
 from fastgen.files.encode import jpeg
-from fastgen.labelling import coco
+from fastgen.formats import coco
 from fastgen.labelling.visibility import window
 from fastgen.records import check_known
 from fastgen.sample import Box, Object, Sample

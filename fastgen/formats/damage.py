@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES, SEGMENTATION_CLASSES
 from fastgen.files.encode import png
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, coco
 from fastgen.formats.yolo import line, outline
-from fastgen.labelling import coco
 from fastgen.labelling.visibility import mask_box, window
 from fastgen.sample import Box, Sample
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
+from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, coco
 from fastgen.formats.yolo import detection_lines
-from fastgen.labelling import coco
 from fastgen.labelling.visibility import window
 from fastgen.sampling import SPLITS
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.distinct import distinct_rows
-from fastgen.drawing.programs import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.environment import Ambient, sky_irradiance, sky_radiance, to_map_frame
 from fastgen.light.prefilter import octahedral_decode
 
@@ -19,6 +18,13 @@ DIRECTIONS = 96
 VERTEX_BYTES = 8 + DIRECTIONS // 8
 """What the shader reads of a vertex: a cone, filled up to four bytes, four of the light that comes
 in, and a bit for each direction."""
+
+LIGHT_STEPS = 127.0
+"""What of 255 stands for all the light of an open sky."""
+
+LIGHT_TIMES = 4.0
+"""What of 255 in a fourth channel stands for as much again as the others hold together, where one
+of them would pass 255: below spreaders the ground is dark and the sunlit roof throws light."""
 
 _LOBE = 8
 """Directions about a mirrored ray: as many as a cap of 34 degrees holds. Four or 14 tell less
