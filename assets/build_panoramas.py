@@ -29,9 +29,8 @@ Image = NDArray[np.float32]
 REC_709 = np.array((0.2126, 0.7152, 0.0722), np.float32)
 MEAN, PEAK = 0.7, 40000.0  # mean luminance by day; the sun stays a half float when compressed
 _MIST_M = 20000.0
-_DOWN_REACH = 1.52  # tangent to the edge of the view down: 45 degrees, and where it is blended
+_DOWN_REACH = 1.52  # tangent to the edge of the view down: 45 degrees, 11.25 of blending, a margin
 _FAINT = 0.03  # irradiance below which the sun does not show through the clouds
-_EARTH_KM = 6371.0
 _TWILIGHT = np.array((0.67, 1.01, 1.91), np.float32)
 """Light of a blue sky without the sun, of luminance 1: daylight of 25,000 K, the highest for which
 CIE 15:2004 (section 3.1) gives its chromaticity."""
@@ -108,9 +107,8 @@ def render(
 
 
 def trace(width: int, samples: int, eye: tuple[float, float, float]) -> dict[str, Image]:
-    """The whole panorama; what lies 45 degrees and more below the horizon from a view straight
-    down, for denoising rows around a pole leaves spokes."""
-    add_camera(eye)
+    """The whole panorama, from the camera that is there; what lies 45 degrees and more below the
+    horizon from a view straight down, for denoising rows around a pole leaves spokes."""
     above = render((width, width // 2), samples, True, (0.25, 1.0))
     add_camera(eye, down=True)
     below = render((width // 4, width // 4), samples, True)
@@ -191,7 +189,8 @@ def compose_sky(
     down = sky.directions(2 * half)[:half]
     base = enlarge(clear[:256], (half, 4 * half))
     if v.sun_deg[0] <= 0:  # single scattering leaves the sky opposite the sun black
-        more = 0.3 - 0.12 * v.sun_deg[0]  # the deeper the sun, the less of the light is left of it
+        # by eye; the deeper the sun, the more of what light is left was scattered more than once
+        more = 0.3 - 0.12 * v.sun_deg[0]
         base = base + more * float((base @ REC_709).mean()) * _TWILIGHT
     mean_sky = (base * down[..., 2:]).mean((0, 1)) / down[..., 2].mean()
     sun_way = toward(*v.sun_deg)
@@ -200,7 +199,7 @@ def compose_sky(
         through, lit, ambient = sky.cloud_layer(v.clouds, 2 * half, sun_way)
         light = sun
         if v.sun_deg[0] <= 0:  # the afterglow reaches clouds that stand out of the earth's shadow
-            shadow_km = _EARTH_KM * (1 / np.cos(np.radians(v.sun_deg[0])) - 1)
+            shadow_km = sky.EARTH_KM * (1 / np.cos(np.radians(v.sun_deg[0])) - 1)
             glow = base[-12:, :].max((0, 1))
             light = 0.9 * glow * (v.clouds.base_km > shadow_km)
         distance = v.clouds.base_km / np.maximum(down[..., 2], 0.01)

@@ -5,7 +5,7 @@
 Compares ids, damage and depth with rays that Embree casts through every pixel centre at the mesh
 deformed in numpy (tests/oracle.py), over random scenes and hard views. A pixel that differs must
 lie within 0.01 px of an edge: some ray so close to its centre then sees what we say. Then makes the
-boxes of markers as the paper does (3.3.1), by a binary mask render and connected components for
+boxes of markers as the paper does (3.3.3), by a binary mask render and connected components for
 each marker, on the same scenes.
 """
 

@@ -203,7 +203,11 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--index", type=int, required=True, metavar="I", help="of the scene")
     export.add_argument("--camera", help="default: all of the scene")
     export.add_argument(
-        "--texel-mm", type=float, default=4.0, metavar="MM", help="of the textures; default: 4"
+        "--texel-mm",
+        type=float,
+        default=4.0,
+        metavar="MM",
+        help="of the textures; default: %(default)g",
     )
     export.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
     export.set_defaults(run=_export)
@@ -215,7 +219,9 @@ def _parser() -> argparse.ArgumentParser:
             metavar="WxH",
             help="what the cameras take, each side 64 to 4096; default: %(default)s",
         )
-        command.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+        command.add_argument(
+            "--seed", type=int, default=0, metavar="S", help="default: %(default)s"
+        )
         _add_hdri(command)
         command.add_argument(
             "--backend", default="auto", metavar="|".join(BACKENDS), help="default: %(default)s"
@@ -234,7 +240,7 @@ def _parser() -> argparse.ArgumentParser:
             "--quality",
             default="balanced",
             metavar="|".join(QUALITY),
-            help="against speed; default: %(default)s",
+            help="samples a pixel, against speed; default: %(default)s",
         )
 
     for name, run, words in (

@@ -94,7 +94,7 @@ class SurfaceConfig:
         for name, color in self.colors.items():
             linear_color(color, f"colors.{name}")
         if not self.colors:
-            raise ConfigError("colors: the list is empty; give at least one color")
+            raise ConfigError("colors: none is given; give at least one, as in {red: '#6b2a22'}")
         _check_colors("rust_colors", self.rust_colors)
         linear_color(self.dirt_color, "dirt_color")
 
@@ -222,9 +222,6 @@ class Config:
                 raise ConfigError(
                     f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
                 )
-        kinds = [kind for kind, weight in self.container.kinds.items() if weight > 0]
-        for name, rig in self.cameras.items():
-            check_room(name, rig, kinds)
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")
 
@@ -254,7 +251,11 @@ class Config:
         """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
         if not isinstance(base, Config | None):
             raise ConfigError(f"base: {base!r} is no Config; take what Config.preset gives")
-        return from_plain(Config, data, base=Config.preset() if base is None else base)
+        made = from_plain(Config, data, base=Config.preset() if base is None else base)
+        kinds = [kind for kind, weight in made.container.kinds.items() if weight > 0]
+        for name, rig in made.cameras.items():
+            check_room(name, rig, kinds, made.damage.bulge_mm)
+        return made
 
     @staticmethod
     def load(path: str | Path, base: "Config | None" = None) -> "Config":

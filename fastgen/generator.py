@@ -180,7 +180,7 @@ class Generator:
         """One labelled image of scene `index`, or of `scene` when that is given.
 
         camera: the name of one of the scene's cameras, or a Camera of your own; by default the
-        scene's first. layer: 'all', or one material layer by itself (see programs.LAYERS).
+        scene's first. layer: 'all', or one material layer by itself, of programs.LAYERS.
         normals: give Sample.normals too, which costs another draw. labels: what becomes of
         objects that are hard to see, in place of config.labels.
         Raises ConfigError for what cannot be drawn, by its name.

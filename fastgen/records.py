@@ -145,6 +145,8 @@ def _made(make: Callable[[], Any], path: str) -> Any:
 
 
 def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> Any:
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.tolist()
     origin = typing.get_origin(hint)
     if origin in (typing.Union, types.UnionType):
         choices = [arg for arg in typing.get_args(hint) if arg is not type(None)]
@@ -165,7 +167,12 @@ def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
     if not isinstance(pair, (list, tuple)) or len(pair) != 2:
         got = f"{_short(value)}{_as_number(value)}"
         raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
-    lo, hi = (_scalar(float, item, path, meta) for item in pair)
+    lo, hi = (_convert(float, item, path, meta, None) for item in pair)
+    if lo > hi and meta.get("unit") == "degrees" and lo - 360 >= meta["lo"]:
+        raise ConfigError(
+            f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them, or write "
+            f"[{lo - 360:g}, {hi:g}]"
+        )
     check_order(path, (lo, hi))
     return Range(lo, hi)
 
@@ -213,7 +220,7 @@ def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
     if hint is bool or hint is str:
         if not isinstance(value, hint):
             kind = "true or false" if hint is bool else "text"
-            lost = "; YAML takes # for a comment, quote it" if hint is str and value is None else ""
+            lost = _unquoted(value) if hint is str else ""
             raise ConfigError(f"{path}: expected {kind}, got {_short(value)}{lost}")
         return value
     if not _is_number(value):
@@ -318,6 +325,13 @@ def _check_kind(kind: type, value: Any) -> None:
     if not isinstance(value, kind):
         what = "True or False" if kind is bool else "text"
         raise ConfigError(f": expected {what}, got {_short(value)}")
+
+
+def _unquoted(value: Any) -> str:
+    """A hint for text that YAML took for something else."""
+    if value is None:
+        return "; if it began with #, quote it: YAML takes that for a comment"
+    return "; put it in quotes" if _is_number(value) else ""
 
 
 def _as_number(value: Any) -> str:

@@ -1,24 +1,33 @@
 """Rigs are refused where a camera may come too near, before anything is drawn."""
 
+import re
+
 import numpy as np
 import pytest
 
 from fastgen import Config
+from fastgen.distributions.camera_config import CameraConfig
 from fastgen.errors import ConfigError
 
 HALF_WIDTH_MM, HALF_LENGTH_MM = 1219.0, 3029.0  # of a 20-foot container, ISO 668
 
 
-def made(**camera):
-    rig = {"face": "door", "focal_mm": 20, "elevation_deg": 0, "target_shift_mm": 0} | camera
-    return Config.from_values({"cameras": {"N": rig}, "container": {"kinds": {"20": 1}}})
+RIG = {
+    "face": "door",
+    "focal_mm": 20,
+    "azimuth_deg": 0,
+    "elevation_deg": 0,
+    "target_shift_mm": 0,
+}
 
 
-def refused(**camera):
+def refused(kind="20", **camera):
+    values = {"cameras": {"N": RIG | camera}, "container": {"kinds": {str(kind): 1}}}
     try:
-        made(**camera)
+        Config.from_values(values | {"damage": {"probability": 0}})
     except ConfigError as error:
-        return str(error).startswith("cameras.N: may come nearer to a container of kind 20")
+        words = rf"cameras\.N: may come within \d+ mm of a container of kind {kind}, and"
+        return re.match(words, str(error)) is not None
     return False
 
 
@@ -58,35 +67,81 @@ def test_only_kinds_that_come_are_asked():
     beside |= {"elevation_deg": 0, "target_shift_mm": 0}
     assert np.sin(np.radians(89)) * 4000 > HALF_LENGTH_MM + 100
     kinds = {"20": 1, "40": 0}
-    Config.from_values({"cameras": {"N": beside}, "container": {"kinds": kinds}})
-    with pytest.raises(ConfigError, match="container of kind 40 than 100 mm"):
-        Config.from_values({"cameras": {"N": beside}, "container": {"kinds": kinds | {"40": 1}}})
+    values = {"cameras": {"N": beside}, "damage": {"probability": 0}}
+    Config.from_values(values | {"container": {"kinds": kinds}})
+    with pytest.raises(ConfigError, match="container of kind 40, and"):
+        Config.from_values(values | {"container": {"kinds": kinds | {"40": 1}}})
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(12))
 def test_no_draw_of_an_accepted_rig_comes_too_near(seed):
+    # half-sizes along right, up and out of each face; ISO 668
+    faces = {"front": "lhw", "back": "lhw", "door": "whl", "no_door": "whl", "roof": "lwh"}
+    kinds = {"20": (6058, 2438, 2591), "45HC": (13716, 2438, 2896)}
     rng = np.random.default_rng(seed)
     accepted = 0
     while accepted < 3:
+        face, kind = rng.choice(list(faces)), rng.choice(list(kinds))
+        sides = dict(zip("lwh", kinds[kind], strict=True))
+        half_right, half_up = (sides[name] / 2 for name in faces[face][:2])
         lo, hi = np.sort(rng.uniform(-89, 89, (2, 2)), axis=0)
-        near = rng.uniform(300, 3000)
-        rig = {
-            "azimuth_deg": [lo[0], hi[0]],
-            "elevation_deg": [lo[1], hi[1]],
-            "distance_mm": [near, near * 1.5],
-            "target_shift_mm": [-300, 300],
-        }
-        if refused(**rig):
+        near, far = np.sort(np.exp(rng.uniform(np.log(300), np.log(1.5e5), 2)))
+        left, right = np.sort(rng.uniform(-1e4, 1e4, 2))
+        rig = {"face": face, "azimuth_deg": [lo[0], hi[0]], "elevation_deg": [lo[1], hi[1]]}
+        rig |= {"distance_mm": [near, far], "target_shift_mm": [left, right]}
+        if refused(kind, **rig):
             continue
         accepted += 1
-        azimuth, elevation = np.radians(rng.uniform(lo, hi, (20000, 2))).T
-        d = rng.uniform(near, near * 1.5, 20000)
-        aside, up = rng.uniform(-300, 300, (2, 20000))
-        away = np.stack(
-            [
-                d * np.cos(elevation) * np.cos(azimuth),
-                np.abs(aside + d * np.cos(elevation) * np.sin(azimuth)) - HALF_WIDTH_MM,
-                np.abs(up + d * np.sin(elevation)) - 2591 / 2,
-            ]
-        )
+        azimuth, elevation = np.radians(rng.uniform(lo, hi, (50000, 2))).T
+        d = rng.uniform(near, far, 50000)
+        aside, up = rng.uniform(left, right, (2, 50000))
+        away = [
+            d * np.cos(elevation) * np.cos(azimuth),
+            np.abs(aside + d * np.cos(elevation) * np.sin(azimuth)) - half_right,
+            np.abs(up + d * np.sin(elevation)) - half_up,
+        ]
         assert np.linalg.norm(np.maximum(away, 0), axis=0).min() >= 100
+
+
+@pytest.mark.parametrize(
+    ("kind", "face", "azimuth_deg", "elevation_deg", "shift_mm"),
+    [
+        ("40", "back", -87.9956, [-89, 89], [6805.5, 6806.7]),
+        ("45HC", "roof", 84.539, [80.14, 83.86], [-7588.1, -7562.1]),
+        ("45HC", "underside", 88.0407, [-89, 89], [-6745.4, -6743.3]),
+    ],
+)
+def test_a_narrow_way_past_the_container_is_found_in_a_wide_rig(
+    kind, face, azimuth_deg, elevation_deg, shift_mm
+):
+    rig = {"face": face, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg}
+    assert refused(kind, distance_mm=[300, 150000], target_shift_mm=shift_mm, **rig)
+
+
+def test_a_sheet_may_bulge_as_far_as_its_damages_reach():
+    concave = {"outward": 0.5, "depth_mm": [50, 150]}
+    for damage, least_mm in (
+        ({"probability": 0}, 300),
+        ({"kinds": ["dented"]}, 300),
+        ({"concave": concave | {"outward": 0}}, 300),
+        ({"concave": concave}, 300),
+        ({"concave": concave | {"depth_mm": 400}}, 500),
+    ):
+        for distance_mm in {300, least_mm - 1, least_mm + 1} - {299}:
+            values = {"cameras": {"N": RIG | {"distance_mm": distance_mm}}, "damage": damage}
+            try:
+                Config.from_values(values)
+            except ConfigError as error:
+                assert distance_mm < least_mm, error  # noqa: PT017
+                assert "may bulge by 400 mm" in str(error)  # noqa: PT017
+            else:
+                assert distance_mm >= least_mm
+
+
+def test_a_python_rig_of_plain_values_is_read_as_a_file_is():
+    rig = {"A": CameraConfig("front", 14.5, (5600, 7400), azimuth_deg=3)}
+    found = Config.checked(Config(cameras=rig)).cameras["A"]
+    assert found.distance_mm == (5600, 7400)
+    assert found.azimuth_deg == (3, 3)
+    with pytest.raises(ConfigError, match=r"^cameras\.A\.azimuth_deg: .* got '12'"):
+        Config.checked(Config(cameras={"A": CameraConfig("front", 14.5, 6000, azimuth_deg="12")}))

@@ -102,6 +102,8 @@ def test_the_limits_of_every_field_give_scenes(path, hint, meta):
             continue  # weights and probabilities by name
         if path == ("container", "depth_scale"):
             given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave
+        if path[-1] in ("depth_mm", "distance_mm"):  # what bulges takes a camera's room
+            base = Config.from_values({"damage": {"concave": {"outward": 0}}}, base)
         if path[-1] in ("azimuth_deg", "elevation_deg"):  # so far aside even they leave room
             base = Config.from_values({"cameras": {"A": {"distance_mm": 9000}}}, base)
         sampled(Config.from_values(nested(path, given), base), 1)
@@ -216,10 +218,27 @@ def test_numbers_of_numpy_are_numbers():
     assert config.damage.probability == 0.5
     assert type(config.damage.probability) is float
     assert config.damage.count == (2, 2)
+    arrays = {"container": {"depth_scale": np.array([1.0, 1.1])}}
+    arrays["surface"] = {"rust_coverage": np.array([0.1, 0.2])}
+    config = Config.from_values(arrays | {"damage": {"kinds": np.array(["dented"])}})
+    assert config.container.depth_scale == (1.0, 1.1)
+    assert config.surface.rust_coverage == (0.1, 0.2)
+    assert config.damage.kinds == ("dented",)
 
 
 def test_a_color_that_yaml_took_for_a_comment_is_told(tmp_path):
     file = tmp_path / "rig.yaml"
     file.write_text("surface:\n  dirt_color: #332211\n")
-    with pytest.raises(ConfigError, match=r"surface\.dirt_color: .* quote it"):
+    with pytest.raises(ConfigError, match=r"surface\.dirt_color: .* began with #, quote it"):
         Config.load(file)
+    file.write_text("surface: {rust_colors: [#332211, #112233]}\n")
+    with pytest.raises(ConfigError, match="put colors in quotes, as in '#332211'"):
+        Config.load(file)
+    file.write_text("surface: {dirt_color: 332211}\n")
+    with pytest.raises(ConfigError, match=r"dirt_color: .* got 332211; put it in quotes"):
+        Config.load(file)
+
+
+def test_a_turn_past_360_degrees_is_told_how_to_write_it():
+    with pytest.raises(ConfigError, match=r"yaw_deg: .* swap them, or write \[-10, 10\]"):
+        Config.from_values({"environment": {"yaw_deg": [350, 10]}})

@@ -1,5 +1,7 @@
 """The port's moving stock and machines as meshes. Metres, z up, each standing on z = 0."""
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 
@@ -206,8 +208,11 @@ def truck() -> bpy.types.Mesh:
     return s.mesh("truck")
 
 
-def ship(length: float, beam: float) -> bpy.types.Mesh:
-    """A container ship's hull and house, bow to +x; waterline at z = 0, deck at z = 13."""
+def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], float]]:
+    """A container ship's hull and house, bow to +x; waterline at z = 0, deck at z = 13.
+
+    Also returns half of the deck's width at an x.
+    """
     s = Shape()
     stations = np.linspace(-length / 2, length / 2, 41)
     levels = np.array((-2.0, 0.0, 1.6, 1.9, 7.0, 13.0))
@@ -247,16 +252,15 @@ def ship(length: float, beam: float) -> bpy.types.Mesh:
     s.beam((house + 2, 0, 45), (house + 2, 0, 58), 0.7, 0.7, "white")
     s.beam((house + 2, -4, 52), (house + 2, 4, 52), 0.4, 0.4, "white")
     s.beam((0.46 * length, 0, 13), (0.46 * length, 0, 27), 0.6, 0.6, "white")
-    for x in np.arange(-length / 2, 0.42 * length, 3.0):
-        for face in (-1, 1):
-            s.beam(
-                (x, face * (beam / 2 - 0.3), 13),
-                (x, face * (beam / 2 - 0.3), 14.1),
-                0.06,
-                0.06,
-                "white",
-            )
-    return s.mesh("ship")
+    for x in np.arange(-length / 2, 0.42 * length, 3.0):  # posts of the railing, along the deck
+        edge = np.interp(x, stations, rows[-1]) - 0.3
+        for y in (-edge, edge):
+            s.beam((x, y, 13), (x, y, 14.1), 0.06, 0.06, "white")
+
+    def half_deck(x: float) -> float:
+        return float(np.interp(x, stations, rows[-1]))
+
+    return s.mesh("ship"), half_deck
 
 
 def warehouse(length: float, depth: float, height: float) -> bpy.types.Mesh:

@@ -79,11 +79,18 @@ class Builder:
         return x < self.v.end_m - 8 and np.hypot(x - ex, y - ey) > radius
 
     def _box(
-        self, feet: int, position: tuple[float, float, float], color: int, turn: float
+        self,
+        feet: int,
+        position: tuple[float, float, float],
+        color: int,
+        turn: float,
+        has_room: bool = True,
     ) -> None:
+        """Where it has no room it is drawn by lot all the same: all else keeps its place."""
         mesh = self.boxes[feet][int(self.rng.integers(6))]
         tone = self.rng.uniform(0.75, 1.15)
-        place(mesh, position, turn, tuple(tone * c for c in PALETTE[color]))
+        if has_room:
+            place(mesh, position, turn, tuple(tone * c for c in PALETTE[color]))
 
     def _ground(self) -> None:
         s, end = Shape(), self.v.end_m
@@ -140,7 +147,7 @@ class Builder:
 
     def _ship(self, x: float, y: float, turn: float = 0.0) -> None:
         length, beam = 290.0, 40.0
-        mesh = models.ship(length, beam)
+        mesh, half_deck = models.ship(length, beam)
         color = ((0.02, 0.03, 0.07), (0.16, 0.02, 0.02), (0.02, 0.08, 0.06))[self.v.seed % 3]
         place(mesh, (x, y - beam / 2, SEA_M), turn, color)
         if turn:  # far away: no load
@@ -151,16 +158,18 @@ class Builder:
             if abs(bx - (x - 0.22 * length) + 4) < 20 or bx > x + 0.40 * length:
                 continue
             tall = int(self.rng.integers(3, 8))
+            deck = min(half_deck(bx + end - x) for end in (-6.1, 6.1))
             rows = 15 if bx < x + 0.3 * length else 11
             for row in range(rows):
-                ry = y - beam / 2 + (row - (rows - 1) / 2) * 2.5
+                aside = (row - (rows - 1) / 2) * 2.5
+                ry = y - beam / 2 + aside
                 color_run = int(self.rng.integers(len(PALETTE)))
                 levels = max(tall - int(self.rng.integers(0, 3)), 1)
                 for level in range(levels):
                     if self.rng.random() < 0.4:
                         color_run = int(self.rng.integers(len(PALETTE)))
                     z = SEA_M + 14.6 + level * models.HEIGHT
-                    self._box(40, (bx, ry, z), color_run, 0.0)
+                    self._box(40, (bx, ry, z), color_run, 0.0, abs(aside) + 1.25 < deck)
         for bay in range(8):
             self._light((first + 34 * bay, y - 4, SEA_M + 34), 0.12)
 

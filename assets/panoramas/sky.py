@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 SUN_RADIUS = np.radians(0.2666)
 """Mean apparent radius of the sun (Astronomical Almanac: 959.63 arc seconds)."""
 
+EARTH_KM = 6371.0
+
 _TILE = 128
 _STEPS, _LIGHT_STEPS = 24, 3
 
@@ -86,11 +88,10 @@ def cloud_layer(
     view = directions(height)[: height // 2].astype(np.float32)
     tile = noise_tile(clouds.seed)
     # over a round earth even the horizon meets the layer: distance to a shell of radius R + h
-    earth = 6371.0
     rise = view[..., 2]
-    near = -earth * rise + np.sqrt((earth * rise) ** 2 + 2 * earth * clouds.base_km)
+    near = -EARTH_KM * rise + np.sqrt((EARTH_KM * rise) ** 2 + 2 * EARTH_KM * clouds.base_km)
     top = clouds.base_km + clouds.thick_km
-    far = -earth * rise + np.sqrt((earth * rise) ** 2 + 2 * earth * top)
+    far = -EARTH_KM * rise + np.sqrt((EARTH_KM * rise) ** 2 + 2 * EARTH_KM * top)
     far = np.minimum(far, near + 6 * clouds.thick_km)
     step = (far - near) / _STEPS
     per_km = _TILE / clouds.size_km / 2
@@ -119,7 +120,7 @@ def cloud_layer(
     for i in range(_STEPS):
         distance = near + (i + start) * step
         p = view * distance[..., None]
-        p[..., 2] += distance**2 / (2 * earth) * (1 - rise**2)  # the ground falls away below
+        p[..., 2] += distance**2 / (2 * EARTH_KM) * (1 - rise**2)  # the ground falls away below
         d = density(p)
         shade = np.zeros_like(d)
         full = d > 0

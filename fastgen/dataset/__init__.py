@@ -1,1 +1,1 @@
-"""What generate.py is made of, and what a finished dataset is asked: shards, verify, stats."""
+"""What generate.py is made of, and what is asked of a finished dataset: shards, storage, verify."""

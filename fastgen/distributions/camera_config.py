@@ -1,6 +1,8 @@
 """Cameras of a rig: their ranges (SeaFront paper, 3.3.1), and where within them one stands."""
 
-from collections.abc import Iterable
+import functools
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,8 +16,12 @@ from fastgen.geometry.container_layout import KINDS, mm_away
 from fastgen.geometry.mesh import FACES
 from fastgen.records import Range, bounds, check_known
 
-_STEPS, _ROUNDS = 33, 3
-"""Places tried along each range, and how often those around the nearest are tried more finely."""
+_STEPS, _ROUNDS, _THIRDS = 33, 3, 40
+"""Angles tried along each range, how often those around the nearest are tried more finely, and how
+often a third of the distances is left out."""
+
+_ROUNDED_MM = 0.1
+"""Places of cameras are rounded to this."""
 
 Array = NDArray[np.float64]
 
@@ -24,14 +30,16 @@ Array = NDArray[np.float64]
 class CameraConfig:
     """One camera of the rig: it looks at the middle of a face from a varied position.
 
-    face: front, back, door, no_door, roof or underside.
+    face: front, back, door, no_door, roof or underside. Over the roof hangs the spreader, up to 2 m
+        high: a camera nearer than that may stand among its beams, which then are cut open.
     focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
     distance_mm: from the point that it looks at.
     azimuth_deg: turns the camera about the vertical through that point; 0 looks straight at the
         face, and where it is positive the camera stands to the right, seen from itself. Of roof
         and underside: how far it stands aside along the length.
     elevation_deg: lifts the camera, which goes on looking there; of roof and underside: how far it
-        stands aside across the length.
+        stands aside across the length, and where it is negative over the roof the ropes run up the
+        image.
     roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
         lies across.
     target_shift_mm: how far beside the middle it looks, along each axis of the face.
@@ -99,38 +107,57 @@ def direction_from(frame: FaceFrame, azimuth_deg: ArrayLike, elevation_deg: Arra
     return np.cos(elevation) * level + np.sin(elevation) * frame.up
 
 
-def check_room(name: str, rig: CameraConfig, kinds: Iterable[str]) -> None:
-    """Raise ConfigError if the camera may come too near to a container of one of `kinds`."""
+def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: float) -> None:
+    """Raise ConfigError if the camera may come too near to a container of one of `kinds`, whose
+    sheets may stand out by `bulge_mm`."""
+    least_mm = NEAR_M / MM + bulge_mm
+    widest = np.deg2rad([np.abs(rig.azimuth_deg).max(), np.abs(rig.elevation_deg).max()])
+    if rig.distance_mm.lo * np.cos(widest).prod() >= least_mm:  # stays before the face's plane
+        return
     for kind in kinds:
-        if _nearest_mm(rig, kind) < NEAR_M / MM:
+        nearest_mm = _nearest_mm(rig, kind)
+        if nearest_mm < least_mm + _ROUNDED_MM:
+            bulges = f" that may bulge by {bulge_mm:g} mm" if bulge_mm else ""
             raise ConfigError(
-                f"cameras.{name}: may come nearer to a container of kind {kind} than "
-                f"{NEAR_M / MM:g} mm, before which nothing is drawn; give a larger distance_mm, or "
-                "azimuth_deg and elevation_deg nearer to 0"
+                f"cameras.{name}: may come within {nearest_mm:.0f} mm of a container of kind "
+                f"{kind}{bulges}, and nothing nearer than {NEAR_M / MM:g} mm is drawn; give a "
+                "larger distance_mm, azimuth_deg and elevation_deg nearer to 0, or a smaller "
+                "target_shift_mm"
             )
 
 
 def _nearest_mm(rig: CameraConfig, kind: str) -> float:
-    """How near the camera may come to a container; of one that stays before its face, at most
-    that."""
-    widest = np.deg2rad([np.abs(rig.azimuth_deg).max(), np.abs(rig.elevation_deg).max()])
-    before_mm = rig.distance_mm.lo * float(np.cos(widest).prod())
-    if before_mm >= NEAR_M / MM:
-        return before_mm
+    """How near the camera may come to a sound container, in millimetres."""
     frame = face_frame(rig.face, kind)
-    ranges = np.array([rig.azimuth_deg, rig.elevation_deg, rig.distance_mm], float)
-    lo, hi = ranges.T
-    for _ in range(_ROUNDS):
-        tried = np.linspace(lo, hi, _STEPS)
-        azimuth, elevation, distance = np.meshgrid(*tried.T, indexing="ij", sparse=True)
-        offset = distance[..., None] * direction_from(frame, azimuth, elevation)
+
+    def away_mm(direction: Array, distance_mm: Array) -> Array:
+        offset = distance_mm[..., None] * direction
         # of what it may look at, the point that brings the camera nearest to the face's middle
         for axis in (frame.right, frame.up):
-            aside = offset @ axis
-            shift = np.clip(-aside, *rig.target_shift_mm)
+            shift = np.clip(-(offset @ axis), *rig.target_shift_mm)
             offset = offset + shift[..., None] * axis
-        away_mm = mm_away(frame.middle_mm + offset, kind)
-        nearest = np.unravel_index(int(away_mm.argmin()), away_mm.shape)
-        at, step = tried[nearest, range(3)], (hi - lo) / (_STEPS - 1)
+        return mm_away(frame.middle_mm + offset, kind)
+
+    ranges = np.array([rig.azimuth_deg, rig.elevation_deg], float)
+    lo, hi = ranges.T
+    nearest = math.inf
+    for _ in range(_ROUNDS):
+        tried = np.linspace(lo, hi, _STEPS)
+        direction = direction_from(frame, *np.meshgrid(*tried.T, indexing="ij", sparse=True))
+        found = _least(functools.partial(away_mm, direction), rig.distance_mm, (_STEPS, _STEPS))
+        nearest = min(nearest, float(found.min()))
+        at = tried[np.unravel_index(int(found.argmin()), found.shape), range(2)]
+        step = (hi - lo) / (_STEPS - 1)
         lo, hi = np.maximum(at - step, ranges[:, 0]), np.minimum(at + step, ranges[:, 1])
-    return float(away_mm.min())
+    return nearest
+
+
+def _least(of: Callable[[Array], Array], within: Range, shape: tuple[int, ...]) -> Array:
+    """Least values [...] of a convex function of numbers within a range, each by itself; a camera's
+    distance from a box is convex in how far it stands from what it looks at."""
+    lo, hi = np.full(shape, within.lo), np.full(shape, within.hi)
+    for _ in range(_THIRDS):
+        third = (hi - lo) / 3
+        left = of(lo + third) <= of(hi - third)
+        lo, hi = np.where(left, lo, lo + third), np.where(left, hi - third, hi)
+    return np.minimum(of(lo), of(hi))

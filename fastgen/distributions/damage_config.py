@@ -118,3 +118,10 @@ class DamageConfig:
         if not self.faces and set(self.kinds) - {"axis"}:
             raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
         check_order("count", self.count)
+
+    @property
+    def bulge_mm(self) -> float:
+        """How far a damage may stand out of its face."""
+        damaged = self.probability > 0 and self.count[1] > 0
+        bulges = damaged and "concave" in self.kinds and self.concave.outward > 0
+        return self.concave.depth_mm.hi if bulges else 0.0

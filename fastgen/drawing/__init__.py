@@ -1,1 +1,1 @@
-"""What renderer.py is made of: shader programs, buffers, textures, targets and passes."""
+"""What renderer.py is made of: shader programs, buffers, textures, targets, passes; and baking."""

@@ -1,1 +1,1 @@
-"""Bytes: pixels and scenes encoded, hashed, and stored whole or not at all."""
+"""Bytes: images, YAML and glTF to and from them, and files that are there whole or not at all."""

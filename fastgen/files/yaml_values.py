@@ -16,7 +16,13 @@ _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
 def loaded(text: str) -> Any:
     """The value of a YAML or JSON text. Raises yaml.YAMLError, and ValueError or RecursionError for
     what PyYAML itself stumbles over."""
-    return yaml.load(text, _Loader)
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError as error:
+        bare = re.search(r"[\[{,:]\s*(#[0-9a-fA-F]{6})\b", text)
+        if bare is None:
+            raise
+        raise yaml.YAMLError(f"{error}; put colors in quotes, as in '{bare[1]}'") from None
 
 
 class _Loader(yaml.SafeLoader):

@@ -2,7 +2,7 @@
 
 A format is one small class in a module of this package with an instance called FORMAT; adding one
 adds one file. Formats are pure: pixels and labels in, bytes out. Where the bytes go, and that they
-arrive whole, is the business of dataset/ and files/storage.py.
+arrive whole, is the business of dataset/.
 """
 
 import importlib

@@ -1,1 +1,3 @@
-"""What labels.py is made of: outlines, visibility, damage, text crops; and boxes over images."""
+"""What labels.py is made of: outlines, visibility, damage. And what is made of labels: text crops,
+boxes over images.
+"""

@@ -1,1 +1,1 @@
-"""What environment.py is made of, and what stands in its way: suns, sky, shadows, reflections."""
+"""Light beside environment.py, and what is in its way: suns, sky, shadows, reflections, tones."""
