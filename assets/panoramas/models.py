@@ -252,14 +252,14 @@ def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], 
     s.beam((house + 2, 0, 45), (house + 2, 0, 58), 0.7, 0.7, "white")
     s.beam((house + 2, -4, 52), (house + 2, 4, 52), 0.4, 0.4, "white")
     s.beam((0.46 * length, 0, 13), (0.46 * length, 0, 27), 0.6, 0.6, "white")
-    for x in np.arange(-length / 2, 0.42 * length, 3.0):  # posts of the railing, along the deck
-        edge = np.interp(x, stations, rows[-1]) - 0.3
-        for y in (-edge, edge):
-            s.beam((x, y, 13), (x, y, 14.1), 0.06, 0.06, "white")
 
     def half_deck(x: float) -> float:
         return float(np.interp(x, stations, rows[-1]))
 
+    for x in np.arange(-length / 2, 0.42 * length, 3.0):  # posts of the railing, along the deck
+        edge = half_deck(x) - 0.3
+        for y in (-edge, edge):
+            s.beam((x, y, 13), (x, y, 14.1), 0.06, 0.06, "white")
     return s.mesh("ship"), half_deck
 
 
