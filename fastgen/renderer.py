@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastgen.camera import NEAR_M, View, view_of
+from fastgen.camera import View, view_of
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.drawing.bake import Atlas, bake_atlas
 from fastgen.drawing.decal_tables import DecalTables, pack_decals
@@ -29,16 +29,17 @@ from fastgen.drawing.programs import (
     VIEW_BLOCK,
     link,
 )
+from fastgen.drawing.regions import Region, bands, box_corners, merged, region_of
 from fastgen.drawing.sample_lattice import fitting
-from fastgen.drawing.sample_targets import Region, SampleTargets
+from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.drawing.shading import UNITS, Shading
 from fastgen.drawing.shapes import Shapes, shadow_casters
 from fastgen.drawing.surface_values import cable_values, damage_values, scene_values
-from fastgen.drawing.targets import Targets, bands, merged
+from fastgen.drawing.targets import Targets
 from fastgen.drawing.textures import art_texture, data_texture, mipmapped_array, noise_texture
 from fastgen.drawing.uniforms import Block
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
-from fastgen.geometry.mesh import UNIT_CUBE, Mesh
+from fastgen.geometry.mesh import Mesh
 from fastgen.gl import GLContext
 from fastgen.kept import Kept
 from fastgen.light.exposure import metered_exposure
@@ -50,9 +51,6 @@ from fastgen.prints.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.spreader import tier_bounds_mm
-
-_BOW_STEPS = 17
-"""Points along a line that a lens may bend, where bounds of it are asked for."""
 
 
 class _SceneDecals:
@@ -154,14 +152,14 @@ class Renderer:
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, samples.inner_row)
             self._set(DAMAGE_BLOCK, shapes)
-        touched = [_region(view, corners_mm(item)) for item in damages]
-        boxes = [_box_corners(mesh.mesh.bounds_mm, damages)]
+        touched = [region_of(view, corners_mm(item)) for item in damages]
+        boxes = [box_corners(mesh.mesh.bounds_mm, damages)]
         cables: list[Region | None] = []
         if spreader is not None:
-            frame, *above = map(_box_corners, tier_bounds_mm(spreader.mesh))
+            frame, *above = map(box_corners, tier_bounds_mm(spreader.mesh))
             boxes = [np.concatenate([*boxes, frame]), *above]
-            cables = [_region(view, above[-1])]
-        regions = bands([_region(view, box) for box in boxes])
+            cables = [region_of(view, above[-1])]
+        regions = bands([region_of(view, box) for box in boxes])
         near = merged(touched)
         holes = merged(
             [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
@@ -327,34 +325,6 @@ class Renderer:
 
     def __exit__(self, *_: object) -> None:
         self.release()
-
-
-def _region(view: View, corners_mm: np.ndarray) -> Region | None:
-    """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
-    if view.distortion:  # what lies between two corners may bow out farther than both
-        a, b = corners_mm[:, None, None], corners_mm[:, None]
-        corners_mm = a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)
-    pixels, depth = view.project(corners_mm)
-    if depth.min() <= NEAR_M:
-        return None
-    margin = 1.0
-    if view.distortion:  # an arc leaves its chord by an eighth of the second difference
-        margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
-    pixels = pixels.reshape(-1, 2)
-    x0, y0 = np.clip(np.floor(pixels.min(axis=0) - margin), 0, view.size)
-    x1, y1 = np.clip(np.ceil(pixels.max(axis=0) + margin), 0, view.size)
-    return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
-
-
-def _box_corners(
-    bounds_mm: tuple[np.ndarray, np.ndarray], damages: tuple[Damage, ...] = ()
-) -> np.ndarray:
-    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included, and
-    dents so deep that they come out on the other side."""
-    low, high = bounds_mm
-    inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
-    bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))
-    return low - bulge + UNIT_CUBE * (high - low + 2 * bulge)
 
 
 def _view_values(

@@ -13,6 +13,7 @@ from fastgen import damage as fields
 from fastgen.camera import View, view_of
 from fastgen.config import Config
 from fastgen.container import KINDS, build_container
+from fastgen.drawing.regions import region_of
 from fastgen.errors import ConfigError
 from fastgen.formats import view_values
 from fastgen.generator import Generator
@@ -20,7 +21,6 @@ from fastgen.geometry.divided_mesh import divided
 from fastgen.gl import open_context
 from fastgen.labels import decal_of
 from fastgen.lens import Distortion
-from fastgen.renderer import _region
 from fastgen.scene import Camera, Scene
 from fastgen.sensor.parts import Lens
 from fastgen.spreader import build_spreader
@@ -366,7 +366,7 @@ def test_what_a_lens_bows_out_stays_within_the_pixels_that_are_shaded():
         lens = Lens("fisheye", (0.0, 0.0, 0.0, 0.0))
         camera = Camera("wide", tuple(place.tolist()), (0, 0, 1400), focal_mm, lens=lens)
         view = view_of(camera, (size, size))
-        region = _region(view, corners)
+        region = region_of(view, corners)
         if region is None:
             continue
         x, y, width, height = region

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import NEAR_M, View
-from fastgen.drawing.sample_targets import Region
+from fastgen.drawing.regions import Region
 from fastgen.geometry.mesh import UNIT_CUBE, Mesh
 
 _SIZE = 64

@@ -7,11 +7,9 @@ from typing import Any, TypeVar
 import moderngl
 import numpy as np
 
+from fastgen.drawing.regions import Region
 from fastgen.drawing.sample_lattice import SampleLattice
 from fastgen.gl import GLContext
-
-Region = tuple[int, int, int, int]
-"""x, y, width and height in pixels."""
 
 T = TypeVar("T")
 

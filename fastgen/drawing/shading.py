@@ -13,7 +13,7 @@ from fastgen.drawing.programs import (
     link_compute,
     listed_classes,
 )
-from fastgen.drawing.sample_targets import Region
+from fastgen.drawing.regions import Region
 from fastgen.drawing.targets import Targets
 
 UNITS = {

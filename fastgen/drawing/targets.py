@@ -1,8 +1,6 @@
-"""The framebuffers of one image size, and regions of it."""
+"""The framebuffers of one image size."""
 
 import ctypes
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -10,7 +8,7 @@ import numpy as np
 
 from fastgen.drawing.pixel_lists import PixelLists
 from fastgen.drawing.programs import listed_classes
-from fastgen.drawing.sample_targets import Region, SampleTargets
+from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.gl import GLContext
 from fastgen.sample import Frame
 
@@ -18,50 +16,6 @@ _GL_COLOR, _GL_DEPTH, _GL_R32UI = 0x1800, 0x1801, 0x8236
 _SKY_CLASS = (ctypes.c_float * 4)(0.0)
 _NO_LABELS = (ctypes.c_uint * 4)(0)
 _VOID_DEPTH = (ctypes.c_float * 4)(np.inf)
-
-
-def bands(regions: Sequence[Region | None]) -> list[Region | None]:
-    """Disjoint regions, the upper first, that hold all of `regions`; None is the whole image.
-
-    Each row is held from the leftmost to the rightmost column of the regions that it crosses.
-    """
-    known = [region for region in regions if region is not None]
-    if len(known) < len(regions):
-        return [None]
-    found: list[Region | None] = []
-    for top, bottom in pairwise(sorted({v for _, y, _, h in known for v in (y, y + h)})):
-        crossed = [(x, x + w) for x, y, w, h in known if y <= top and bottom <= y + h]
-        if not crossed:
-            continue
-        left, right = min(x for x, _ in crossed), max(x for _, x in crossed)
-        last = found[-1] if found else None
-        if last and (last[0], last[2]) == (left, right - left) and last[1] + last[3] == top:
-            found[-1] = (left, last[1], right - left, bottom - last[1])
-        else:
-            found.append((left, top, right - left, bottom - top))
-    return found
-
-
-def merged(regions: Sequence[Region | None]) -> list[Region | None]:
-    """Disjoint regions that hold all of `regions`, those that overlap within the least rectangle
-    about them; None is the whole image."""
-    found: list[Region] = []
-    for region in regions:
-        if region is None:
-            return [None]
-        x, y, width, height = region
-        left, top, right, bottom = x, y, x + width, y + height
-        while touched := [
-            (a, b, w, h)
-            for a, b, w, h in found
-            if a < right and left < a + w and b < bottom and top < b + h
-        ]:
-            found = [other for other in found if other not in touched]
-            left, top = min(left, *(a for a, *_ in touched)), min(top, *(t[1] for t in touched))
-            right = max(right, *(a + w for a, _, w, _ in touched))
-            bottom = max(bottom, *(b + h for _, b, _, h in touched))
-        found.append((left, top, right - left, bottom - top))
-    return list(found)
 
 
 class Targets:

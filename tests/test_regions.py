@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.drawing.targets import bands, merged
+from fastgen.drawing.regions import bands, merged
 
 
 def painted(regions, size=(40, 30)):
