@@ -240,7 +240,8 @@ def _parser() -> argparse.ArgumentParser:
             "--quality",
             default="balanced",
             metavar="|".join(QUALITY),
-            help="samples a pixel, against speed; default: %(default)s",
+            help="samples a pixel, and rays for the light of high, against speed; default: "
+            "%(default)s",
         )
 
     for name, run, words in (

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain, product
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from fastgen.gl import BACKENDS, open_context
 from fastgen.labelling.visibility import Shot
 from fastgen.labels import label
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
+from fastgen.light.ray_bodies import check_rays
 from fastgen.light.sun_shadow import shader_suns
 from fastgen.opened import Opened
 from fastgen.records import check_fields, check_known, nearest, whole
@@ -43,8 +44,16 @@ from fastgen.sensor.develop import develop, is_needed
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 
-QUALITY = {"draft": (1, 1), "balanced": (3, 2), "high": (5, 25)}
-"""Samples along each axis of a pixel, and lookups of the material layers in it, by quality."""
+
+class Quality(NamedTuple):
+    """samples_per_axis, lookups, traced: as of Renderer."""
+
+    samples_per_axis: int
+    lookups: int
+    traced: bool = False
+
+
+QUALITY = {"draft": Quality(1, 1), "balanced": Quality(3, 2), "high": Quality(5, 25, True)}
 
 
 _BRIGHTEST_AIR = 0.65
@@ -71,9 +80,9 @@ class Generator:
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
     in place of the bundled ones. quality: draft (one sample a pixel, its materials looked up once),
-    balanced (nine, materials looked up twice), or high (25, and as often). `high` takes nine
-    samples of images of more than about a megapixel or 1638 rows, as 25 of a scene with holes take
-    2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
+    balanced (nine, materials looked up twice), or high (25, and as often, and light found by rays,
+    which Embree casts on the CPU whatever draws). `high` takes nine samples of images of more than
+    about a megapixel or 1638 rows, as 25 of a scene with holes take 2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
     four, filtered with the neighbours', of images of more than 2730 rows.
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
     first that works. Threads may share it, and draw in turn; make one in each process. An image
@@ -81,7 +90,8 @@ class Generator:
 
     A process that is forked off, or that gets it pickled, opens a context of its own. What one that
     was dropped unclosed held is freed when the next opens one.
-    Raises ConfigError for a bad argument, AssetError for a bad HDRI, ContextError without OpenGL.
+    Raises ConfigError for a bad argument, and for high where there is no Embree; AssetError for a
+    bad HDRI, ContextError without OpenGL.
     """
 
     def __init__(
@@ -107,6 +117,8 @@ class Generator:
         self.seed = whole("seed", seed)
         self.size = _whole_size(size)
         check_known("quality", quality, tuple(QUALITY))
+        if QUALITY[quality].traced:
+            check_rays()
         check_known("backend", backend, BACKENDS)
         self.backend = backend
         for name, rig in self.config.cameras.items():
@@ -133,8 +145,7 @@ class Generator:
             partial(
                 Renderer,
                 light=partial(_load_light, self._hdris),
-                samples_per_axis=QUALITY[quality][0],
-                lookups=QUALITY[quality][1],
+                **QUALITY[quality]._asdict(),
                 mask_threshold_mm=self.config.damage.mask_threshold_mm,
             ),
         )

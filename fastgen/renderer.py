@@ -19,6 +19,7 @@ from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.drawing.bake import Atlas, bake_atlas
 from fastgen.drawing.decal_tables import DecalTables, pack_decals
 from fastgen.drawing.gpu_mesh import GpuMesh
+from fastgen.drawing.light_points import LightPoints, point_step
 from fastgen.drawing.programs import (
     DAMAGE_BLOCK,
     DAMAGE_VARIANTS,
@@ -33,7 +34,7 @@ from fastgen.drawing.regions import Region, bands, box_corners, merged, region_o
 from fastgen.drawing.sample_lattice import fitting
 from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.drawing.shading import UNITS, Shading
-from fastgen.drawing.shapes import Shapes, shadow_casters
+from fastgen.drawing.shapes import Shapes, ray_bodies, shadow_casters
 from fastgen.drawing.surface_values import cable_values, damage_values, scene_values
 from fastgen.drawing.targets import Targets
 from fastgen.drawing.textures import art_texture, data_texture, mipmapped_array, noise_texture
@@ -41,12 +42,14 @@ from fastgen.drawing.uniforms import Block
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.geometry.mesh import Mesh
 from fastgen.gl import GLContext
-from fastgen.kept import Kept
+from fastgen.kept import Kept, Recent
 from fastgen.light.exposure import metered_exposure
 from fastgen.light.gpu_light import GpuLight
 from fastgen.light.openness import lobe_masks
+from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import dfg_table
 from fastgen.light.sun_shadow import ShadowMap, shader_suns, sun_values
+from fastgen.light.traced_light import traced_light
 from fastgen.prints.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
@@ -72,7 +75,8 @@ class Renderer:
     gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2, 3 or 5;
     fewer for images whose samples the driver's textures have no room for. lookups: of the material
     layers in a pixel, 1, 2 or 25; 1 of one sample.
-    mask_threshold_mm: what moved by more counts as damaged.
+    mask_threshold_mm: what moved by more counts as damaged. traced: whether light is found by rays
+    at points of the image, and not at vertices alone; ask ray_bodies.check_rays first.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
 
@@ -83,6 +87,7 @@ class Renderer:
         samples_per_axis: int = 3,
         lookups: int = 2,
         mask_threshold_mm: float = 5.0,
+        traced: bool = False,
     ) -> None:
         self._gl = gl
         self._ctx = gl.ctx
@@ -90,12 +95,15 @@ class Renderer:
         self._samples_per_axis = samples_per_axis
         self._lookups = lookups
         self._mask_threshold_mm = mask_threshold_mm
+        self._traced = traced
         self._geometry = {
             damage: link(self._ctx, "geometry.vert", "geometry.frag", UNITS, damage=damage)
             for damage in DAMAGE_VARIANTS
         }
         self._shading: Kept[Shading] = Kept(len(LAYERS))
         self._targets: Kept[Targets] = Kept(2)
+        self._points: Kept[LightPoints] = Kept(2)
+        self._bodies: Recent[RayBodies] = Recent(2)
         self._shapes = Shapes(self._ctx, self._geometry)
         self._lights: Kept[GpuLight] = Kept(24)
         self._scenes: Kept[_SceneDecals] = Kept(2)
@@ -139,9 +147,10 @@ class Renderer:
         targets = self._targets.get(size, lambda: Targets(self._gl, size, per_axis))
         samples = targets.samples
         light = self._light(scene.environment.name)
-        mesh, spreader = self._shapes.of(scene, camera.lens is not None, light.ambient)
+        mesh, spreader, lit = self._shapes.of(scene, camera.lens is not None, light.ambient)
+        traced = self._traced and layer == "all"
         shading = self._shading.get(
-            (layer, per_axis), lambda: Shading(self._ctx, per_axis, self._lookups, layer)
+            (layer, per_axis), lambda: Shading(self._ctx, per_axis, self._lookups, layer, traced)
         )
         shadow = self._shadow(scene)
         seen = _view_values(scene, view, samples, self.exposure(scene, camera, size))
@@ -164,10 +173,24 @@ class Renderer:
         holes = merged(
             [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
         )
-        samples.begin(damage, bands([*regions, *near]), holes)
+        drawn = bands([*regions, *near])
+        samples.begin(damage, drawn, holes)
         self._bind_surface(scene, mesh, spreader)
         self._sample(samples, holes, view, camera, damages, mesh, spreader)
         self._bind_light(samples, light, shadow)
+        if traced:
+            bodies = self._bodies.get(
+                (scene, camera.lens is not None),
+                lambda: ray_bodies(
+                    scene, mesh.mesh, spreader.mesh if spreader else None, lit, light.ambient
+                ),
+            )
+            points = self._points.get(
+                (size, per_axis), lambda: LightPoints(self._gl, size, per_axis)
+            )
+            found = points.read(damage, drawn, view.position_m)
+            yaw_deg = scene.environment.yaw_deg
+            points.light(found, traced_light(found, bodies, light.sky_rays, yaw_deg))
         shading.draw(
             targets,
             regions,
@@ -241,7 +264,7 @@ class Renderer:
         """Make the light and the shapes of a scene, so that drawing it takes neither time nor
         memory for that; lens: whether one bends what is drawn."""
         light = self.ambient(scene.environment.name)
-        self._shapes.zone_table(*self._shapes.of(scene, lens, light))
+        self._shapes.zone_table(*self._shapes.of(scene, lens, light)[:2])
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(
@@ -311,8 +334,8 @@ class Renderer:
 
     def release(self) -> None:
         """Free every GL object that this renderer made."""
-        caches: list[Any] = [self._shading, self._targets, self._shapes, self._lights]
-        for kept in (*caches, self._scenes, self._sun_shadow):
+        caches: list[Any] = [self._shading, self._targets, self._points, self._shapes]
+        for kept in (*caches, self._lights, self._scenes, self._sun_shadow):
             kept.release()
         blocks: list[Any] = [*self._blocks.values()]
         for item in (*blocks, *self._geometry.values(), self._occluder):
@@ -345,5 +368,6 @@ def _view_values(
         "pixel_angle": 1 / view.focal_px,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
+        "point_step": point_step(view.size),
         **view.lens_values(samples.to_clip),
     }

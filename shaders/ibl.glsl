@@ -34,11 +34,23 @@ vec3 background(vec3 direction) {
     return textureLod(background_light, uv, 0.0).rgb;
 }
 
+// What rays have found to reach a point: of what an unhidden sky gives, its share of the irradiance and
+// of what the mirror shows; irradiance / pi and radiance in the mirror that surfaces add.
+struct Traced {
+    vec3 open;
+    vec3 thrown;
+    vec3 mirrored_open;
+    vec3 mirrored_thrown;
+    float known;   // 0 where no rays were cast
+};
+
+const Traced NO_RAYS = Traced(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 0.0);
+
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
 // its irradiance from there, relative to that of a whole sky about that direction, the share that is
 // open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
 // 1 or 0, irradiance / pi that the suns throw on what hides it and faces here, times its share, and the
-// albedo of what hides it
+// albedo of what hides it; where there are rays, they stand for all of this
 struct Openness {
     vec3 direction;
     float rim;
@@ -47,6 +59,7 @@ struct Openness {
     float bounces;
     vec3 sun;
     vec3 beside;
+    Traced rays;
 };
 
 // along the surface, away from what hides the sky most; 0 where it is hidden all round alike
@@ -97,5 +110,9 @@ vec3 lit(Reflector r, Openness sky) {
     float most = length(aside);
     float lean = 1.12 * m.roughness * (1.0 - open) * smoothstep(0.0, 0.2, most) / max(most, 1e-3);
     vec3 mirrored = mix(sky.beside * around, prefiltered(fma(vec3(lean), aside, mirror), width), open);
+    if (sky.rays.known > 0.0) {
+        around = diffuse_radiance(r.normal) * sky.rays.open + sky.rays.thrown;
+        mirrored = prefiltered(mirror, width) * sky.rays.mirrored_open + sky.rays.mirrored_thrown;
+    }
     return r.diffuse * around + specular * mirrored;
 }

@@ -22,6 +22,9 @@
 #include "decal.glsl"
 #include "zone.glsl"
 #include "material.glsl"
+#if TRACED
+#include "traced.glsl"
+#endif
 #if WITH_DAMAGE
 #include "damage.glsl"
 #include "inside.glsl"
@@ -50,7 +53,7 @@ Openness openness_at(ivec2 sample_at, uint zone) {
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);
-    return Openness(cone / size, rim, light, stored.w, bounces, vec3(0.0), vec3(0.0));
+    return Openness(cone / size, rim, light, stored.w, bounces, vec3(0.0), vec3(0.0), NO_RAYS);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -160,10 +163,13 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     // the paint of the place, for much rust seldom stands alone, but never a print's
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
     vec4 sun_seen = vec4(0.0);
-#if SUNS && LAYER == LAYER_ALL
     float depth = texelFetch(sheet_depths, sample_at, 0).r;
     vec2 place = place_of(sample_at);
     vec3 from_eye = depth * view_ray(place);
+#if TRACED
+    sky.rays = traced_at(place, key, from_eye, normal);
+#endif
+#if SUNS && LAYER == LAYER_ALL
     // before a sun behind the wall stands the whole container, too close to a groove for the map
     if (dot(p.surface.outward, sun_toward[0].xyz) >= 0.0) {
         sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);

@@ -15,7 +15,7 @@ from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.errors import ConfigError
-from fastgen.generator import QUALITY, Generator
+from fastgen.generator import QUALITY, Generator, Quality
 from fastgen.scene import Scene, Spreader
 from tests import oracle
 
@@ -164,7 +164,7 @@ def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
 def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeypatch):
     """The inner view of a hole, where textures are two rows too short for both."""
     scene = close_up(scene_with(generator, "perforation"), "perforation")
-    monkeypatch.setitem(QUALITY, "balanced", (2, 1))
+    monkeypatch.setitem(QUALITY, "balanced", Quality(2, 1))
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         usual = other.render(scene=scene, camera="close")
 

@@ -263,7 +263,7 @@ def test_in_a_white_furnace_a_spreader_is_as_bright_as_the_sky(world, lit, monke
     monkeypatch.setattr(interreflection, "_BOUNCES", 100)
     container, spreader, _, _ = world
     count = len(container.positions_mm)
-    glowing = Lit(container, np.zeros((count, 0), np.uint8), np.ones((count, 3), np.float32))
+    glowing = Lit(container, np.zeros((count, 0), np.uint8), *[np.ones((count, 3), np.float32)] * 2)
     light = lit(BLACK, WHITE, WHITE, glowing).irradiance
     locks = [".locks." in chart.name for chart in spreader.charts]
     assert light.max() < 1 + 1e-4

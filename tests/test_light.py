@@ -95,7 +95,7 @@ def lit_by(monkeypatch, values):
     uint8 [V, VERTEX_BYTES] of float [V, 3]."""
 
     def seen(mesh):
-        return Lit(mesh, values(mesh.normals), np.ones(mesh.normals.shape, np.float32))
+        return Lit(mesh, values(mesh.normals), *[np.ones(mesh.normals.shape, np.float32)] * 2)
 
     with monkeypatch.context() as patch:
         patch.setattr(SkyProbe, "openness", lambda _, mesh, *others: seen(mesh))

@@ -10,7 +10,7 @@ from fastgen.camera import view_of
 from fastgen.config import Config
 from fastgen.container import build_container
 from fastgen.drawing.gpu_mesh import facing_groups
-from fastgen.generator import QUALITY, Generator
+from fastgen.generator import QUALITY, Generator, Quality
 from fastgen.light.srgb import DECODED
 from fastgen.scene import Spreader
 from fastgen.sensor.light import displayed, light_of
@@ -135,7 +135,7 @@ def test_cover_is_the_share_of_a_pixel_that_is_no_sky(samples, monkeypatch):
     if samples == 4:
         seen = cv2.blur(seen, (times + 1, times + 1))  # a box on a box is a tent
     expected = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
-    monkeypatch.setitem(QUALITY, "balanced", (round(samples**0.5), 1))
+    monkeypatch.setitem(QUALITY, "balanced", Quality(round(samples**0.5), 1))
     with Generator(SOUND, seed=5, size=SIZE) as generator:
         sample = generator.render(index=1, camera="B")
     error = np.abs(sample.cover / 255 - expected)

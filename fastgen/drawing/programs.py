@@ -151,6 +151,7 @@ VIEW_BLOCK = Block(
         ("float", "exposure"),
         ("vec3", "ray_down"),
         ("vec2", "yaw"),
+        ("int", "point_step"),  # pixels between points that rays are cast from
         ("vec4", "lens_radial"),
         ("vec4", "lens_back", 2),
         ("vec2", "lens_tangential"),
@@ -214,7 +215,13 @@ def noise_deviation() -> NDArray[np.float32]:
 
 
 def _constants(
-    samples_per_axis: int, lookups: int, layer: str, pixel_class: str, damage: str, suns: int
+    samples_per_axis: int,
+    lookups: int,
+    layer: str,
+    pixel_class: str,
+    damage: str,
+    suns: int,
+    traced: bool,
 ) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
@@ -284,6 +291,7 @@ def _constants(
         "ZONE_LEVEL": ZONE_LEVEL,
         **RUST_DEFINES,
         "SUNS": suns,
+        "TRACED": int(traced),
         "SHADOW_TEXELS": SHADOW_TEXELS,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
@@ -324,12 +332,15 @@ def expand(
     pixel_class: str = "sky",
     damage: str = "sound",
     suns: int = 0,
+    traced: bool = False,
 ) -> str:
     """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
-            constants = _constants(samples_per_axis, lookups, layer, pixel_class, damage, suns)
+            constants = _constants(
+                samples_per_axis, lookups, layer, pixel_class, damage, suns, traced
+            )
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)
         return included(shader_path(match[1]).read_text(encoding="utf-8"))

@@ -38,6 +38,9 @@ UNITS = {
     "light_points": 18,
     "rest_y": 19,
     "rest_z": 20,
+    "point_keys": 21,
+    "point_places": 22,
+    "point_light": 23,
 }
 
 
@@ -54,12 +57,19 @@ class Shading:
     """The programs that shade one layer: a classifier, and one program a pixel class.
 
     They are linked when first needed, and scenes with and without damage share what they can.
+    traced: whether light is what rays found, of drawing.light_points.
     """
 
     def __init__(
-        self, ctx: moderngl.Context, samples_per_axis: int, lookups: int, layer: str
+        self,
+        ctx: moderngl.Context,
+        samples_per_axis: int,
+        lookups: int,
+        layer: str,
+        traced: bool = False,
     ) -> None:
         self._ctx = ctx
+        self._traced = traced
         self._samples_per_axis = samples_per_axis
         self._lookups = lookups
         self._layer = layer
@@ -174,6 +184,7 @@ class Shading:
             "pixel_class": pixel_class,
             "damage": damage,
             "suns": suns,
+            "traced": self._traced,
         }
 
     def release(self) -> None:

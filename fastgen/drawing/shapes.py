@@ -1,22 +1,25 @@
 """Containers and spreaders on the GPU, with what they hide of the sky from each other."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 
 from fastgen.container import build_container, container_outline
+from fastgen.damage import deform
 from fastgen.drawing.gpu_mesh import GpuMesh, zone_table
 from fastgen.drawing.programs import SPREADER_ZONE
 from fastgen.drawing.surface_values import reflectances
-from fastgen.environment import Ambient
+from fastgen.environment import Ambient, to_map_frame
 from fastgen.geometry.divided_mesh import as_drawn
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.spreader_parts import CUT_MM
 from fastgen.kept import Kept
 from fastgen.light.occluders import Body, without_cables
 from fastgen.light.openness import Sky
-from fastgen.light.sky_probe import SkyProbe
+from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
+from fastgen.light.sky_probe import Lit, SkyProbe
 from fastgen.scene import Container, Scene
 from fastgen.spreader import build_spreader
 
@@ -35,8 +38,11 @@ class Shapes:
         self._zones: Kept[moderngl.Texture] = Kept(128)
         self._probe = SkyProbe(ctx)
 
-    def of(self, scene: Scene, bent: bool, light: Ambient) -> tuple[GpuMesh, GpuMesh | None]:
-        """Container and spreader of a scene, ready to be drawn; bent: whether a lens bends them.
+    def of(
+        self, scene: Scene, bent: bool, light: Ambient
+    ) -> tuple[GpuMesh, GpuMesh | None, tuple[Lit, ...]]:
+        """Container and spreader of a scene, ready to be drawn, and the light of their vertices;
+        bent: whether a lens bends them.
 
         light: of the scene's environment.
         """
@@ -54,7 +60,8 @@ class Shapes:
                 shape, outline, held, below, sky, reflectances(scene, (mesh.mesh, usual))
             )
             spreader.set_openness(lit.values)
-        return mesh, spreader
+            return mesh, spreader, (below, lit)
+        return mesh, spreader, (below,)
 
     def container(self, container: Container) -> GpuMesh:
         """The mesh of a container at rest."""
@@ -86,6 +93,39 @@ class Shapes:
         """Free all GL objects."""
         for kept in (self._containers, self._spreaders, self._zones, self._probe):
             kept.release()
+
+
+def ray_bodies(
+    scene: Scene,
+    container: Mesh,
+    spreader: Mesh | None,
+    lit: Sequence[Lit],
+    light: Ambient,
+) -> RayBodies:
+    """What rays meet of a scene. container, spreader: as they are drawn. lit: the light of their
+    vertices, as Shapes.of gives it. light: of the scene's environment."""
+    meshes = [container] if spreader is None else [container, spreader]
+    paints = np.array(reflectances(scene, meshes), np.float32)
+    bodies = [
+        LitBody(
+            mesh.positions_mm,
+            mesh.triangles,
+            paints[[chart.material_index for chart in mesh.charts]][mesh.chart],
+            one.without_suns,
+        )
+        for mesh, one in zip(meshes, lit, strict=True)
+    ]
+    if scene.damages:
+        moved = deform(scene.damages, bodies[0].positions_mm).astype(np.float32)
+        bodies[0] = replace(bodies[0], positions_mm=moved)
+    suns = [
+        DistantLight(
+            to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
+            np.array(sun.light, np.float32),
+        )
+        for sun in light.suns
+    ]
+    return RayBodies(bodies, suns)
 
 
 def spreader_mesh(scene: Scene, cut_mm: float = CUT_MM) -> Mesh | None:

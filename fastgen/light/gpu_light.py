@@ -1,6 +1,7 @@
 """An EnvironmentLight on the GPU: three octahedral maps."""
 
 import ctypes
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -8,6 +9,9 @@ import numpy as np
 from fastgen.environment import Ambient, EnvironmentLight
 from fastgen.gl import GLContext
 from fastgen.light.hdri import HALF_MAX
+from fastgen.light.prefilter import BORDER
+from fastgen.light.sky_rays import SkyRays
+from fastgen.light.traced_light import DIRECTIONS
 
 _TEXTURE_2D = 0x0DE1
 _RGB = 0x1907
@@ -24,6 +28,8 @@ class GpuLight:
         ctx = gl.ctx
         self.ambient = Ambient.of(light)
         self.background_size = light.background.shape[0]
+        inner = slice(BORDER, -BORDER)
+        self._radiance = light.specular[0, inner, inner].astype(np.float16)
         layers, size = light.specular.shape[:2]
         self.specular = ctx.texture_array(
             (size, size, layers), 4, _half(light.specular), dtype="f2"
@@ -34,6 +40,11 @@ class GpuLight:
         for texture in (self.specular, self.irradiance, self.background):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False
+
+    @cached_property
+    def sky_rays(self) -> SkyRays:
+        """What rays ask of it."""
+        return SkyRays(self._radiance.astype(np.float32), DIRECTIONS)
 
     def release(self) -> None:
         """Free all GL objects."""

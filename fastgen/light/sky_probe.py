@@ -84,16 +84,17 @@ def _spreader_points(spreader: Mesh) -> Array:
 @dataclass(frozen=True, eq=False)
 class Lit:
     """A mesh in its light. values: `Openness.under` its sky, uint8 [V, VERTEX_BYTES]. irradiance:
-    [V, 3], / pi, the suns' included."""
+    [V, 3], / pi, the suns' included. without_suns: the same without."""
 
     mesh: Mesh
     values: NDArray[np.uint8]
     irradiance: NDArray[np.float32]
+    without_suns: NDArray[np.float32]
 
 
 def _lit(mesh: Mesh, openness: Openness, sky: Sky) -> Lit:
     light = openness.irradiance(sky)
-    return Lit(mesh, openness.under(sky, light), light + openness.sunlight(sky))
+    return Lit(mesh, openness.under(sky, light), light + openness.sunlight(sky), light)
 
 
 class SkyProbe:
@@ -149,7 +150,7 @@ class SkyProbe:
                 sheet * cells.mean(below.irradiance),
                 reflectance[spreader.chart],
             )
-            return Lit(spreader, openness.under(sky, light), light + sun)
+            return Lit(spreader, openness.under(sky, light), light + sun, light)
 
         return self._lit.get((openness, sky, below, paints), lit)
 

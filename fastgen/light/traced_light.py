@@ -1,0 +1,189 @@
+"""Light that rays find at points of surfaces: how much of the sky's gets there, and what other
+surfaces throw. Plain arrays: no GL here.
+
+Of diffuse light a point gets the sum over rays by the sky's light (Pharr, Jakob and Humphreys 2023,
+Physically Based Rendering, 4th ed., section 12.5); what mirrors show by visible normals of GGX
+(Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps). Both are told as what of
+an unhidden sky is left, a ratio of two sums over the same rays, in which the noise of a sky that
+nothing hides cancels, and what surfaces add.
+
+Points of a tile of 2x2 cast rays in four different sets of directions, and where an image is shaded
+as many of each are averaged: Keller and Heidrich 2001, Interleaved Sampling.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.light.ray_bodies import RayBodies
+from fastgen.light.reflectance import DIELECTRIC_F0, MIN_ROUGHNESS, fresnel_climb
+from fastgen.light.sky_rays import SkyRays
+
+Floats = NDArray[np.float32]
+
+TILE = 2
+"""Points along a side of what has all sets of directions."""
+
+RAYS = 64
+"""Of each point, a power of two: half of them start into the surface and are left out."""
+
+MIRRORED_RAYS = 16
+
+DIRECTIONS = RAYS * TILE * TILE
+"""That a SkyRays holds."""
+
+_BLOCK = 1024
+"""Points at once, as a core's cache holds their rays."""
+
+_LIFT_MM = 1.0
+
+_ORDER = np.array([0, 2, 3, 1])
+"""Bayer's: neighbours within a tile have sets far apart in the sequence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """K points. column, row: [K] in the grid that they are from. place_mm, normal, toward_eye:
+    float32 [K, 3], the last two unit vectors. roughness: [K], perceptual."""
+
+    column: NDArray[np.intp]
+    row: NDArray[np.intp]
+    place_mm: Floats
+    normal: Floats
+    toward_eye: Floats
+    roughness: Floats
+
+    def chosen(self, which: NDArray[np.intp]) -> "Points":
+        """Some of them."""
+        arrays = (self.place_mm, self.normal, self.toward_eye, self.roughness)
+        return Points(self.column[which], self.row[which], *(array[which] for array in arrays))
+
+
+def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float) -> Floats:
+    """What reaches points [K], float32 [K, 4, 3]: the share of the irradiance of an unhidden sky,
+    irradiance / pi that surfaces throw; the share of what the mirror would show of it, and the
+    radiance of the surfaces that it shows instead.
+
+    sky: of DIRECTIONS directions, turned by yaw_deg as environment.py has it.
+    """
+    found = np.empty((len(points.row), 4, 3), np.float32)
+    group = _ORDER[points.row % TILE * TILE + points.column % TILE]
+    turn = _turn(yaw_deg)
+    for number in range(TILE * TILE):
+        of_group = np.flatnonzero(group == number)
+        for first in range(0, len(of_group), _BLOCK):
+            which = of_group[first : first + _BLOCK]
+            part = points.chosen(which)
+            start = part.place_mm + _LIFT_MM * part.normal
+            found[which, :2] = _diffuse(part, start, bodies, sky, turn, number)
+            found[which, 2:] = _mirrored(part, start, bodies, sky, turn, number)
+    return found
+
+
+def _turn(yaw_deg: float) -> Floats:
+    """From the frame of the environment's map to the world, [3, 3] for rows of vectors."""
+    c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]], np.float32)
+
+
+def _diffuse(
+    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, turn: Floats, group: int
+) -> Floats:
+    """[K, 2, 3]"""
+    rays = slice(group * RAYS, (group + 1) * RAYS)
+    toward = sky.directions[rays] @ turn
+    density = sky.density[rays]
+    cosine = np.maximum(points.normal @ toward.T, 0)
+    point, ray = np.nonzero(cosine)
+    met, radiance = bodies.met(start[point], toward[ray])
+    point, ray = point[met], ray[met]
+    hidden = np.zeros_like(cosine)
+    hidden[point, ray] = cosine[point, ray]
+    light = sky.radiance[rays] / density[:, None]
+    whole = cosine @ light
+    lost = hidden @ light
+    weight = hidden[point, ray] / density[ray]
+    thrown = _sums(radiance * weight[:, None], point, len(start))
+    thrown /= np.maximum(cosine @ (1 / density), 1e-6)[:, None]
+    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown], axis=1)
+
+
+def _mirrored(
+    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, turn: Floats, group: int
+) -> Floats:
+    """[K, 2, 3]"""
+    alpha = np.maximum(points.roughness, MIN_ROUGHNESS)[:, None] ** 2
+    frame = _frames(points.normal)
+    view = np.einsum("kac,kc->ka", frame, points.toward_eye)[:, None]
+    view[..., 2] = np.maximum(view[..., 2], 1e-3)
+    half = _visible_normals(view, alpha, _lattice(group))
+    facing = (view * half).sum(axis=-1)
+    local = 2 * facing[..., None] * half - view
+    up = np.maximum(local[..., 2], 1e-4)
+    masked = _smith_g1(up, alpha)  # for G2 / G1 of the eye is about G1 of the light
+    climb = fresnel_climb(np.minimum(facing, 1).astype(np.float64)).astype(np.float32)
+    weight = (local[..., 2] > 0) * masked * (DIELECTRIC_F0 + (1 - DIELECTRIC_F0) * climb)
+    # Walter et al. 2007, eq. 33, over the visible normals of Heitz 2018, eq. 3
+    spread = half[..., 2] ** 2 * (alpha**2 - 1) + 1
+    density = alpha**2 / (np.pi * spread**2) * _smith_g1(view[..., 2], alpha) / (4 * view[..., 2])
+    toward = np.einsum("kma,kac->kmc", local, frame).reshape(-1, 3)
+    # Krivanek and Colbert 2008, Real-time Shading with Filtered Importance Sampling
+    seen = sky.mean(toward @ turn.T, (1 / (MIRRORED_RAYS * density)).ravel())
+    seen *= weight.reshape(-1, 1)
+    whole = seen.reshape(*weight.shape, 3).sum(axis=1)
+    point, ray = np.nonzero(weight)
+    flat = point * MIRRORED_RAYS + ray
+    met, radiance = bodies.met(start[point], toward[flat])
+    point, flat = point[met], flat[met]
+    lost = _sums(seen[flat], point, len(start))
+    thrown = _sums(radiance * weight.ravel()[flat, None], point, len(start))
+    total = np.maximum(weight.sum(axis=1), 1e-6)[:, None]
+    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown / total], axis=1)
+
+
+def _sums(values: Floats, row: NDArray[np.intp], count: int) -> Floats:
+    """Of values [H, 3] by the row [H] each belongs to, [count, 3]."""
+    total = [np.bincount(row, channel, count) for channel in values.T]
+    return np.stack(total, axis=1).astype(np.float32)
+
+
+def _lattice(group: int) -> Floats:
+    """Points [MIRRORED_RAYS, 2] of the unit square: the part of a group of the R2 sequence, which
+    generalizes the golden ratio to two dimensions (Roberts 2018, The Unreasonable Effectiveness of
+    Quasirandom Sequences)."""
+    ratio = 1.32471795724474602596  # the real root of x^3 = x + 1
+    i = group * MIRRORED_RAYS + np.arange(MIRRORED_RAYS)
+    return np.stack([0.5 + i / ratio, 0.5 + i / ratio**2], axis=1).astype(np.float32) % 1
+
+
+def _visible_normals(view: Floats, alpha: Floats, uv: Floats) -> Floats:
+    """Microfacet normals [K, M, 3] that a viewer [K, 1, 3] sees; alpha [K, 1], uv [M, 2]. Dupuy and
+    Benyoub 2023, listing 3."""
+    stretch = np.concatenate([alpha, alpha, np.ones_like(alpha)], axis=1)[:, None]
+    stretched = view * stretch
+    stretched /= np.linalg.norm(stretched, axis=-1, keepdims=True)
+    phi = 2 * np.pi * uv[:, 0]
+    z = 1 - uv[:, 1] * (1 + stretched[..., 2])
+    r = np.sqrt(np.clip(1 - z * z, 0, 1))
+    cap = np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=-1)
+    half = (cap + stretched) * stretch
+    return np.asarray(half / np.linalg.norm(half, axis=-1, keepdims=True), np.float32)
+
+
+def _smith_g1(cosine: Floats, alpha: Floats) -> Floats:
+    """Share of microfacets that are not masked from a direction: Walter et al. 2007, eq. 34."""
+    tangent = 1 / (cosine * cosine) - 1
+    return np.asarray(2 / (1 + np.sqrt(1 + alpha * alpha * tangent)), np.float32)
+
+
+def _frames(normal: Floats) -> Floats:
+    """Two tangents and the normal, rows of [K, 3, 3]: Duff et al. 2017, Building an Orthonormal
+    Basis, Revisited."""
+    x, y, z = normal.T
+    sign = np.copysign(np.float32(1), z)
+    a = -1 / (sign + z)
+    b = x * y * a
+    one = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    other = np.stack([b, sign + y * y * a, -y], axis=1)
+    return np.stack([one, other, normal], axis=1)
