@@ -82,8 +82,9 @@ class Generator:
     in place of the bundled ones. quality: draft (one sample a pixel, its materials looked up once),
     balanced (nine, materials looked up twice), or high (25, and as often, and light found by rays,
     which Embree casts on the CPU whatever draws). `high` takes nine samples of images of more than
-    about a megapixel or 1638 rows, as 25 of a scene with holes take 2 kB a pixel. Where a driver's textures end at 16384 texels, as Mesa's do, it and balanced take
-    four, filtered with the neighbours', of images of more than 2730 rows.
+    about a megapixel or 1638 rows, as 25 of a scene with holes take 2 kB a pixel. Where a driver's
+    textures end at 16384 texels, as Mesa's do, it and balanced take four, filtered with the
+    neighbours', of images of more than 2730 rows.
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
     first that works. Threads may share it, and draw in turn; make one in each process. An image
     much taller than wide takes more memory than one lying, see sample_lattice.py.

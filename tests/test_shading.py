@@ -49,7 +49,8 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0))), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0),"
+        " NO_RAYS)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     np.testing.assert_allclose(out[:, :3], 1.0, atol=0.01)
@@ -64,11 +65,38 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0))), 1.0); }"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0),"
+        " NO_RAYS)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     assert (out[:, 0] <= 1.01).all()
     assert (out[:, 0] >= 0).all()
+    del kept
+
+
+def test_light_that_rays_found_stands_for_the_sky(gl):
+    """Under a white sky surfaces as bright as it change nothing, however much of it they hide, and
+    what is hidden by black ones is lost, whatever the cone says."""
+    kept = blocks(gl, yaw=(1, 0), background_size=16)
+    rng = np.random.default_rng(5)
+    rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, open, cone
+
+    def lit(rays):
+        body = (
+            '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+            "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
+            f" vec3 open = vec3(x.z); Traced rays = {rays};"
+            " return vec4(lit(reflector(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
+            " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, vec3(0.1), vec3(0.3), rays)),"
+            " 1.0); }"
+        )
+        return run(gl, body, rows, white_light(gl))[:, :3]
+
+    all_open = lit("Traced(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 1.0)")
+    bright = lit("Traced(open, 1.0 - open, open, 1.0 - open, 1.0)")
+    dark = lit("Traced(open, vec3(0.0), open, vec3(0.0), 1.0)")
+    np.testing.assert_allclose(bright, all_open, rtol=1e-4)
+    np.testing.assert_allclose(dark, rows[:, 2:3] * all_open, rtol=1e-3, atol=1e-4)
     del kept
 
 
@@ -84,7 +112,7 @@ def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
         " float share = 1.0 - x.w * x.w;"
         " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
         " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, vec3(0.0),"
-        " vec3(0.0, 0.5, 1.0))), 1.0); }"
+        " vec3(0.0, 0.5, 1.0), NO_RAYS)), 1.0); }"
     )
     black, grey, white = run(gl, body, rows, white_light(gl))[:, :3].T
     assert (black <= grey + 1e-6).all()

@@ -190,7 +190,8 @@ def without(element: str) -> Iterator[None]:
     """While it lasts, renders lack what of `element` no scene decides."""
 
     def unhidden(_: SkyProbe, container: Mesh, *__: object) -> Lit:
-        return Lit(container, open_sky(container.normals), np.zeros_like(container.normals))
+        dark = np.zeros_like(container.normals)
+        return Lit(container, open_sky(container.normals), dark, dark)
 
     with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
         yield

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.light.prefilter import octahedral_decode
-from fastgen.scene import REC_709
 
 Floats = NDArray[np.float32]
 
@@ -29,18 +28,19 @@ class SkyRays:
     """
 
     def __init__(self, radiance: Floats, count: int) -> None:
-        cells, solid_angle, along = _cells(len(radiance))
-        light = radiance.reshape(-1, 3)[along]
-        power = (light @ REC_709.astype(np.float32) + np.float32(1e-20)) * solid_angle
+        size = len(radiance)
+        solid_angle = _solid_angles(size)
+        # no channel before the others
+        power = (radiance.mean(axis=2, dtype=np.float64) + 1e-20) * solid_angle
         share = _EVEN * solid_angle / solid_angle.sum() + (1 - _EVEN) * power / power.sum()
-        # the van der Corput sequence, so that runs of it are spread evenly too
-        bits = int(count).bit_length() - 1
-        turned = [int(f"{i:0{bits}b}"[::-1], 2) for i in range(count)]
-        total = np.cumsum(share, dtype=np.float64)
-        chosen = np.searchsorted(total / total[-1], (np.array(turned) + 0.5) / count)
-        self.directions = cells[chosen]
-        self.density = (share / solid_angle)[chosen]
-        self.radiance = light[chosen]
+        # a row, then a place in it: Pharr, Jakob and Humphreys 2023, section 2.4.3
+        u, v = spread_points(count)
+        row, down = _inverted(share.sum(axis=1)[None], v)
+        column, right = _inverted(share[row], u)
+        toward = octahedral_decode(np.stack([column + right, row + down], axis=-1) / size)
+        self.directions = toward.astype(np.float32)
+        self.density = (share / solid_angle)[row, column].astype(np.float32)
+        self.radiance = radiance[row, column]
         levels = [cv2.resize(radiance, (n, n), interpolation=cv2.INTER_AREA) for n in _SIDES]
         self._levels = np.concatenate([level.reshape(-1, 3) for level in levels])
 
@@ -68,17 +68,42 @@ def _octahedral(toward: Floats) -> tuple[Floats, Floats]:
     return u * np.float32(0.5) + np.float32(0.5), v * np.float32(0.5) + np.float32(0.5)
 
 
+def spread_points(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Coordinates [count] each in [0, 1) of a sequence of which any run of 2^k points that begins
+    at a multiple of 2^k is a (0, k, 2)-net: van der Corput's and Sobol's, as Kollig and Keller 2002
+    (Efficient Multidimensional Sampling, section 3) have them."""
+    bits = 32
+    number = np.arange(count, dtype=np.uint64)
+    found = np.zeros((2, count), np.uint64)
+    turn = [np.uint64(1 << (bits - 1))] * 2
+    for bit in range(max(count - 1, 1).bit_length()):
+        is_set = (number >> np.uint64(bit) & np.uint64(1)).astype(bool)
+        for coordinate in (0, 1):
+            found[coordinate, is_set] ^= turn[coordinate]
+        turn = [turn[0] >> np.uint64(1), turn[1] ^ turn[1] >> np.uint64(1)]
+    found[0] ^= np.uint64(0x9E3779B9)
+    found[1] ^= np.uint64(0x7F4A7C15)
+    u, v = found / 2.0**bits
+    return u, v
+
+
+def _inverted(
+    share: NDArray[np.float64], at: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """In which of N parts, whose shares of a row are [K, N] or for all [1, N], a place [K] of it
+    from 0 to 1 lies, and how far through that part."""
+    total = np.cumsum(share, axis=1)
+    total /= total[:, -1:]
+    part = np.minimum((total <= at[:, None]).sum(axis=1), total.shape[1] - 1)
+    row = np.arange(len(at)) if len(total) > 1 else np.zeros(len(at), np.intp)
+    before = np.where(part > 0, total[row, part - 1], 0)
+    return part, (at - before) / (total[row, part] - before)
+
+
 @cache
-def _cells(size: int) -> tuple[Floats, Floats, NDArray[np.intp]]:
-    """Directions [size^2, 3] and solid angles [size^2] of an octahedral map's texels, along a curve
-    on which neighbours stay near one another, and where in the map they are, [size^2]."""
-    place = np.arange(size * size)
-    row, column = np.divmod(place, size)
-    # Morton 1966: the bits of both coordinates by turns
-    code = sum(((row >> b & 1) << (2 * b + 1)) | ((column >> b & 1) << (2 * b)) for b in range(10))
-    along = np.argsort(code)
-    uv = np.stack([column[along] + 0.5, row[along] + 0.5], axis=-1) / size
-    toward = octahedral_decode(uv)
-    solid_angle = np.abs(toward).sum(axis=1) ** 3  # as environment.sky_radiance has it
-    solid_angle *= 4 * np.pi / solid_angle.sum()
-    return toward.astype(np.float32), solid_angle.astype(np.float32), along
+def _solid_angles(size: int) -> NDArray[np.float64]:
+    """Of an octahedral map's texels [size, size], in steradians."""
+    step = (np.arange(size) + 0.5) / size
+    toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1))
+    found = np.abs(toward).sum(axis=-1) ** 3  # as environment.sky_radiance has it
+    return np.asarray(found * (4 * np.pi / found.sum()))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import DIELECTRIC_F0, MIN_ROUGHNESS, fresnel_climb
-from fastgen.light.sky_rays import SkyRays
+from fastgen.light.sky_rays import SkyRays, spread_points
 
 Floats = NDArray[np.float32]
 
@@ -149,12 +149,9 @@ def _sums(values: Floats, row: NDArray[np.intp], count: int) -> Floats:
 
 
 def _lattice(group: int) -> Floats:
-    """Points [MIRRORED_RAYS, 2] of the unit square: the part of a group of the R2 sequence, which
-    generalizes the golden ratio to two dimensions (Roberts 2018, The Unreasonable Effectiveness of
-    Quasirandom Sequences)."""
-    ratio = 1.32471795724474602596  # the real root of x^3 = x + 1
-    i = group * MIRRORED_RAYS + np.arange(MIRRORED_RAYS)
-    return np.stack([0.5 + i / ratio, 0.5 + i / ratio**2], axis=1).astype(np.float32) % 1
+    """Points [MIRRORED_RAYS, 2] of the unit square, other ones for each group."""
+    points = np.stack(spread_points(MIRRORED_RAYS * TILE * TILE), axis=1)
+    return points[group * MIRRORED_RAYS :][:MIRRORED_RAYS].astype(np.float32)
 
 
 def _visible_normals(view: Floats, alpha: Floats, uv: Floats) -> Floats:
