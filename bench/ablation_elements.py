@@ -104,7 +104,8 @@ def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
 
 @lru_cache(maxsize=64)
 def _all_open(mesh: Mesh) -> Lit:
-    return Lit(mesh, openness.open_sky(mesh.normals), np.zeros(mesh.normals.shape, np.float32))
+    dark = np.zeros(mesh.normals.shape, np.float32)
+    return Lit(mesh, openness.open_sky(mesh.normals), dark, dark)
 
 
 def _probe(measured: Callable[..., Lit], open_sky: bool) -> Callable[..., Lit]:
