@@ -3,8 +3,9 @@
 Two indirect draws, of the container and of the spreader that holds it, write for each sample which
 surface it sees and where on the unfolded sheet; one more a hole, what shows through it. Passes over
 the image then shade each pixel once for each different surface among its samples and write colour,
-ids, damage and depth at the pixel centre. Ids are never filtered: a sample lies exactly on each
-pixel centre.
+ids, damage and depth at the pixel centre. Traced, points of what the samples see are read back in
+between, and the light that rays find there goes to the shaders. Ids are never filtered: a sample
+lies exactly on each pixel centre.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -148,9 +149,10 @@ class Renderer:
         samples = targets.samples
         light = self._light(scene.environment.name)
         mesh, spreader, lit = self._shapes.of(scene, camera.lens is not None, light.ambient)
-        traced = self._traced and layer == "all"
+        rays = light.sky_rays if layer == "all" else None
         shading = self._shading.get(
-            (layer, per_axis), lambda: Shading(self._ctx, per_axis, self._lookups, layer, traced)
+            (layer, per_axis),
+            lambda: Shading(self._ctx, per_axis, self._lookups, layer, rays is not None),
         )
         shadow = self._shadow(scene)
         seen = _view_values(scene, view, samples, self.exposure(scene, camera, size))
@@ -178,7 +180,7 @@ class Renderer:
         self._bind_surface(scene, mesh, spreader)
         self._sample(samples, holes, view, camera, damages, mesh, spreader)
         self._bind_light(samples, light, shadow)
-        if traced:
+        if rays is not None:
             bodies = self._bodies.get(
                 (scene, camera.lens is not None),
                 lambda: ray_bodies(
@@ -190,7 +192,7 @@ class Renderer:
             )
             found = points.read(damage, drawn, view.position_m)
             yaw_deg = scene.environment.yaw_deg
-            points.light(found, traced_light(found, bodies, light.sky_rays, yaw_deg))
+            points.light(found, traced_light(found, bodies, rays, yaw_deg))
         shading.draw(
             targets,
             regions,
@@ -268,7 +270,7 @@ class Renderer:
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(
-            environment, lambda: GpuLight(self._gl, self._light_of(environment))
+            environment, lambda: GpuLight(self._gl, self._light_of(environment), self._traced)
         )
 
     def ambient(self, environment: str) -> Ambient:

@@ -1,11 +1,12 @@
 // Points of surfaces that rays are cast from, two a cell of a grid over the image. Upper half: what the
 // middle pixel of the cell sees, if that is a surface. Lower half: another surface among the samples of
-// the cell, if any, by turns the first and the last.
+// that pixel and those of the cell beside it, if any, by turns the first and the last.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
 
-uniform int point_rows;   // of cells
+uniform int point_rows;     // of cells
+uniform ivec2 last_pixel;   // of the image
 
 layout(location = 0) out uint out_key;    // 0 for none
 layout(location = 1) out vec4 out_place;  // from the eye in m; perceptual roughness
@@ -22,8 +23,9 @@ void main() {
         uint first = key;
         bool last = ((cell.x + cell.y) & 1) == 1;
         key = 0u;
-        // no pixel beyond the next: farther outside the object the targets hold what was drawn before
-        ivec2 before = -ivec2(min(point_step / 2, 1)), after = ivec2(min((point_step - 1) / 2, 1));
+        // no pixel beyond the next, nor outside the image: there the targets hold what was drawn before
+        ivec2 before = -ivec2(min(point_step / 2, 1));
+        ivec2 after = min(ivec2(min((point_step - 1) / 2, 1)), last_pixel - pixel);
         for (int y = before.y; y <= after.y; ++y) {
             for (int x = before.x; x <= after.x; ++x) {
                 ivec2 middle = middle_of(pixel + ivec2(x, y));

@@ -14,13 +14,15 @@ Traced traced_at(vec2 place, uint key, vec3 from_eye, vec3 normal) {
         ivec2 cell = nearest + ivec2(i % 3, i / 3 % 3) - 1;
         // as much of each of a tile's four sets of rays
         vec2 near = clamp(1.5 - abs(vec2(cell) - at), 0.0, 1.0);
-        cell = clamp(cell, ivec2(0), cells - 1);
+        cell = abs(cell);   // as in a mirror at the borders: a cell's parity tells its set
+        cell = max(min(cell, 2 * (cells - 1) - cell), 0);
         if (i >= 9) cell.y += cells.y;
         vec3 apart = texelFetch(point_places, cell, 0).xyz - from_eye;
         // waves of sheets are 20 mm deep and more; damaged ones bend
         float off = WITH_DAMAGE == 1 ? fma(0.15, length(apart), 0.005) : 0.005;
         bool same = texelFetch(point_keys, cell, 0).r == key && abs(dot(apart, normal)) < off;
-        float weight = same ? near.x * near.y : 0.0;
+        if (!same) continue;
+        float weight = near.x * near.y;
         mean.open += weight * texelFetch(point_light, ivec3(cell, 0), 0).rgb;
         mean.thrown += weight * texelFetch(point_light, ivec3(cell, 1), 0).rgb;
         mean.mirrored_open += weight * texelFetch(point_light, ivec3(cell, 2), 0).rgb;

@@ -1,14 +1,16 @@
 """Which points of an image rays are cast from, and whose light its pixels have."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import fastgen.renderer
 from fastgen import Config, Generator
-from fastgen.drawing.light_points import point_step
+from fastgen.drawing import light_points
 from fastgen.errors import ConfigError
+from fastgen.sensor.light import light_of
 
 FISHEYE = {"cameras": {"A": {"focal_mm": 24, "lens": {"model": "fisheye", "k1": [-0.02, 0.0]}}}}
 DAMAGED = {"damage": {"probability": 1, "count": [3, 5]}}
@@ -28,20 +30,41 @@ def traced_with(monkeypatch, light):
     return asked
 
 
+@pytest.fixture
+def coarse(monkeypatch):
+    """Points as far apart as in images of several thousand pixels."""
+
+    def apart(size, step):
+        monkeypatch.setattr(light_points, "_POINTS_PER_AXIS", (size[0] * size[1]) ** 0.5 / step)
+        assert light_points.point_step(size) == step
+
+    return apart
+
+
+def test_as_many_points_as_are_told():
+    for side in (64, 320, 400, 401, 640, 800, 801, 1440, 4096):
+        step = light_points.point_step((side, side))
+        assert side / step <= 400
+        assert step == 1 or side / (step - 1) > 400
+
+
 @pytest.mark.parametrize(
-    ("changed", "size"),
+    ("changed", "size", "step"),
     [
-        ({}, (320, 320)),
-        ({}, (700, 500)),
-        ({}, (90, 211)),
-        (DAMAGED, (640, 640)),
-        (HOLED, (320, 240)),
-        (FISHEYE, (400, 300)),
+        ({}, (320, 320), 1),
+        ({}, (700, 500), 2),
+        ({}, (90, 211), 1),
+        ({}, (92, 211), 3),
+        ({}, (211, 90), 4),
+        ({}, (123, 122), 5),
+        (DAMAGED, (640, 640), 2),
+        (HOLED, (320, 240), 1),
+        (FISHEYE, (400, 300), 1),
     ],
 )
-def test_points_are_what_the_middle_pixels_of_cells_see(monkeypatch, changed, size):
+def test_points_are_what_the_middle_pixels_of_cells_see(monkeypatch, coarse, changed, size, step):
+    coarse(size, step)
     asked = traced_with(monkeypatch, lambda points, *_: np.ones((len(points.row), 4, 3)))
-    step = point_step(size)
     with Generator(Config.from_values(changed), 4, size, quality="high") as generator:
         for index in range(3):
             sample = generator.render(index, camera="A")
@@ -94,22 +117,33 @@ def test_almost_all_that_is_seen_has_the_light_that_was_traced(monkeypatch, chan
             assert (sample.image[inside].max(axis=1) > 3).mean() < 0.05
 
 
-def test_light_is_the_mean_of_points_on_the_same_surface(monkeypatch):
-    """What one lit row of points lights reaches a cell and a half, along surfaces alone."""
+@pytest.mark.parametrize("step", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_light_reaches_as_far_on_either_side_of_points(monkeypatch, coarse, step, axis):
+    """One lit row or column of points lights what is up to a cell and a half away."""
+    size = (320, 323)
+    coarse(size, step)
+    rows = len(range(step // 2, size[1], step))
+    lit_cell = 160 // step
 
     def one_row(points, *_):
         light = np.zeros((len(points.row), 4, 3))
-        light[points.row % 320 == 160, :2] = 1
+        at = points.column if axis else points.row % rows
+        light[at == lit_cell, :2] = 1
         return light
 
     traced_with(monkeypatch, one_row)
-    with Generator(Config.from_values(OVERCAST), 4, (320, 320), quality="high") as generator:
-        sample = generator.render(2, camera="Cl")
+    with Generator(Config.from_values(OVERCAST), 4, size, quality="high") as generator:
+        sample = generator.render(3, camera="Cr")
     whole = (sample.ids == 1) & (sample.cover == 255)
-    lit = np.array([sample.image[row, whole[row]].mean() for row in range(150, 171)])
-    assert (lit[[9, 10, 11]] > 20).all()
-    assert (lit[:8] < 5).all()
-    assert (lit[13:] < 5).all()
+    image = np.where(whole[..., None], light_of(sample.image), np.nan)
+    profile = np.nanmean(image, axis=(1 - axis, 2))
+    middle = lit_cell * step + step // 2
+    near = np.arange(middle - 6, middle + 7) if step < 5 else np.arange(middle - 9, middle + 10)
+    away = np.abs(near - middle) / step
+    assert profile[near[away <= 0.5]].min() > 3 * profile[near[away >= 1.5]].max()
+    weight = profile[near] / profile[near].sum()
+    assert weight @ near == pytest.approx(middle, abs=0.25 * step)
 
 
 def test_high_is_the_same_to_the_byte_from_another_generator():
@@ -119,6 +153,34 @@ def test_high_is_the_same_to_the_byte_from_another_generator():
             images.append([generator.render(i).image for i in (3, 1, 3)])
     np.testing.assert_array_equal(images[0], images[1])
     np.testing.assert_array_equal(images[0][0], images[0][2])
+
+
+def test_nothing_of_earlier_images_is_left(monkeypatch, coarse):
+    """Below an image's samples lie those of what holes show at its top."""
+    size = (92, 92)  # the last cells end with the image, and would go on for a pixel
+    coarse(size, 3)
+    asked = traced_with(monkeypatch, lambda points, *_: np.ones((len(points.row), 4, 3)))
+    holed = Generator(Config.from_values(HOLED), 3).scene(1)
+    hole = next(d for d in holed.damages if abs(d.inward[1]) == 1)
+    at, toward = np.array(hole.origin_mm), np.array(hole.inward)
+    with Generator(seed=4, size=size, quality="high") as generator:
+        views = []
+        for down_mm in (200, 230, 260, 290):
+            target = at - (0, 0, down_mm)
+            position = target - 2500 * toward
+            plain = replace(holed.cameras[0], focal_mm=150.0, roll_deg=0.0)
+            views.append(replace(plain, position_mm=tuple(position), target_mm=tuple(target)))
+        sound = replace(holed, damages=())
+
+        def points():
+            for view in views:
+                generator.render(scene=sound, camera=view)
+            return np.concatenate([each.place_mm for each in asked[-len(views) :]])
+
+        before = points()
+        for view in views:
+            generator.render(scene=holed, camera=view)
+            np.testing.assert_array_equal(points(), before)
 
 
 def test_high_without_embree_is_refused_at_once(monkeypatch):

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+import fastgen.light.traced_light
 from fastgen.environment import load_environment, to_map_frame
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.prefilter import octahedral_decode
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
+from fastgen.light.reflectance import DIELECTRIC_F0, dfg_table
 from fastgen.light.sky_rays import SkyRays, spread_points
-from fastgen.light.traced_light import DIRECTIONS, RAYS, Points, traced_light
+from fastgen.light.traced_light import DIRECTIONS, RAYS, Points, lobe, traced_light
 
 SIDE = 126
 EVEN = SkyRays(np.ones((SIDE, SIDE, 3), np.float32), DIRECTIONS)
@@ -114,7 +116,7 @@ def test_rough_mirrors_show_a_wall_in_part():
     wall = plate((-2, 0, 0), (0, 1e6, 0), (0, 0, 1e6))
     *_, mirrored, shown = found(points((0, 0, 1), roughness=0.6), [wall])
     np.testing.assert_allclose(mirrored, 0.5, atol=0.04)
-    np.testing.assert_allclose(shown, 0.5 * PAINT * LIGHT, atol=0.04)
+    np.testing.assert_allclose(shown, 0.5 * PAINT * LIGHT, rtol=0.08)
 
 
 def spherical_share(sky, yaw_deg, normal, hidden):
@@ -153,6 +155,72 @@ def test_runs_of_spread_points_are_nets():
             tall = count.bit_length() - 1 - wide
             cells = set(zip(np.floor(u[part] * 2**wide), np.floor(v[part] * 2**tall), strict=True))
             assert len(cells) == count
+
+
+@pytest.fixture
+def many_rays(monkeypatch):
+    """As many rays as tell a wrong formula from noise."""
+    monkeypatch.setattr(fastgen.light.traced_light, "MIRRORED_RAYS", 4096)
+
+
+def ggx_share(sky, yaw_deg, normal, eye, roughness, hidden):
+    """Of what a mirror [N, N, 3] shows, the share that is not hidden: a sum over all texels of
+    F D G1 G1 / n.v, written out."""
+    step = (np.arange(SIDE) + 0.5) / SIDE
+    toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
+    solid_angle = np.abs(toward).sum(axis=1) ** 3
+    world = to_map_frame(toward, -yaw_deg)
+    up = world @ normal
+    half = (world + eye) / np.linalg.norm(world + eye, axis=1, keepdims=True)
+    squared = roughness**4
+    spread = 1 / ((half @ normal) ** 2 * (squared - 1) + 1) ** 2
+    shadowed = 1 / (up + np.sqrt(squared + (1 - squared) * up**2))  # G1 / (2 n.l)
+    c = half @ eye
+    g = np.sqrt(c**2 + 1.25)
+    fresnel = 0.5 * ((g - c) / (g + c)) ** 2
+    fresnel *= 1 + ((c * (g + c) - 1) / (c * (g - c) + 1)) ** 2
+    weight = np.where(up > 0, up * shadowed * spread * fresnel * solid_angle, 0)
+    light = sky.reshape(-1, 3) * weight[:, None]
+    return 1 - light[hidden(world)].sum(axis=0) / light.sum(axis=0)
+
+
+@pytest.mark.parametrize("name", ["sunset", "port_noon"])
+@pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
+@pytest.mark.parametrize("roughness", [0.5, 0.8])
+def test_mirrors_of_real_skies_lose_what_a_sum_over_the_lobe_does(
+    many_rays, name, yaw_deg, roughness
+):
+    radiance = np.ascontiguousarray(load_environment(bundled_hdris()[name]).specular[0, 1:-1, 1:-1])
+    normal, eye = np.array([0.0, -1.0, 0.0]), np.array([0.0, -0.3, -(0.91**0.5)])
+    screen = plate((2e6, -1000, 2e6 + 1000), (2e6, 0, 0), (0, 0, 2e6), facing=-1)
+
+    def hidden(toward):
+        return (toward[:, 1] < 0) & (toward[:, 2] > -toward[:, 1]) & (toward[:, 0] > 0)
+
+    sky = SkyRays(radiance, DIRECTIONS)
+    traced = traced_light(points(normal, eye, roughness), RayBodies([screen], ()), sky, yaw_deg)
+    expected = ggx_share(radiance, yaw_deg, normal, eye, roughness, hidden)
+    assert np.abs(expected - 0.5).max() < 0.47  # part of it
+    np.testing.assert_allclose(traced[:, 2].mean(axis=0), expected, atol=0.03)
+    even = ggx_share(np.ones_like(radiance), 0, normal, eye, roughness, hidden)
+    thrown = traced[:, 3].mean(axis=0)
+    np.testing.assert_allclose(thrown, (1 - even) * PAINT * LIGHT, rtol=0.05)
+
+
+@pytest.mark.parametrize("cosine", [0.3, 0.9])
+@pytest.mark.parametrize("roughness", [0.4, 0.9])
+def test_rays_of_a_lobe_stand_for_the_hemisphere(many_rays, cosine, roughness):
+    eye = (0, (1 - cosine**2) ** 0.5, cosine)
+    toward, weight, density = lobe(points((0, 0, 1), eye, roughness), 0)
+    np.testing.assert_allclose(np.linalg.norm(toward, axis=-1), 1, atol=1e-3)
+    np.testing.assert_array_equal(weight[0] > 0, toward[0, :, 2] > 0)
+    if roughness > 0.5:  # narrower ones leave too little for the rest
+        upward = np.where(toward[..., 2] > 0, 1 / density, 0).mean()
+        assert upward == pytest.approx(2 * np.pi, rel=0.05)
+    table = dfg_table()
+    scale, bias = table[int(roughness * len(table)), int(cosine * len(table))]
+    albedo = scale * DIELECTRIC_F0 + bias  # which has G2 with masking and shadowing correlated
+    assert weight.mean() == pytest.approx(albedo, rel=0.2)
 
 
 def test_directions_stand_for_the_whole_sky():

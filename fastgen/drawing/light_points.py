@@ -1,6 +1,7 @@
 """Points of what an image shows, and the light that rays find there, on the GPU."""
 
 import ctypes
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,13 +19,13 @@ from fastgen.light.traced_light import Points
 _GL_COLOR = 0x1800
 _NO_KEY = (ctypes.c_uint * 4)(0)
 
-_POINTS_PER_AXIS = 320
-"""Of a square image, at most about: rays cost as much for large images as for those."""
+_POINTS_PER_AXIS = 400
+"""Of a square image, at most: rays cost no more for large images."""
 
 
 def point_step(size: tuple[int, int]) -> int:
     """Pixels of a (width, height) = size image between points, along either axis."""
-    return max(1, round(float(np.sqrt(size[0] * size[1])) / _POINTS_PER_AXIS))
+    return math.ceil(math.sqrt(size[0] * size[1]) / _POINTS_PER_AXIS)
 
 
 class LightPoints:
@@ -96,6 +97,7 @@ class LightPoints:
     def _draw(self, damage: str, regions: Sequence[Region | None]) -> None:
         program, array = self._program(damage)
         program["point_rows"] = self._rows
+        program["last_pixel"] = tuple(side - 1 for side in self._size)
         self._target.use()
         self._ctx.scissor = None
         self._clear_uint(_GL_COLOR, 0, _NO_KEY)

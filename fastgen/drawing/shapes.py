@@ -102,8 +102,12 @@ def ray_bodies(
     lit: Sequence[Lit],
     light: Ambient,
 ) -> RayBodies:
-    """What rays meet of a scene. container, spreader: as they are drawn. lit: the light of their
-    vertices, as Shapes.of gives it. light: of the scene's environment."""
+    """What rays meet of a scene: its damaged container, in the light of the sound one and without
+    holes, and its spreader.
+
+    container, spreader: as they are drawn. lit: the light of their vertices, as Shapes.of gives it.
+    light: of the scene's environment.
+    """
     meshes = [container] if spreader is None else [container, spreader]
     paints = np.array(reflectances(scene, meshes), np.float32)
     bodies = [

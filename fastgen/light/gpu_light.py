@@ -1,7 +1,6 @@
 """An EnvironmentLight on the GPU: three octahedral maps."""
 
 import ctypes
-from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -21,15 +20,16 @@ _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 
 class GpuLight:
-    """Textures of one environment, and what of it the CPU asks for. Owned by the renderer, which
-    releases it."""
+    """Textures of one environment, and what of it the CPU asks for; traced: for rays as well.
+    Owned by the renderer, which releases it."""
 
-    def __init__(self, gl: GLContext, light: EnvironmentLight) -> None:
+    def __init__(self, gl: GLContext, light: EnvironmentLight, traced: bool = False) -> None:
         ctx = gl.ctx
         self.ambient = Ambient.of(light)
         self.background_size = light.background.shape[0]
         inner = slice(BORDER, -BORDER)
-        self._radiance = light.specular[0, inner, inner].astype(np.float16)
+        radiance = np.ascontiguousarray(light.specular[0, inner, inner])
+        self.sky_rays = SkyRays(radiance, DIRECTIONS) if traced else None
         layers, size = light.specular.shape[:2]
         self.specular = ctx.texture_array(
             (size, size, layers), 4, _half(light.specular), dtype="f2"
@@ -40,11 +40,6 @@ class GpuLight:
         for texture in (self.specular, self.irradiance, self.background):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False
-
-    @cached_property
-    def sky_rays(self) -> SkyRays:
-        """What rays ask of it."""
-        return SkyRays(self._radiance.astype(np.float32), DIRECTIONS)
 
     def release(self) -> None:
         """Free all GL objects."""

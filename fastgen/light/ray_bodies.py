@@ -16,7 +16,7 @@ from fastgen.errors import ConfigError
 
 Floats = NDArray[np.float32]
 
-_LIFT_MM = 1.0
+LIFT_MM = 1.0
 """Off a surface start the rays that leave it."""
 
 
@@ -26,14 +26,14 @@ def check_rays() -> None:
 
 
 def _embree(module: str) -> Any:
-    """A module of the package embreex, which takes 30 ms to import and exists for x86-64 alone."""
+    """A module of the package embreex, which takes 30 ms to import."""
     try:
         return importlib.import_module(f"embreex.{module}")
     except ImportError as error:
         raise ConfigError(
             "quality: high casts rays with Embree, and this machine has it not "
             f"({error}; {platform.machine()}): pip install embreex, of which there are builds for "
-            "x86-64, or take balanced"
+            "Linux on x86-64, or take balanced"
         ) from None
 
 
@@ -89,7 +89,7 @@ class RayBodies:
         before = np.einsum("hc,hc->h", normals, rays) < 0
         radiance = self._glow[met]
         if self._suns:
-            place = start_mm[which] + found["tfar"][which, None] * rays + _LIFT_MM * normals
+            place = start_mm[which] + found["tfar"][which, None] * rays + LIFT_MM * normals
         for sun in self._suns:
             cosine = normals @ sun.toward
             lit = np.flatnonzero((cosine > 0) & before)

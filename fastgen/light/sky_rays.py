@@ -12,8 +12,8 @@ from fastgen.light.prefilter import octahedral_decode
 
 Floats = NDArray[np.float32]
 
-_SIDES = (126, 84, 56, 38, 25, 17, 11, 7)
-"""Texels along a side of the maps that means are looked up in, the sides in steps of 1.5."""
+_LEVELS, _LEVEL_STEP = 8, 1.5
+"""Maps that means are looked up in, and how often the side of each goes into the last one's."""
 
 _EVEN = 0.5
 """Share of the directions that are spread evenly: they find what surfaces throw on one another."""
@@ -41,15 +41,17 @@ class SkyRays:
         self.directions = toward.astype(np.float32)
         self.density = (share / solid_angle)[row, column].astype(np.float32)
         self.radiance = radiance[row, column]
-        levels = [cv2.resize(radiance, (n, n), interpolation=cv2.INTER_AREA) for n in _SIDES]
+        sides = [max(round(size / _LEVEL_STEP**level), 1) for level in range(_LEVELS)]
+        levels = [cv2.resize(radiance, (n, n), interpolation=cv2.INTER_AREA) for n in sides]
+        self._sides = np.array(sides, np.int32)
         self._levels = np.concatenate([level.reshape(-1, 3) for level in levels])
 
     def mean(self, toward: Floats, solid_angle: Floats) -> Floats:
         """Mean radiance [K, 3] over a solid angle [K] in steradians about directions [K, 3]."""
-        sides = np.array(_SIDES, np.int32)
+        sides = self._sides
         # a level's texels are 4 pi / side^2 wide on the mean
         fits = np.sqrt(4 * np.pi / np.maximum(solid_angle, 1e-9))
-        level = np.rint(np.log(_SIDES[0] / np.clip(fits, 1, _SIDES[0])) / np.log(1.5))
+        level = np.rint(np.log(sides[0] / np.clip(fits, 1, sides[0])) / np.log(_LEVEL_STEP))
         level = np.minimum(level.astype(np.int32), len(sides) - 1)
         side = sides[level]
         x, y = (np.minimum((c * side).astype(np.int32), side - 1) for c in _octahedral(toward))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.light.ray_bodies import RayBodies
+from fastgen.light.ray_bodies import LIFT_MM, RayBodies
 from fastgen.light.reflectance import DIELECTRIC_F0, MIN_ROUGHNESS, fresnel_climb
 from fastgen.light.sky_rays import SkyRays, spread_points
 
@@ -35,8 +35,6 @@ DIRECTIONS = RAYS * TILE * TILE
 
 _BLOCK = 1024
 """Points at once, as a core's cache holds their rays."""
-
-_LIFT_MM = 1.0
 
 _ORDER = np.array([0, 2, 3, 1])
 """Bayer's: neighbours within a tile have sets far apart in the sequence."""
@@ -75,7 +73,7 @@ def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float
         for first in range(0, len(of_group), _BLOCK):
             which = of_group[first : first + _BLOCK]
             part = points.chosen(which)
-            start = part.place_mm + _LIFT_MM * part.normal
+            start = part.place_mm + LIFT_MM * part.normal
             found[which, :2] = _diffuse(part, start, bodies, sky, turn, number)
             found[which, 2:] = _mirrored(part, start, bodies, sky, turn, number)
     return found
@@ -113,6 +111,25 @@ def _mirrored(
     points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, turn: Floats, group: int
 ) -> Floats:
     """[K, 2, 3]"""
+    toward, weight, density = lobe(points, group)
+    # Krivanek and Colbert 2008, Real-time Shading with Filtered Importance Sampling
+    wide = np.float32(1 / MIRRORED_RAYS) / density
+    seen = sky.mean(toward.reshape(-1, 3) @ turn.T, wide.ravel())
+    seen *= weight.reshape(-1, 1)
+    whole = seen.reshape(*weight.shape, 3).sum(axis=1)
+    point, ray = np.nonzero(weight)
+    met, radiance = bodies.met(start[point], toward[point, ray])
+    point, ray = point[met], ray[met]
+    lost = _sums(seen.reshape(*weight.shape, 3)[point, ray], point, len(start))
+    thrown = _sums(radiance * weight[point, ray, None], point, len(start))
+    total = np.maximum(weight.sum(axis=1), 1e-6)[:, None]
+    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown / total], axis=1)
+
+
+def lobe(points: Points, group: int) -> tuple[Floats, Floats, Floats]:
+    """Rays into what a dielectric's mirror shows: directions [K, M, 3], their weights [K, M], the
+    reflectance if all of them count alike, 0 for those into the surface, and how many of all rays
+    are a steradian about each, [K, M]."""
     alpha = np.maximum(points.roughness, MIN_ROUGHNESS)[:, None] ** 2
     frame = _frames(points.normal)
     view = np.einsum("kac,kc->ka", frame, points.toward_eye)[:, None]
@@ -121,25 +138,15 @@ def _mirrored(
     facing = (view * half).sum(axis=-1)
     local = 2 * facing[..., None] * half - view
     up = np.maximum(local[..., 2], 1e-4)
-    masked = _smith_g1(up, alpha)  # for G2 / G1 of the eye is about G1 of the light
     climb = fresnel_climb(np.minimum(facing, 1).astype(np.float64)).astype(np.float32)
-    weight = (local[..., 2] > 0) * masked * (DIELECTRIC_F0 + (1 - DIELECTRIC_F0) * climb)
+    # G2 over the eye's G1, with masking and shadowing apart, is the light's G1
+    weight = (local[..., 2] > 0) * _smith_g1(up, alpha)
+    weight *= DIELECTRIC_F0 + (1 - DIELECTRIC_F0) * climb
     # Walter et al. 2007, eq. 33, over the visible normals of Heitz 2018, eq. 3
     spread = half[..., 2] ** 2 * (alpha**2 - 1) + 1
-    density = alpha**2 / (np.pi * spread**2) * _smith_g1(view[..., 2], alpha) / (4 * view[..., 2])
-    toward = np.einsum("kma,kac->kmc", local, frame).reshape(-1, 3)
-    # Krivanek and Colbert 2008, Real-time Shading with Filtered Importance Sampling
-    seen = sky.mean(toward @ turn.T, (1 / (MIRRORED_RAYS * density)).ravel())
-    seen *= weight.reshape(-1, 1)
-    whole = seen.reshape(*weight.shape, 3).sum(axis=1)
-    point, ray = np.nonzero(weight)
-    flat = point * MIRRORED_RAYS + ray
-    met, radiance = bodies.met(start[point], toward[flat])
-    point, flat = point[met], flat[met]
-    lost = _sums(seen[flat], point, len(start))
-    thrown = _sums(radiance * weight.ravel()[flat, None], point, len(start))
-    total = np.maximum(weight.sum(axis=1), 1e-6)[:, None]
-    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown / total], axis=1)
+    seen = _smith_g1(view[..., 2], alpha) / (4 * view[..., 2])
+    density = np.asarray(alpha**2 / (np.pi * spread**2) * seen, np.float32)
+    return np.einsum("kma,kac->kmc", local, frame), weight, density
 
 
 def _sums(values: Floats, row: NDArray[np.intp], count: int) -> Floats:
