@@ -1,6 +1,6 @@
 """How far are the images from a path tracer's?
 
-    python bench/accuracy.py [--cases 32] [--qualities draft,balanced,high]
+    python bench/accuracy.py [--cases 32] [--qualities draft,balanced,fine,high]
 
 Renders the 32 cases of bench/references at every quality and compares with what Cycles made of the
 same exported scenes at 1,024 samples, under the same light, exposure, tone curve and pixel filter:
@@ -212,7 +212,7 @@ def main() -> None:
     """Print the tables and write the pictures."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=len(cases()))
-    parser.add_argument("--qualities", default="draft,balanced,high")
+    parser.add_argument("--qualities", default="draft,balanced,fine,high")
     parser.add_argument("--blender-python", type=Path)
     parser.add_argument("--picture", type=Path, default=ROOT / "docs" / "accuracy.jpg")
     parser.add_argument("--out", type=Path, help="folder of a picture a case and quality")

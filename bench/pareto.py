@@ -45,7 +45,6 @@ from fastgen import Config, Generator, environment
 from fastgen.camera import view_of
 from fastgen.drawing import shapes
 from fastgen.export import export_glb
-from fastgen.generator import QUALITY
 from fastgen.scene import Camera, Scene
 
 PYRENDER_TEXEL_MM = 6.0
@@ -79,11 +78,6 @@ def _coarse_mesh() -> Patches:
     return [(shapes, "build_container", lambda *kind: build(*kind, max_edge_mm=2000.0))]
 
 
-def _no_rays() -> Patches:
-    high = QUALITY["high"]._replace(traced=False)
-    return [(sys.modules["fastgen.generator"], "QUALITY", {**QUALITY, "high": high})]
-
-
 def _light_maps(scale: float) -> Callable[[], Patches]:
     """Prefiltered maps of `scale` times the side, made anew instead of read from the cache."""
 
@@ -106,10 +100,10 @@ OCCLUSION = "occlusion of the sky"
 VARIANTS = (
     Variant("draft", "draft"),
     Variant("balanced"),
+    Variant("fine", "fine"),
     Variant("high", "high"),
     Variant("draft, no occlusion", "draft", (OCCLUSION,)),
     Variant("balanced, no occlusion", absent=(OCCLUSION,)),
-    Variant("high, no rays", "high", patches=_no_rays),
     Variant("balanced, no shadow of the sun", absent=("shadow of the sun",)),
     Variant("balanced, no noise layers", absent=LAYERS),
     Variant("balanced, no reflections", absent=("reflections altogether",)),
@@ -141,9 +135,7 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
     errors, seconds = [], []
     named = {element.name: element for element in ELEMENTS}
     absences = [Absence(named[name]) for name in variant.absent]
-    with variant.entered(absences):
-        made = Generator(Config.preset(), SEED, SIZE, quality=variant.quality)
-    with made as generator:
+    with Generator(Config.preset(), SEED, SIZE, quality=variant.quality) as generator:
         for case in chosen:
             reference = load(case.number)
             scene, camera = reference.scene, reference.scene.camera(case.camera)

@@ -93,7 +93,7 @@ class Reference:
     openness: Array
 
 
-FILTERS = {"draft": "box", "balanced": "box", "high": "box"}
+FILTERS = {"draft": "box", "balanced": "box", "fine": "box", "high": "box"}
 """The pixel filter of each quality at SIZE: a box is the pixel's square; `draft` has none and is
 held to it. A tent reaches a pixel to each side; only images too large for nine samples have it."""
 

@@ -43,7 +43,7 @@ BACKENDS = ("egl", "osmesa")
 WORKERS = (1, 2)
 SIZES = "320x320,640x640,1333x800,1920x1080"
 USUAL = "640x640"
-OTHER_QUALITIES = ("draft", "high")
+OTHER_QUALITIES = ("draft", "fine", "high")
 
 
 def stages(
