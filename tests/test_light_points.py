@@ -185,6 +185,6 @@ def test_nothing_of_earlier_images_is_left(monkeypatch, coarse):
 
 def test_high_without_embree_is_refused_at_once(monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
-    with pytest.raises(ConfigError, match=r"quality: high .* embreex.*balanced"):
+    with pytest.raises(ConfigError, match=r"quality: high .* embreex.*fine"):
         Generator(quality="high")
-    Generator(quality="balanced").close()
+    Generator(quality="fine").close()

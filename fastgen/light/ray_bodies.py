@@ -33,7 +33,7 @@ def _embree(module: str) -> Any:
         raise ConfigError(
             "quality: high casts rays with Embree, and this machine has it not "
             f"({error}; {platform.machine()}): pip install embreex, of which there are builds for "
-            "Linux on x86-64, or take balanced"
+            "Linux on x86-64, or take fine"
         ) from None
 
 
