@@ -280,12 +280,8 @@ def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray
 
 @functools.cache
 def _sky_geometry(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Directions [size^2, 3] and relative solid angles [size^2] of octahedral cells."""
-    step = (np.arange(size) + 0.5) / size
-    cells = prefilter.octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
-    # the octahedron's faces are equally far from its middle: a piece of one, at a distance r, fills
-    # an angle in proportion to r^-3; on it |x| + |y| + |z| = 1, so that r is 1 / (|x| + |y| + |z|)
-    solid_angle = np.abs(cells).sum(axis=1) ** 3
+    """As prefilter.octahedral_texels."""
+    cells, solid_angle = prefilter.octahedral_texels(size)
     return cells.astype(np.float32), solid_angle.astype(np.float32)
 
 

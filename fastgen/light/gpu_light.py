@@ -27,9 +27,11 @@ class GpuLight:
         ctx = gl.ctx
         self.ambient = Ambient.of(light)
         self.background_size = light.background.shape[0]
-        inner = slice(BORDER, -BORDER)
-        radiance = np.ascontiguousarray(light.specular[0, inner, inner])
-        self.sky_rays = SkyRays(radiance, DIRECTIONS) if traced else None
+        self.sky_rays: SkyRays | None = None
+        if traced:
+            inner = slice(BORDER, -BORDER)
+            radiance = np.ascontiguousarray(light.specular[0, inner, inner])
+            self.sky_rays = SkyRays(radiance, DIRECTIONS)
         layers, size = light.specular.shape[:2]
         self.specular = ctx.texture_array(
             (size, size, layers), 4, _half(light.specular), dtype="f2"

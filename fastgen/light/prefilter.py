@@ -11,6 +11,7 @@ seamless over the whole sphere. A levelled one is of (y, z, x) in place of (x, y
 """
 
 from collections.abc import Callable
+from functools import cache
 
 import cv2
 import numpy as np
@@ -42,6 +43,17 @@ def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
     xy = f - np.where(f < 0, -1.0, 1.0) * np.maximum(-z, 0.0)
     n = np.concatenate([xy, z], axis=-1)
     return n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+
+@cache
+def octahedral_texels(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Directions [size^2, 3] and relative solid angles [size^2] of the texels of an octahedral map
+    without a border."""
+    step = (np.arange(size) + 0.5) / size
+    texels = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
+    # the octahedron's faces are equally far from its middle: a piece of one, at a distance r, fills
+    # an angle in proportion to r^-3; on it |x| + |y| + |z| = 1, so that r is 1 / (|x| + |y| + |z|)
+    return texels, np.abs(texels).sum(axis=1) ** 3
 
 
 def equirect_directions(height: int) -> NDArray[np.float64]:

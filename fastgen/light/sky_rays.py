@@ -2,13 +2,11 @@
 does, and its mean over a small solid angle. No GL here.
 """
 
-from functools import cache
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.light.prefilter import octahedral_decode
+from fastgen.light.prefilter import octahedral_decode, octahedral_encode, octahedral_texels
 
 Floats = NDArray[np.float32]
 
@@ -29,7 +27,8 @@ class SkyRays:
 
     def __init__(self, radiance: Floats, count: int) -> None:
         size = len(radiance)
-        solid_angle = _solid_angles(size)
+        solid_angle = octahedral_texels(size)[1].reshape(size, size)
+        solid_angle = solid_angle * (4 * np.pi / solid_angle.sum())
         # no channel before the others
         power = (radiance.mean(axis=2, dtype=np.float64) + 1e-20) * solid_angle
         share = _EVEN * solid_angle / solid_angle.sum() + (1 - _EVEN) * power / power.sum()
@@ -46,7 +45,7 @@ class SkyRays:
         self._sides = np.array(sides, np.int32)
         self._levels = np.concatenate([level.reshape(-1, 3) for level in levels])
 
-    def mean(self, toward: Floats, solid_angle: Floats) -> Floats:
+    def mean(self, toward: NDArray[np.floating], solid_angle: Floats) -> Floats:
         """Mean radiance [K, 3] over a solid angle [K] in steradians about directions [K, 3]."""
         sides = self._sides
         # a level's texels are 4 pi / side^2 wide on the mean
@@ -54,20 +53,10 @@ class SkyRays:
         level = np.rint(np.log(sides[0] / np.clip(fits, 1, sides[0])) / np.log(_LEVEL_STEP))
         level = np.minimum(level.astype(np.int32), len(sides) - 1)
         side = sides[level]
-        x, y = (np.minimum((c * side).astype(np.int32), side - 1) for c in _octahedral(toward))
+        uv = octahedral_encode(toward).T
+        x, y = (np.minimum((c * side).astype(np.int32), side - 1) for c in uv)
         first = np.cumsum([0, *(sides * sides)[:-1]]).astype(np.int32)
         return np.take(self._levels, first[level] + y * side + x, axis=0)
-
-
-def _octahedral(toward: Floats) -> tuple[Floats, Floats]:
-    """As prefilter.octahedral_encode in single precision, u and v [K] each."""
-    x, y, z = np.ascontiguousarray(toward.T)
-    total = np.abs(x) + np.abs(y) + np.abs(z)
-    x, y = x / total, y / total
-    below = z < 0
-    u = np.where(below, np.copysign(1 - np.abs(y), x), x)
-    v = np.where(below, np.copysign(1 - np.abs(x), y), y)
-    return u * np.float32(0.5) + np.float32(0.5), v * np.float32(0.5) + np.float32(0.5)
 
 
 def spread_points(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -100,12 +89,3 @@ def _inverted(
     row = np.arange(len(at)) if len(total) > 1 else np.zeros(len(at), np.intp)
     before = np.where(part > 0, total[row, part - 1], 0)
     return part, (at - before) / (total[row, part] - before)
-
-
-@cache
-def _solid_angles(size: int) -> NDArray[np.float64]:
-    """Of an octahedral map's texels [size, size], in steradians."""
-    step = (np.arange(size) + 0.5) / size
-    toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1))
-    found = np.abs(toward).sum(axis=-1) ** 3  # as environment.sky_radiance has it
-    return np.asarray(found * (4 * np.pi / found.sum()))

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.environment import to_map_frame
 from fastgen.light.ray_bodies import LIFT_MM, RayBodies
 from fastgen.light.reflectance import DIELECTRIC_F0, MIN_ROUGHNESS, fresnel_climb
 from fastgen.light.sky_rays import SkyRays, spread_points
@@ -67,30 +68,23 @@ def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float
     """
     found = np.empty((len(points.row), 4, 3), np.float32)
     group = _ORDER[points.row % TILE * TILE + points.column % TILE]
-    turn = _turn(yaw_deg)
     for number in range(TILE * TILE):
         of_group = np.flatnonzero(group == number)
         for first in range(0, len(of_group), _BLOCK):
             which = of_group[first : first + _BLOCK]
             part = points.chosen(which)
             start = part.place_mm + LIFT_MM * part.normal
-            found[which, :2] = _diffuse(part, start, bodies, sky, turn, number)
-            found[which, 2:] = _mirrored(part, start, bodies, sky, turn, number)
+            found[which, :2] = _diffuse(part, start, bodies, sky, yaw_deg, number)
+            found[which, 2:] = _mirrored(part, start, bodies, sky, yaw_deg, number)
     return found
 
 
-def _turn(yaw_deg: float) -> Floats:
-    """From the frame of the environment's map to the world, [3, 3] for rows of vectors."""
-    c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
-    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]], np.float32)
-
-
 def _diffuse(
-    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, turn: Floats, group: int
+    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, yaw_deg: float, group: int
 ) -> Floats:
     """[K, 2, 3]"""
     rays = slice(group * RAYS, (group + 1) * RAYS)
-    toward = sky.directions[rays] @ turn
+    toward = to_map_frame(sky.directions[rays], -yaw_deg).astype(np.float32)
     density = sky.density[rays]
     cosine = np.maximum(points.normal @ toward.T, 0)
     point, ray = np.nonzero(cosine)
@@ -108,13 +102,13 @@ def _diffuse(
 
 
 def _mirrored(
-    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, turn: Floats, group: int
+    points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, yaw_deg: float, group: int
 ) -> Floats:
     """[K, 2, 3]"""
     toward, weight, density = lobe(points, group)
     # Krivanek and Colbert 2008, Real-time Shading with Filtered Importance Sampling
     wide = np.float32(1 / MIRRORED_RAYS) / density
-    seen = sky.mean(toward.reshape(-1, 3) @ turn.T, wide.ravel())
+    seen = sky.mean(to_map_frame(toward.reshape(-1, 3), yaw_deg), wide.ravel())
     seen *= weight.reshape(-1, 1)
     whole = seen.reshape(*weight.shape, 3).sum(axis=1)
     point, ray = np.nonzero(weight)
