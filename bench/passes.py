@@ -1,6 +1,7 @@
 """What each pass of a draw costs, and for how many pixels.
 
     python bench/passes.py [--scenes 6] [--repeats 3] [--size 640x640] [--damage 0.4]
+        [--quality balanced]
 
 Prints, for each camera, core-milliseconds (process CPU time, so other load on the machine counts
 little) and thousands of pixels of each pass in one process, means over scenes of the least of
@@ -25,6 +26,7 @@ from fastgen import Config, Generator
 from fastgen.drawing.gpu_mesh import GpuMesh
 from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.drawing.shading import Shading
+from fastgen.generator import QUALITY
 
 
 class PassTimer:
@@ -83,12 +85,12 @@ class PassTimer:
 
 
 def measure(
-    config: Config, size: tuple[int, int], scenes: int, repeats: int
+    config: Config, size: tuple[int, int], quality: str, scenes: int, repeats: int
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
     """Mean milliseconds and mean pixels, by camera and pass; 'draw' is a whole draw untouched."""
     spent: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    with Generator(config, seed=7, size=size, backend="egl") as generator:
+    with Generator(config, seed=7, size=size, backend="egl", quality=quality) as generator:
         renderer = generator._gpu.renderer()
         ctx = renderer._ctx
         for index in range(scenes):
@@ -128,12 +130,17 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=6)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--size", default="640x640")
+    parser.add_argument("--quality", choices=tuple(QUALITY), default="balanced")
     parser.add_argument("--damage", type=float, help="share of scenes with damage")
     options = parser.parse_args()
     width, height = parse_size(options.size)
     values = {} if options.damage is None else {"damage": {"probability": options.damage}}
     times, pixels = measure(
-        Config.from_values(values), (width, height), options.scenes, options.repeats
+        Config.from_values(values),
+        (width, height),
+        options.quality,
+        options.scenes,
+        options.repeats,
     )
     cameras = list(times)
     names = list(dict.fromkeys(name for rows in times.values() for name in rows))

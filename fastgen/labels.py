@@ -14,9 +14,9 @@ from fastgen.damage import deform
 from fastgen.drawing.decal_tables import object_ids
 from fastgen.geometry.divided_mesh import as_drawn
 from fastgen.geometry.mesh import Mesh
-from fastgen.labelling.coverage import boxes, covers, project
+from fastgen.labelling.coverage import boxes, covered, project
 from fastgen.labelling.damage_labels import damage_objects
-from fastgen.labelling.facets import Facets, decal_facets, mesh_facets
+from fastgen.labelling.facets import Facets, decal_facets, in_fours, mesh_facets
 from fastgen.labelling.visibility import Shot, float_box, mask_box, visibility
 from fastgen.sample import Box, Keypoint, Object
 from fastgen.scene import Decal, Scene
@@ -61,7 +61,8 @@ def _decals(shot: Shot) -> list[Object]:
     bounds = boxes(seen.pixels, seen.owner, count)
     # of what is not seen, what it would cover does not matter
     asked = (areas[ids[labelled]] > 0)[seen.owner]
-    alone = covers(seen.pixels[asked], seen.owner[asked], count, view.size)
+    alone = covered(seen.pixels[asked], seen.owner[asked], count, view.size)
+    hidden = alone.hidden(frame.ids.ravel()[alone.pixel] == ids[labelled][alone.owner])
     pixels, depth = view.project(outlines_mm(scene, mesh))
     counts: dict[str, int] = {}
     objects = []
@@ -83,7 +84,7 @@ def _decals(shot: Shot) -> list[Object]:
                 # from the outline's corners in the order in which the eye finds them
                 quad=tuple(outline[::_EDGE_POINTS][::-1].ravel().tolist()) if outline.size else (),
                 reading=("vertical" if decal.vertical else "horizontal") if decal.text else "",
-                **visibility(shot, alone[row], frame.ids, object_id, area),
+                **visibility(shot.config, area, int(hidden[row]), int(alone.beyond[row])),
             )
         )
     return objects
@@ -98,17 +99,18 @@ def visible_boxes(
     [count] areas in pixels. Ids 0 and 1 (void and container) are left out, None and 0, as are those
     of `count` and above.
     """
-    at = np.flatnonzero((ids > CONTAINER_ID) & (ids < count))
-    rows, columns = np.divmod(at, ids.shape[1])
-    found = ids.ravel()[at].astype(np.int64)
+    mask = (ids > CONTAINER_ID) & (ids < count)
+    at = cv2.findNonZero(mask.view(np.uint8))
+    columns, rows = np.zeros((2, 0), np.int32) if at is None else at.reshape(-1, 2).T
+    found = ids[rows, columns].astype(np.int64)
     areas = np.bincount(found, minlength=count)[:count]
-    shape = ids.shape
-    x0, y0 = np.full(count, shape[1]), np.full(count, shape[0])
-    x1, y1 = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    x0, y0 = np.full((2, count), max(ids.shape), np.int32)
+    x1, y1 = np.zeros((2, count), np.int32)
+    # pixels come row by row, and of those that write to one place the last stays
+    y0[found[::-1]] = rows[::-1]
+    y1[found] = rows + 1
     np.minimum.at(x0, found, columns)
-    np.minimum.at(y0, found, rows)
     np.maximum.at(x1, found, columns + 1)
-    np.maximum.at(y1, found, rows + 1)
     found_boxes: list[Box | None] = [
         (int(x0[i]), int(y0[i]), int(x1[i]), int(y1[i])) if areas[i] else None for i in range(count)
     ]
@@ -178,10 +180,12 @@ def _container(shot: Shot) -> Object:
     if view.distortion:
         sides = _pieces(sides)
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
-    (alone,) = covers(box.pixels, box.owner, 1, view.size)
-    castings, polygon = _castings(shot, corners)
     # what is void within the box is known: nothing hides there
-    told = visibility(shot, alone, frame.ids == SPREADER_ID, False, area)
+    spreader = frame.ids == SPREADER_ID
+    alone = covered(box.pixels, box.owner, 1, view.size, mask_box(spreader) or (0, 0, 0, 0))
+    (hidden,) = alone.hidden(~spreader.ravel()[alone.pixel])
+    castings, polygon = _castings(shot, corners)
+    told = visibility(shot.config, area, int(hidden), int(alone.beyond[0]))
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
         told["truncated"] = True  # damage bulges out of the box
     return Object(
@@ -206,7 +210,8 @@ def _spreader(shot: Shot) -> list[Object]:
     mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
     seen = project(_all_facets(mesh), shot.view)
     (bounds,) = boxes(seen.pixels, seen.owner, 1)
-    (alone,) = covers(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
+    alone = covered(seen.pixels[seen.faces], seen.owner[seen.faces], 1, shot.view.size)
+    (hidden,) = alone.hidden(shown.ravel()[alone.pixel])
     return [
         Object(
             id=SPREADER_ID,
@@ -215,7 +220,7 @@ def _spreader(shot: Shot) -> list[Object]:
             bbox=mask_box(shown),
             amodal_bbox=float_box(bounds),
             area=area,
-            **visibility(shot, alone, shown, True, area),
+            **visibility(shot.config, area, int(hidden), int(alone.beyond[0])),
         )
     ]
 
@@ -223,7 +228,7 @@ def _spreader(shot: Shot) -> list[Object]:
 @lru_cache(maxsize=2)
 def _all_facets(mesh: Mesh) -> Facets:
     """Of a mesh that nothing damages; the cameras of a scene share them."""
-    return mesh_facets(None, mesh, list(mesh.groups), 0)
+    return in_fours(mesh_facets(None, mesh, list(mesh.groups), 0))
 
 
 @lru_cache(maxsize=4)
@@ -280,7 +285,9 @@ def _castings(
     ]
     if depth.min() <= 0:
         return tuple(found), ()
-    straight, _ = replace(shot.view, distortion=None).project(corners)
+    straight = pixels
+    if shot.view.distortion:
+        straight, _ = replace(shot.view, distortion=None).project(corners)
     hull = cv2.convexHull(straight.astype(np.float32), returnPoints=False).ravel()
     outline = pixels[hull]
     if shot.view.distortion:  # lines of the world are curves in the image

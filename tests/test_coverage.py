@@ -12,8 +12,8 @@ from fastgen.camera import View
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
 from fastgen.generator import Generator
-from fastgen.labelling.coverage import covers
-from fastgen.labelling.facets import clip
+from fastgen.labelling.coverage import covered
+from fastgen.labelling.facets import Facets, clip, in_fours
 from fastgen.labels import decal_of
 from fastgen.scene import Camera, Spreader
 from fastgen.spreader import build_spreader
@@ -269,9 +269,13 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
     rng = np.random.default_rng(3)
     corners = rng.uniform(-20, 60, (50, 3, 2))
     owner = np.repeat(np.arange(5), 10)
-    found = covers(corners, owner, 5, (50, 40))
+    found = covered(corners, owner, 5, (50, 40))
+    lower = covered(corners, owner, 5, (50, 40), (3, 10, 47, 40))
+    image = np.zeros((40, 50), bool)
+    image[10:, :] = True
+    hidden = found.hidden(image.ravel()[found.pixel])
     columns, rows = np.meshgrid(np.arange(-30, 80) + 0.5, np.arange(-30, 80) + 0.5)
-    for number, cover in enumerate(found):
+    for number in range(5):
         truth = np.zeros(columns.shape, bool)
         for a, b, c in corners[owner == number]:
             sides = [
@@ -279,16 +283,39 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
                 for p, q in ((a, b), (b, c), (c, a))
             ]
             truth |= np.all(np.array(sides) >= 0, axis=0) | np.all(np.array(sides) <= 0, axis=0)
-        image = np.zeros((40, 50), np.uint8)
-        image[10:, :] = 1
-        assert cover.beyond == truth.sum() - truth[30:70, 30:80].sum()
-        assert cover.hidden(image, 1) == truth[30:40, 30:80].sum()
-        assert cover.hidden(image, 7) == truth[30:70, 30:80].sum()
+        within = truth[30:70, 30:80]
+        assert found.beyond[number] == lower.beyond[number] == truth.sum() - within.sum()
+        assert hidden[number] == within[:10].sum()
+        assert (found.pixel[found.owner == number] == np.flatnonzero(within)).all()
+        within[:10] = within[:, :3] = within[:, 47:] = False
+        assert (lower.pixel[lower.owner == number] == np.flatnonzero(within)).all()
 
 
 def test_enormous_objects_are_counted_to_a_thousandth():
     square = np.array([[[-9e5, -8e5], [7e5, -8e5], [7e5, 9e5], [-9e5, 9e5]]])
-    (cover,) = covers(square, np.zeros(1, np.int64), 1, (64, 48))
-    assert cover.mask.shape == (48, 64)
-    assert cover.mask.all()
-    assert cover.beyond == pytest.approx(16e5 * 17e5, rel=1e-3)
+    found = covered(square, np.zeros(1, np.int64), 1, (64, 48))
+    assert (found.pixel == np.arange(64 * 48)).all()
+    assert found.beyond == pytest.approx(16e5 * 17e5, rel=1e-3)
+
+
+def test_triangles_that_make_a_flat_convex_polygon_become_one():
+    square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    bent = square + [5.0, 0, 0]
+    bent[3, 2] = 1
+    dart = np.array([[0.0, 9, 0], [4, 9, 0], [1, 10, 0], [0, 13, 0]])
+    triangles = [
+        *(square[[0, 1, 2]], square[[0, 2, 3]]),  # the fourth corner comes last
+        *(square[[0, 1, 2]] + 20, square[[3, 0, 2]] + 20),  # and first
+        *(bent[[0, 1, 2]], bent[[0, 2, 3]]),
+        *(dart[[0, 1, 2]], dart[[0, 2, 3]]),
+        *(square[[0, 1, 2]] + 40, square[[0, 2, 3]] + 60),
+        square[[0, 1, 2]] + 80,
+    ]
+    corners = np.array(triangles)
+    made = in_fours(Facets(corners, 2 * corners, np.full(len(corners), 3)))
+    assert (made.rest_mm == 2 * made.corners_mm).all()
+    assert (made.owner == 3).all()
+    assert len(made) == 2 + 7
+    assert (made.corners_mm[:2] == [square, square + 20]).all()
+    assert (made.corners_mm[2:, :3] == corners[4:]).all()
+    assert (made.corners_mm[2:, 3] == corners[4:, 2]).all()

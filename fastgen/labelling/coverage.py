@@ -4,13 +4,14 @@ A pixel is covered when its centre lies in one of the object's facets that face 
 on an edge go to one side only, as rasterizers have it (OpenGL 4.5 core specification, 14.6.1).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import NEAR_M, View
 from fastgen.labelling.facets import Facets, clip, highest, lowest
+from fastgen.sample import Box
 
 Array = NDArray[np.float64]
 Runs = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
@@ -22,24 +23,20 @@ _MOST_ROWS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Cover:
-    """Pixels that one object covers alone.
+class Covered:
+    """Pixels that each of some objects covers alone.
 
-    mask: bool [h, w], those within the image. corner: (x, y) of the mask's first pixel. beyond: how
-    many more it covers outside the image.
+    pixel: int [P], row * width + column of those within the image, each object's once; owner: int
+    [P], whose they are. beyond: int [count], how many more each object covers outside the image.
     """
 
-    mask: NDArray[np.bool_]
-    corner: tuple[int, int]
-    beyond: int
+    pixel: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    beyond: NDArray[np.int64]
 
-    def hidden(self, target: NDArray[np.generic], value: int) -> int:
-        """Covered pixels of the image where `target` [H, W] is not `value`."""
-        (x, y), (height, width) = self.corner, self.mask.shape
-        return int(np.count_nonzero(self.mask & (target[y : y + height, x : x + width] != value)))
-
-
-NOTHING = Cover(np.zeros((0, 0), bool), (0, 0), 0)
+    def hidden(self, seen: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """How many of each object's pixels are not `seen` [P], int [count]."""
+        return np.bincount(self.owner[~seen], minlength=len(self.beyond))
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,30 +79,43 @@ def boxes(pixels: Array, owner: NDArray[np.int64], count: int) -> Array:
     return found
 
 
-def covers(
-    pixels: Array, owner: NDArray[np.int64], count: int, size: tuple[int, int]
-) -> list[Cover]:
-    """What each owner's polygons [K, M, 2] cover, their union, in an image of `size`."""
+def covered(
+    pixels: Array,
+    owner: NDArray[np.int64],
+    count: int,
+    size: tuple[int, int],
+    asked: Box | None = None,
+) -> Covered:
+    """What each owner's polygons [K, M, 2] cover, their union, in an image of `size`.
+
+    asked: the part of the image whose pixels are asked for; all of it by default.
+    """
+    width, height = size
     rows = np.ptp(pixels[..., 1]) if pixels.size else 0.0
     step = max(int(np.ceil(rows / _MOST_ROWS)), 1)
-    runs = spans(pixels / step if step > 1 else pixels)
     if step > 1:  # of something enormous the image sees a small part, which is counted as it is
-        total = _union_length(runs, owner, count) * step**2
-        runs = spans(pixels, size[1])
+        whole = _union_length(spans(pixels / step), owner, count) * step**2
+        runs, asked = spans(pixels, height), None
     else:
-        outside = _union_length(_outside(runs, size), owner, count)
+        runs = spans(pixels)
     polygon, row, left, right = runs
-    left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
-    inside = (right > left) & (row >= 0) & (row < size[1])
-    whose = owner[polygon[inside]]
-    row, left, right = row[inside], left[inside], right[inside]
-    result = []
-    borders = np.searchsorted(whose, np.arange(count + 1)).tolist()
-    for i, part in enumerate(map(slice, borders, borders[1:])):
-        mask, corner = _union(row[part], left[part], right[part])
-        beyond = outside[i] if step == 1 else max(total[i] - np.count_nonzero(mask), 0)
-        result.append(Cover(mask, corner, int(beyond)))
-    return result
+    x0, y0, x1, y1 = asked or (0, 0, width, height)
+    first, last = np.maximum(left, x0), np.minimum(right, x1)
+    inside = np.flatnonzero((last > first) & (row >= y0) & (row < y1))
+    # one long line of all owners' rows, with a pixel between them that none has
+    line = width * height + 1
+    start = owner[polygon[inside]] * line + row[inside] * width
+    start, end = _merged(start + first[inside], start + last[inside])
+    length, whose = end - start, start // line
+    pixel = np.arange(length.sum()) + np.repeat(
+        start - whose * line - np.cumsum(length) + length, length
+    )
+    if step > 1:
+        within = np.bincount(whose, weights=length, minlength=count)
+        beyond = np.maximum(whole - within, 0).astype(np.int64)
+    else:
+        beyond = _union_length(_outside(runs, size), owner, count)
+    return Covered(pixel, np.repeat(whose, length), beyond)
 
 
 def _outside(runs: Runs, size: tuple[int, int]) -> Runs:
@@ -124,25 +134,12 @@ def _outside(runs: Runs, size: tuple[int, int]) -> Runs:
 def _merged(
     start: NDArray[np.int64], end: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ascending starts and ends of the union of intervals, of which there is at least one."""
+    """Ascending starts and ends of the union of intervals."""
     start, end = np.sort(start), np.sort(end)
     # as many have ended as have begun: a gap follows
     apart = start[1:] > end[:-1]
-    return start[np.append(True, apart)], end[np.append(apart, True)]
-
-
-def _union(
-    row: NDArray[np.int64], left: NDArray[np.int64], right: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], tuple[int, int]]:
-    """Mask [h, w] of the union of runs, and its corner (x, y)."""
-    if not len(row):
-        return NOTHING.mask, NOTHING.corner
-    x0, y0 = int(left.min()), int(row.min())
-    width, height = int(right.max()) - x0, int(row.max()) + 1 - y0
-    at = (row - y0) * width - x0
-    edges = np.stack(_merged(at + left, at + right), axis=1).ravel()
-    lengths = np.diff(edges, prepend=0, append=width * height)
-    return np.repeat(np.arange(len(lengths)) % 2 == 1, lengths).reshape(height, width), (x0, y0)
+    edge = np.ones(min(len(start), 1), bool)
+    return start[np.append(edge, apart)], end[np.append(apart, edge)]
 
 
 def _union_length(runs: Runs, owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -177,24 +174,22 @@ def spans(pixels: Array, rows: int | None = None) -> Runs:
     start = np.cumsum(height) - height
     # of a convex polygon one edge crosses a row on its way down the image, and one on its way up
     following = np.roll(first, -1, axis=1)
-    rows_crossed = np.abs(following - first)
-    edge = np.flatnonzero(rows_crossed)
-    whose = edge // pixels.shape[1]
-    length = rows_crossed.ravel()[edge]
+    crossed = np.abs(following - first).ravel()
+    edge = np.flatnonzero(crossed)
+    whose, length = edge // pixels.shape[1], crossed[edge]
     begin = np.minimum(first, following).ravel()[edge]
     rises = (following < first).ravel()[edge]
-    count = int(height.sum())
-    ends = np.cumsum(length)
-    step = np.arange(int(length.sum())) - np.repeat(ends - length, length)
-    y_center = np.repeat(begin, length) + step + 0.5
-    at = np.repeat(start[whose] + begin - top[whose] + rises * count, length) + step
-    crossings = np.empty(2 * count)
-    crossings[at] = np.repeat(x.ravel()[edge], length) + (
-        y_center - np.repeat(y.ravel()[edge], length)
-    ) * np.repeat(slope.ravel()[edge], length)
-    falling, rising = crossings.reshape(2, count)
-    left = np.ceil(np.minimum(falling, rising) - 0.5).astype(np.int64)
-    right = np.ceil(np.maximum(falling, rising) - 0.5).astype(np.int64)
+    slope = slope.ravel()[edge]
+    at_begin = x.ravel()[edge] + (begin + 0.5 - y.ravel()[edge]) * slope
+    count, total = int(height.sum()), int(length.sum())
+    before = np.cumsum(length) - length
+    step = np.arange(total) - np.repeat(before, length)
+    place = np.repeat(start[whose] + begin - top[whose] + rises * count, length) + step
+    columns = np.empty(2 * count, np.int64)
+    # the first column whose centre a crossing is not right of
+    columns[place] = np.ceil(np.repeat(at_begin - 0.5, length) + step * np.repeat(slope, length))
+    falling, rising = columns.reshape(2, count)
+    left, right = np.minimum(falling, rising), np.maximum(falling, rising)
     some = np.flatnonzero(right > left)
     polygon = np.repeat(np.arange(len(pixels)), height)
     row = np.arange(count) + np.repeat(top - start, height)
@@ -207,37 +202,51 @@ _MOST_POINTS = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """What single pixel centres see. pixel: int [P, 2], column and row; within: bool [P], whether
-    that is in the image; depth_m: float64 [P]; rest_mm: float64 [P, 3]. Outside the image a point
-    is the centre of `step` by `step` pixels, of which `pixel` is the first."""
+    """What single pixel centres see. column, row: int [P]; within: bool [P], whether that is in the
+    image; depth_m: float64 [P]. Outside the image a point is the centre of `step` by `step` pixels,
+    of which (column, row) is the first.
 
-    pixel: NDArray[np.int64]
+    facet: int [P], index into `plane`, float64 [F, 3, 4]: what each facet's rest position over
+    depth, in mm / m, and inverse depth are at its origin, and by how much they grow a pixel to the
+    right and down. away: float64 [2, P], right and down from that origin.
+    """
+
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
     within: NDArray[np.bool_]
     depth_m: Array
-    rest_mm: Array
     step: int
+    facet: NDArray[np.int64]
+    plane: Array
+    away: Array
+
+    def rest_mm(self, which: NDArray[np.int64]) -> Array:
+        """Rest positions [W, 3] of the points numbered `which` [W]."""
+        plane, (right, down) = self.plane[self.facet[which], :, :3], self.away[:, which, None]
+        over_depth = plane[:, 0] + right * plane[:, 1] + down * plane[:, 2]
+        return np.asarray(over_depth * self.depth_m[which, None])
 
 
-def surface_points(seen: Projected, size: tuple[int, int]) -> Points:
+def surface_points(seen: Projected, size: tuple[int, int]) -> list[Points]:
     """Every pixel centre in every facet, also outside an image of `size`: there on a grid that is
-    coarser the larger the facets are together."""
+    coarser the larger the facets are together, as Points of its own."""
     bounds = boxes(seen.pixels, np.zeros(len(seen.owner), np.int64), 1)[0]
     area = np.prod(bounds[2:] - bounds[:2]) if np.isfinite(bounds).all() else 0.0
     if area <= _MOST_POINTS:
-        return _points(seen, spans(seen.pixels), 1, size)
+        return [_points(seen, spans(seen.pixels), 1, size)]
     polygon, row, left, right = spans(seen.pixels, size[1])
     left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
     fine = _points(seen, (polygon, row, left, right), 1, size)
     step = int(np.ceil(2 * np.sqrt(area / _MOST_POINTS)))
     coarse = _points(seen, spans(seen.pixels / step), step, size)
     off = ~coarse.within
-    return Points(
-        np.concatenate([fine.pixel, coarse.pixel[off]]),
-        np.concatenate([fine.within, coarse.within[off]]),
-        np.concatenate([fine.depth_m, coarse.depth_m[off]]),
-        np.concatenate([fine.rest_mm, coarse.rest_mm[off]]),
-        step,
+    outside = replace(
+        coarse,
+        **{name: getattr(coarse, name)[off] for name in ("column", "row", "within", "depth_m")},
+        facet=coarse.facet[off],
+        away=coarse.away[:, off],
     )
+    return [fine, outside]
 
 
 def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Points:
@@ -248,21 +257,31 @@ def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Po
     """
     polygon, row, left, right = runs
     length = right - left
-    run = np.repeat(np.arange(len(row)), length)
-    column = left[run] + np.arange(len(run)) - np.repeat(np.cumsum(length) - length, length)
-    met, polygon = np.unique(polygon, return_inverse=True)
-    corners, depth_m, rest_mm = seen.pixels[met], seen.depth_m[met], seen.rest_mm[met]
-    polygon, row = polygon[run], row[run]
-    origin = corners[:, :1]
-    flat = np.concatenate([corners - origin, np.ones_like(depth_m)[..., None]], axis=2)
-    values = np.concatenate([rest_mm, np.ones_like(rest_mm[..., :1])], axis=2)
-    # clipping leaves corners that repeat; of three as drawn the inverse is the same for less
-    inverse = np.linalg.pinv if flat.shape[1] > 3 else np.linalg.inv
-    to_values = inverse(flat) @ (values / depth_m[..., None])
-    pixel = np.stack([column, row], axis=1) * step
-    center = pixel + 0.5 * step
-    within = np.all((center >= 0) & (center < size), axis=1)
-    at = np.concatenate([center - origin[polygon, 0], np.ones((len(pixel), 1))], axis=1)
-    found = np.einsum("pi,pij->pj", at, to_values[polygon])
-    depth = 1 / found[:, 3]
-    return Points(pixel, within, depth, found[:, :3] * depth[:, None], step)
+    ends = np.cumsum(length)
+    column = np.arange(length.sum()) + np.repeat(left - ends + length, length)
+    met = np.zeros(len(seen.owner), bool)
+    met[polygon] = True
+    origin, plane = _planes(seen, np.flatnonzero(met))
+    facet = np.repeat((np.cumsum(met) - 1)[polygon], length)
+    column, row = column * step, np.repeat(row, length) * step
+    x, y = column + 0.5 * step, row + 0.5 * step
+    within = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1])
+    away = np.stack([x - origin[facet, 0], y - origin[facet, 1]])
+    inverse, right_of, down_of = plane[..., 3].T.copy()
+    depth = 1 / (inverse[facet] + away[0] * right_of[facet] + away[1] * down_of[facet])
+    return Points(column, row, within, depth, step, facet, plane, away)
+
+
+def _planes(seen: Projected, which: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Origins [F, 2] in pixels and planes [F, 3, 4], as of Points, of the facets `which` [F]."""
+    corners, depth, rest = seen.pixels[which], seen.depth_m[which], seen.rest_mm[which]
+    values = np.concatenate([rest, np.ones_like(rest[..., :1])], axis=2) / depth[..., None]
+    # three corners fix a plane: of more, as clipping leaves, those of the largest triangle of a fan
+    sides = corners[:, 1:] - corners[:, :1]
+    doubled = sides[:, :-1, 0] * sides[:, 1:, 1] - sides[:, :-1, 1] * sides[:, 1:, 0]
+    k, row = np.abs(doubled).argmax(axis=1), np.arange(len(which))
+    b, c, area = sides[row, k], sides[row, k + 1], doubled[row, k, None]
+    grows, other = values[row, k + 1] - values[:, 0], values[row, k + 2] - values[:, 0]
+    right = (grows * c[:, 1:] - other * b[:, 1:]) / area
+    down = (other * b[:, :1] - grows * c[:, :1]) / area
+    return corners[:, 0], np.stack([values[:, 0], right, down], axis=1)

@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +10,7 @@ from fastgen.camera import MM
 from fastgen.classes import SOUND_CONTAINER
 from fastgen.damage import amount_mm, in_hole, mask_values, may_be_seen
 from fastgen.geometry.mesh import Mesh
-from fastgen.labelling.coverage import NOTHING, Cover, project, surface_points
+from fastgen.labelling.coverage import Points, project, surface_points
 from fastgen.labelling.facets import Facets, damage_facets
 from fastgen.labelling.visibility import Shot, float_box, mask_box, visibility
 from fastgen.sample import Object
@@ -29,7 +30,7 @@ def damage_objects(shot: Shot) -> list[Object]:
     for damage, value in zip(shot.scene.damages, mask_values(shot.scene.damages), strict=True):
         shown = shot.frame.damage == value
         area = int(np.count_nonzero(shown))
-        alone, bounds = _cover(shot, damage, shown)
+        hidden, beyond, bounds = _alone(shot, damage, shown)
         objects.append(
             Object(
                 id=value,
@@ -38,54 +39,64 @@ def damage_objects(shot: Shot) -> list[Object]:
                 bbox=mask_box(shown),
                 amodal_bbox=float_box(bounds),
                 area=area,
-                **visibility(shot, alone, shot.frame.damage, value, area),
+                **visibility(shot.config, area, hidden, beyond),
             )
         )
     return objects
 
 
-def _cover(
+def _alone(
     shot: Shot, damage: Damage, shown: NDArray[np.bool_]
-) -> tuple[Cover, NDArray[np.float64]]:
-    """What the damage would cover alone, and the bounds of that, infinite where it is nothing."""
+) -> tuple[int, int, NDArray[np.float64]]:
+    """Of what the damage would cover alone: pixels of the image that are not shown, how many lie
+    outside it, and the bounds of all, infinite where it is nothing."""
     unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
     x, y, z = shot.view.position_m / MM
     # where a hole is in view all damages are drawn, and more of them are seen than one might think
     if not may_be_seen(damage, (x, y, z), shot.scene.damages) and not shown.any():
-        return NOTHING, unbounded
-    size = shot.view.size
-    points = surface_points(project(_facets(shot.scene, shot.mesh, damage), shot.view), size)
-    pixel, within = points.pixel, points.within
-    x, y = np.where(within[:, None], pixel, 0).T
+        return 0, 0, unbounded
+    x0, y0, width, height = cv2.boundingRect(shown.view(np.uint8))
+    bounds = np.array([x0, y0, x0 + width, y0 + height], np.float64) if width else unbounded
+    hidden, beyond = np.zeros(shown.size, bool), 0
+    for points in surface_points(
+        project(_facets(shot.scene, shot.mesh, damage), shot.view), shot.view.size
+    ):
+        part = _damaged(shot, damage, points, shown)
+        column, row, within = points.column[part], points.row[part], points.within[part]
+        if not len(part):
+            continue
+        size = np.where(within, 1, points.step)
+        least = column.min(), row.min()
+        most = (column + size).max(), (row + size).max()
+        bounds = np.concatenate([np.minimum(bounds[:2], least), np.maximum(bounds[2:], most)])
+        hidden[row[within] * shown.shape[1] + column[within]] = True
+        off = ~within
+        beyond += _distinct(column[off] // points.step, row[off] // points.step) * points.step**2
+    return int(np.count_nonzero(hidden & ~shown.ravel())), beyond, bounds
+
+
+def _damaged(
+    shot: Shot, damage: Damage, points: Points, shown: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Which of the points damage has reached, but for those where the image shows it or that the
+    sheet is sound."""
+    place = np.where(points.within, points.row * shown.shape[1] + points.column, 0)
     # where the sheet itself is seen, the damage target knows the answer already
-    known = within & (points.depth_m <= shot.frame.depth[y, x] * (1 + _DEPTH_SLACK))
-    known &= (shot.frame.damage[y, x] == SOUND_CONTAINER) | shown[y, x]
-    rest_mm = points.rest_mm[~known]
+    known = points.within & (points.depth_m <= shot.frame.depth.ravel()[place] * (1 + _DEPTH_SLACK))
+    known &= (shot.frame.damage.ravel()[place] == SOUND_CONTAINER) | shown.ravel()[place]
+    asked = np.flatnonzero(~known)
+    rest_mm = points.rest_mm(asked)
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     part |= in_hole(damage, rest_mm)
-    rows, columns = np.divmod(np.flatnonzero(shown), size[0])
-    covered = np.concatenate([pixel[~known][part], np.stack([columns, rows], axis=1)])
-    if not len(covered):
-        return NOTHING, unbounded
-    within = np.append(within[~known][part], np.ones(len(rows), bool))
-    ends = covered + np.where(within, 1, points.step)[:, None]
-    bounds = np.concatenate([covered.min(axis=0), ends.max(axis=0)]).astype(np.float64)
-    beyond = _distinct(covered[~within] // points.step) * points.step**2
-    inside = covered[within]
-    if not len(inside):
-        return Cover(NOTHING.mask, (0, 0), beyond), bounds
-    low = inside.min(axis=0)
-    mask = np.zeros((inside.max(axis=0) - low + 1)[::-1], bool)
-    mask[*(inside - low).T[::-1]] = True
-    return Cover(mask, (int(low[0]), int(low[1])), beyond), bounds
+    return asked[part]
 
 
-def _distinct(cells: NDArray[np.int64]) -> int:
-    """How many of cells [P, 2] of a grid differ: coverage.surface_points bounds their number, and
-    sorting them takes ten times as long."""
-    if not len(cells):
+def _distinct(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
+    """How many cells [P] of a grid differ: coverage.surface_points bounds their number, and sorting
+    them takes ten times as long."""
+    if not len(columns):
         return 0
-    columns, rows = (cells - cells.min(axis=0)).T
+    columns, rows = columns - columns.min(), rows - rows.min()
     met = np.zeros((rows.max() + 1, columns.max() + 1), bool)
     met[rows, columns] = True
     return int(np.count_nonzero(met))

@@ -5,6 +5,7 @@ in the world are exact on the triangles that are drawn. Sutherland and Hodgman 1
 Polygon Clipping".
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import TypeVar
@@ -39,26 +40,21 @@ class Facets:
 def decal_facets(scene: Scene, mesh: Mesh) -> Facets:
     """The labelled decals of `scene`; owner counts them in scene order from 0."""
     decals = [decal for decal in scene.decals if decal.class_name]
-    triangles, sheets, planes, owner = [], [], [], []
-    for number, decal in enumerate(decals):
-        found, sheet = _on_chart(mesh, decal)
-        normals, offsets = half_planes(decal)
-        inmost = highest(sheet @ normals.T + offsets)  # toward each edge
-        touches = (inmost > 0).all(axis=1)
-        sheets.append(sheet[touches])
-        triangles.append(found[touches])
-        planes.append(np.broadcast_to(np.column_stack([normals, offsets]), (len(sheets[-1]), 4, 3)))
-        owner.append(np.full(len(sheets[-1]), number))
     if not decals:
         return Facets(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), np.zeros(0, np.int64))
-    index, whose = np.concatenate(triangles), np.concatenate(owner)
-    sheet, edges = np.concatenate(sheets), np.concatenate(planes)
+    found = [_on_chart(mesh, face, decals) for face in dict.fromkeys(d.face for d in decals)]
+    whose, index, sheet = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.argsort(whose, kind="stable")
+    whose, index, sheet = whose[order], index[order], sheet[order]
+    normals, offsets = (np.stack(parts) for parts in zip(*map(half_planes, decals), strict=True))
+    # an edge's distance is linear in the weights, so one value a corner of the triangle does
+    inside = np.einsum("tcd,ted->tce", sheet, normals[whose]) + offsets[whose, None]
+    touches = (highest(inside) > 0).all(axis=1)
+    index, whose, inside = index[touches], whose[touches], inside[touches]
     weights = np.broadcast_to(np.eye(3), (len(index), 3, 3))
     for k in range(4):
-        # an edge's distance is linear in the weights, so one value a corner of the triangle does
-        at_corners = np.einsum("tcd,td->tc", sheet, edges[:, k, :2]) + edges[:, k, 2:]
-        weights, left = clip(weights, np.einsum("tmc,tc->tm", weights, at_corners))
-        index, whose, sheet, edges = index[left], whose[left], sheet[left], edges[left]
+        weights, left = clip(weights, np.einsum("tmc,tc->tm", weights, inside[..., k]))
+        index, whose, inside = index[left], whose[left], inside[left]
     corners, rest = _corners(scene, mesh, index)
     return Facets(weights @ corners, weights @ rest, whose)
 
@@ -88,6 +84,35 @@ def mesh_facets(scene: Scene | None, mesh: Mesh, groups: list[str], owner: int) 
     )
     corners, rest = _corners(scene, mesh, index)
     return Facets(corners, rest, np.full(len(index), owner))
+
+
+def in_fours(facets: Facets) -> Facets:
+    """The same surface of fewer polygons: of triangles 2 i and 2 i + 1 one with four corners where
+    that is flat and convex, as of a box's side. All facets: triangles of one owner."""
+    even = len(facets) // 2 * 2
+    first, second = facets.corners_mm[:even:2], facets.corners_mm[1:even:2]
+    # the corner of the second that the first lacks, before or behind the two that it shares
+    ahead = (second[:, 1] == first[:, 0]) & (second[:, 2] == first[:, 2])
+    behind = (second[:, 0] == first[:, 0]) & (second[:, 1] == first[:, 2])
+    fits = ahead.all(axis=1) | behind.all(axis=1)
+    fourth = np.where(ahead.all(axis=1), 0, 2)[:, None, None]
+
+    def with_fourth(corners: Array) -> Array:
+        other = np.take_along_axis(corners[1:even:2], fourth, axis=1)
+        return np.concatenate([corners[:even:2], other], axis=1)
+
+    four = with_fourth(facets.corners_mm)
+    side = np.roll(four, -1, axis=1) - four
+    turns = np.cross(side, np.roll(side, -1, axis=1))
+    along = (turns * turns[:, :1]).sum(axis=2)
+    lengths = np.linalg.norm(turns, axis=2)
+    fits &= (along > (1 - 1e-6) * lengths * lengths[:, :1]).all(axis=1)
+    single = np.append(np.repeat(~fits, 2), np.ones(len(facets) - even, bool))
+    corners, rest = (
+        np.concatenate([with_fourth(points)[fits], _padded(points[single], 4)])
+        for points in (facets.corners_mm, facets.rest_mm)
+    )
+    return Facets(corners, rest, np.broadcast_to(facets.owner[:1], len(corners)))
 
 
 def half_planes(decal: Decal) -> tuple[Array, Array]:
@@ -165,16 +190,21 @@ def highest(values: NDArray[Number]) -> NDArray[Number]:
     return reduce(np.maximum, np.moveaxis(values, 1, 0))
 
 
-def _on_chart(mesh: Mesh, decal: Decal) -> tuple[NDArray[np.int64], Array]:
-    """Triangles of the decal's chart around it, and their sheet corners [T, 3, 2] in mm."""
-    number = mesh.chart_index(decal.face)
+def _on_chart(
+    mesh: Mesh, face: str, decals: Sequence[Decal]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Pairs of a decal on chart `face`, by its number, and a triangle around it: both [P], and the
+    triangle's sheet corners [P, 3, 2] in mm."""
+    number = mesh.chart_index(face)
     index, sheet = mesh.chart_triangles(number)
     low, high = mesh.chart_bounds(number)
-    reach = np.hypot(*decal.size_mm) / 2
-    center = np.array(decal.center_mm)
-    near = (high[0] >= center[0] - reach) & (low[0] <= center[0] + reach)
-    near &= (high[1] >= center[1] - reach) & (low[1] <= center[1] + reach)
-    return index[near], sheet[near]
+    here = np.array([i for i, decal in enumerate(decals) if decal.face == face])
+    x, y = np.array([decals[i].center_mm for i in here]).T[..., None]
+    reach = np.array([np.hypot(*decals[i].size_mm) / 2 for i in here])[:, None]
+    near = (high[0] >= x - reach) & (low[0] <= x + reach)
+    near &= (high[1] >= y - reach) & (low[1] <= y + reach)
+    row, triangle = np.nonzero(near)
+    return here[row], index[triangle], sheet[triangle]
 
 
 def _corners(scene: Scene | None, mesh: Mesh, index: NDArray[np.int64]) -> tuple[Array, Array]:

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import Any, TypedDict
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import View
 from fastgen.config import Config
 from fastgen.geometry.mesh import Mesh
-from fastgen.labelling.coverage import Cover
 from fastgen.sample import Box, Frame
 from fastgen.scene import Scene
 
@@ -41,18 +41,12 @@ class Visibility(TypedDict):
     ignored: bool
 
 
-def visibility(
-    shot: Shot, alone: Cover, target: NDArray[np.generic], value: int, area: int
-) -> Visibility:
-    """alone: what the object would cover by itself. target [H, W] has `value` in its `area` visible
-    pixels.
-
-    Pixels that are seen count as covered whatever the cover says of them.
-    """
-    hidden, beyond = alone.hidden(target, value), alone.beyond
+def visibility(config: Config, area: int, hidden: int, beyond: int) -> Visibility:
+    """area: the object's visible pixels; hidden: those that it would cover alone as well; beyond:
+    likewise outside the image."""
     whole = area + hidden + beyond
     fraction = area / whole if whole else 0.0
-    rules = shot.config.labels
+    rules = config.labels
     return {
         "visible_fraction": fraction,
         "truncated": bool(area) and beyond > 0,
@@ -63,10 +57,8 @@ def visibility(
 
 def mask_box(mask: NDArray[np.bool_]) -> Box | None:
     """Tight box of a mask [H, W], None where it is empty."""
-    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-    if not rows.size:
-        return None
-    return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    return (x, y, x + width, y + height) if width else None
 
 
 def float_box(bounds: NDArray[np.float64]) -> tuple[float, float, float, float] | None:
