@@ -125,14 +125,14 @@ class DepthMap:
         self._target = ctx.framebuffer([], self.depth)
 
     def draw(self, views: Iterable[MapView]) -> None:
-        """Show views and nothing beside."""
+        """Show views; what lies beside their tiles is left as it was."""
         ctx = self._ctx
         self._target.use()
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         ctx.front_face = "ccw"
-        self._target.clear(depth=1.0)
         for view in views:
+            self._target.clear(depth=1.0, viewport=view.tile)
             self._target.viewport = view.tile
             ctx.cull_face = "front"
             self._show(view.bodies, view.to_map)

@@ -6,6 +6,7 @@ Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import moderngl
 import numpy as np
@@ -114,26 +115,35 @@ class ShadowMap:
         if shown == self._shown:
             return
         self._shown = ()  # until it does, whatever happens
-        bodies: list[Solid] = [_bent(container, outline or container, damages)]
-        if spreader is not None:
-            bodies.append(spreader)
+        body, of_door = _bent(container, outline or container, damages)
+        bodies: list[Solid] = [body] if spreader is None else [body, spreader]
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
         tiles = [_FIRST_TILE, *_OTHER_TILES[: len(toward) - 1]]
         to_tiles = np.stack([map_matrix(way, low, high) for way in toward])
         first, size = np.split(np.array(tiles), 2, axis=1)
         to_tiles[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
-        drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
-        thick = drawn[:1]
-        views = [
-            MapView(drawn, matrix, tile, thick)
-            for matrix, tile in zip(to_tiles, tiles, strict=True)
+        side = float(np.sign(toward[0, 0]))
+        # the door shades its own end alone, which has a tile of its own or the sun behind it
+        plain = Body(body.positions_mm, body.triangles[~of_door]) if side else body
+        drawn: dict[Solid, DrawnBody] = {}
+
+        def view(solids: Sequence[Solid], matrix: Array, tile: Tile, thick: bool = True) -> MapView:
+            for solid in solids:
+                if solid not in drawn:
+                    drawn[solid] = DrawnBody(self._ctx, self._program, solid)
+            shown = [drawn[solid] for solid in solids]
+            return MapView(shown, matrix, tile, shown[:1] if thick else [])
+
+        views = [view([plain, *bodies[1:]], to_tiles[0], tiles[0])]
+        views += [
+            view(bodies, matrix, tile)
+            for matrix, tile in zip(to_tiles[1:], tiles[1:], strict=True)
         ]
         self.toward = toward
         self._to_map = _in_map(to_tiles, np.array(tiles))
         self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(_MAP_SIZE, 2)
         self.end = _NO_END
-        side = float(np.sign(toward[0, 0]))
         if side:
             from_mm = float(np.abs(container.bounds_mm[int(side > 0)][0])) - _END_DEPTH_MM
             # what shades a point there stands still farther out, but for lookups around it
@@ -145,13 +155,10 @@ class ShadowMap:
                 self.end, matrix, tile = _end_tile(
                     to_tiles[0], self._to_map[0], ends, side, from_mm
                 )
-                outer = [DrawnBody(self._ctx, self._program, body) for body in ends]
-                thick = outer[:1] if ends[0] is container_end else []
-                views.append(MapView(outer, matrix, tile, thick))
-                drawn = drawn + outer
+                views.append(view(ends, matrix, tile, ends[0] is container_end))
         self._map.draw(views)
-        for body in drawn:
-            body.release()
+        for item in drawn.values():
+            item.release()
         self._shown = shown
 
     def from_ray(self, eye_m: Array) -> Array:
@@ -216,10 +223,15 @@ def _beyond(body: Solid, side: float, from_mm: float) -> Body:
     return Body(body.positions_mm, body.triangles[outer])
 
 
-def _bent(container: Mesh, outline: Mesh, damages: tuple[Damage, ...]) -> Solid:
-    """A container as the damages move it: of its own triangles where they do, else of outline's."""
+def _bent(
+    container: Mesh, outline: Mesh, damages: tuple[Damage, ...]
+) -> tuple[Body, NDArray[np.bool_]]:
+    """A container as the damages move it, of its own triangles where they do, else of outline's,
+    and which triangles are of its door. Floor members, in the shade of the floor, are left out."""
     if not damages:
-        return outline
+        part = _parts(outline)
+        kept = part != _MEMBER
+        return Body(outline.positions_mm, outline.triangles[kept]), part[kept] == _DOOR
     moved = container.positions_mm.copy()
     columns = np.ascontiguousarray(moved.T)  # comparisons along rows take ten times as long
     reached = np.zeros(len(container.charts), bool)
@@ -230,12 +242,27 @@ def _bent(container: Mesh, outline: Mesh, damages: tuple[Damage, ...]) -> Solid:
         rest = container.positions_mm[near].astype(np.float64)
         moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
         reached[container.chart[near]] = True
-    bent = container.triangles[reached[container.chart[container.triangles[:, 0]]]]
-    rigid = outline.triangles[~reached[outline.chart[outline.triangles[:, 0]]]]
-    return Body(
+    bent, rigid = _parts(container), _parts(outline)
+    is_bent = reached[container.chart[container.triangles[:, 0]]] & (bent != _MEMBER)
+    is_rigid = ~reached[outline.chart[outline.triangles[:, 0]]] & (rigid != _MEMBER)
+    body = Body(
         np.concatenate([moved, outline.positions_mm]),
-        np.concatenate([bent, rigid + np.uint32(len(moved))]),
+        np.concatenate(
+            [container.triangles[is_bent], outline.triangles[is_rigid] + np.uint32(len(moved))]
+        ),
     )
+    return body, np.concatenate([bent[is_bent], rigid[is_rigid]]) == _DOOR
+
+
+_DOOR, _MEMBER = 1, 2
+
+
+@lru_cache(maxsize=32)
+def _parts(container: Mesh) -> NDArray[np.uint8]:
+    """Of each triangle [T]: _DOOR, of leaves and gear, _MEMBER, below the floor, or 0."""
+    numbers = {"door": _DOOR, "member": _MEMBER}
+    of_chart = [numbers.get(chart.name.split(".")[0], 0) for chart in container.charts]
+    return np.array(of_chart, np.uint8)[container.chart[container.triangles[:, 0]]]
 
 
 def shader_suns(suns: Sequence[Sun]) -> int:
