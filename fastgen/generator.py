@@ -46,15 +46,16 @@ MIN_SIZE, MAX_SIZE = 64, 4096
 
 
 class Quality(NamedTuple):
-    """samples_per_axis, lookups, traced: as of Renderer."""
+    """As of Renderer."""
 
     samples_per_axis: int
     lookups: int
     traced: bool = False
+    shadow_detail: float = 1.0
 
 
 QUALITY = {
-    "draft": Quality(1, 1),
+    "draft": Quality(1, 1, shadow_detail=0.5),
     "balanced": Quality(3, 2),
     "fine": Quality(5, 25),
     "high": Quality(5, 25, traced=True),

@@ -78,6 +78,7 @@ class Renderer:
     layers in a pixel, 1, 2 or 25; 1 of one sample.
     mask_threshold_mm: what moved by more counts as damaged. traced: whether light is found by rays
     at points of the image, and not at vertices alone; ask ray_bodies.check_rays first.
+    shadow_detail: as of sun_shadow.ShadowMap.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
 
@@ -89,6 +90,7 @@ class Renderer:
         lookups: int = 2,
         mask_threshold_mm: float = 5.0,
         traced: bool = False,
+        shadow_detail: float = 1.0,
     ) -> None:
         self._gl = gl
         self._ctx = gl.ctx
@@ -109,7 +111,7 @@ class Renderer:
         self._lights: Kept[GpuLight] = Kept(24)
         self._scenes: Kept[_SceneDecals] = Kept(2)
         self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
-        self._sun_shadow = ShadowMap(self._ctx, self._occluder)
+        self._sun_shadow = ShadowMap(self._ctx, self._occluder, shadow_detail)
         self._blocks = {
             block.name: self._ctx.buffer(reserve=block.size)
             for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)

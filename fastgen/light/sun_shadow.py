@@ -7,6 +7,7 @@ Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -22,10 +23,10 @@ from fastgen.scene import Damage
 _EDGE_TEXELS = 1
 """Nothing is drawn on a sun's tile's edge: it stands for all that lies beyond."""
 
-_FIRST_SIZE = (1536 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
-"""Texels along and across for the first sun: of up to 10 mm each way."""
+_FIRST_TEXELS = (1536, 512)
+"""Along and across for the first sun: of up to 10 mm each way."""
 
-_END_SIZE = (1280, 1280)
+_END_TEXELS = (1280, 1280)
 _END_TEXEL_MM = 2.5
 _END_DEPTH_MM = 450.0
 """The first sun has another tile for the end that it shines on, to as far behind its castings as
@@ -35,23 +36,8 @@ the tile is full."""
 _END_BORDER_MM = 60.0
 """Around the part of it that is asked for: more than lookups of a filtered shadow reach."""
 
-_OTHERS_SIZE = (1024 + 2 * _EDGE_TEXELS, 512 + 2 * _EDGE_TEXELS)
+_OTHERS_TEXELS = (1024, 512)
 """For each of the others: what they throw is fainter."""
-
-_LEFT, _BELOW = max(_END_SIZE[0], _OTHERS_SIZE[0]), _FIRST_SIZE[1]
-_MAP_SIZE = (
-    max(_FIRST_SIZE[0], _LEFT + _OTHERS_SIZE[0]),
-    _BELOW + max(_END_SIZE[1], 2 * _OTHERS_SIZE[1]) + _OTHERS_SIZE[1],
-)
-_FIRST_TILE: Tile = (0, 0, *_FIRST_SIZE)
-_OTHER_TILES: tuple[Tile, ...] = tuple(
-    (x, y, *_OTHERS_SIZE)
-    for x, y in (
-        (_LEFT, _BELOW),
-        (_LEFT, _BELOW + _OTHERS_SIZE[1]),
-        (0, _MAP_SIZE[1] - _OTHERS_SIZE[1]),
-    )
-)
 
 _BIAS_MM = 2.0
 
@@ -74,6 +60,36 @@ class EndTile:
     from_mm: float
 
 
+class _Layout(NamedTuple):
+    """Where a map of `size` texels has the tile of each sun, and `end`, the room for the end's,
+    whose texels are no finer than end_texel_mm."""
+
+    size: tuple[int, int]
+    suns: tuple[Tile, ...]
+    end: Tile
+    end_texel_mm: float
+
+
+def _layout(detail: float) -> _Layout:
+    """detail: of the full number of texels each way."""
+
+    def scaled(texels: tuple[int, int], edge: int) -> tuple[int, int]:
+        along, across = (round(detail * count) + 2 * edge for count in texels)
+        return along, across
+
+    first, others = (scaled(size, _EDGE_TEXELS) for size in (_FIRST_TEXELS, _OTHERS_TEXELS))
+    end = scaled(_END_TEXELS, 0)
+    left, below = max(end[0], others[0]), first[1]
+    height = below + max(end[1], 2 * others[1]) + others[1]
+    corners = ((left, below), (left, below + others[1]), (0, height - others[1]))
+    return _Layout(
+        (max(first[0], left + others[0]), height),
+        ((0, 0, *first), *((*corner, *others) for corner in corners)),
+        (0, below, *end),
+        _END_TEXEL_MM / detail,
+    )
+
+
 _NO_END = EndTile(np.zeros(4), np.array([1.0, 1.0, 0.0, 0.0]), 1.0, 0.0)
 
 
@@ -81,20 +97,24 @@ class ShadowMap:
     """What each sun meets first of a container and the spreader that holds it, less its cables.
 
     Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
-    made anew for each, freed ones would stay with the process in pieces. toward: unit vectors
+    made anew for each, freed ones would stay with the process in pieces. detail: of the full number
+    of texels each way, 0.5 for a quarter of them. toward: unit vectors
     [S, 3] to the suns. tiles: [S, 4], where in the texture each has its own part, from the centre
     (u, v) of the first texel to that of the last. end: the first sun's finer part.
     """
 
-    def __init__(self, ctx: moderngl.Context, program: moderngl.Program) -> None:
+    def __init__(
+        self, ctx: moderngl.Context, program: moderngl.Program, detail: float = 1.0
+    ) -> None:
         self._ctx = ctx
         self._program = program
+        self._layout = _layout(detail)
         self._shown: tuple[object, ...] = ()
         self.toward = np.zeros((0, 3))
         self._to_map = np.zeros((0, 4, 4))
         self.tiles = np.zeros((0, 4))
         self.end = _NO_END
-        self._map = DepthMap(ctx, program, _MAP_SIZE)
+        self._map = DepthMap(ctx, program, self._layout.size)
         self.depth = self._map.depth
         self.depth.compare_func = "<="
         self.depth.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -119,13 +139,13 @@ class ShadowMap:
         bodies: list[Solid] = [body] if spreader is None else [body, spreader]
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
-        tiles = [_FIRST_TILE, *_OTHER_TILES[: len(toward) - 1]]
+        tiles = self._layout.suns[: len(toward)]
         to_tiles = np.stack([map_matrix(way, low, high) for way in toward])
         first, size = np.split(np.array(tiles), 2, axis=1)
         to_tiles[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
         side = float(np.sign(toward[0, 0]))
         # the door shades its own end alone, which has a tile of its own or the sun behind it
-        plain = Body(body.positions_mm, body.triangles[~of_door]) if side else body
+        plain = _plain(body, of_door) if side else body
         drawn: dict[Solid, DrawnBody] = {}
 
         def view(solids: Sequence[Solid], matrix: Array, tile: Tile, thick: bool = True) -> MapView:
@@ -137,12 +157,11 @@ class ShadowMap:
 
         views = [view([plain, *bodies[1:]], to_tiles[0], tiles[0])]
         views += [
-            view(bodies, matrix, tile)
-            for matrix, tile in zip(to_tiles[1:], tiles[1:], strict=True)
+            view(bodies, matrix, tile) for matrix, tile in zip(to_tiles[1:], tiles[1:], strict=True)
         ]
         self.toward = toward
-        self._to_map = _in_map(to_tiles, np.array(tiles))
-        self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(_MAP_SIZE, 2)
+        self._to_map = _in_map(to_tiles, np.array(tiles), self._layout)
+        self.tiles = np.hstack([first + 0.5, first + size - 0.5]) / np.tile(self._layout.size, 2)
         self.end = _NO_END
         if side:
             from_mm = float(np.abs(container.bounds_mm[int(side > 0)][0])) - _END_DEPTH_MM
@@ -153,7 +172,7 @@ class ShadowMap:
             ends = [end for end in (container_end, *others) if len(end.triangles)]
             if ends:
                 self.end, matrix, tile = _end_tile(
-                    to_tiles[0], self._to_map[0], ends, side, from_mm
+                    to_tiles[0], self._to_map[0], ends, side, from_mm, self._layout
                 )
                 views.append(view(ends, matrix, tile, ends[0] is container_end))
         self._map.draw(views)
@@ -175,17 +194,22 @@ class ShadowMap:
         self._map.release()
 
 
-def _in_map(to_tiles: Array, tiles: NDArray[np.int64]) -> Array:
+def _in_map(to_tiles: Array, tiles: NDArray[np.int64], layout: _Layout) -> Array:
     """Of matrices [S, 4, 4] to clip space of `tiles` [S, 4]: to that of the whole map."""
     first, size = np.split(tiles, 2, axis=1)
     found = to_tiles.copy()
-    found[:, :2] *= (size / _MAP_SIZE)[..., None]
-    found[:, :2, 3] += (2 * first + size) / _MAP_SIZE - 1
+    found[:, :2] *= (size / layout.size)[..., None]
+    found[:, :2, 3] += (2 * first + size) / layout.size - 1
     return found
 
 
 def _end_tile(
-    to_first: Array, first_to_map: Array, ends: Sequence[Body], side: float, from_mm: float
+    to_first: Array,
+    first_to_map: Array,
+    ends: Sequence[Body],
+    side: float,
+    from_mm: float,
+    layout: _Layout,
 ) -> tuple[EndTile, Array, Tile]:
     """The tile of the end toward `side`, and the view of `ends`, as of _beyond, to draw in it.
 
@@ -198,14 +222,14 @@ def _end_tile(
     units = np.linalg.norm(to_first[:2, :3], axis=1)  # a millimetre
     least = seen.min(axis=0) - _END_BORDER_MM * units
     most = seen.max(axis=0) + _END_BORDER_MM * units
-    texels = np.ceil((most - least) / units / _END_TEXEL_MM)
-    width, height = np.minimum(texels, _END_SIZE).astype(int).tolist()
-    tile = (0, _BELOW, width, height)
+    texels = np.ceil((most - least) / units / layout.end_texel_mm)
+    width, height = np.minimum(texels, layout.end[2:]).astype(int).tolist()
+    tile = (*layout.end[:2], width, height)
     to_tile = to_first.copy()
     to_tile[:2, 3] -= (least + most) / 2
     to_tile[:2] *= (2 / (most - least))[:, None]
 
-    (to_map,) = _in_map(to_tile[None], np.array([tile]))
+    (to_map,) = _in_map(to_tile[None], np.array([tile]), layout)
     units_in_map = np.linalg.norm(to_map[:2, :3], axis=1)
     scale = units_in_map / np.linalg.norm(first_to_map[:2, :3], axis=1)
     offset = to_map[:2, 3] - scale * first_to_map[:2, 3]
@@ -213,7 +237,7 @@ def _end_tile(
     place = np.concatenate([scale, (offset + 1 - scale) / 2])
     border = _END_BORDER_MM / 2 * units_in_map / 2
     first, size = np.split(np.array(tile), 2)
-    inner = np.concatenate([first / _MAP_SIZE + border, (first + size) / _MAP_SIZE - border])
+    inner = np.concatenate([first / layout.size + border, (first + size) / layout.size - border])
     return EndTile(place, inner, side, from_mm), to_tile, tile
 
 
@@ -254,13 +278,30 @@ def _bent(
     return body, np.concatenate([bent[is_bent], rigid[is_rigid]]) == _DOOR
 
 
+def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
+    """A container with one flat sheet for its door, where the door is deepest."""
+    corners = container.positions_mm[container.triangles[of_door].ravel()]
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    sheet = [(low[0], y, z) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    first = len(container.positions_mm)
+    return Body(
+        np.concatenate([container.positions_mm, np.array(sheet, np.float32)]),
+        np.concatenate(
+            [
+                container.triangles[~of_door],
+                np.array([[0, 2, 3], [0, 3, 1]], np.uint32) + np.uint32(first),
+            ]
+        ),
+    )
+
+
 _DOOR, _MEMBER = 1, 2
 
 
 @lru_cache(maxsize=32)
 def _parts(container: Mesh) -> NDArray[np.uint8]:
     """Of each triangle [T]: _DOOR, of leaves and gear, _MEMBER, below the floor, or 0."""
-    numbers = {"door": _DOOR, "member": _MEMBER}
+    numbers = {"door": _DOOR, "member": _MEMBER}  # charts such as member.3, door.handle.0
     of_chart = [numbers.get(chart.name.split(".")[0], 0) for chart in container.charts]
     return np.array(of_chart, np.uint8)[container.chart[container.triangles[:, 0]]]
 
