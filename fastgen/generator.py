@@ -52,10 +52,11 @@ class Quality(NamedTuple):
     lookups: int
     traced: bool = False
     shadow_detail: float = 1.0
+    coarse: bool = False
 
 
 QUALITY = {
-    "draft": Quality(1, 1, shadow_detail=0.5),
+    "draft": Quality(1, 1, shadow_detail=0.5, coarse=True),
     "balanced": Quality(3, 2),
     "fine": Quality(5, 25),
     "high": Quality(5, 25, traced=True),

@@ -78,7 +78,9 @@ class Renderer:
     layers in a pixel, 1, 2 or 25; 1 of one sample.
     mask_threshold_mm: what moved by more counts as damaged. traced: whether light is found by rays
     at points of the image, and not at vertices alone; ask ray_bodies.check_rays first.
-    shadow_detail: as of sun_shadow.ShadowMap.
+    shadow_detail: as of sun_shadow.ShadowMap. coarse: whether two by two pixels that see one facet,
+    without prints or damage near, are shaded at once, as Vaidyanathan et al. 2014, Coarse Pixel
+    Shading, do; of one sample a pixel only.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
 
@@ -91,6 +93,7 @@ class Renderer:
         mask_threshold_mm: float = 5.0,
         traced: bool = False,
         shadow_detail: float = 1.0,
+        coarse: bool = False,
     ) -> None:
         self._gl = gl
         self._ctx = gl.ctx
@@ -99,6 +102,7 @@ class Renderer:
         self._lookups = lookups
         self._mask_threshold_mm = mask_threshold_mm
         self._traced = traced
+        self._coarse = coarse
         self._geometry = {
             damage: link(self._ctx, "geometry.vert", "geometry.frag", UNITS, damage=damage)
             for damage in DAMAGE_VARIANTS
@@ -154,7 +158,9 @@ class Renderer:
         rays = light.sky_rays if layer == "all" else None
         shading = self._shading.get(
             (layer, per_axis),
-            lambda: Shading(self._ctx, per_axis, self._lookups, layer, rays is not None),
+            lambda: Shading(
+                self._ctx, per_axis, self._lookups, layer, rays is not None, self._coarse
+            ),
         )
         shadow = self._shadow(scene)
         seen = _view_values(scene, view, samples, self.exposure(scene, camera, size))

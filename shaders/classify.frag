@@ -2,6 +2,7 @@
 // is known of its labels already: decals, damages and holes are found where they are shaded.
 // llvmpipe runs both sides of every branch in a shader; the depth test is the branch that it takes.
 #version 430 core
+#extension GL_ARB_derivative_control : enable
 #include "blocks.glsl"
 #include "octahedral.glsl"
 #include "decal_cell.glsl"
@@ -50,6 +51,14 @@ void main() {
 #if HOLED
     if (near > 1) found = CLASS_HOLED;
 #endif
+#endif
+#if COARSE && defined(GL_ARB_derivative_control)
+    // where two by two pixels see one facet alone, the first is shaded for all; fragments run so, and
+    // derivatives tell what is alike (as floats that hold all bits of a key, in two parts)
+    vec3 known = vec3(key & 0xffffu, key >> 16, found);
+    float row = float(dFdxFine(known) == vec3(0.0));
+    if (found == CLASS_PLAIN && row > 0.0 && dFdyFine(known) == vec3(0.0) && dFdyFine(row) == 0.0)
+        found = ivec2(gl_FragCoord.xy) % 2 == ivec2(0) ? CLASS_COARSE : CLASS_WITHIN;
 #endif
     gl_FragDepth = CLASS_DEPTH_STEP * float(found);
     out_labels = key == 0u                        ? 0u

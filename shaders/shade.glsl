@@ -44,12 +44,38 @@ struct Shaded {
     float cover;   // share of the pixel that is no sky
 };
 
+// pixels that are shaded at once, in their middle
+#if WITH_COARSE
+const ivec2 SHADED = ivec2(2);
+#else
+const ivec2 SHADED = ivec2(1);
+#endif
+
+// what samplers hold in the middle of the pixels that are shaded at once, the first at sample_at
+vec4 mean_of(sampler2D values, ivec2 sample_at) {
+    vec4 first = texelFetch(values, sample_at, 0);
+#if WITH_COARSE
+    return 0.5 * (first + texelFetch(values, sample_at + SHADED - 1, 0));
+#else
+    return first;
+#endif
+}
+
+vec4 mean_of_bytes(usampler2D values, ivec2 sample_at) {
+    vec4 first = unpackUnorm4x8(texelFetch(values, sample_at, 0).r);
+#if WITH_COARSE
+    return 0.5 * (first + unpackUnorm4x8(texelFetch(values, sample_at + SHADED - 1, 0).r));
+#else
+    return first;
+#endif
+}
+
 // as openness.py encodes it; interreflection.py has found what surfaces throw on the spreader
 Openness openness_at(ivec2 sample_at, uint zone) {
-    vec4 stored = unpackUnorm4x8(texelFetch(openness_points, sample_at, 0).r);
+    vec4 stored = mean_of_bytes(openness_points, sample_at);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec4 encoded = unpackUnorm4x8(texelFetch(light_points, sample_at, 0).r);
+    vec4 encoded = mean_of_bytes(light_points, sample_at);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);
@@ -110,11 +136,11 @@ struct Part {
 };
 
 Part part_at(ivec2 sample_at, uint key, vec3 view) {
-    vec2 sheet_mm = texelFetch(sheet_points, sample_at, 0).xy;
+    vec2 sheet_mm = mean_of(sheet_points, sample_at).xy;
     vec3 normal = key_normal(key);
     Part p;
     p.damage = SOUND_CONTAINER;
-    p.depth = texelFetch(sheet_depths, sample_at, 0).r;
+    p.depth = mean_of(sheet_depths, sample_at).r;
     p.scar = 0.0;
 #if WITH_DAMAGE
     Damaged d = damage_at(rest_at(sample_at));
@@ -125,7 +151,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 #endif
     float facing = dot(normal, view);
     // the geometric mean of the footprint's two axes on the sheet
-    p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+    p.footprint_mm = float(SHADED.x) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
     p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (key_zone(key) >= SPREADER_ZONE) {
@@ -163,8 +189,8 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     // the paint of the place, for much rust seldom stands alone, but never a print's
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
     vec4 sun_seen = vec4(0.0);
-    float depth = texelFetch(sheet_depths, sample_at, 0).r;
-    vec2 place = place_of(sample_at);
+    float depth = mean_of(sheet_depths, sample_at).r;
+    vec2 place = place_of(sample_at) + 0.5 * vec2(SHADED - 1);
     vec3 from_eye = depth * view_ray(place);
 #if TRACED
     sky.rays = traced_at(place, key, from_eye, normal);
@@ -189,7 +215,7 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 Shaded single_surface(ivec2 pixel) {
     ivec2 middle = middle_of(pixel);
     uint key = key_at(middle);
-    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 * vec2(SHADED)));
     Part p = part_at(middle, key, view);
 #if LOOKUPS > 1
     // the sheet is all but flat between the middle and two others of its near samples

@@ -99,7 +99,9 @@ void main() {
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
 #endif
-    imageStore(color_image, pixel, uvec4(packUnorm4x8(vec4(developed(color), s.cover))));
+    uvec4 shown = uvec4(packUnorm4x8(vec4(developed(color), s.cover)));
+    for (int y = 0; y < SHADED.y; ++y)
+        for (int x = 0; x < SHADED.x; ++x) imageStore(color_image, pixel + ivec2(x, y), shown);
     // of other pixels classify.frag knew it
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));

@@ -37,6 +37,8 @@ PIXEL_CLASSES = {
     "sky": (),
     "plain": (),
     "decal": ("DECALS",),
+    "coarse": ("COARSE",),
+    "within": (),
     "mixed": ("MIXED",),
     "mixed_decal": ("MIXED", "DECALS"),
     "damaged": ("DECALS", "DAMAGE"),
@@ -44,11 +46,12 @@ PIXEL_CLASSES = {
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
     "cable": (),
 }
-"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near;
+"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near; two
+by two pixels of one facet to shade at once, and those within such a block that is shaded already;
 cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
 """
 
-PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
+PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
 LIST_GROUP = 64
 """Pixels of a list that a compute work group takes."""
@@ -61,7 +64,7 @@ LIST_BINDING = 0
 MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
 
-CLASS_DEPTH_STEP = 0.125
+CLASS_DEPTH_STEP = 0.0625
 """Classes are told apart as depths, multiples of this (exact in every depth format)."""
 
 SPREADER_ZONE = MAX_ZONES
@@ -193,14 +196,16 @@ DAMAGE_BLOCK = Block(
 )
 
 
-def listed_classes(samples_per_axis: int, damage: str) -> tuple[str, ...]:
+def listed_classes(samples_per_axis: int, damage: str, coarse: bool) -> tuple[str, ...]:
     """The classes of pixels that such a frame may hold and that are shaded from lists.
 
-    damage: one of DAMAGE_VARIANTS. The other classes, sky and cable, are drawn.
+    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. The other classes, sky and cable, are drawn.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if name in ("sky", "cable") or (samples_per_axis == 1 and name.startswith("mixed")):
+        if name in ("sky", "cable", "within") or (name == "coarse" and not coarse):
+            return False
+        if samples_per_axis == 1 and name.startswith("mixed"):
             return False
         if "HOLES" in traits:
             return damage == "holed"
@@ -222,6 +227,7 @@ def _constants(
     damage: str,
     suns: int,
     traced: bool,
+    coarse: bool,
 ) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
@@ -293,6 +299,7 @@ def _constants(
         "SUNS": suns,
         "TRACED": int(traced),
         "SHADOW_TEXELS": SHADOW_TEXELS,
+        "COARSE": int(coarse),
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),
@@ -333,13 +340,14 @@ def expand(
     damage: str = "sound",
     suns: int = 0,
     traced: bool = False,
+    coarse: bool = False,
 ) -> str:
     """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
             constants = _constants(
-                samples_per_axis, lookups, layer, pixel_class, damage, suns, traced
+                samples_per_axis, lookups, layer, pixel_class, damage, suns, traced, coarse
             )
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)

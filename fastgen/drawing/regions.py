@@ -72,8 +72,9 @@ def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
     if view.distortion:  # an arc leaves its chord by an eighth of the second difference
         margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
     pixels = pixels.reshape(-1, 2)
-    x0, y0 = np.clip(np.floor(pixels.min(axis=0) - margin), 0, view.size)
-    x1, y1 = np.clip(np.ceil(pixels.max(axis=0) + margin), 0, view.size)
+    # of whole blocks of two by two pixels, see classify.frag
+    x0, y0 = np.clip(2 * np.floor((pixels.min(axis=0) - margin) / 2), 0, view.size)
+    x1, y1 = np.clip(2 * np.ceil((pixels.max(axis=0) + margin) / 2), 0, view.size)
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
 
 

@@ -57,7 +57,7 @@ class Shading:
     """The programs that shade one layer: a classifier, and one program a pixel class.
 
     They are linked when first needed, and scenes with and without damage share what they can.
-    traced: whether light is what rays found, of drawing.light_points.
+    traced: whether light is what rays found, of drawing.light_points. coarse: see Renderer.
     """
 
     def __init__(
@@ -67,9 +67,11 @@ class Shading:
         lookups: int,
         layer: str,
         traced: bool = False,
+        coarse: bool = False,
     ) -> None:
         self._ctx = ctx
         self._traced = traced
+        self._coarse = coarse
         self._samples_per_axis = samples_per_axis
         self._lookups = lookups
         self._layer = layer
@@ -111,7 +113,7 @@ class Shading:
             self._run("cables", "cable", "sound", cables)
         image.depth_mask = False
         self._ctx.depth_func = "=="
-        listed = listed_classes(self._samples_per_axis, damage)
+        listed = listed_classes(self._samples_per_axis, damage, self._coarse)
         for name in listed:
             targets.lists.begin(name)
             self._run("list", name, "sound", regions)
@@ -185,6 +187,7 @@ class Shading:
             "damage": damage,
             "suns": suns,
             "traced": self._traced,
+            "coarse": self._coarse,
         }
 
     def release(self) -> None:

@@ -35,7 +35,7 @@ class Targets:
         ]
         self._classes = ctx.depth_renderbuffer(size)
         self.image = ctx.framebuffer(self._image, self._classes)
-        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, "holed"))
+        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, "holed", coarse=True))
         self._clear_float, self._clear_uint = (
             gl.function(name, None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p)
             for name in ("glClearBufferfv", "glClearBufferuiv")
