@@ -199,7 +199,7 @@ DAMAGE_BLOCK = Block(
 def listed_classes(samples_per_axis: int, damage: str, coarse: bool) -> tuple[str, ...]:
     """The classes of pixels that such a frame may hold and that are shaded from lists.
 
-    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. The other classes, sky and cable, are drawn.
+    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. The others, sky and cable, are drawn.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
