@@ -76,7 +76,8 @@ _CYCLES: dict[str, Any] = {
 }
 
 PEERS = (
-    Peer("fastgen", "with_fastgen.py"),
+    Peer("fastgen, balanced", "with_fastgen.py", ("balanced",)),
+    Peer("fastgen, draft", "with_fastgen.py", ("draft",)),
     Peer(
         "pyrender, colour + segmentation",
         "with_pyrender.py",

@@ -1,4 +1,4 @@
-"""fastgen itself, measured as its peers are: python with_fastgen.py JOB OUT."""
+"""fastgen itself, measured as its peers are: python with_fastgen.py JOB OUT QUALITY."""
 
 import os
 import sys
@@ -14,10 +14,11 @@ from fastgen import Config, Generator
 from fastgen.scene import Scene
 
 
-def main(folder: Path, out: Path) -> None:
+def main(folder: Path, out: Path, quality: str) -> None:
     """Every view, image and all labels from one draw."""
     job = read_job(folder)
-    with Generator(Config.preset(), seed=job.seed, size=job.size) as generator:
+    config = Config.preset()
+    with Generator(config, seed=job.seed, size=job.size, quality=quality) as generator:
         recorder = Recorder(out, f"{fastgen.__version__}, {generator.renderer_name}")
         for scene in job.scenes:
             with recorder.lap("set-up"):
@@ -36,4 +37,4 @@ def main(folder: Path, out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3])
