@@ -57,7 +57,8 @@ void main() {
     // derivatives tell what is alike (as floats that hold all bits of a key, in two parts)
     vec3 known = vec3(key & 0xffffu, key >> 16, found);
     float row = float(dFdxFine(known) == vec3(0.0));
-    if (found == CLASS_PLAIN && row > 0.0 && dFdyFine(known) == vec3(0.0) && dFdyFine(row) == 0.0)
+    bool column = dFdyFine(known) == vec3(0.0), rows = dFdyFine(row) == 0.0;
+    if (found == CLASS_PLAIN && row > 0.0 && column && rows)
         found = ivec2(gl_FragCoord.xy) % 2 == ivec2(0) ? CLASS_COARSE : CLASS_WITHIN;
 #endif
     gl_FragDepth = CLASS_DEPTH_STEP * float(found);
