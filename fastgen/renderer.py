@@ -159,7 +159,12 @@ class Renderer:
         shading = self._shading.get(
             (layer, per_axis),
             lambda: Shading(
-                self._ctx, per_axis, self._lookups, layer, rays is not None, self._coarse
+                self._ctx,
+                per_axis,
+                self._lookups,
+                layer,
+                rays is not None,
+                self._coarse and per_axis == 1,
             ),
         )
         shadow = self._shadow(scene)

@@ -54,12 +54,17 @@ void main() {
 #endif
 #if COARSE && defined(GL_ARB_derivative_control)
     // where two by two pixels see one facet alone, the first is shaded for all; fragments run so, and
-    // derivatives tell what is alike (as floats that hold all bits of a key, in two parts)
+    // derivatives tell what is alike (as floats that hold all bits of a key, in two parts). Facets that
+    // face one way share a key: a step over the sheet tells of what lies hidden between them
     vec3 known = vec3(key & 0xffffu, key >> 16, found);
-    float row = float(dFdxFine(known) == vec3(0.0));
-    bool column = dFdyFine(known) == vec3(0.0), rows = dFdyFine(row) == 0.0;
-    if (found == CLASS_PLAIN && row > 0.0 && column && rows)
-        found = ivec2(gl_FragCoord.xy) % 2 == ivec2(0) ? CLASS_COARSE : CLASS_WITHIN;
+    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
+    vec2 step_mm = abs(dFdxFine(sheet_mm)) + abs(dFdyFine(sheet_mm));
+    float most_mm = COARSE_STEP_PX * 1000.0 * pixel_angle * texelFetch(sheet_depths, middle, 0).r;
+    bool alike = abs(dFdxFine(known)) + abs(dFdyFine(known)) == vec3(0.0);
+    float one = float(found == CLASS_PLAIN && alike && max(step_mm.x, step_mm.y) < most_mm);
+    float row = one * float(dFdxFine(one) == 0.0);
+    float block = row * float(dFdyFine(row) == 0.0);
+    if (block > 0.0) found = ivec2(gl_FragCoord.xy) % 2 == ivec2(0) ? CLASS_COARSE : CLASS_WITHIN;
 #endif
     gl_FragDepth = CLASS_DEPTH_STEP * float(found);
     out_labels = key == 0u                        ? 0u

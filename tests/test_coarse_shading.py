@@ -72,6 +72,8 @@ def test_a_block_has_one_colour_only_where_its_pixels_see_one_facet(drawn, kind)
             four = blocks(values).reshape(*changed.shape, 4, -1)
             assert (four == four[:, :, :1])[changed].all()
         assert (blocks(single.ids)[changed] != 0).all()
+        depth = blocks(single.depth)[changed]
+        assert (np.ptp(depth, axis=1) < 0.02 * depth[:, 0]).all()  # nothing hidden in between
         # its colour is that of its pixels: the same layers and light, looked up once
         apart = np.abs(each.mean(axis=2) - one.mean(axis=2)).max(axis=-1)[changed]
         assert np.median(apart) < 3

@@ -51,6 +51,10 @@ by two pixels of one facet to shade at once, and those within such a block that 
 cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
 """
 
+COARSE_STEP_PX = 4.0
+"""Pixels' widths over the sheet, by which pixels that are shaded at once lie apart at most: what is
+seen more aslant, and what lies behind a step, is shaded by itself."""
+
 PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
 LIST_GROUP = 64
@@ -300,6 +304,7 @@ def _constants(
         "TRACED": int(traced),
         "SHADOW_TEXELS": SHADOW_TEXELS,
         "COARSE": int(coarse),
+        "COARSE_STEP_PX": COARSE_STEP_PX,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),

@@ -24,14 +24,14 @@ _EDGE_TEXELS = 1
 """Nothing is drawn on a sun's tile's edge: it stands for all that lies beyond."""
 
 _FIRST_TEXELS = (1536, 512)
-"""Along and across for the first sun: of up to 10 mm each way."""
+"""Along and across for the first sun, in full detail: of up to 10 mm each way."""
 
 _END_TEXELS = (1280, 1280)
 _END_TEXEL_MM = 2.5
 _END_DEPTH_MM = 450.0
 """The first sun has another tile for the end that it shines on, to as far behind its castings as
-damage pushes leaves: texels no finer than that, as a locking bar is 34 mm wide, up to 3.6 mm where
-the tile is full."""
+damage pushes leaves: in full detail texels no finer than that, as a locking bar is 34 mm wide, up
+to 3.6 mm where the tile is full."""
 
 _END_BORDER_MM = 60.0
 """Around the part of it that is asked for: more than lookups of a filtered shadow reach."""
@@ -135,7 +135,9 @@ class ShadowMap:
         if shown == self._shown:
             return
         self._shown = ()  # until it does, whatever happens
-        body, of_door = _bent(container, outline or container, damages)
+        # from below, floor members shade one another
+        left_out = _MEMBER if toward[:, 2].min() > 0 else _NONE
+        body, of_door = _bent(container, outline or container, damages, left_out)
         bodies: list[Solid] = [body] if spreader is None else [body, spreader]
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
@@ -145,7 +147,7 @@ class ShadowMap:
         to_tiles[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
         side = float(np.sign(toward[0, 0]))
         # the door shades its own end alone, which has a tile of its own or the sun behind it
-        plain = _plain(body, of_door) if side else body
+        plain = _plain(body, of_door) if side and of_door.any() else body
         drawn: dict[Solid, DrawnBody] = {}
 
         def view(solids: Sequence[Solid], matrix: Array, tile: Tile, thick: bool = True) -> MapView:
@@ -248,13 +250,13 @@ def _beyond(body: Solid, side: float, from_mm: float) -> Body:
 
 
 def _bent(
-    container: Mesh, outline: Mesh, damages: tuple[Damage, ...]
+    container: Mesh, outline: Mesh, damages: tuple[Damage, ...], left_out: int
 ) -> tuple[Body, NDArray[np.bool_]]:
     """A container as the damages move it, of its own triangles where they do, else of outline's,
-    and which triangles are of its door. Floor members, in the shade of the floor, are left out."""
+    and which triangles are of its door. left_out: the part, as of _parts, that it lacks."""
     if not damages:
         part = _parts(outline)
-        kept = part != _MEMBER
+        kept = part != left_out
         return Body(outline.positions_mm, outline.triangles[kept]), part[kept] == _DOOR
     moved = container.positions_mm.copy()
     columns = np.ascontiguousarray(moved.T)  # comparisons along rows take ten times as long
@@ -267,8 +269,8 @@ def _bent(
         moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
         reached[container.chart[near]] = True
     bent, rigid = _parts(container), _parts(outline)
-    is_bent = reached[container.chart[container.triangles[:, 0]]] & (bent != _MEMBER)
-    is_rigid = ~reached[outline.chart[outline.triangles[:, 0]]] & (rigid != _MEMBER)
+    is_bent = reached[container.chart[container.triangles[:, 0]]] & (bent != left_out)
+    is_rigid = ~reached[outline.chart[outline.triangles[:, 0]]] & (rigid != left_out)
     body = Body(
         np.concatenate([moved, outline.positions_mm]),
         np.concatenate(
@@ -279,7 +281,7 @@ def _bent(
 
 
 def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
-    """A container with one flat sheet for its door, where the door is deepest."""
+    """A container with one flat sheet for its door, as deep as any of it is, damage included."""
     corners = container.positions_mm[container.triangles[of_door].ravel()]
     low, high = corners.min(axis=0), corners.max(axis=0)
     sheet = [(low[0], y, z) for y in (low[1], high[1]) for z in (low[2], high[2])]
@@ -295,7 +297,7 @@ def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
     )
 
 
-_DOOR, _MEMBER = 1, 2
+_NONE, _DOOR, _MEMBER = -1, 1, 2
 
 
 @lru_cache(maxsize=32)
