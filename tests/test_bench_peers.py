@@ -73,7 +73,7 @@ def test_peer_that_is_not_installed_is_listed_with_the_command(tmp_path, capsys)
 
 
 def test_script_that_fails_is_listed_with_its_last_words(tmp_path):
-    broken = peers.Peer("broken", "with_fastgen.py")
+    broken = peers.Peer("broken", "with_fastgen.py", ("draft",))
     assert "job.json" in peers.run(broken, tmp_path, tmp_path / "out")["failed"]
 
 
