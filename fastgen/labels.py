@@ -181,9 +181,9 @@ def _container(shot: Shot) -> Object:
         sides = _pieces(sides)
     box = project(Facets(sides, sides, np.zeros(len(sides), np.int64)), view)
     # what is void within the box is known: nothing hides there
-    spreader = frame.ids == SPREADER_ID
-    alone = covered(box.pixels, box.owner, 1, view.size, mask_box(spreader) or (0, 0, 0, 0))
-    (hidden,) = alone.hidden(~spreader.ravel()[alone.pixel])
+    asked = mask_box(shot.spreader_shown) or (0, 0, 0, 0)
+    alone = covered(box.pixels, box.owner, 1, view.size, asked)
+    (hidden,) = alone.hidden(~shot.spreader_shown.ravel()[alone.pixel])
     castings, polygon = _castings(shot, corners)
     told = visibility(shot.config, area, int(hidden), int(alone.beyond[0]))
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
@@ -205,7 +205,7 @@ def _spreader(shot: Shot) -> list[Object]:
     """The spreader with its headblock and the cables as far as they are modelled."""
     if shot.spreader is None:
         return []
-    shown = shot.frame.ids == SPREADER_ID
+    shown = shot.spreader_shown
     area = int(np.count_nonzero(shown))
     mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
     seen = project(_all_facets(mesh), shot.view)

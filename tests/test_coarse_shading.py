@@ -27,7 +27,7 @@ def drawn(monkeypatch):
     """Images of two scenes, shaded in blocks and pixel by pixel."""
 
     def of(values):
-        config = Config.from_values({**values, "labels": {}})
+        config = Config.from_values(values)
         samples = []
         for coarse in (True, False):
             quality = generator.QUALITY["draft"]._replace(coarse=coarse)

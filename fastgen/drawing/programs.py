@@ -51,11 +51,11 @@ by two pixels of one facet to shade at once, and those within such a block that 
 cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
 """
 
+PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
+
 COARSE_STEP_PX = 4.0
 """Pixels' widths over the sheet, by which pixels that are shaded at once lie apart at most: what is
 seen more aslant, and what lies behind a step, is shaded by itself."""
-
-PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
 LIST_GROUP = 64
 """Pixels of a list that a compute work group takes."""
@@ -69,7 +69,7 @@ MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
 
 CLASS_DEPTH_STEP = 0.0625
-"""Classes are told apart as depths, multiples of this (exact in every depth format)."""
+"""Classes are told apart as depths, multiples of this; a depth format rounds equal ones alike."""
 
 SPREADER_ZONE = MAX_ZONES
 """The spreader's zones number from here on, the container's below."""

@@ -2,7 +2,6 @@
 
 from functools import lru_cache
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +12,7 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.labelling.coverage import Points, project, surface_points
 from fastgen.labelling.facets import Facets, damage_facets
 from fastgen.labelling.visibility import Shot, float_box, mask_box, visibility
-from fastgen.sample import Object
+from fastgen.sample import Box, Object
 from fastgen.scene import Damage, Scene
 
 _DEPTH_SLACK = 1e-3
@@ -30,13 +29,14 @@ def damage_objects(shot: Shot) -> list[Object]:
     for damage, value in zip(shot.scene.damages, mask_values(shot.scene.damages), strict=True):
         shown = shot.frame.damage == value
         area = int(np.count_nonzero(shown))
-        hidden, beyond, bounds = _alone(shot, damage, shown)
+        bbox = mask_box(shown)
+        hidden, beyond, bounds = _alone(shot, damage, shown, bbox)
         objects.append(
             Object(
                 id=value,
                 class_name=damage.kind,
                 instance=value % 100,
-                bbox=mask_box(shown),
+                bbox=bbox,
                 amodal_bbox=float_box(bounds),
                 area=area,
                 **visibility(shot.config, area, hidden, beyond),
@@ -46,17 +46,16 @@ def damage_objects(shot: Shot) -> list[Object]:
 
 
 def _alone(
-    shot: Shot, damage: Damage, shown: NDArray[np.bool_]
+    shot: Shot, damage: Damage, shown: NDArray[np.bool_], bbox: Box | None
 ) -> tuple[int, int, NDArray[np.float64]]:
     """Of what the damage would cover alone: pixels of the image that are not shown, how many lie
-    outside it, and the bounds of all, infinite where it is nothing."""
+    outside it, and the bounds of all, infinite where it is nothing. bbox: of `shown`."""
     unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
     x, y, z = shot.view.position_m / MM
     # where a hole is in view all damages are drawn, and more of them are seen than one might think
-    if not may_be_seen(damage, (x, y, z), shot.scene.damages) and not shown.any():
+    if not may_be_seen(damage, (x, y, z), shot.scene.damages) and bbox is None:
         return 0, 0, unbounded
-    x0, y0, width, height = cv2.boundingRect(shown.view(np.uint8))
-    bounds = np.array([x0, y0, x0 + width, y0 + height], np.float64) if width else unbounded
+    bounds = unbounded if bbox is None else np.array(bbox, np.float64)
     hidden, beyond = np.zeros(shown.size, bool), 0
     for points in surface_points(
         project(_facets(shot.scene, shot.mesh, damage), shot.view), shot.view.size

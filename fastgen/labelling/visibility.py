@@ -1,6 +1,7 @@
 """How much of an object is seen: what every kind of object's label has in common."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypedDict
 
 import cv2
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import View
+from fastgen.classes import SPREADER_ID
 from fastgen.config import Config
 from fastgen.geometry.mesh import Mesh
 from fastgen.sample import Box, Frame
@@ -30,6 +32,11 @@ class Shot:
     mesh: Mesh
     spreader: Mesh | None
     config: Config
+
+    @cached_property
+    def spreader_shown(self) -> NDArray[np.bool_]:
+        """Pixels [H, W] that see the spreader."""
+        return self.frame.ids == SPREADER_ID
 
 
 class Visibility(TypedDict):

@@ -136,8 +136,8 @@ class ShadowMap:
             return
         self._shown = ()  # until it does, whatever happens
         # from below, floor members shade one another
-        left_out = _MEMBER if toward[:, 2].min() > 0 else _NONE
-        body, of_door = _bent(container, outline or container, damages, left_out)
+        members = bool(toward[:, 2].min() <= 0)
+        body, of_door = _bent(container, outline or container, damages, members)
         bodies: list[Solid] = [body] if spreader is None else [body, spreader]
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
@@ -250,13 +250,13 @@ def _beyond(body: Solid, side: float, from_mm: float) -> Body:
 
 
 def _bent(
-    container: Mesh, outline: Mesh, damages: tuple[Damage, ...], left_out: int
+    container: Mesh, outline: Mesh, damages: tuple[Damage, ...], members: bool
 ) -> tuple[Body, NDArray[np.bool_]]:
     """A container as the damages move it, of its own triangles where they do, else of outline's,
-    and which triangles are of its door. left_out: the part, as of _parts, that it lacks."""
+    and which triangles are of its door. members: whether it has its floor's."""
     if not damages:
         part = _parts(outline)
-        kept = part != left_out
+        kept = (part != _MEMBER) | members
         return Body(outline.positions_mm, outline.triangles[kept]), part[kept] == _DOOR
     moved = container.positions_mm.copy()
     columns = np.ascontiguousarray(moved.T)  # comparisons along rows take ten times as long
@@ -269,8 +269,8 @@ def _bent(
         moved[near] += (deform((damage,), rest) - rest).astype(np.float32)
         reached[container.chart[near]] = True
     bent, rigid = _parts(container), _parts(outline)
-    is_bent = reached[container.chart[container.triangles[:, 0]]] & (bent != left_out)
-    is_rigid = ~reached[outline.chart[outline.triangles[:, 0]]] & (rigid != left_out)
+    is_bent = reached[container.chart[container.triangles[:, 0]]] & ((bent != _MEMBER) | members)
+    is_rigid = ~reached[outline.chart[outline.triangles[:, 0]]] & ((rigid != _MEMBER) | members)
     body = Body(
         np.concatenate([moved, outline.positions_mm]),
         np.concatenate(
@@ -297,7 +297,7 @@ def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
     )
 
 
-_NONE, _DOOR, _MEMBER = -1, 1, 2
+_DOOR, _MEMBER = 1, 2
 
 
 @lru_cache(maxsize=32)
