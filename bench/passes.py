@@ -24,6 +24,7 @@ from results import parse_size
 
 from fastgen import Config, Generator
 from fastgen.drawing.gpu_mesh import GpuMesh
+from fastgen.drawing.pixel_lists import PixelLists
 from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.drawing.shading import Shading
 from fastgen.generator import QUALITY
@@ -38,15 +39,14 @@ class PassTimer:
         self.count_pixels = False
         self.seconds: dict[str, float] = {}
         self.pixels: dict[str, int] = {}
-        self._within = False
 
     def __enter__(self) -> "PassTimer":
         self._wrap(SampleTargets, "begin", lambda *_: "clear")
         self._wrap(GpuMesh, "draw", lambda *_: "geometry")
         self._wrap(GpuMesh, "draw_inside", lambda *_: "inside")
-        self._wrap(Shading, "_run", lambda stage, name, *_: name if stage == "shade" else stage)
-        self._wrap(Shading, "_dispatch", lambda name, *_: name)
         self._wrap(Shading, "_draw_sky", lambda *_: "sky")
+        self._wrap(Shading, "_classify", lambda *_: "classify")
+        self._wrap(PixelLists, "dispatch", lambda name, *_: name)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -59,16 +59,6 @@ class PassTimer:
 
         def timed(this: object, *args: Any, **named_args: Any) -> None:
             name = named(*args)
-            if self._within:  # through a lens the sky is a pass like others
-                original(this, *args, **named_args)
-                return
-            self._within = True
-            try:
-                measured(name, this, *args, **named_args)
-            finally:
-                self._within = False
-
-        def measured(name: str, this: object, *args: Any, **named_args: Any) -> None:
             if self.count_pixels:
                 query = self._ctx.query(samples=True)
                 with query:

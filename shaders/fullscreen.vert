@@ -1,9 +1,8 @@
-// One triangle that covers the image, at the depth of one pixel class.
+// One triangle that covers the image, as far away as the sky.
 #version 430 core
-
-uniform float class_depth = 0.0;
+#include "blocks.glsl"
 
 void main() {
     vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);
-    gl_Position = vec4(corner * 2.0 - 1.0, class_depth * 2.0 - 1.0, 1.0);
+    gl_Position = vec4(corner * 2.0 - 1.0, SKY_DEPTH, 1.0);
 }

@@ -1,14 +1,47 @@
-// Shades the listed pixels of one class: all but those of the sky and of cables.
+// Shades the listed pixels of one class: all but those that see sky alone.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
 #include "pixel_list.glsl"
+#if OF_CABLES
+#include "cables.glsl"
+#endif
 
 layout(local_size_x = LIST_GROUP) in;
 
 layout(r32ui, binding = 0) writeonly uniform uimage2D color_image;   // four bytes, stored as one number
 layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
 layout(r32f, binding = 2) writeonly uniform image2D depth_image;
+
+#if OF_CABLES
+// steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye
+// sees two, each as wide as it faces the eye
+Shaded cable(vec2 center) {
+    vec3 ray = view_ray(center);
+    vec3 view = -normalize(ray);
+    vec4 base = material_base[CABLE_MATERIAL];
+    Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
+#if SHOWN(RUST)
+    steel.albedo = cable_rusted.rgb;
+    steel.roughness = mix(steel.roughness, rust_roughness, cable_rusted.a);
+    steel.metallic *= 1.0 - cable_rusted.a;
+#endif
+    wet(steel.albedo, steel.roughness, steel.metallic, 0.8 * wetness);   // material.glsl's mean
+    vec3 color = vec3(0.0);
+    for (int axis = 0; axis < 2; ++axis) {
+        vec3 normal = vec3(0.0);
+        normal[axis] = view[axis] < 0.0 ? -1.0 : 1.0;
+        Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), steel.albedo,
+                                  NO_RAYS);
+        color += abs(view[axis]) * layer_color(steel, normal, view, whole, vec4(1.0));
+    }
+    color /= max(abs(view.x) + abs(view.y), 1e-6);
+    Shaded s = sky(ray);
+    s.cover = cables_cover(center);
+    s.color = mix(s.color, color, s.cover);
+    return s;
+}
+#endif
 
 void main() {
     if (gl_GlobalInvocationID.x >= listed_pixels()) return;
@@ -95,6 +128,9 @@ void main() {
     } while (++part < MAX_PARTS && left != 0u);
     color /= done;   // of a busy pixel, what was not come to counts like the rest
     s.cover = 1.0 - sky_weight / done;
+#elif OF_CABLES
+    Shaded s = cable(vec2(pixel) + 0.5);
+    vec3 color = s.color;
 #else
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
@@ -102,7 +138,7 @@ void main() {
     uvec4 shown = uvec4(packUnorm4x8(vec4(developed(color), s.cover)));
     for (int y = 0; y < SHADED.y; ++y)
         for (int x = 0; x < SHADED.x; ++x) imageStore(color_image, pixel + ivec2(x, y), shown);
-    // of other pixels classify.frag knew it
+    // of other pixels classify.comp knew it
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
 #endif

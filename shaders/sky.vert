@@ -3,8 +3,6 @@
 #version 430 core
 #include "blocks.glsl"
 
-uniform float class_depth;
-
 out vec2 map_uv;   // inside the map's border
 
 void main() {
@@ -22,5 +20,5 @@ void main() {
     vec2 across = vec2(dot(world, ray_right), dot(world, ray_down));
     vec2 to_border = -vec2(dot(ray_corner, ray_right), dot(ray_corner, ray_down));
     float ahead = dot(world, normalize(cross(ray_right, ray_down)));
-    gl_Position = vec4(across / to_border, (class_depth * 2.0 - 1.0) * ahead, ahead);
+    gl_Position = vec4(across / to_border, SKY_DEPTH * ahead, ahead);
 }

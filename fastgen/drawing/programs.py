@@ -34,11 +34,9 @@ LAYERS = (
 """What the shader can show; `ids` and `damage` of `fastgen show` are label targets."""
 
 PIXEL_CLASSES = {
-    "sky": (),
     "plain": (),
     "decal": ("DECALS",),
     "coarse": ("COARSE",),
-    "within": (),
     "mixed": ("MIXED",),
     "mixed_decal": ("MIXED", "DECALS"),
     "damaged": ("DECALS", "DAMAGE"),
@@ -46,9 +44,9 @@ PIXEL_CLASSES = {
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
     "cable": (),
 }
-"""Pixels by what is to be done there: several surfaces to filter, decals, damage or holes near; two
-by two pixels of one facet to shade at once, and those within such a block that is shaded already;
-cables that cover part of the sky. Where there are decals too, classify.frag takes the next class.
+"""Pixels that see more than sky, by what is to be done there: several surfaces to filter, decals,
+damage or holes near; two by two pixels of one facet to shade at once; cables that cover part of the
+sky. Each class has a list, see shaders/classify.comp.
 """
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
@@ -57,19 +55,20 @@ COARSE_STEP_PX = 4.0
 """Pixels' widths over the sheet, by which pixels that are shaded at once lie apart at most: what is
 seen more aslant, and what lies behind a step, is shaded by itself."""
 
+SKY_DEPTH = 1 - 2**-18
+"""Depth of the sky in clip space, over w: before what is cleared, behind all that camera.FAR_M
+lets be seen, but for its last metre. Clipping may round depths."""
+
 LIST_GROUP = 64
 """Pixels of a list that a compute work group takes."""
 
 LIST_HEADER = 4
-"""Numbers before the pixels of a list: the three of its dispatch, and its length."""
+"""Numbers about a list ahead of all pixels: the three of its dispatch, and its length."""
 
 LIST_BINDING = 0
 
 MAX_DAMAGES = 128
 """Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
-
-CLASS_DEPTH_STEP = 0.0625
-"""Classes are told apart as depths, multiples of this; a depth format rounds equal ones alike."""
 
 SPREADER_ZONE = MAX_ZONES
 """The spreader's zones number from here on, the container's below."""
@@ -200,20 +199,20 @@ DAMAGE_BLOCK = Block(
 )
 
 
-def listed_classes(samples_per_axis: int, damage: str, coarse: bool) -> tuple[str, ...]:
-    """The classes of pixels that such a frame may hold and that are shaded from lists.
+def listed_classes(
+    samples_per_axis: int, damage: str = "holed", coarse: bool = True
+) -> tuple[str, ...]:
+    """The classes that pixels of such a frame may be of, in the order of their lists.
 
-    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. The others, sky and cable, are drawn.
+    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. By default as many as can be.
     """
 
     def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if name in ("sky", "cable", "within") or (name == "coarse" and not coarse):
-            return False
-        if samples_per_axis == 1 and name.startswith("mixed"):
+        if samples_per_axis == 1 and name.startswith(("mixed", "cable")):
             return False
         if "HOLES" in traits:
             return damage == "holed"
-        return damage != "sound" or "DAMAGE" not in traits
+        return (damage != "sound" or "DAMAGE" not in traits) and (coarse or name != "coarse")
 
     return tuple(name for name, traits in PIXEL_CLASSES.items() if comes(name, traits))
 
@@ -232,6 +231,7 @@ def _constants(
     suns: int,
     traced: bool,
     coarse: bool,
+    cables: bool,
 ) -> str:
     levels = environment.ROUGHNESS_LEVELS
     steps = "".join(
@@ -242,6 +242,7 @@ def _constants(
     # prints are filtered by themselves and cost most, and damages share their classes: a second
     # lookup there gains little
     lookups = 1 if lookups == 2 and "DECALS" in PIXEL_CLASSES[pixel_class] else lookups
+    lists = listed_classes(samples_per_axis)
     shown = {name: int(layer in ("all", "normals", "reflection", name)) for name in LAYERS}
     defines: dict[str, object] = {
         "MM": "0.001",
@@ -276,9 +277,11 @@ def _constants(
         **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
         **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},
-        **{f"CLASS_{name.upper()}": i for i, name in enumerate(PIXEL_CLASSES)},
-        "CLASS_DEPTH_STEP": CLASS_DEPTH_STEP,
-        "CLASS": list(PIXEL_CLASSES).index(pixel_class),
+        **{f"LIST_{name.upper()}": f"{i}u" for i, name in enumerate(lists)},
+        "LIST": f"LIST_{pixel_class.upper()}",
+        "NO_LIST": f"{len(lists)}u",
+        "LISTS": f"{len(lists)}u",
+        "LIST_HEADER": f"{LIST_HEADER}u",
         **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
         "GUTTER_STEPS": GUTTER_STEPS,
         "OUT_OF_REACH_MM": "1e6",
@@ -303,7 +306,10 @@ def _constants(
         "SUNS": suns,
         "TRACED": int(traced),
         "SHADOW_TEXELS": SHADOW_TEXELS,
+        "SKY_DEPTH": SKY_DEPTH,
         "COARSE": int(coarse),
+        "CABLES_NEAR": int(cables),
+        "OF_CABLES": int(pixel_class == "cable"),
         "COARSE_STEP_PX": COARSE_STEP_PX,
         "CABLES": CABLES,
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
@@ -341,18 +347,22 @@ def expand(
     samples_per_axis: int = 1,
     lookups: int = 1,
     layer: str = "all",
-    pixel_class: str = "sky",
+    pixel_class: str = "plain",
     damage: str = "sound",
     suns: int = 0,
     traced: bool = False,
     coarse: bool = False,
+    cables: bool = False,
 ) -> str:
-    """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations."""
+    """Shader text with its includes filled in; `blocks.glsl` stands for the shared declarations.
+
+    cables: whether pixels may see some.
+    """
 
     def include(match: re.Match[str]) -> str:
         if match[1] == "blocks.glsl":
             constants = _constants(
-                samples_per_axis, lookups, layer, pixel_class, damage, suns, traced, coarse
+                samples_per_axis, lookups, layer, pixel_class, damage, suns, traced, coarse, cables
             )
             blocks = [SCENE_BLOCK, VIEW_BLOCK] + [DAMAGE_BLOCK] * (damage != "sound")
             return constants + "".join(block.glsl() for block in blocks)

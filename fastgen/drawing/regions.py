@@ -60,6 +60,21 @@ def merged(regions: Sequence[Region | None]) -> list[Region | None]:
     return list(found)
 
 
+def outside(regions: Sequence[Region], others: Sequence[Region]) -> list[Region]:
+    """Disjoint regions that hold all of `regions`, which are disjoint, but what lies in `others`."""
+    left = list(regions)
+    for x, y, width, height in others:
+        found = []
+        for a, b, w, h in left:
+            # above and below whole, beside it what is left of the rows between
+            top, bottom = (min(max(row, b), b + h) for row in (y, y + height))
+            first, last = (min(max(column, a), a + w) for column in (x, x + width))
+            found += [(a, b, w, top - b), (a, bottom, w, b + h - bottom)]
+            found += [(a, top, first - a, bottom - top), (last, top, a + w - last, bottom - top)]
+        left = [part for part in found if part[2] > 0 and part[3] > 0]
+    return left
+
+
 def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
     if view.distortion:  # what lies between two corners may bow out farther than both
@@ -72,7 +87,7 @@ def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
     if view.distortion:  # an arc leaves its chord by an eighth of the second difference
         margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
     pixels = pixels.reshape(-1, 2)
-    # of whole blocks of two by two pixels, see classify.frag
+    # of whole blocks of two by two pixels, see classify.comp
     x0, y0 = np.clip(2 * np.floor((pixels.min(axis=0) - margin) / 2), 0, view.size)
     x1, y1 = np.clip(2 * np.ceil((pixels.max(axis=0) + margin) / 2), 0, view.size)
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)

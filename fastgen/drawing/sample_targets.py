@@ -31,6 +31,7 @@ class SampleTargets:
     def __init__(self, gl: GLContext, size: tuple[int, int], samples_per_axis: int) -> None:
         self._ctx = gl.ctx
         self._size = size
+        self.per_axis = samples_per_axis
         self._lattice = SampleLattice(samples_per_axis)
         self._fine = self._lattice.texels(size)
         row = self._lattice.inner_row(size, gl.ctx.info["GL_MAX_TEXTURE_SIZE"])
@@ -61,10 +62,13 @@ class SampleTargets:
         inside: regions that `limit_inside` will name.
         """
         self._make_room(damage)
-        for box in (*map(self._texels, seen), *map(self._texels_inside, inside)):
-            # clearing framebuffers, llvmpipe takes four times as long, and longer for a part
+        boxes = [*map(self._texels, seen), *map(self._texels_inside, inside)]
+        # clearing framebuffers, llvmpipe takes four times as long, and longer for a part
+        for box in boxes:
             self._empty(self.keys, box, _KEYS_FORMAT, None)
-            self._empty(self._depth, box, _DEPTH_FORMAT, _FAR)
+        # of single samples it tells the sky from all else, see Targets.begin
+        for box in [self._texels(None), *boxes] if self.per_axis == 1 else boxes:
+            self._empty(self.depth_buffer, box, _DEPTH_FORMAT, _FAR)
         target = self._sound if damage == "sound" else self._damaged
         target.use()
         target.viewport = (0, 0, *self._fine)
@@ -81,7 +85,7 @@ class SampleTargets:
             self.depths = self._texture(1, "f4")
             self.openness = self._texture(1, "u4")
             self.light = self._texture(1, "u4")
-            self._depth = self._kept(self._ctx.depth_texture((self._fine[0], rows)))
+            self.depth_buffer = self._kept(self._ctx.depth_texture((self._fine[0], rows)))
             self._sound = self._framebuffer()
         if damage != "sound" and not self.rest:
             self.rest = [self._texture(1, "f4") for _ in range(3)]
@@ -89,7 +93,7 @@ class SampleTargets:
 
     def _framebuffer(self) -> moderngl.Framebuffer:
         usual = [self.keys, self.points, self.depths, self.openness, self.light]
-        made: moderngl.Framebuffer = self._ctx.framebuffer([*usual, *self.rest], self._depth)
+        made: moderngl.Framebuffer = self._ctx.framebuffer([*usual, *self.rest], self.depth_buffer)
         return self._kept(made)
 
     def _texture(self, components: int, dtype: str) -> moderngl.Texture:

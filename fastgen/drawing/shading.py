@@ -1,19 +1,18 @@
-"""The passes over the image: pixels are sorted into classes, each is shaded by itself."""
+"""The passes over the image: the sky, then pixels sorted into classes, each shaded by itself."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import moderngl
 
-from fastgen.drawing.pixel_lists import PixelLists
 from fastgen.drawing.programs import (
-    CLASS_DEPTH_STEP,
+    LIST_GROUP,
     PIXEL_CLASSES,
     link,
     link_compute,
     listed_classes,
 )
-from fastgen.drawing.regions import Region
+from fastgen.drawing.regions import Region, outside
 from fastgen.drawing.targets import Targets
 
 UNITS = {
@@ -48,13 +47,13 @@ _OCTAHEDRON = 24
 """Corners of its eight triangles."""
 
 
-def _mask(color: bool, labels: bool) -> Any:
-    """Of colour, and of labels and depth; moderngl's annotation knows the mask of a single one."""
-    return [(color,) * 4, (labels,) * 4, (labels,) * 4]
+_ALL: Any = [(True,) * 4] * 3
+_COLOR_ALONE: Any = [(True,) * 4, (False,) * 4, (False,) * 4]
+"""Masks of colour, labels and depth; moderngl's annotation knows the mask of a single one."""
 
 
 class Shading:
-    """The programs that shade one layer: a classifier, and one program a pixel class.
+    """The programs that shade one layer: the sky's, classifiers, and one program a pixel class.
 
     They are linked when first needed, and scenes with and without damage share what they can.
     traced: whether light is what rays found, of drawing.light_points. coarse: see Renderer.
@@ -75,9 +74,9 @@ class Shading:
         self._samples_per_axis = samples_per_axis
         self._lookups = lookups
         self._layer = layer
-        self._programs: list[moderngl.Program] = []
-        self._arrays: dict[tuple[str, str, str, int], moderngl.VertexArray] = {}
-        self._listed: dict[tuple[str, int], moderngl.ComputeShader] = {}
+        self._skies: dict[tuple[str, str], tuple[moderngl.Program, moderngl.VertexArray]] = {}
+        self._classifiers: dict[tuple[str, bool], moderngl.ComputeShader] = {}
+        self._shaders: dict[tuple[str, int], moderngl.ComputeShader] = {}
 
     def draw(
         self,
@@ -96,89 +95,65 @@ class Shading:
         disjoint, None where that is not known. cables: likewise, of bundles of them. suns: as many
         as sun_shadow.shader_suns tells, their shadow map bound. bent: if a lens bends the view.
         """
-        image = targets.image
-        image.use()
-        self._ctx.scissor = None
-        image.color_mask = _mask(color=False, labels=True)
-        image.depth_mask = True
-        targets.clear_to_sky()
-        self._ctx.enable_only(moderngl.DEPTH_TEST)
-        self._ctx.depth_func = "1"  # always
-        self._run("classify", "sky", "sound", regions)
-        for part in near_damage:
-            self._run("classify", "sky", damage, [part] if part else regions)
-        image.color_mask = _mask(color=False, labels=False)
-        if self._samples_per_axis > 1:
-            self._ctx.depth_func = ">"
-            self._run("cables", "cable", "sound", cables)
-        image.depth_mask = False
-        self._ctx.depth_func = "=="
-        listed = listed_classes(self._samples_per_axis, damage, self._coarse)
-        for name in listed:
-            targets.lists.begin(name)
-            self._run("list", name, "sound", regions)
-        image.color_mask = _mask(color=True, labels=False)
-        if self._samples_per_axis > 1:
-            self._run("shade", "cable", "sound", cables, suns)
-        self._draw_sky(bent)
-        self._ctx.scissor = None
-        self._ctx.memory_barrier()
+        self._draw_sky(targets, bent)
         targets.bind_images()
-        for name in listed:
-            self._dispatch(name, targets.lists, suns)
+        targets.lists.begin()
+        everything = (0, 0, *targets.size)
+        near, cabled, seen = (
+            [region or everything for region in each] for each in (near_damage, cables, regions)
+        )
+        if self._samples_per_axis == 1:
+            cabled = []
+        self._classify(outside(seen, [*near, *cabled]), "sound", cables=False)
+        self._classify(outside(near, cabled), damage, cables=False)
+        self._classify(cabled, damage, cables=True)
         self._ctx.memory_barrier()
-        self._ctx.depth_func = "<"
+        for name in listed_classes(self._samples_per_axis, damage, self._coarse):
+            if cabled or name != "cable":
+                targets.lists.dispatch(name, self._shader(name, suns))
+        self._ctx.memory_barrier()
 
-    def _run(
-        self,
-        stage: str,
-        pixel_class: str,
-        damage: str,
-        regions: Sequence[Region | None],
-        suns: int = 0,
-    ) -> None:
-        """Draw `stage`.frag over the pixels of a class in `regions`; the classifier gives all of
-        them theirs."""
-        key = (stage, pixel_class, damage, suns)
-        if key not in self._arrays:
-            depth = list(PIXEL_CLASSES).index(pixel_class) * CLASS_DEPTH_STEP
-            self._link(key, "fullscreen.vert", f"{stage}.frag", depth)
-        for region in regions:
-            self._ctx.scissor = region
-            self._arrays[key].render(moderngl.TRIANGLES, vertices=3)
-
-    def _draw_sky(self, bent: bool) -> None:
-        """Shade all pixels that are still of the first class."""
-        if bent or self._layer != "all":
-            self._run("shade", "sky", "sound", [None])
+    def _classify(self, regions: Sequence[Region], damage: str, cables: bool) -> None:
+        """List the pixels of `regions`, of which the first column and row are even."""
+        if not regions:
             return
-        key = ("sky", "sky", "sound", 0)
-        if key not in self._arrays:
-            # clipping may round depths: they lie between the first two classes
-            self._link(key, "sky.vert", "sky.frag", CLASS_DEPTH_STEP / 2)
-        self._ctx.scissor = None
-        self._ctx.depth_func = ">="
-        self._arrays[key].render(moderngl.TRIANGLES, vertices=_OCTAHEDRON)
-
-    def _link(
-        self, key: tuple[str, str, str, int], vertex: str, fragment: str, class_depth: float
-    ) -> None:
-        program = link(self._ctx, vertex, fragment, UNITS, **self._variant(*key[1:]))
-        program["class_depth"] = class_depth
-        self._programs.append(program)
-        self._arrays[key] = self._ctx.vertex_array(program, [])
-
-    def _dispatch(self, pixel_class: str, lists: PixelLists, suns: int) -> None:
-        """Shade the listed pixels of a class."""
-        key = (pixel_class, suns)
-        if key not in self._listed:
-            damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
-            self._listed[key] = link_compute(
-                self._ctx, "shade_listed.comp", UNITS, **self._variant(pixel_class, damage, suns)
+        key = (damage, cables)
+        if key not in self._classifiers:
+            self._classifiers[key] = link_compute(
+                self._ctx, "classify.comp", UNITS, **self._variant("plain", damage), cables=cables
             )
-        lists.dispatch(pixel_class, self._listed[key])
+        program = self._classifiers[key]
+        side = 2 if self._coarse else 1
+        for region in regions:
+            program["region"] = region
+            across, down = (-(-length // side) for length in region[2:])
+            program.run(-(-across // LIST_GROUP), down)
 
-    def _variant(self, pixel_class: str, damage: str, suns: int) -> dict[str, Any]:
+    def _draw_sky(self, targets: Targets, bent: bool) -> None:
+        """Shade at least the pixels that see sky alone."""
+        own = bent or self._layer != "all"
+        stages = ("fullscreen.vert", "bent_sky.frag") if own else ("sky.vert", "sky.frag")
+        if stages not in self._skies:
+            program = link(self._ctx, *stages, UNITS, **self._variant("plain", "sound"))
+            self._skies[stages] = program, self._ctx.vertex_array(program, [])
+        self._ctx.scissor = None
+        self._ctx.enable_only(moderngl.DEPTH_TEST if targets.begin() else moderngl.NOTHING)
+        targets.image.depth_mask = False
+        targets.image.color_mask = _COLOR_ALONE
+        self._skies[stages][1].render(moderngl.TRIANGLES, vertices=3 if own else _OCTAHEDRON)
+        targets.image.color_mask = _ALL
+        targets.image.depth_mask = True
+
+    def _shader(self, pixel_class: str, suns: int) -> moderngl.ComputeShader:
+        """What shades the listed pixels of a class."""
+        key = (pixel_class, suns)
+        if key not in self._shaders:
+            damage = "holed" if "DAMAGE" in PIXEL_CLASSES[pixel_class] else "sound"
+            variant = self._variant(pixel_class, damage, suns)
+            self._shaders[key] = link_compute(self._ctx, "shade_listed.comp", UNITS, **variant)
+        return self._shaders[key]
+
+    def _variant(self, pixel_class: str, damage: str, suns: int = 0) -> dict[str, Any]:
         return {
             "samples_per_axis": self._samples_per_axis,
             "lookups": self._lookups,
@@ -192,6 +167,6 @@ class Shading:
 
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [*self._arrays.values(), *self._programs, *self._listed.values()]
-        for item in items:
+        skies = [item for pair in self._skies.values() for item in reversed(pair)]
+        for item in (*skies, *self._classifiers.values(), *self._shaders.values()):
             item.release()

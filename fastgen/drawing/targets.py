@@ -12,8 +12,8 @@ from fastgen.drawing.sample_targets import SampleTargets
 from fastgen.gl import GLContext
 from fastgen.sample import Frame
 
-_GL_COLOR, _GL_DEPTH, _GL_R32UI = 0x1800, 0x1801, 0x8236
-_SKY_CLASS = (ctypes.c_float * 4)(0.0)
+_GL_COLOR, _GL_R32UI = 0x1800, 0x8236
+_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D = 0x8D40, 0x8D00, 0x0DE1
 _NO_LABELS = (ctypes.c_uint * 4)(0)
 _VOID_DEPTH = (ctypes.c_float * 4)(np.inf)
 
@@ -33,19 +33,28 @@ class Targets:
             ctx.texture(size, 1, dtype="u4"),
             ctx.texture(size, 1, dtype="f4"),
         ]
-        self._classes = ctx.depth_renderbuffer(size)
-        self.image = ctx.framebuffer(self._image, self._classes)
-        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis, "holed", coarse=True))
+        self.image = ctx.framebuffer(self._image)
+        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis))
+        self._attach = gl.function(
+            "glFramebufferTexture2D", None, *[ctypes.c_uint] * 4, ctypes.c_int
+        )
         self._clear_float, self._clear_uint = (
             gl.function(name, None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p)
             for name in ("glClearBufferfv", "glClearBufferuiv")
         )
 
-    def clear_to_sky(self) -> None:
-        """Mark all pixels of the bound image framebuffer as sky, class 0, without any object."""
-        self._clear_float(_GL_DEPTH, 0, _SKY_CLASS)
+    def begin(self) -> bool:
+        """Bind the image's framebuffer, without any object in it. Whether its depth test knows, by
+        a depth of 1, which pixels see sky alone."""
+        self.image.use()
         self._clear_uint(_GL_COLOR, 1, _NO_LABELS)
         self._clear_float(_GL_COLOR, 2, _VOID_DEPTH)
+        if self.samples.per_axis > 1:
+            return False
+        # moderngl asks that all be of one size; of holed scenes the samples' depth is higher
+        depth = self.samples.depth_buffer.glo
+        self._attach(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D, depth, 0)
+        return True
 
     def bind_images(self) -> None:
         """Let compute shaders write the colour, label and depth images, units 0 to 2, colours in
@@ -83,6 +92,6 @@ class Targets:
 
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [self.samples, self.image, self._classes, *self._image, self.lists]
+        items: list[Any] = [self.samples, self.image, *self._image, self.lists]
         for item in items:
             item.release()
