@@ -42,8 +42,9 @@ class PassTimer:
 
     def __enter__(self) -> "PassTimer":
         self._wrap(SampleTargets, "begin", lambda *_: "clear")
-        self._wrap(GpuMesh, "draw", lambda *_: "geometry")
-        self._wrap(GpuMesh, "draw_inside", lambda *_: "inside")
+        self._wrap(
+            GpuMesh, "draw", lambda program, _: "inside" if program == "holed" else "geometry"
+        )
         self._wrap(Shading, "_draw_sky", lambda *_: "sky")
         self._wrap(Shading, "_classify", lambda *_: "classify")
         self._wrap(PixelLists, "dispatch", lambda name, *_: name)

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from fastgen.camera import View, view_of
 from fastgen.damage import corners_mm, seen_damages, variant
 from fastgen.drawing.bake import Atlas, bake_atlas
-from fastgen.drawing.decal_tables import DecalTables, pack_decals
 from fastgen.drawing.gpu_mesh import GpuMesh
 from fastgen.drawing.light_points import LightPoints, point_step
 from fastgen.drawing.programs import (
@@ -26,6 +25,7 @@ from fastgen.drawing.programs import (
     DAMAGE_VARIANTS,
     LAYERS,
     LOBE_CELLS,
+    REACH_MARGIN_MM,
     SCENE_BLOCK,
     SPREADER_ZONE,
     VIEW_BLOCK,
@@ -34,11 +34,12 @@ from fastgen.drawing.programs import (
 from fastgen.drawing.regions import Region, bands, box_corners, merged, region_of
 from fastgen.drawing.sample_lattice import fitting
 from fastgen.drawing.sample_targets import SampleTargets
+from fastgen.drawing.scene_decals import SceneDecals
 from fastgen.drawing.shading import UNITS, Shading
 from fastgen.drawing.shapes import Shapes, ray_bodies, shadow_casters
 from fastgen.drawing.surface_values import cable_values, damage_values, scene_values
 from fastgen.drawing.targets import Targets
-from fastgen.drawing.textures import art_texture, data_texture, mipmapped_array, noise_texture
+from fastgen.drawing.textures import art_texture, mipmapped_array, noise_texture
 from fastgen.drawing.uniforms import Block
 from fastgen.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.geometry.mesh import Mesh
@@ -55,19 +56,6 @@ from fastgen.prints.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.sample import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.spreader import tier_bounds_mm
-
-
-class _SceneDecals:
-    """Decal tables of one scene as textures."""
-
-    def __init__(self, ctx: moderngl.Context, tables: DecalTables) -> None:
-        self.grid = data_texture(ctx, tables.grid)
-        self.table = data_texture(ctx, tables.table)
-        self.glyphs = data_texture(ctx, tables.glyphs)
-
-    def release(self) -> None:
-        for texture in (self.grid, self.table, self.glyphs):
-            texture.release()
 
 
 class Renderer:
@@ -113,7 +101,7 @@ class Renderer:
         self._bodies: Recent[RayBodies] = Recent(2)
         self._shapes = Shapes(self._ctx, self._geometry)
         self._lights: Kept[GpuLight] = Kept(24)
-        self._scenes: Kept[_SceneDecals] = Kept(2)
+        self._scenes: Kept[SceneDecals] = Kept(2)
         self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
         self._sun_shadow = ShadowMap(self._ctx, self._occluder, shadow_detail)
         self._blocks = {
@@ -168,7 +156,7 @@ class Renderer:
             ),
         )
         shadow = self._shadow(scene)
-        seen = _view_values(scene, view, samples, self.exposure(scene, camera, size))
+        seen = _view_values(scene, view, samples, self._exposure(scene, camera, view))
         sunny = sun_values(light.ambient.suns, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
         hung = cable_values(scene, spreader.mesh if spreader else None, view.position_m)
@@ -189,7 +177,7 @@ class Renderer:
             [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
         )
         drawn = bands([*regions, *near])
-        samples.begin(damage, drawn, holes)
+        samples.begin(damage, drawn, near, holes)
         self._bind_surface(scene, mesh, spreader)
         self._sample(samples, holes, view, camera, damages, mesh, spreader)
         self._bind_light(samples, light, shadow)
@@ -228,7 +216,6 @@ class Renderer:
         spreader: GpuMesh | None,
     ) -> None:
         """Draw the geometry into the empty sample targets; holes: pixels that they may touch."""
-        damage = variant(damages)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._lobes.use(UNITS["lobe_masks"])
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
@@ -236,12 +223,20 @@ class Renderer:
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}
         if spreader is not None:
-            spreader.draw(camera.position_mm, damage)
-        mesh.draw(camera.position_mm, damage, bent)
+            spreader.draw("sound", spreader.seen_from(camera.position_mm))
+        seen = mesh.seen_from(camera.position_mm, bent)
+        if damages:
+            boxes = [corners_mm(item) for item in damages]
+            seen, touched = mesh.clusters.parted(seen, boxes, REACH_MARGIN_MM)
+            mesh.draw("sound", seen)
+            samples.begin_damaged()
+            mesh.draw("damaged", touched)
+        else:
+            mesh.draw("sound", seen)
         moved_mm = sum(abs(d.depth_mm) for d in damages)
         for region in holes:
             samples.limit_inside(region)
-            mesh.draw_inside(mesh.clusters.seen_in(view, region, moved_mm))
+            mesh.draw("holed", mesh.clusters.seen_in(view, region, moved_mm))
         samples.end()
 
     def _bind_light(
@@ -312,27 +307,25 @@ class Renderer:
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
         """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
+        return self._exposure(scene, camera, view_of(camera, size))
+
+    def _exposure(self, scene: Scene, camera: Camera, view: View) -> float:
         light = self.ambient(scene.environment.name)
         paint = scene.surface.paint.albedo
-        view = view_of(camera, size)
         return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
 
     def _bind_surface(self, scene: Scene, mesh: GpuMesh, spreader: GpuMesh | None) -> None:
         """Bind what the material layers read."""
         decals = self._scenes.get(
             scene,
-            lambda: _SceneDecals(
-                self._ctx, pack_decals(scene, mesh.mesh, self._art_layers, self._fonts)
-            ),
+            lambda: SceneDecals(self._ctx, scene, mesh.mesh, self._art_layers, self._fonts),
         )
         textures: dict[str, Any] = {
             "noise_tiles": self._noise,
             "art": self._art,
             "glyph_tiles": self._tiles,
             "zone_table": self._shapes.zone_table(mesh, spreader),
-            "decal_grid": decals.grid,
-            "decal_table": decals.table,
-            "glyph_table": decals.glyphs,
+            **decals.textures,
         }
         for name, texture in textures.items():
             texture.use(UNITS[name])

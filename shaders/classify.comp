@@ -4,7 +4,7 @@
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
-#include "decal_cell.glsl"
+#include "decals_near.glsl"
 #include "samples.glsl"
 #include "keys_around.glsl"
 #include "pixel_list.glsl"
@@ -27,23 +27,97 @@ uniform sampler2D sheet_depths;
 layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
 layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 
-// what a pixel is listed as: NO_LIST where it sees sky alone
-struct Seen {
-    uint key;
-    uint list;
-};
+#if DAMAGED
+// 1 near a damage, 2 near a hole, else 0
+int damage_near(vec3 rest_mm) {
+    int near = 0;
+    for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
+         i = next_near(i + 1, damage_count, rest_mm))
+        if (within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
+    return near;
+}
+#endif
 
-bool bears_decals(uint key, ivec2 sample_at) {
-    return key != 0u && cell_at(key_zone(key), texelFetch(sheet_points, sample_at, 0).xy).x != 0u;
+void write_labels(ivec2 pixel, uint key, float depth) {
+    if (key == 0u) return;
+    uint labels = key_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (SOUND_CONTAINER << 16);
+    imageStore(label_image, pixel, uvec4(labels));
+    imageStore(depth_image, pixel, vec4(depth));
 }
 
-Seen seen_at(ivec2 pixel) {
+#if COARSE
+// lists those of a block of two by two pixels whose bits are set, each by itself
+void list_each(uint list, ivec2 block, uint bits) {
+    if (bits == 0u) return;
+    uint at = listed(list, bitCount(bits));
+    for (int i = 0; i < 4; ++i)
+        if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_group(i), 1u);
+}
+
+// from the order of textureGather to that of in_group
+vec4 by_rows(vec4 v) { return v.wzxy; }
+
+// those of two by two pixels that see one facet, without prints or damage near, are shaded at once
+void main() {
+    ivec2 in_region = 2 * ivec2(gl_GlobalInvocationID.xy);
+    if (in_region.x >= region.z) return;
+    ivec2 block = region.xy + in_region;
+    vec2 middle = vec2(block + 1) / vec2(textureSize(surface_keys, 0));
+    uvec4 key = textureGather(surface_keys, middle).wzxy;
+    vec4 sheet_x = by_rows(textureGather(sheet_points, middle, 0));
+    vec4 sheet_y = by_rows(textureGather(sheet_points, middle, 1));
+    vec4 depth = by_rows(textureGather(sheet_depths, middle));
+#if DAMAGED
+    vec4 rest_mm[3] = vec4[3](by_rows(textureGather(rest_x, middle)), by_rows(textureGather(rest_y, middle)),
+                              by_rows(textureGather(rest_z, middle)));
+#endif
+    uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
+    for (int i = 0; i < 4; ++i) {
+        ivec2 pixel = block + in_group(i);
+        if (any(greaterThanEqual(pixel - region.xy, region.zw))) key[i] = 0u;
+        write_labels(pixel, key[i], depth[i]);
+        uint bit = key[i] != 0u ? 1u << i : 0u;
+#if DAMAGED
+        int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]));
+        if (near > 1) holed |= bit;
+        if (near == 1) damaged |= bit;
+        if (near > 0) bit = 0u;
+#endif
+        if (near_decals(key_zone(key[i]), vec2(sheet_x[i], sheet_y[i]))) decals |= bit;
+        else plain |= bit;
+    }
+    list_each(LIST_DECAL, block, decals);
+#if DAMAGED
+    list_each(LIST_DAMAGED, block, damaged);
+    list_each(LIST_HOLED, block, holed);
+#endif
+    uint groups[4];
+    uint count = 0u;
+    for (int i = 0; i < 4; ++i) {
+        // facets that face one way share a key: a step over the sheet tells of what lies hidden between
+        float most_mm = COARSE_STEP_PX * 1000.0 * pixel_angle * depth[i];
+        uint group = 0u;
+        for (int j = i; j < 4; ++j) {
+            float step_mm = max(abs(sheet_x[j] - sheet_x[i]), abs(sheet_y[j] - sheet_y[i]));
+            if (key[j] == key[i] && step_mm < most_mm) group |= 1u << j;
+        }
+        groups[i] = (plain & 1u << i) != 0u ? group & plain : 0u;
+        plain &= ~groups[i];
+        count += groups[i] != 0u ? 1u : 0u;
+    }
+    if (count == 0u) return;
+    uint at = listed(LIST_COARSE, count);
+    for (int i = 0; i < 4; ++i)
+        if (groups[i] != 0u) list_entries[at++] = list_entry(block, groups[i]);
+}
+#else
+void main() {
+    ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
+    if (in_region.x >= region.z) return;
+    ivec2 pixel = region.xy + in_region;
     ivec2 middle = middle_of(pixel);
     uint keys[FILTER_NEAR] = keys_near(middle);
     uint key = keys[0];
-    bool decal = bears_decals(key, middle);
-    uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
-#if SAMPLES_PER_AXIS > 1
     bool mixed = false;
     // the first and the last of other parts stand for all: few pixels see a fourth
     uint first = key, last = key;
@@ -55,23 +129,24 @@ Seen seen_at(ivec2 pixel) {
         last_at = middle + FILTER_OFFSET[i];
         if (first == key) { first = last; first_at = last_at; }
     }
-    decal = decal || bears_decals(first, first_at) || bears_decals(last, last_at);
+    uint part[3] = uint[3](key, first, last);
+    ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
+    bool decal = false;
+    for (int i = 0; i < (SAMPLES_PER_AXIS > 1 ? 3 : 1); ++i)
+        decal = decal || (part[i] != 0u && near_decals(key_zone(part[i]), texelFetch(sheet_points, part_at[i], 0).xy));
+    write_labels(pixel, key, texelFetch(sheet_depths, middle, 0).r);
+    uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
+#if SAMPLES_PER_AXIS > 1
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
 #endif
 #if DAMAGED
-    vec3 rest_mm = rest_at(middle);
-    int near = 0;   // 1 near a damage, 2 near a hole
-    for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
-         i = next_near(i + 1, damage_count, rest_mm))
-        if (key != 0u && within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
+    int near = key != 0u ? damage_near(rest_at(middle)) : 0;
 #if SAMPLES_PER_AXIS > 1
     if (near > 0) list = mixed ? LIST_MIXED_DAMAGED : LIST_DAMAGED;
 #else
     if (near > 0) list = LIST_DAMAGED;
 #endif
-#if HOLED
     if (near > 1) list = LIST_HOLED;
-#endif
 #endif
 #if CABLES_NEAR
     // in which nothing but sky is seen beside them, though perhaps all samples see sky, or the cable
@@ -80,53 +155,6 @@ Seen seen_at(ivec2 pixel) {
         bare = bare && (keys[i] == 0u || float(key_zone(keys[i])) == cable_zone);
     if (bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496) list = LIST_CABLE;
 #endif
-    return Seen(key, list);
-}
-
-void write_labels(ivec2 pixel, uint key) {
-    if (key == 0u) return;
-    uint labels = key_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (SOUND_CONTAINER << 16);
-    imageStore(label_image, pixel, uvec4(labels));
-    imageStore(depth_image, pixel, vec4(texelFetch(sheet_depths, middle_of(pixel), 0).r));
-}
-
-#if COARSE
-// where two by two pixels see one facet alone, the first is shaded for all
-void main() {
-    ivec2 in_region = 2 * ivec2(gl_GlobalInvocationID.xy);
-    if (in_region.x >= region.z) return;
-    ivec2 pixel = region.xy + in_region;
-    bool whole = all(lessThan(in_region + 1, region.zw));
-    Seen seen[4];
-    vec2 sheet_mm[4];
-    for (int i = 0; i < 4; ++i) {
-        ivec2 at = pixel + ivec2(i & 1, i >> 1);
-        seen[i] = seen_at(at);
-        sheet_mm[i] = texelFetch(sheet_points, at, 0).xy;
-    }
-    bool alike = whole;
-    for (int i = 0; i < 4; ++i) {
-        alike = alike && seen[i].key == seen[0].key && seen[i].list == LIST_PLAIN;
-        // facets that face one way share a key: a step over the sheet tells of what lies hidden between
-        vec2 step_mm = abs(sheet_mm[i ^ 1] - sheet_mm[i]) + abs(sheet_mm[i ^ 2] - sheet_mm[i]);
-        float depth = texelFetch(sheet_depths, pixel + ivec2(i & 1, i >> 1), 0).r;
-        alike = alike && max(step_mm.x, step_mm.y) < COARSE_STEP_PX * 1000.0 * pixel_angle * depth;
-    }
-    if (alike) list_pixel(LIST_COARSE, pixel);
-    for (int i = 0; i < 4; ++i) {
-        ivec2 at = pixel + ivec2(i & 1, i >> 1);
-        if (any(greaterThanEqual(at - region.xy, region.zw))) continue;
-        write_labels(at, seen[i].key);
-        if (!alike && seen[i].list != NO_LIST) list_pixel(seen[i].list, at);
-    }
-}
-#else
-void main() {
-    ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
-    if (in_region.x >= region.z) return;
-    ivec2 pixel = region.xy + in_region;
-    Seen seen = seen_at(pixel);
-    write_labels(pixel, seen.key);
-    if (seen.list != NO_LIST) list_pixel(seen.list, pixel);
+    if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);
 }
 #endif

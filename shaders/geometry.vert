@@ -23,6 +23,9 @@ flat out uint surface_key;
 out vec3 rest_mm;
 #endif
 
+// what damages touch and what they do not is drawn by different programs, and meets without a gap
+invariant gl_Position;
+
 uniform usampler2D lobe_masks;   // as openness.py makes them
 
 uvec3 lobe_mask(vec3 direction, int below) {
@@ -46,10 +49,6 @@ void main() {
 #if DAMAGED
     rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
-    if (in_zone >= SPREADER_ZONE) {   // no damage moves or marks it
-        rest_mm = vec3(OUT_OF_REACH_MM);
-        position_mm = in_position_mm;
-    }
 #endif
     openness = vec4(in_cone, open_about_mirror(position_mm * MM, in_normal));
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));

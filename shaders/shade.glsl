@@ -44,18 +44,21 @@ struct Shaded {
     float cover;   // share of the pixel that is no sky
 };
 
-// pixels that are shaded at once, in their middle
+// pixels that are shaded at once are so in the middle between the first and the last of them: how far that
+// is from the first, and how many there are
 #if WITH_COARSE
-const ivec2 SHADED = ivec2(2);
+ivec2 to_last;
+float shaded_at_once;
 #else
-const ivec2 SHADED = ivec2(1);
+const ivec2 to_last = ivec2(0);
+const float shaded_at_once = 1.0;
 #endif
 
-// what samplers hold in the middle of the pixels that are shaded at once, the first at sample_at
+// what samplers hold in that middle, the first sample being at sample_at
 vec4 mean_of(sampler2D values, ivec2 sample_at) {
     vec4 first = texelFetch(values, sample_at, 0);
 #if WITH_COARSE
-    return 0.5 * (first + texelFetch(values, sample_at + SHADED - 1, 0));
+    return 0.5 * (first + texelFetch(values, sample_at + to_last, 0));
 #else
     return first;
 #endif
@@ -64,7 +67,7 @@ vec4 mean_of(sampler2D values, ivec2 sample_at) {
 vec4 mean_of_bytes(usampler2D values, ivec2 sample_at) {
     vec4 first = unpackUnorm4x8(texelFetch(values, sample_at, 0).r);
 #if WITH_COARSE
-    return 0.5 * (first + unpackUnorm4x8(texelFetch(values, sample_at + SHADED - 1, 0).r));
+    return 0.5 * (first + unpackUnorm4x8(texelFetch(values, sample_at + to_last, 0).r));
 #else
     return first;
 #endif
@@ -150,8 +153,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
-    // the geometric mean of the footprint's two axes on the sheet
-    p.footprint_mm = float(SHADED.x) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+    p.footprint_mm = sqrt(shaded_at_once) * lookup_mm(p.depth, facing);
     p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (key_zone(key) >= SPREADER_ZONE) {
@@ -190,7 +192,7 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
     vec4 sun_seen = vec4(0.0);
     float depth = mean_of(sheet_depths, sample_at).r;
-    vec2 place = place_of(sample_at) + 0.5 * vec2(SHADED - 1);
+    vec2 place = place_of(sample_at) + 0.5 * vec2(to_last);
     vec3 from_eye = depth * view_ray(place);
 #if TRACED
     sky.rays = traced_at(place, key, from_eye, normal);
@@ -215,7 +217,7 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 Shaded single_surface(ivec2 pixel) {
     ivec2 middle = middle_of(pixel);
     uint key = key_at(middle);
-    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 * vec2(SHADED)));
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 + 0.5 * vec2(to_last)));
     Part p = part_at(middle, key, view);
 #if LOOKUPS > 1
     // the sheet is all but flat between the middle and two others of its near samples

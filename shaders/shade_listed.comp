@@ -44,8 +44,17 @@ Shaded cable(vec2 center) {
 #endif
 
 void main() {
-    if (gl_GlobalInvocationID.x >= listed_pixels()) return;
-    ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
+    if (gl_GlobalInvocationID.x >= pixels_listed()) return;
+    uint entry = listed_at(gl_GlobalInvocationID.x);
+    ivec2 pixel = listed_pixel(entry);
+#if WITH_COARSE
+    uint group = listed_group(entry);
+    int first = findLSB(group);
+    ivec2 block = pixel;
+    pixel += in_group(first);
+    to_last = in_group(findMSB(group)) - in_group(first);
+    shaded_at_once = float(bitCount(group));
+#endif
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
     ivec2 middle = middle_of(pixel);
@@ -136,8 +145,12 @@ void main() {
     vec3 color = s.color;
 #endif
     uvec4 shown = uvec4(packUnorm4x8(vec4(developed(color), s.cover)));
-    for (int y = 0; y < SHADED.y; ++y)
-        for (int x = 0; x < SHADED.x; ++x) imageStore(color_image, pixel + ivec2(x, y), shown);
+#if WITH_COARSE
+    for (int i = 0; i < 4; ++i)
+        if ((group & 1u << i) != 0u) imageStore(color_image, block + in_group(i), shown);
+#else
+    imageStore(color_image, pixel, shown);
+#endif
     // of other pixels classify.comp knew it
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));

@@ -126,7 +126,7 @@ def test_front_holds_exactly_the_points_that_none_beats():
 
 
 def test_every_text_that_an_ablation_changes_stands_in_a_shader():
-    shaders = ("shade.frag", "shade_listed.comp")
+    shaders = ("bent_sky.frag", "shade_listed.comp")
     text = "".join(
         programs.expand(
             shader_path(name).read_text(encoding="utf-8"), 3, pixel_class=pixel_class, suns=1

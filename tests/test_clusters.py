@@ -71,3 +71,32 @@ def test_near_the_eye_nothing_is_left_out(scene):
     crosses = (eye[..., 2].min(axis=1) < 0.1) & (eye[..., 2].max(axis=1) > 0.1)
     assert crosses.any()
     assert chosen[crosses].all()
+
+
+def test_triangles_are_parted_by_whether_a_box_may_reach_them():
+    mesh = build_container("20")
+    clusters = Clusters(mesh)
+    rng = np.random.default_rng(8)
+    corners = mesh.positions_mm[mesh.triangles]
+    low, high = mesh.bounds_mm
+    asked = [slice(10, 1000), slice(5000, 5001), slice(9000, len(mesh.triangles))]
+    wanted = np.zeros(len(mesh.triangles), bool)
+    for part in asked:
+        wanted[part] = True
+    for _ in range(40):
+        middle = rng.uniform(low, high, (2, 3))
+        boxes = [m + rng.uniform(-300, 300, (8, 3)) for m in middle]
+        far, near = clusters.parted(asked, boxes, 40.0)
+        times = np.zeros(len(mesh.triangles), int)
+        for part in (*far, *near):
+            times[part] += 1
+        np.testing.assert_array_equal(times, wanted)
+        meets = np.zeros(len(mesh.triangles), bool)
+        for box in boxes:
+            above = (corners.max(axis=1) >= box.min(axis=0) - 40).all(axis=1)
+            meets |= above & (corners.min(axis=1) <= box.max(axis=0) + 40).all(axis=1)
+        is_far = np.zeros(len(mesh.triangles), bool)
+        for part in far:
+            is_far[part] = True
+        assert not (is_far & meets).any()
+        assert is_far.sum() > 0.5 * wanted.sum()  # most of a container is

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.drawing.regions import bands, merged
+from fastgen.drawing.regions import bands, merged, outside
 
 
 def painted(regions, size=(40, 30)):
@@ -46,3 +46,16 @@ def test_merged_regions_hold_all_and_no_pixel_twice():
     assert fewer > 50
     assert merged([(3, 4, 5, 6), None]) == [None]
     assert merged([]) == []
+
+
+def test_outside_is_each_pixel_of_some_regions_that_others_lack():
+    rng = np.random.default_rng(9)
+    for _ in range(300):
+        low = rng.integers(0, [30, 20], (rng.integers(1, 4), 2))
+        kept = bands([(*map(int, a), *map(int, rng.integers(1, 10, 2))) for a in low])
+        low = rng.integers(0, [30, 20], (rng.integers(0, 4), 2))
+        others = [(*map(int, a), *map(int, rng.integers(0, 12, 2))) for a in low]
+        given = outside(kept, others)
+        expected = (painted(kept) > 0) & (painted(others) == 0)
+        np.testing.assert_array_equal(painted(given), expected)
+        assert all(width > 0 and height > 0 for _, _, width, height in given)

@@ -1,6 +1,7 @@
 """Which triangles of a mesh may be seen in a part of an image, by boxes around runs of them."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,28 @@ class Clusters:
         left_of = pixels.min(axis=1) < (x + width + _MARGIN_PX, y + height + _MARGIN_PX)
         return self._runs((right_of & left_of).all(axis=1) | (depth.min(axis=1) <= NEAR_M))
 
+    def parted(
+        self, triangles: Sequence[slice], boxes_mm: Sequence[NDArray[np.float64]], margin_mm: float
+    ) -> tuple[list[slice], list[slice]]:
+        """Those of `triangles` that are far from some boxes, and the others. boxes_mm: corners
+        [8, 3] each; margin_mm: how near to one of them is far."""
+        met = np.zeros(len(self._low), bool)
+        for box in boxes_mm:
+            low, high = box.min(axis=0) - margin_mm, box.max(axis=0) + margin_mm
+            met |= ((self._low <= high) & (self._high >= low)).all(axis=1)
+        near = np.repeat(met, _SIZE)[: self._count]
+        asked = np.zeros(self._count, bool)
+        for part in triangles:
+            asked[part] = True
+        return _slices(asked & ~near), _slices(asked & near)
+
     def _runs(self, shown: NDArray[np.bool_]) -> list[slice]:
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], shown, [False]]))) * _SIZE
-        ends = np.minimum(edges[1::2], self._count)
-        return [slice(int(a), int(b)) for a, b in zip(edges[::2], ends, strict=True)]
+        return [
+            slice(_SIZE * run.start, min(_SIZE * run.stop, self._count)) for run in _slices(shown)
+        ]
+
+
+def _slices(chosen: NDArray[np.bool_]) -> list[slice]:
+    """Where `chosen` holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]))).tolist()
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -65,7 +65,7 @@ class GpuMesh:
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
         self._openness = ctx.buffer(open_sky(mesh.normals).tobytes())
         self._shown: weakref.ref[NDArray[np.uint8]] | None = None
-        most = max(len(mesh.groups), Clusters.most_runs(mesh))
+        most = len(mesh.groups) + 2 * Clusters.most_runs(mesh)
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_zone")
         content = (self._vertices, "3f 3f 2f 1u", *names)
@@ -78,7 +78,7 @@ class GpuMesh:
 
     @cached_property
     def clusters(self) -> Clusters:
-        """What of the mesh may be behind a hole: few scenes ask, and only of containers."""
+        """What of the mesh damages touch, and what may be behind a hole: asked of containers."""
         return Clusters(self.mesh)
 
     def set_openness(self, values: NDArray[np.uint8]) -> None:
@@ -87,28 +87,26 @@ class GpuMesh:
             self._openness.write(values)
             self._shown = weakref.ref(values)  # many meshes wait for their turn
 
-    def draw(self, position_mm: Iterable[float], damage: str, bent: Collection[str] = ()) -> None:
-        """Draw what a camera at `position_mm` may see from outside.
-
-        damage: one of programs.DAMAGE_VARIANTS. bent: faces to draw even if turned away.
-        """
+    def seen_from(self, position_mm: Iterable[float], bent: Collection[str] = ()) -> list[slice]:
+        """Triangles that a camera at `position_mm` may see from outside; bent: faces to count in
+        even if turned away."""
         names = {*facing_groups(self.mesh, position_mm), *bent}
-        seen = [triangles for name, triangles in self.mesh.groups.items() if name in names]
-        self._draw("sound" if damage == "sound" else "damaged", seen)
+        return [triangles for name, triangles in self.mesh.groups.items() if name in names]
 
-    def draw_inside(self, triangles: Sequence[slice]) -> None:
-        """Draw the insides of some triangles into the inner view, but for what holes tore away."""
-        if triangles:
-            self._draw("holed", triangles)
+    def draw(self, program: str, triangles: Sequence[slice]) -> None:
+        """Draw some triangles in one call.
 
-    def _draw(self, program: str, parts: Sequence[slice]) -> None:
-        """All in one call."""
-        commands = np.zeros(len(parts), _COMMAND)
+        program: one of programs.DAMAGE_VARIANTS; 'holed' draws insides into the inner view, but for
+        what holes tore away.
+        """
+        if not triangles:
+            return
+        commands = np.zeros(len(triangles), _COMMAND)
         commands["instances"] = 1
-        commands["count"] = [3 * (part.stop - part.start) for part in parts]
-        commands["first"] = [3 * part.start for part in parts]
+        commands["count"] = [3 * (part.stop - part.start) for part in triangles]
+        commands["first"] = [3 * part.start for part in triangles]
         self._commands.write(commands.tobytes())
-        self._arrays[program].render_indirect(self._commands, moderngl.TRIANGLES, len(parts))
+        self._arrays[program].render_indirect(self._commands, moderngl.TRIANGLES, len(triangles))
 
     def release(self) -> None:
         """Free all GL objects."""

@@ -56,8 +56,7 @@ COARSE_STEP_PX = 4.0
 seen more aslant, and what lies behind a step, is shaded by itself."""
 
 SKY_DEPTH = 1 - 2**-18
-"""Depth of the sky in clip space, over w: before what is cleared, behind all that camera.FAR_M
-lets be seen, but for its last metre. Clipping may round depths."""
+"""Of clip space, over w: before 1, for clipping may round, and behind all nearer than 198 m."""
 
 LIST_GROUP = 64
 """Pixels of a list that a compute work group takes."""
@@ -90,6 +89,9 @@ DAMAGE_VARIANTS = ("sound", "damaged", "holed")
 REACH_MARGIN_MM = 40.0
 """Pixels are filtered with their neighbours: this far around a damage they are shaded with it."""
 
+OUT_OF_REACH_MM = 1e6
+"""Rest position, along each axis, of what no damage touches."""
+
 LOBE_CELLS = 32
 """Along each side of the octahedral maps of openness.lobe_masks."""
 
@@ -106,6 +108,7 @@ LOOKUP_PLACES = {
 """Where in a pixel that sees one surface they are, in pixels from its centre."""
 
 DECAL_CELL_MM = 64.0
+NEAR_CELL_MM = 16.0  # of decals_near
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 
 GUTTER_STEPS = 17
@@ -199,22 +202,10 @@ DAMAGE_BLOCK = Block(
 )
 
 
-def listed_classes(
-    samples_per_axis: int, damage: str = "holed", coarse: bool = True
-) -> tuple[str, ...]:
-    """The classes that pixels of such a frame may be of, in the order of their lists.
-
-    damage: one of DAMAGE_VARIANTS. coarse: see Renderer. By default as many as can be.
-    """
-
-    def comes(name: str, traits: tuple[str, ...]) -> bool:
-        if samples_per_axis == 1 and name.startswith(("mixed", "cable")):
-            return False
-        if "HOLES" in traits:
-            return damage == "holed"
-        return (damage != "sound" or "DAMAGE" not in traits) and (coarse or name != "coarse")
-
-    return tuple(name for name, traits in PIXEL_CLASSES.items() if comes(name, traits))
+def listed_classes(samples_per_axis: int) -> tuple[str, ...]:
+    """The classes that pixels of so many samples may be of, in the order of their lists."""
+    others = ("mixed", "cable") if samples_per_axis == 1 else ("coarse",)
+    return tuple(name for name in PIXEL_CLASSES if not name.startswith(others))
 
 
 def noise_deviation() -> NDArray[np.float32]:
@@ -270,6 +261,7 @@ def _constants(
         "SCRATCHED_SHARE": f"{noise_tiles().scratched:.6f}",
         "NOISE_LEVELS": f"{_NOISE_LEVELS:.1f}",
         "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
+        "NEAR_CELL_MM": f"{NEAR_CELL_MM:.1f}",
         "ART_SIZE": f"{ART_SIZE:.1f}",
         "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
         "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
@@ -284,7 +276,7 @@ def _constants(
         "LIST_HEADER": f"{LIST_HEADER}u",
         **{f"WITH_{trait}": int(trait in PIXEL_CLASSES[pixel_class]) for trait in PIXEL_TRAITS},
         "GUTTER_STEPS": GUTTER_STEPS,
-        "OUT_OF_REACH_MM": "1e6",
+        "OUT_OF_REACH_MM": f"{OUT_OF_REACH_MM:g}",
         "LIST_GROUP": f"{LIST_GROUP}u",
         "LIST_BINDING": LIST_BINDING,
         "MAX_PARTS": 3,

@@ -61,7 +61,7 @@ def merged(regions: Sequence[Region | None]) -> list[Region | None]:
 
 
 def outside(regions: Sequence[Region], others: Sequence[Region]) -> list[Region]:
-    """Disjoint regions that hold all of `regions`, which are disjoint, but what lies in `others`."""
+    """Disjoint regions that hold all of `regions`, disjoint ones, but what lies in `others`."""
     left = list(regions)
     for x, y, width, height in others:
         found = []

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import moderngl
 import numpy as np
 
+from fastgen.drawing.programs import OUT_OF_REACH_MM
 from fastgen.drawing.regions import Region
 from fastgen.drawing.sample_lattice import SampleLattice
 from fastgen.gl import GLContext
@@ -15,8 +16,10 @@ T = TypeVar("T")
 
 _GL_SCISSOR_TEST = 0x0C11
 _FAR = (ctypes.c_float * 1)(1.0)
+_OUT_OF_REACH = (ctypes.c_float * 1)(OUT_OF_REACH_MM)
 _KEYS_FORMAT, _DEPTH_FORMAT = (0x8D94, 0x1405), (0x1902, 0x1406)
-"""GL_RED_INTEGER of GL_UNSIGNED_INT, GL_DEPTH_COMPONENT of GL_FLOAT."""
+_REST_FORMAT = (0x1903, 0x1406)
+"""GL_RED_INTEGER of GL_UNSIGNED_INT, GL_DEPTH_COMPONENT and GL_RED of GL_FLOAT."""
 
 
 class SampleTargets:
@@ -54,12 +57,18 @@ class SampleTargets:
         )
 
     def begin(
-        self, damage: str, seen: Sequence[Region | None], inside: Sequence[Region | None] = ()
+        self,
+        damage: str,
+        seen: Sequence[Region | None],
+        touched: Sequence[Region | None] = (),
+        inside: Sequence[Region | None] = (),
     ) -> None:
-        """Bind the framebuffer, emptied where it will be asked; key 0 is the void.
+        """Bind the framebuffer for what no damage touches, emptied where it will be asked; key 0 is
+        the void.
 
         damage: one of programs.DAMAGE_VARIANTS. seen: regions of the image, None for all of it.
-        inside: regions that `limit_inside` will name.
+        touched: where rest positions will be asked for. inside: regions that `limit_inside` will
+        name.
         """
         self._make_room(damage)
         boxes = [*map(self._texels, seen), *map(self._texels_inside, inside)]
@@ -69,7 +78,16 @@ class SampleTargets:
         # of single samples it tells the sky from all else, see Targets.begin
         for box in [self._texels(None), *boxes] if self.per_axis == 1 else boxes:
             self._empty(self.depth_buffer, box, _DEPTH_FORMAT, _FAR)
-        target = self._sound if damage == "sound" else self._damaged
+        for box in map(self._texels, touched):
+            for rest in self.rest:
+                self._empty(rest, box, _REST_FORMAT, _OUT_OF_REACH)
+        self._use(self._sound)
+
+    def begin_damaged(self) -> None:
+        """Bind the framebuffer for what damages touch, which keeps rest positions."""
+        self._use(self._damaged)
+
+    def _use(self, target: moderngl.Framebuffer) -> None:
         target.use()
         target.viewport = (0, 0, *self._fine)
 

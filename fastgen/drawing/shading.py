@@ -40,16 +40,12 @@ UNITS = {
     "point_keys": 21,
     "point_places": 22,
     "point_light": 23,
+    "decal_cells": 24,
 }
 
 
 _OCTAHEDRON = 24
 """Corners of its eight triangles."""
-
-
-_ALL: Any = [(True,) * 4] * 3
-_COLOR_ALONE: Any = [(True,) * 4, (False,) * 4, (False,) * 4]
-"""Masks of colour, labels and depth; moderngl's annotation knows the mask of a single one."""
 
 
 class Shading:
@@ -108,10 +104,21 @@ class Shading:
         self._classify(outside(near, cabled), damage, cables=False)
         self._classify(cabled, damage, cables=True)
         self._ctx.memory_barrier()
-        for name in listed_classes(self._samples_per_axis, damage, self._coarse):
-            if cabled or name != "cable":
+        for name in listed_classes(self._samples_per_axis):
+            if self._comes(name, damage, bool(cabled)):
                 targets.lists.dispatch(name, self._shader(name, suns))
         self._ctx.memory_barrier()
+
+    def _comes(self, name: str, damage: str, cables: bool) -> bool:
+        """Whether a frame may hold pixels of a class."""
+        if name == "cable":
+            return cables
+        if name in ("plain", "coarse"):
+            return self._coarse == (name == "coarse")
+        traits = PIXEL_CLASSES[name]
+        if "HOLES" in traits:
+            return damage == "holed"
+        return damage != "sound" or "DAMAGE" not in traits
 
     def _classify(self, regions: Sequence[Region], damage: str, cables: bool) -> None:
         """List the pixels of `regions`, of which the first column and row are even."""
@@ -120,7 +127,7 @@ class Shading:
         key = (damage, cables)
         if key not in self._classifiers:
             self._classifiers[key] = link_compute(
-                self._ctx, "classify.comp", UNITS, **self._variant("plain", damage), cables=cables
+                self._ctx, "classify.comp", UNITS, **self._variant("decal", damage), cables=cables
             )
         program = self._classifiers[key]
         side = 2 if self._coarse else 1
@@ -138,11 +145,7 @@ class Shading:
             self._skies[stages] = program, self._ctx.vertex_array(program, [])
         self._ctx.scissor = None
         self._ctx.enable_only(moderngl.DEPTH_TEST if targets.begin() else moderngl.NOTHING)
-        targets.image.depth_mask = False
-        targets.image.color_mask = _COLOR_ALONE
         self._skies[stages][1].render(moderngl.TRIANGLES, vertices=3 if own else _OCTAHEDRON)
-        targets.image.color_mask = _ALL
-        targets.image.depth_mask = True
 
     def _shader(self, pixel_class: str, suns: int) -> moderngl.ComputeShader:
         """What shades the listed pixels of a class."""

@@ -45,7 +45,7 @@ def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.Textu
 
 
 def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:
-    """Numbers [H, W, C], float32 or uint32, for shaders to fetch by row and column.
+    """Numbers [H, W, C], float32, uint32 or uint8, for shaders to fetch by row and column.
 
     Filled up with zeros to powers of two: llvmpipe compiles its shaders anew, which takes seconds,
     where a texture's sides stop or start being such.
@@ -54,7 +54,7 @@ def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:
     rows, columns = (1 << (side - 1).bit_length() for side in (height, width))
     filled = np.zeros((rows, columns, channels), values.dtype)
     filled[:height, :width] = values
-    dtype = {"f": "f4", "u": "u4"}[values.dtype.kind]
+    dtype = f"{values.dtype.kind}{values.dtype.itemsize}"
     texture = ctx.texture((columns, rows), channels, filled.tobytes(), dtype=dtype)
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return texture
