@@ -60,7 +60,8 @@ class View:
         points = np.asarray(points_mm, np.float64)
         # in one product: of a stack of small matrices NumPy takes one after the other
         turned = points.reshape(-1, 3) @ (MM * self.rotation.T)
-        turned -= self.rotation @ self.position_m
+        for axis, offset in enumerate(self.rotation @ self.position_m):
+            turned[:, axis] -= offset  # NumPy is slow along an axis of three
         return turned.reshape(points.shape)
 
     def project(
@@ -72,11 +73,15 @@ class View:
         """
         view = self.to_view(points_mm)
         depth = view[..., 2].copy()
-        plane = view[..., :2] * (1 / np.where(depth > 1e-9, depth, np.nan))[..., None]
+        inverse = 1 / np.where(depth > 1e-9, depth, np.nan)
+        plane = np.empty((*depth.shape, 2))
+        for axis in (0, 1):
+            np.multiply(view[..., axis], inverse, out=plane[..., axis])
         if self.distortion:
             plane = self.distortion.apply(plane)
         plane *= self.focal_px
-        plane += self.center_px
+        for axis, center in enumerate(self.center_px):
+            plane[..., axis] += center
         return plane, depth
 
     def rays(

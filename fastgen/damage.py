@@ -92,10 +92,13 @@ def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]
     rest = np.asarray(points_mm, np.float64).reshape(-1, 3)
     moved = rest.copy()
     for damage in damages:
-        q = rest - np.array(damage.origin_mm)
-        near = np.einsum("pc,pc->p", q, q) < np.square(reach_mm(damage)).sum()
-        if near.any():  # what lies farther away than all it reaches does not move
-            moved[near] += amount_mm(damage, rest[near])[:, None] * np.array(damage.inward)
+        away = sum((x - at) ** 2 for x, at in zip(rest.T, damage.origin_mm, strict=True))
+        # what lies farther away than all it reaches does not move
+        near = np.flatnonzero(away < np.square(reach_mm(damage)).sum())
+        if len(near):
+            amount = amount_mm(damage, rest.take(near, axis=0))
+            for axis, inward in enumerate(damage.inward):
+                moved[near, axis] += amount * inward
     return moved.reshape(np.shape(points_mm))
 
 

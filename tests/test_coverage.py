@@ -13,7 +13,6 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config import Config
 from fastgen.generator import Generator
 from fastgen.labelling.coverage import covered
-from fastgen.labelling.facets import Facets, clip, in_fours
 from fastgen.labels import decal_of
 from fastgen.scene import Camera, Spreader
 from fastgen.spreader import build_spreader
@@ -169,7 +168,7 @@ def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
         camera = scene.camera("Cr")
         camera = dataclasses.replace(camera, target_mm=tuple(target.tolist()), focal_mm=120.0)
         wanted = small.render(scene=scene, camera=camera).objects
-        monkeypatch.setattr("fastgen.labelling.coverage._MOST_POINTS", 40_000)
+        monkeypatch.setattr("fastgen.labelling.surface_points._MOST_POINTS", 40_000)
         found = large.render(scene=scene, camera=camera).objects
     pairs = [(a, b) for a, b in zip(wanted, found, strict=True) if a.class_name == "concave"]
     assert len(pairs) == 2
@@ -254,17 +253,6 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
     assert flags == {1, 2}
 
 
-def test_clipping_halves_a_square():
-    square = np.array([[[0.0, 0], [2, 0], [2, 2], [0, 2]]])
-    half, left = clip(square, square[..., 0] - 1.5)
-    assert left.all()
-    assert half.shape == (1, 4, 2)
-    assert {tuple(p) for p in half[0]} == {(1.5, 0), (2, 0), (2, 2), (1.5, 2)}
-    none, left = clip(square, square[..., 0] - 3)
-    assert len(none) == 0
-    assert not left.any()
-
-
 def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
     rng = np.random.default_rng(3)
     corners = rng.uniform(-20, 60, (50, 3, 2))
@@ -273,7 +261,9 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
     lower = covered(corners, owner, 5, (50, 40), (3, 10, 47, 40))
     image = np.zeros((40, 50), bool)
     image[10:, :] = True
-    hidden = found.hidden(image.ravel()[found.pixel])
+    hidden = found.area - found.shown(image)
+    (pixel, whose), (lower_pixel, lower_whose) = found.pixels(), lower.pixels()
+    assert (lower.shown(image) == lower.area).all()
     columns, rows = np.meshgrid(np.arange(-30, 80) + 0.5, np.arange(-30, 80) + 0.5)
     for number in range(5):
         truth = np.zeros(columns.shape, bool)
@@ -286,36 +276,14 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
         within = truth[30:70, 30:80]
         assert found.beyond[number] == lower.beyond[number] == truth.sum() - within.sum()
         assert hidden[number] == within[:10].sum()
-        assert (found.pixel[found.owner == number] == np.flatnonzero(within)).all()
+        assert found.area[number] == within.sum()
+        assert (pixel[whose == number] == np.flatnonzero(within)).all()
         within[:10] = within[:, :3] = within[:, 47:] = False
-        assert (lower.pixel[lower.owner == number] == np.flatnonzero(within)).all()
+        assert (lower_pixel[lower_whose == number] == np.flatnonzero(within)).all()
 
 
 def test_enormous_objects_are_counted_to_a_thousandth():
     square = np.array([[[-9e5, -8e5], [7e5, -8e5], [7e5, 9e5], [-9e5, 9e5]]])
     found = covered(square, np.zeros(1, np.int64), 1, (64, 48))
-    assert (found.pixel == np.arange(64 * 48)).all()
+    assert (found.pixels()[0] == np.arange(64 * 48)).all()
     assert found.beyond == pytest.approx(16e5 * 17e5, rel=1e-3)
-
-
-def test_triangles_that_make_a_flat_convex_polygon_become_one():
-    square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
-    bent = square + [5.0, 0, 0]
-    bent[3, 2] = 1
-    dart = np.array([[0.0, 9, 0], [4, 9, 0], [1, 10, 0], [0, 13, 0]])
-    triangles = [
-        *(square[[0, 1, 2]], square[[0, 2, 3]]),  # the fourth corner comes last
-        *(square[[0, 1, 2]] + 20, square[[3, 0, 2]] + 20),  # and first
-        *(bent[[0, 1, 2]], bent[[0, 2, 3]]),
-        *(dart[[0, 1, 2]], dart[[0, 2, 3]]),
-        *(square[[0, 1, 2]] + 40, square[[0, 2, 3]] + 60),
-        square[[0, 1, 2]] + 80,
-    ]
-    corners = np.array(triangles)
-    made = in_fours(Facets(corners, 2 * corners, np.full(len(corners), 3)))
-    assert (made.rest_mm == 2 * made.corners_mm).all()
-    assert (made.owner == 3).all()
-    assert len(made) == 2 + 7
-    assert (made.corners_mm[:2] == [square, square + 20]).all()
-    assert (made.corners_mm[2:, :3] == corners[4:]).all()
-    assert (made.corners_mm[2:, 3] == corners[4:, 2]).all()

@@ -6,7 +6,8 @@ import pytest
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config import Config
 from fastgen.generator import Generator
-from fastgen.labels import decal_of, visible_boxes
+from fastgen.labelling.visibility import mask_box, value_boxes
+from fastgen.labels import decal_of
 from tests import oracle
 
 
@@ -85,7 +86,18 @@ def test_unoccluded_markers_are_nearly_fully_visible(samples):
 
 def test_boxes_of_random_ids_equal_brute_force():
     ids = np.random.default_rng(0).choice([0, 1, 2, 5, 9], size=(37, 53)).astype(np.uint16)
-    boxes, areas = visible_boxes(ids, 10)
+    ids[20:24] = 5  # goes on from the end of a row to the next
+    boxes, areas = value_boxes(ids, 2, 10)
     for value in range(2, 10):
-        assert boxes[value] == oracle.box_of(ids == value)
-        assert areas[value] == (ids == value).sum()
+        assert boxes[value - 2] == oracle.box_of(ids == value)
+        assert areas[value - 2] == (ids == value).sum()
+    none, areas = value_boxes(ids[:0], 2, 10)
+    assert none == [None] * 8
+    assert not areas.any()
+
+
+def test_the_box_of_a_mask_equals_brute_force():
+    mask = np.zeros((37, 53), bool)
+    assert mask_box(mask) is None
+    mask[5, 50] = mask[31, 7] = True
+    assert mask_box(mask) == oracle.box_of(mask) == (7, 5, 51, 32)

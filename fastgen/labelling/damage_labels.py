@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera import MM
-from fastgen.classes import SOUND_CONTAINER
+from fastgen.classes import DAMAGE_VALUES, SOUND_CONTAINER
 from fastgen.damage import amount_mm, in_hole, mask_values, may_be_seen
 from fastgen.geometry.mesh import Mesh
-from fastgen.labelling.coverage import Points, project, surface_points
+from fastgen.labelling.coverage import project
 from fastgen.labelling.facets import Facets, damage_facets
-from fastgen.labelling.visibility import Shot, float_box, mask_box, visibility
+from fastgen.labelling.surface_points import Points, surface_points
+from fastgen.labelling.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Box, Object
 from fastgen.scene import Damage, Scene
 
@@ -25,69 +26,79 @@ def damage_objects(shot: Shot) -> list[Object]:
     A damage is where it alone would have moved the sheet beyond the threshold, or torn it away. Its
     amodal box is that of the pixels there; None where a camera so placed cannot see it.
     """
+    damages = shot.scene.damages
+    if not damages:
+        return []
+    seen_boxes, areas = shot.boxes_on_container(
+        shot.frame.damage, DAMAGE_VALUES.start, DAMAGE_VALUES.stop
+    )
     objects = []
-    for damage, value in zip(shot.scene.damages, mask_values(shot.scene.damages), strict=True):
-        shown = shot.frame.damage == value
-        area = int(np.count_nonzero(shown))
-        bbox = mask_box(shown)
-        hidden, beyond, bounds = _alone(shot, damage, shown, bbox)
+    for damage, value in zip(damages, mask_values(damages), strict=True):
+        bbox, area = seen_boxes[value - DAMAGE_VALUES.start], areas[value - DAMAGE_VALUES.start]
+        hidden, beyond, bounds = _alone(shot, damage, value, bbox)
+        (amodal_bbox,) = float_boxes(bounds[None])
         objects.append(
             Object(
                 id=value,
                 class_name=damage.kind,
                 instance=value % 100,
                 bbox=bbox,
-                amodal_bbox=float_box(bounds),
-                area=area,
-                **visibility(shot.config, area, hidden, beyond),
+                amodal_bbox=amodal_bbox,
+                area=int(area),
+                **visibility(shot.config, int(area), hidden, beyond),
             )
         )
     return objects
 
 
 def _alone(
-    shot: Shot, damage: Damage, shown: NDArray[np.bool_], bbox: Box | None
+    shot: Shot, damage: Damage, value: int, bbox: Box | None
 ) -> tuple[int, int, NDArray[np.float64]]:
     """Of what the damage would cover alone: pixels of the image that are not shown, how many lie
-    outside it, and the bounds of all, infinite where it is nothing. bbox: of `shown`."""
+    outside it, and the bounds of all, infinite where it is nothing. value: the damage's in the
+    damage target; bbox: of what is shown."""
     unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
     x, y, z = shot.view.position_m / MM
     # where a hole is in view all damages are drawn, and more of them are seen than one might think
     if not may_be_seen(damage, (x, y, z), shot.scene.damages) and bbox is None:
         return 0, 0, unbounded
     bounds = unbounded if bbox is None else np.array(bbox, np.float64)
-    hidden, beyond = np.zeros(shown.size, bool), 0
+    places, beyond = [np.zeros((2, 0), np.int64)], 0
     for points in surface_points(
         project(_facets(shot.scene, shot.mesh, damage), shot.view), shot.view.size
     ):
-        part = _damaged(shot, damage, points, shown)
-        column, row, within = points.column[part], points.row[part], points.within[part]
+        part, hidden = _damaged(shot, damage, points, value)
+        column, row, within = (a.take(part) for a in (points.column, points.row, points.within))
         if not len(part):
             continue
         size = np.where(within, 1, points.step)
         least = column.min(), row.min()
         most = (column + size).max(), (row + size).max()
         bounds = np.concatenate([np.minimum(bounds[:2], least), np.maximum(bounds[2:], most)])
-        hidden[row[within] * shown.shape[1] + column[within]] = True
+        places.append(np.stack([column[hidden], row[hidden]]))
         off = ~within
         beyond += _distinct(column[off] // points.step, row[off] // points.step) * points.step**2
-    return int(np.count_nonzero(hidden & ~shown.ravel())), beyond, bounds
+    return _distinct(*np.concatenate(places, axis=1)), beyond, bounds
 
 
 def _damaged(
-    shot: Shot, damage: Damage, points: Points, shown: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Which of the points damage has reached, but for those where the image shows it or that the
-    sheet is sound."""
-    place = np.where(points.within, points.row * shown.shape[1] + points.column, 0)
+    shot: Shot, damage: Damage, points: Points, value: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Which of the points damage has reached, int [D], but for those where the image shows it or
+    that the sheet is sound; and which of these lie in the image, that does not show it, bool [D].
+    """
+    width = shot.view.size[0]
+    place = np.where(points.within, points.row * width + points.column, 0)
+    depth, drawn = shot.frame.depth.ravel().take(place), shot.frame.damage.ravel().take(place)
     # where the sheet itself is seen, the damage target knows the answer already
-    known = points.within & (points.depth_m <= shot.frame.depth.ravel()[place] * (1 + _DEPTH_SLACK))
-    known &= (shot.frame.damage.ravel()[place] == SOUND_CONTAINER) | shown.ravel()[place]
+    known = points.within & (points.depth_m <= depth * (1 + _DEPTH_SLACK))
+    known &= (drawn == SOUND_CONTAINER) | (drawn == value)
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
     part |= in_hole(damage, rest_mm)
-    return asked[part]
+    found = asked[part]
+    return found, points.within.take(found) & (drawn.take(found) != value)
 
 
 def _distinct(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
@@ -105,7 +116,7 @@ def _facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
     """The cameras of a scene share them."""
     kept = _kept_facets(scene, mesh)
     if damage not in kept:
-        kept[damage] = damage_facets(scene, mesh, damage, 0)
+        kept[damage] = damage_facets(scene, mesh, damage)
     return kept[damage]
 
 
