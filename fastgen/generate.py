@@ -103,8 +103,9 @@ def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Mak
 
     def run(job: Job, tasks: list[Task], on_report: Callable[[str, Any], None]) -> None:
         whole = worker_count >= len(os.sched_getaffinity(0))
-        arguments = (job, whole)
-        workers.run(maker, arguments, tasks, worker_count, on_report, Strikes(job), hang_s)
+        workers.run(
+            maker, (job, whole), tasks, worker_count, on_report, Strikes(job), hang_s, whole
+        )
 
     return run
 

@@ -141,6 +141,30 @@ def test_light_beside_a_wall_is_the_integral_over_what_the_wall_leaves(radiance,
     assert (np.abs(np.mean(off, axis=0)) < 0.02).all()
 
 
+def test_alike_vertices_are_lit_as_each_is_by_itself():
+    """Found once for each kind, in whatever order they stand; and all at once as one by one."""
+    rng = np.random.default_rng(11)
+    normals = facing(12)
+    open_to = rng.random((12, 96)) < rng.random((12, 1))
+    bits, cones = np.packbits(open_to, axis=1), encoded(normals, open_to)
+    suns = (Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005), Sun((0.0, 0.8, 0.6), (9, 9, 9), 0.01))
+    sky = Sky(replace(light_of(sunset), suns=suns), 40.0)
+    alone = [Openness(*(part[[i]] for part in (normals, bits, cones))) for i in range(12)]
+    mixed = rng.integers(0, 12, 500)
+    together = Openness(normals[mixed], bits[mixed], cones[mixed])
+    np.testing.assert_array_equal(together.open_to, open_to[mixed])
+    light, sun = together.irradiance(sky), together.sunlight(sky)
+    for found, of_one in ((light, "irradiance"), (sun, "sunlight")):
+        expected = np.concatenate([getattr(one, of_one)(sky) for one in alone])
+        np.testing.assert_allclose(found, expected[mixed], rtol=1e-5, atol=1e-6)
+    values = np.concatenate([one.under(sky) for one in alone])[mixed].astype(int)
+    assert np.abs(together.under(sky) - values).max() <= 1  # matrices of one row round otherwise
+    for found, expected in zip(
+        together.lit(sky), (together.under(sky, light), light + sun, light), strict=True
+    ):
+        np.testing.assert_array_equal(found, expected)
+
+
 def test_where_nothing_hides_the_sky_any_light_is_whole():
     normals = facing(100)
     bits = np.full((100, 12), 255, np.uint8)

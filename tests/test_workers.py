@@ -34,6 +34,55 @@ class StartsSlowly:
         pass
 
 
+class TellsItsThreads:
+    """Reports what is set of matrices' threads, and how many of the process's threads are not
+    Python's."""
+
+    def __init__(self, report):
+        self._report = report
+
+    def __call__(self, _task):
+        import numpy as np
+
+        square = np.ones((600, 600))
+        _ = square @ square
+        foreign = len(os.listdir("/proc/self/task")) - threading.active_count()
+        self._report("threads", (os.environ.get("OPENBLAS_NUM_THREADS"), foreign))
+
+
+def threads_of_a_worker(whole_machine):
+    """What a worker tells as TellsItsThreads."""
+    heard = []
+
+    def on_death(task, place, ended):
+        raise AssertionError(ended)
+
+    workers.run(
+        TellsItsThreads, (), [1], 1, lambda _, value: heard.append(value), on_death,
+        whole_machine=whole_machine,
+    )  # fmt: skip
+    return heard[0]
+
+
+def test_where_workers_fill_the_machine_they_have_no_threads_for_matrices(monkeypatch):
+    for name in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    before = dict(os.environ)
+    assert threads_of_a_worker(True) == ("1", 0)
+    assert threads_of_a_worker(False)[0] is None
+    assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize("name", ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"])
+def test_threads_that_the_user_asked_for_are_left(monkeypatch, name):
+    for other in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(other, raising=False)
+    monkeypatch.setenv(name, "2")
+    expected = "2" if name == "OPENBLAS_NUM_THREADS" else None
+    assert threads_of_a_worker(True)[0] == expected
+    assert os.environ[name] == "2"
+
+
 @pytest.mark.parametrize("speaks", [True, False])
 def test_a_slow_start_is_no_hang_where_it_says_so(speaks):
     ends = []

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
 
+import cv2
 import orjson
 
 from fastgen.config import Config
@@ -131,13 +132,15 @@ def shard_of(path: str) -> int | None:
 class Maker:
     """Makes shards of one job in one process; opens GL when it is made.
 
-    whole_machine: there is a process on every core, so the rasterizer needs no threads.
+    whole_machine: there is a process on every core, so neither the rasterizer nor OpenCV needs
+    threads.
     """
 
     def __init__(self, job: Job, whole_machine: bool, report: Report) -> None:
         if whole_machine:
             # llvmpipe reads it at its first context
             os.environ.setdefault("LP_NUM_THREADS", "0")
+            cv2.setNumThreads(1)
         self._job = job
         self._report = report
         self._formats = formats_of(job.formats)
@@ -177,7 +180,7 @@ class Maker:
             **self._made_by,
             "images": [record["stem"] for _, record in made],
             "failed": [{"scene": i, "seed": self._job.seed, "error": skip[i]} for i in skip],
-            "files": {path: _entry(files, path) for path in files},
+            "files": _entries(files),
             "records": [record for _, record in made],
         }
         self._storage.write(manifest_path(task.shard), [seal(orjson.dumps(manifest))])
@@ -258,11 +261,15 @@ def _joined(made: Sequence[tuple[Files, Record]]) -> Files:
     return {path: content for files, _ in made for path, content in files.items()}
 
 
-def _entry(files: Files, path: str) -> list[Any]:
-    content = files[path]
-    data = files[content.path] if isinstance(content, Same) else content
-    assert isinstance(data, bytes)
-    return [len(data), digest(data)]
+def _entries(files: Files) -> dict[str, list[Any]]:
+    """Size and content hash of each file; what is the same as another comes after that."""
+    found: dict[str, list[Any]] = {}
+    for path, content in files.items():
+        if isinstance(content, Same):
+            found[path] = found[content.path]
+        else:
+            found[path] = [len(content), digest(content)]
+    return found
 
 
 def _index(record: Record) -> int:

@@ -38,19 +38,22 @@ class Folder:
     def commit(self, files: Files, name: str) -> None:
         """Write aside, flush, rename. name: distinguishes this commit from others under way."""
         aside = self.root / f"{ASIDE}-{name}-{uuid.uuid4().hex}"
-        places = {path: aside / str(number) for number, path in enumerate(files)}
+        # text: paths that pathlib parses take longer than what is done with them
+        places = {path: f"{aside}/{number}" for number, path in enumerate(files)}
         try:
             aside.mkdir()
             for path, content in files.items():
                 if isinstance(content, Same):
                     _link(places[content.path], places[path])
                 else:
-                    places[path].write_bytes(content)
+                    with open(places[path], "wb") as stream:
+                        stream.write(content)
             _flush(aside)
-            for folder in {(self.root / path).parent for path in files}:
-                folder.mkdir(parents=True, exist_ok=True)
+            for folder in {os.path.dirname(path) for path in files}:
+                (self.root / folder).mkdir(parents=True, exist_ok=True)
             for path, place in places.items():
-                _move(place, self.root / path)
+                # POSIX leaves the old name where both are one file already; it goes with `aside`
+                os.replace(place, f"{self.root}/{path}")
         except FileNotFoundError as error:
             raise OutputError(f"{self.root}: vanished while it was written ({error})") from None
         except OSError as error:
@@ -274,18 +277,12 @@ def _words(error: Exception) -> str:
     return str(error) or type(error).__name__
 
 
-def _link(source: Path, target: Path) -> None:
+def _link(source: str, target: str) -> None:
     """A second name for `source`, or a copy where the file system has no links."""
     try:
         os.link(source, target)
     except OSError:
         shutil.copyfile(source, target)
-
-
-def _move(source: Path, target: Path) -> None:
-    os.replace(source, target)
-    # POSIX leaves the old name where both are one file already
-    source.unlink(missing_ok=True)
 
 
 def _flush(folder: Path) -> None:

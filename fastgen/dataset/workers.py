@@ -27,6 +27,10 @@ HANG_S = 300.0
 _POLL_S = 1.0
 _STOPS = {signal.SIGINT, signal.SIGTERM}
 
+_MATRIX_THREADS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
+"""OpenBLAS takes the first of these that is set when NumPy is imported, which is before any code of
+ours runs in a process that starts."""
+
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
@@ -49,10 +53,24 @@ def undisturbed() -> Iterator[None]:
             signal.raise_signal(held[0])
 
 
+@contextlib.contextmanager
+def _one_matrix_thread() -> Iterator[None]:
+    """Processes that start meanwhile multiply matrices in one thread, unless the user has set how
+    many. More of them spin while they wait, and take the cores of other workers."""
+    set_by_user = any(name in os.environ for name in _MATRIX_THREADS)
+    if not set_by_user:
+        os.environ[_MATRIX_THREADS[0]] = "1"
+    try:
+        yield
+    finally:
+        if not set_by_user:
+            os.environ.pop(_MATRIX_THREADS[0], None)
+
+
 class _Worker:
     """One process, what it is at and when it last said something."""
 
-    def __init__(self, setup: Setup, arguments: tuple[Any, ...]) -> None:
+    def __init__(self, setup: Setup, arguments: tuple[Any, ...], whole_machine: bool) -> None:
         # a context made before a fork hangs its children, so processes start afresh
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
@@ -60,7 +78,7 @@ class _Worker:
         # a signal may reach the whole group, and the parent decides: a worker that is not ready
         # yet takes this mask over and stays quiet. The tracker's own start would lift the mask
         resource_tracker.ensure_running()
-        with undisturbed():
+        with undisturbed(), _one_matrix_thread() if whole_machine else contextlib.nullcontext():
             before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
             try:
                 self.process.start()
@@ -92,19 +110,21 @@ def run(
     on_report: Callable[[str, Any], None],
     on_death: Callable[[Any, Any, str], Any],
     hang_s: float = HANG_S,
+    whole_machine: bool = False,
 ) -> None:
     """Have `count` processes do all tasks.
 
     on_report: gets what workers report, but for 'at', which names the place that a task is at.
     on_death: gets the task of a worker that crashed or hung, its place and how it ended; returns
-    the task to try instead, or raises. Raises OutputError with a worker's own words where it met
-    an error that no repetition mends. No process outlives the call.
+    the task to try instead, or raises. whole_machine: there is a process on every core, so that
+    matrices need no threads. Raises OutputError with a worker's own words where it met an error
+    that no repetition mends. No process outlives the call.
     """
     waiting = deque(tasks)
     workers: list[_Worker] = []
     try:
         while waiting and len(workers) < count:
-            workers.append(_Worker(setup, arguments))
+            workers.append(_Worker(setup, arguments, whole_machine))
             workers[-1].give(waiting.popleft())
         while busy := [worker for worker in workers if worker.task is not None]:
             wait([worker.pipe for worker in busy], timeout=_POLL_S)
@@ -117,7 +137,7 @@ def run(
                     workers.remove(worker)
                     if not waiting:
                         continue
-                    worker = _Worker(setup, arguments)
+                    worker = _Worker(setup, arguments, whole_machine)
                     workers.append(worker)
                 if worker.task is None and waiting:
                     worker.give(waiting.popleft())

@@ -84,6 +84,7 @@ class FaceFrame(NamedTuple):
     middle_mm: Array
 
 
+@functools.cache
 def face_frame(face: str, kind: str) -> FaceFrame:
     """The frame of a face of a container of a kind."""
     length, width, height = KINDS[kind].size_mm

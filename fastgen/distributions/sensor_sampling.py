@@ -33,6 +33,8 @@ def sample_sensor(
 
     moment: when it takes it. streams: gives the random stream of each part by its name.
     """
+    if config == SensorConfig():  # all is off: seeding streams takes longer than all they draw
+        return None
     sensor = Sensor(
         defocus=_defocus(config, distance_mm, streams("defocus")),
         motion=_motion(config, streams("motion")),
@@ -59,6 +61,8 @@ def sample_moment(
 
 def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
     """The weather of a scene; streams: as for `sample_sensor`."""
+    if config == WeatherConfig():
+        return Weather()
     fog, rain, wet = streams("fog"), streams("rain"), streams("wet")
     foggy, rains = (
         rng.random() < probability

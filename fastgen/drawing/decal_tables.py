@@ -4,7 +4,7 @@ A coarse grid over the atlas names the decals that may cover a spot; a table row
 placement and ink; a glyph table holds the letters. A few hundred bytes a decal.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ DECAL_TEXELS = 5
 CELL_SLOTS = 8
 GLYPH_COLUMNS = 256
 
-_MARGIN_MM = 26.0
+MARGIN_MM = 26.0
 """Antialiasing reaches this far beyond a decal's edge: half a lookup, of programs.LOOKUP_PX, in the
 coarsest usual view, which has 39 mm a pixel at 640 pixels across."""
 
@@ -57,47 +57,88 @@ def pack_decals(
 ) -> DecalTables:
     """Tables for `scene` on `mesh`. Raises SceneError where one lies off its sheet or
     more than CELL_SLOTS meet."""
-    columns, rows = (int(np.ceil(side / DECAL_CELL_MM)) for side in mesh.atlas_size_mm)
-    slots = np.zeros((rows, columns, CELL_SLOTS), np.uint32)
-    table = np.zeros((max(len(scene.decals), 1), DECAL_TEXELS, 4), np.float32)
+    decals, count = scene.decals, len(scene.decals)
+    rects = [mesh.charts[mesh.chart_index(decal.face)].rect_mm for decal in decals]
+    corner, sheet = np.split(np.array(rects).reshape(count, 4), 2, axis=1)
+    center = corner + np.array([decal.center_mm for decal in decals]).reshape(count, 2)
+    half = np.array([decal.size_mm for decal in decals]).reshape(count, 2) / 2
+    angle = np.deg2rad([decal.rotation_deg for decal in decals])
+    cos, sin = np.cos(angle), np.sin(angle)
+    table = np.zeros((max(count, 1), DECAL_TEXELS, 4), np.float32)
+    table[:count, 0] = np.stack([cos, sin, -sin, cos], axis=1)
+    table[:count, 1] = np.concatenate([center, half], axis=1)
     glyphs: list[tuple[float, float, float, float]] = []
-    for i, (decal, object_id) in enumerate(zip(scene.decals, object_ids(scene), strict=True)):
-        x0, y0, width, height = mesh.charts[mesh.chart_index(decal.face)].rect_mm
-        center = np.array([x0 + decal.center_mm[0], y0 + decal.center_mm[1]])
-        half = np.array(decal.size_mm) / 2
-        cos, sin = decal.turn[:, 0]
+    for row, decal, object_id in zip(table, decals, object_ids(scene), strict=False):
         kind = decal.art if decal.art == "stripes" else decal.kind
-        table[i, 0] = cos, sin, -sin, cos
-        table[i, 1] = *center, *half
-        table[i, 2] = *decal.albedo, decal.wear
-        table[i, 3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), 0
+        row[2] = *decal.albedo, decal.wear
+        row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), 0
         if decal.kind == "text":
             run = _glyph_run(decal, fonts[decal.font])
-            table[i, 4] = decal.cap_mm, len(glyphs), len(run), 0
+            row[4] = decal.cap_mm, len(glyphs), len(run), 0
             glyphs.extend(run)
-        reach = np.abs([[cos, -sin], [sin, cos]]) @ half + _MARGIN_MM
-        low = np.maximum(center - reach, (x0, y0)) / DECAL_CELL_MM
-        high = np.minimum(center + reach, (x0 + width, y0 + height)) / DECAL_CELL_MM
-        if (low > high).any():
-            raise SceneError(
-                f"decals[{i}] ({decal.kind} on {decal.face}): center_mm {decal.center_mm} lies off "
-                f"its sheet, which is {width:.0f} by {height:.0f} mm"
-            )
-        cells = slots[int(low[1]) : int(high[1]) + 1, int(low[0]) : int(high[0]) + 1]
-        used = np.count_nonzero(cells, axis=-1)
-        if used.size and used.max() >= CELL_SLOTS:
-            raise SceneError(
-                f"decals[{i}] ({decal.kind} on {decal.face} at {decal.center_mm}): more than "
-                f"{CELL_SLOTS} decals meet within {DECAL_CELL_MM:g} mm; spread them"
-            )
-        cells[np.arange(len(used))[:, None], np.arange(used.shape[1]), used] = i + 1
-    grid = slots[..., 0::2] | (slots[..., 1::2] << np.uint32(16))
+    width, height = half.T
+    along, across = abs(cos) * width + abs(sin) * height, abs(sin) * width + abs(cos) * height
+    reach = np.stack([along, across], axis=1) + MARGIN_MM
+    low = np.maximum(center - reach, corner) / DECAL_CELL_MM
+    high = np.minimum(center + reach, corner + sheet) / DECAL_CELL_MM
     glyph_rows = max(-(-len(glyphs) // GLYPH_COLUMNS), 1)
     glyph_table = np.zeros((glyph_rows * GLYPH_COLUMNS, 4), np.float32)
     if glyphs:
         glyph_table[: len(glyphs)] = glyphs
     return DecalTables(
-        np.ascontiguousarray(grid), table, glyph_table.reshape(glyph_rows, GLYPH_COLUMNS, 4)
+        _grid(decals, mesh, low, high),
+        table,
+        glyph_table.reshape(glyph_rows, GLYPH_COLUMNS, 4),
+    )
+
+
+def _grid(
+    decals: Sequence[Decal], mesh: Mesh, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> NDArray[np.uint32]:
+    """As of DecalTables. low, high: where each decal begins and ends, [N, 2] (x, y) in cells of the
+    atlas. Raises SceneError as pack_decals does."""
+    size = np.ceil(np.array(mesh.atlas_size_mm) / DECAL_CELL_MM).astype(int)
+    off = (low[:, 0] > high[:, 0]) | (low[:, 1] > high[:, 1])
+    first = low.astype(int)
+    wide, tall = np.maximum(np.minimum(high.astype(int), size - 1) - first + 1, 0).T
+    touched = np.where(off, 0, wide * tall)
+    # each decal's cells, a row after the other
+    number = np.repeat(np.arange(len(decals)), touched)
+    step = np.arange(len(number)) - np.repeat(np.cumsum(touched) - touched, touched)
+    row, column = np.divmod(step, wide[number])
+    cell = (first[number, 1] + row) * size[0] + first[number, 0] + column
+    # how many decals lie in the cell already
+    order = np.argsort(cell, kind="stable")
+    begins = np.diff(cell[order], prepend=-1) != 0
+    place = np.arange(len(cell))
+    slot = np.empty(len(cell), int)
+    slot[order] = place - np.maximum.accumulate(np.where(begins, place, 0))
+    crowded = slot >= CELL_SLOTS
+    _check(decals, mesh, off, number[crowded])
+    slots = np.zeros((size[1], size[0], CELL_SLOTS), np.uint32)
+    slots.reshape(-1, CELL_SLOTS)[cell, slot] = number + 1
+    return slots[..., 0::2] | (slots[..., 1::2] << np.uint32(16))
+
+
+def _check(
+    decals: Sequence[Decal], mesh: Mesh, off: NDArray[np.bool_], crowded: NDArray[np.intp]
+) -> None:
+    """Raise SceneError for the first decal that is `off` its sheet [N], or of the numbers [K] of
+    those that find no slot."""
+    wrong = np.union1d(np.flatnonzero(off), crowded).tolist()
+    if not wrong:
+        return
+    i = wrong[0]
+    decal = decals[i]
+    if off[i]:
+        *_, width, height = mesh.charts[mesh.chart_index(decal.face)].rect_mm
+        raise SceneError(
+            f"decals[{i}] ({decal.kind} on {decal.face}): center_mm {decal.center_mm} lies off "
+            f"its sheet, which is {width:.0f} by {height:.0f} mm"
+        )
+    raise SceneError(
+        f"decals[{i}] ({decal.kind} on {decal.face} at {decal.center_mm}): more than "
+        f"{CELL_SLOTS} decals meet within {DECAL_CELL_MM:g} mm; spread them"
     )
 
 

@@ -108,7 +108,7 @@ def ray_bodies(
     container, spreader: as they are drawn. lit: the light of their vertices, as Shapes.of gives it.
     light: of the scene's environment.
     """
-    meshes = [container] if spreader is None else [container, spreader]
+    meshes = (container,) if spreader is None else (container, spreader)
     paints = np.array(reflectances(scene, meshes), np.float32)
     bodies = [
         LitBody(

@@ -1,6 +1,7 @@
 """A scene's materials, layers and damages as the values of the shader's uniform blocks."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,7 +50,8 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
     return base, trait
 
 
-def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
+@lru_cache(maxsize=2)  # all cameras of a scene ask alike
+def reflectances(scene: Scene, meshes: tuple[Mesh, ...]) -> tuple[Color, ...]:
     """What each of MATERIALS gives back, rust included, of light from all around.
 
     meshes: what the scene's container and spreader are made of. Without dirt, which changes the
@@ -61,7 +63,8 @@ def reflectances(scene: Scene, meshes: Iterable[Mesh]) -> tuple[Color, ...]:
     return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
 
 
-def _rusted(scene: Scene, meshes: Iterable[Mesh]) -> tuple[np.ndarray, np.ndarray]:
+@lru_cache(maxsize=4)  # of container and spreader, and of what cables are
+def _rusted(scene: Scene, meshes: tuple[Mesh, ...]) -> tuple[np.ndarray, np.ndarray]:
     """As rust.rusted, of the scene's materials."""
     rust = scene.surface.rust
     base, trait = _materials(scene.surface, scene.spreader)
@@ -144,7 +147,7 @@ def cable_values(
     chart = mesh.chart_index(CABLE_CHART)
     zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
     lengths = np.full((CABLES, 1), CABLE_LENGTH_MM / 1000)
-    albedo, share = (row[MATERIALS.index("cable")] for row in _rusted(scene, [mesh]))
+    albedo, share = (row[MATERIALS.index("cable")] for row in _rusted(scene, (mesh,)))
     return {
         "cable_zone": float(SPREADER_ZONE + zone),
         "cable_rusted": [*albedo, *share],

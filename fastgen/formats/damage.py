@@ -40,10 +40,10 @@ class _Damage(Format):
         found = list(instances(item.sample))
         height, width = item.sample.damage.shape
         lines = []
-        for category, _, mask, ignored in found:
-            polygon = outline(mask)
+        for category, box, mask, ignored in found:
+            polygon = outline(window(mask, box))
             if len(polygon) > 2 and not ignored:
-                points = polygon / (width, height)
+                points = (polygon + box[:2]) / (width, height)
                 lines.append(line(category - 1, points.ravel().tolist()))
         files: Files = {
             f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),

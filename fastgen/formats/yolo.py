@@ -42,7 +42,9 @@ def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:
 
 def line(index: int, values: Iterable[float]) -> str:
     """One label: class, then numbers clipped to 0..1."""
-    return f"{index} " + " ".join(f"{min(max(v, 0.0), 1.0):.6f}" for v in values) + "\n"
+    clipped = tuple([min(max(v, 0.0), 1.0) for v in values])
+    # outlines have hundreds: one format for all of them takes half the time of one each
+    return f"{index}{' %.6f' * len(clipped)}\n" % clipped
 
 
 def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -55,7 +57,8 @@ def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     if box is None:
         return np.zeros((0, 2))
     # with pixels cut in four, contours run through quarters at the border, whose outer edge is it
-    quarters = window(mask, box).astype(np.uint8).repeat(2, axis=0).repeat(2, axis=1)
+    seen = window(mask, box).view(np.uint8)
+    quarters = cv2.resize(seen, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     found, _ = cv2.findContours(quarters, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     borders = [((contour + 1) // 2).astype(np.float32) for contour in found]
     parts = [cv2.approxPolyDP(each, 0.5, True)[:, 0].astype(np.float64) for each in borders]

@@ -292,6 +292,9 @@ class Cells:
     def mean(self, values: Array) -> Array:
         """Of values [V, 3] of the container's vertices, in each cell [C, 3]; 0 where none is."""
         number = np.maximum(np.bincount(self.cell, minlength=self.count), 1)
-        chosen = values[self.vertices]
-        total = [np.bincount(self.cell, chosen[:, c], self.count) for c in range(3)]
+        # channels apart: along the last axis NumPy takes several times as long
+        total = [
+            np.bincount(self.cell, np.take(channel, self.vertices), self.count)
+            for channel in values.T
+        ]
         return np.stack(total, axis=1) / number[:, None]

@@ -3,6 +3,7 @@ in. No GL here.
 """
 
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ _FIELD_BITS = 21  # of a channel, three of which share a number
 _WHOLE = 1 << (
     _FIELD_BITS - 1
 )  # what all directions add up to, but for rounding; a field holds twice that
+_WORD = np.uint64(32)  # bits
 _BLOCK = 2048  # vertices at once, as a core's cache holds them
 
 Array = NDArray[np.float64]
@@ -45,13 +47,16 @@ Directions = NDArray[np.bool_]
 """Whether each of V points is open to each of sky_directions(): [V, DIRECTIONS]."""
 
 
+@cache
 def sky_directions() -> Array:
-    """Unit vectors [DIRECTIONS, 3] spread evenly over the sphere: a Fibonacci spiral."""
+    """Unit vectors [DIRECTIONS, 3] spread evenly over the sphere: a Fibonacci spiral. Read-only."""
     i = np.arange(DIRECTIONS)
     z = 1 - (2 * i + 1) / DIRECTIONS
     turn = np.pi * (3 - 5**0.5) * i
     flat = np.sqrt(1 - z * z)
-    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    found = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    found.flags.writeable = False
+    return found
 
 
 def open_sky(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
@@ -122,6 +127,9 @@ class Openness:
 
     normals: unit [V, 3]; few of them differ. open_to: Directions packed along them, uint8
     [V, DIRECTIONS / 8]. cone: uint8 [V, 3] as of `encoded`.
+
+    Vertices that are alike in all three are of one kind, about 0.6 V kinds of a container's: light
+    is found once for each of the K kinds.
     """
 
     def __init__(
@@ -131,57 +139,30 @@ class Openness:
         cone: NDArray[np.uint8],
     ) -> None:
         first, number = distinct_rows(normals)
-        self._normals, self._number = normals[first], _narrow(number)
-        # a column after the other is what `under` reads
-        self._open_to = np.ascontiguousarray(open_to.T)
-        packed = cone.astype(np.int32) @ np.array([1, 1 << 8, 1 << 16], np.int32)
-        _, first, which = np.unique(packed, return_index=True, return_inverse=True)
-        self._cones, self._which = cone[first], _narrow(which)
+        self._normals = normals[first]
+        rows = np.full((len(cone), VERTEX_BYTES), 255, np.uint8)
+        rows[:, :3], rows[:, 8:] = cone, open_to
+        a, _, b, c, d = rows.view(np.uint32).T.astype(np.uint64)
+        told = [a << _WORD | b, c << _WORD | d, number.astype(np.uint64)]
+        first, kind = distinct_rows(np.stack(told, axis=1))
+        self._kind, self._number = _narrow(kind), _narrow(number[first])
+        self._rows = rows[first]
+        """As the shader reads each kind, but for the light."""
+        packed, which = np.unique(self._rows.view(np.uint32)[:, 0], return_inverse=True)
+        self._cones, self._which = packed.view(np.uint8).reshape(-1, 4)[:, :3], _narrow(which)
 
     @property
     def open_to(self) -> Directions:
         """Whether each vertex is open to each direction."""
-        return np.unpackbits(self._open_to.T, axis=1).astype(bool)
+        return np.unpackbits(self._rows[self._kind, 8:], axis=1).astype(bool)
 
     def irradiance(self, sky: Sky) -> NDArray[np.float32]:
-        """Irradiance / pi, [V, 3], from where `sky` is open, without its suns.
-
-        It is a part of the irradiance about the normal: that of the open ones in sums over all
-        directions. Of such sums over eight directions at a time there are 256 for each normal: a
-        byte of open_to finds its own.
-        """
-        toward = sky_directions()
-        radiance = np.maximum(sky_radiance(sky.light, toward, sky.yaw_deg), _DARK)
-        cosine = np.maximum(self._normals @ toward.T.astype(np.float32), 0)
-        weight = cosine[:, None] * radiance.T
-        weight *= _WHOLE / weight.sum(axis=2, keepdims=True)
-        # the three channels side by side in one number: adding one takes a third of the time
-        red, green, blue = np.rint(weight).astype(np.uint64).transpose(1, 0, 2)
-        together = (blue << _FIELD_BITS | green) << _FIELD_BITS | red
-        sums = _sums_of_eight(together.reshape(len(together), -1, 8))
-        total = np.zeros(len(self._number), np.uint64)
-        row = 256 * self._number.astype(np.intp)
-        for bits, table in zip(self._open_to, sums.transpose(1, 0, 2), strict=True):
-            total += np.take(table, row + bits)
-        step = self._whole(sky, _directions(open_sky(self._normals)[:, :3])) / _WHOLE
-        found = np.empty((len(total), 3), np.float32)
-        for channel in range(3):
-            share = (total & (2 * _WHOLE - 1)).astype(np.float32)
-            total >>= _FIELD_BITS
-            np.multiply(share, np.take(step[:, channel], self._number), out=found[:, channel])
-        return found
+        """Irradiance / pi, [V, 3], from where `sky` is open, without its suns."""
+        return self._each(self._irradiance(sky))
 
     def sunlight(self, sky: Sky) -> NDArray[np.float32]:
         """As `irradiance`, from the suns alone; each is as open as the directions about it."""
-        found = np.zeros((len(self._number), 3), np.float32)
-        for sun in sky.light.suns:
-            toward = to_map_frame(sun.direction, -sky.yaw_deg)
-            nearest = np.argsort(-sky_directions() @ toward)[:_ABOUT_SUN]
-            bits = [self._open_to[k >> 3] >> (7 - (k & 7)) & 1 for k in nearest.tolist()]
-            cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
-            share = cosine[self._number] * np.mean(bits, axis=0, dtype=np.float32)
-            found += share[:, None] * np.array(sun.light, np.float32)
-        return found
+        return self._each(self._sunlight(sky))
 
     def under(self, sky: Sky, light: NDArray[np.floating] | None = None) -> NDArray[np.uint8]:
         """As the shader reads it under `sky`, uint8 [V, VERTEX_BYTES]: the cone, the light that
@@ -192,24 +173,96 @@ class Openness:
         which is what the shader looks up, and as LIGHT_TIMES (s - 1) the scale s that all three
         fit in.
         """
-        light = self.irradiance(sky) if light is None else light
-        step = LIGHT_STEPS / self._whole(sky, _directions(self._cones))
-        found = np.full((len(light), VERTEX_BYTES), 255, np.uint8)
-        found[:, :3] = np.take(self._cones, self._which, axis=0)
-        steps = [light[:, c] * np.take(step[:, c], self._which) for c in range(3)]
+        if light is None:
+            return self._read(np.take(self._steps(sky, self._irradiance(sky)), self._kind))
+        return self._read(self._steps(sky, light, self._kind))
+
+    def lit(self, sky: Sky) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
+        """`under` the sky, `irradiance` with `sunlight`, and without, at less than their cost."""
+        light = self._irradiance(sky)
+        values = self._read(np.take(self._steps(sky, light), self._kind))
+        return values, self._each(light + self._sunlight(sky)), self._each(light)
+
+    def _each(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Of each vertex [V, 3] what is known of each kind [K, 3], both a channel after the other
+        in memory."""
+        return np.take(light.T, self._kind, axis=1).T
+
+    def _bits(self, number: int) -> NDArray[np.uint8]:
+        """Which of eight directions from 8 `number` on are open to each kind, a bit each."""
+        return self._rows[:, 8 + number]
+
+    def _irradiance(self, sky: Sky) -> NDArray[np.float32]:
+        """As `irradiance`, of each kind.
+
+        It is a part of the irradiance about the normal: that of the open ones in sums over all
+        directions. Of such sums over eight directions at a time there are 256 for each normal: a
+        byte of open_to finds its own.
+        """
+        cosine = np.maximum(self._normals @ sky_directions().T.astype(np.float32), 0)
+        weight = cosine[:, None] * _radiance(sky).T
+        weight *= _WHOLE / weight.sum(axis=2, keepdims=True)
+        # the three channels side by side in one number: adding one takes a third of the time
+        red, green, blue = np.rint(weight).astype(np.uint64).transpose(1, 0, 2)
+        together = (blue << _FIELD_BITS | green) << _FIELD_BITS | red
+        sums = _sums_of_eight(together.reshape(len(together), -1, 8).transpose(1, 0, 2))
+        total = np.zeros(len(self._number), np.uint64)
+        row = 256 * self._number.astype(np.intp)
+        for number, table in enumerate(sums.reshape(len(sums), -1)):
+            total += np.take(table, row + self._bits(number))
+        step = self._whole(sky, _directions(open_sky(self._normals)[:, :3])) / _WHOLE
+        found = np.empty((3, len(total)), np.float32)
+        for channel in range(3):
+            share = (total & (2 * _WHOLE - 1)).astype(np.float32)
+            total >>= _FIELD_BITS
+            np.multiply(share, np.take(step[:, channel], self._number), out=found[channel])
+        return found.T
+
+    def _sunlight(self, sky: Sky) -> NDArray[np.float32]:
+        """As `sunlight`, of each kind."""
+        found = np.zeros((3, len(self._number)), np.float32)
+        for sun in sky.light.suns:
+            toward = to_map_frame(sun.direction, -sky.yaw_deg)
+            nearest = np.argsort(-sky_directions() @ toward)[:_ABOUT_SUN]
+            count = sum(self._bits(k >> 3) >> (7 - (k & 7)) & 1 for k in nearest.tolist())
+            cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
+            share = np.take(cosine, self._number) * (count / np.float32(_ABOUT_SUN))
+            for channel, light in zip(found, sun.light, strict=True):
+                channel += share * np.float32(light)
+        return found.T
+
+    def _steps(
+        self, sky: Sky, light: NDArray[np.floating], kind: Any = slice(None)
+    ) -> NDArray[np.uint32]:
+        """The light that comes in as of `under`, four bytes in a number each [N]; light: [N, 3] of
+        vertices or kinds; kind: theirs."""
+        step, which = LIGHT_STEPS / self._whole(sky, _directions(self._cones)), self._which[kind]
+        steps = [light[:, c] * np.take(step[:, c], which) for c in range(3)]
         brightest = np.maximum(np.maximum.reduce(steps), 255) / 255
         times = np.minimum(np.ceil(LIGHT_TIMES * (brightest - 1)), 255)
         # what is brighter still is dimmed as a whole: its colour stays
         fits = 1 / np.maximum(1 + times / LIGHT_TIMES, brightest)
+        found = np.empty((len(light), 4), np.uint8)
         for channel in range(3):
-            found[:, 4 + channel] = np.minimum(steps[channel] * fits + 0.5, 255)  # rounds
-        found[:, 7] = times
-        found[:, 8:] = self._open_to.T
+            found[:, channel] = np.minimum(steps[channel] * fits + 0.5, 255)  # rounds
+        found[:, 3] = times
+        return found.view(np.uint32)[:, 0]
+
+    def _read(self, steps: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        """As `under`; steps: as of _steps, of each vertex [V]."""
+        found = np.take(self._rows, self._kind, axis=0)
+        found.view(np.uint32)[:, 1] = steps
         return found
 
     @staticmethod
     def _whole(sky: Sky, toward: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.maximum(sky_irradiance(sky.light, toward, sky.yaw_deg), _DARK)
+
+
+@lru_cache(maxsize=1)  # a scene's container and its spreader ask alike
+def _radiance(sky: Sky) -> NDArray[np.float32]:
+    """Radiance [DIRECTIONS, 3] from about each of the directions."""
+    return np.maximum(sky_radiance(sky.light, sky_directions(), sky.yaw_deg), _DARK)
 
 
 def _narrow(index: NDArray[np.intp]) -> NDArray[np.unsignedinteger[Any]]:
@@ -219,14 +272,15 @@ def _narrow(index: NDArray[np.intp]) -> NDArray[np.unsignedinteger[Any]]:
 
 def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Unit vectors [K, 3] along the cones [K, 3] of `encoded`."""
-    toward = cone.astype(np.float32) - 128
-    return toward / np.linalg.norm(toward, axis=1, keepdims=True)
+    x, y, z = np.subtract(cone.T, 128, dtype=np.float32)
+    return (np.stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)).T
 
 
 def _sums_of_eight(weight: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Sums [..., 256] of those of eight weights [..., 8] whose bits are set in each byte, in the
     order of np.packbits: the first has the highest."""
-    sums = np.zeros((*weight.shape[:-1], 1), np.uint64)
-    for bit in range(7, -1, -1):
-        sums = np.concatenate([sums, sums + weight[..., bit : bit + 1]], axis=-1)
+    sums = np.zeros((*weight.shape[:-1], 256), np.uint64)
+    for bit in range(8):
+        known = sums[..., : 1 << bit]
+        np.add(known, weight[..., 7 - bit, None], out=sums[..., 1 << bit : 2 << bit])
     return sums

@@ -25,15 +25,20 @@ _CHUNK_ROWS = 8
 
 def octahedral_encode(direction: ArrayLike) -> NDArray[np.float64]:
     """Directions [..., 3] (any length above 0) to octahedral uv [..., 2] in [0, 1]."""
-    # by column: along the last axis, of two or three, NumPy takes six times as long
+    return np.stack(_octahedral_uv(direction), axis=-1)
+
+
+def _octahedral_uv(direction: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """As octahedral_encode, u and v [...] apart: along the last axis, of two or three, NumPy takes
+    six times as long."""
     x, y, z = np.moveaxis(np.asarray(direction, np.float64), -1, 0)
     total = np.abs(x) + np.abs(y) + np.abs(z)
     x, y = x / total, y / total
     folded_x = (1.0 - np.abs(y)) * np.where(x < 0, -1.0, 1.0)
     folded_y = (1.0 - np.abs(x)) * np.where(y < 0, -1.0, 1.0)
     below = z < 0
-    uv = [np.where(below, folded_x, x), np.where(below, folded_y, y)]
-    return np.stack(uv, axis=-1) * 0.5 + 0.5
+    u, v = np.where(below, folded_x, x), np.where(below, folded_y, y)
+    return u * 0.5 + 0.5, v * 0.5 + 0.5
 
 
 def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
@@ -192,16 +197,17 @@ def fill_border(octahedral: NDArray[np.float32]) -> None:
 def sample_octahedral(
     octahedral: NDArray[np.float32], direction: NDArray[np.floating]
 ) -> NDArray[np.float32]:
-    """Bilinear lookup, as GL does it, of a bordered map [N, N, C] by directions [K, 3]: [K, C]."""
-    size = octahedral.shape[0]
-    x = BORDER + octahedral_encode(direction) * (size - 2 * BORDER) - 0.5
-    low = np.clip(np.floor(x).astype(np.intp), 0, size - 2)
-    fx, fy = (x - low).astype(np.float32).T[..., None]
-    texels, first = octahedral.reshape(size * size, -1), low[:, 1] * size + low[:, 0]
-    top = texels.take(first, axis=0) * (1 - fx) + texels.take(first + 1, axis=0) * fx
-    first += size
-    bottom = texels.take(first, axis=0) * (1 - fx) + texels.take(first + 1, axis=0) * fx
-    return top * (1 - fy) + bottom * fy
+    """Bilinear lookup, as GL does it, of a bordered map [N, N, C] by directions [K, 3]: [K, C], a
+    channel after the other in memory."""
+    size, channels = octahedral.shape[0], octahedral.shape[2]
+    x, y = (BORDER + uv * (size - 2 * BORDER) - 0.5 for uv in _octahedral_uv(direction))
+    column, row = (np.clip(np.floor(at).astype(np.intp), 0, size - 2) for at in (x, y))
+    fx, fy = (x - column).astype(np.float32), (y - row).astype(np.float32)
+    texels, first = octahedral.reshape(size * size, channels).T, row * size + column
+    corners = np.array([0, 1, size, size + 1])[:, None]
+    a, b, c, d = np.take(texels, first + corners, axis=1).swapaxes(0, 1)
+    found: NDArray[np.float32] = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy
+    return found.T
 
 
 def ggx_lobe(roughness: float) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:

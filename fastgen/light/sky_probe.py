@@ -93,8 +93,7 @@ class Lit:
 
 
 def _lit(mesh: Mesh, openness: Openness, sky: Sky) -> Lit:
-    light = openness.irradiance(sky)
-    return Lit(mesh, openness.under(sky, light), light + openness.sunlight(sky), light)
+    return Lit(mesh, *openness.lit(sky))
 
 
 class SkyProbe:

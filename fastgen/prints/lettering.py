@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from fastgen.errors import AssetError
 from fastgen.prints.artwork import Font
@@ -21,8 +22,7 @@ COLUMN_PITCH_CAPS = 1.6
 GLYPH_PITCH_CAPS = 1.35
 
 
-@dataclass(frozen=True)
-class PlacedGlyph:
+class PlacedGlyph(NamedTuple):
     """A glyph's tile rectangle in mm; origin at the lower left corner of the text's ink box."""
 
     char: str
