@@ -86,13 +86,12 @@ class Generator:
 
     config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
     64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
-    in place of the bundled ones. quality: draft (one sample a pixel, shaded once for two by two of
-    a facet, in a coarser shadow of the sun), balanced (nine, materials looked up twice), fine (25,
-    and as often), or high (as fine, and light found by rays, which Embree casts on the CPU whatever
-    draws). Fine and high take nine samples of images of more than about a megapixel or 1638 rows,
-    as 25 of a scene with holes take 2 kB a pixel. Where a driver's textures end at 16384 texels, as
-    Mesa's do, all but draft take four, filtered with the neighbours', of images of more than 2730
-    rows.
+    in place of the bundled ones. quality: draft (one sample a pixel, shaded once for those of two
+    by two that see one facet, in a coarser shadow of the sun), balanced (nine, materials looked up
+    twice), fine (25, and as often), or high (as fine, and light found by rays, which Embree casts
+    on the CPU whatever draws). Fine and high take nine samples of images of more than about a
+    megapixel or 1638 rows, as 25 of a scene with holes take 2 kB a pixel. Where textures end at
+    16384 texels, as Mesa's do, all but draft take four of images of more than 2730 rows.
     device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
     first that works. Threads may share it, and draw in turn; make one in each process. An image
     much taller than wide takes more memory than one lying, see sample_lattice.py.

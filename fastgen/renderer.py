@@ -1,11 +1,12 @@
 """Renderer: Scene -> Frame, the owner of all GL objects that this takes.
 
-Two indirect draws, of the container and of the spreader that holds it, write for each sample which
-surface it sees and where on the unfolded sheet; one more a hole, what shows through it. Passes over
-the image then shade each pixel once for each different surface among its samples and write colour,
-ids, damage and depth at the pixel centre. Traced, points of what the samples see are read back in
-between, and the light that rays find there goes to the shaders. Ids are never filtered: a sample
-lies exactly on each pixel centre.
+Indirect draws, of the spreader, of what of the container no damage touches and of the rest, write
+for each sample which surface it sees and where on the unfolded sheet; one more a hole, what shows
+through it. Then the sky is drawn, pixels that see more are listed by what is to be done there, and
+each list is shaded: a pixel once for each different surface among its samples. Colour, ids, damage
+and depth come of it, the last three at the pixel centre. Traced, points of what the samples see are
+read back in between, and the light that rays find there goes to the shaders. Ids are never
+filtered: a sample lies exactly on each pixel centre.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -66,9 +67,9 @@ class Renderer:
     layers in a pixel, 1, 2 or 25; 1 of one sample.
     mask_threshold_mm: what moved by more counts as damaged. traced: whether light is found by rays
     at points of the image, and not at vertices alone; ask ray_bodies.check_rays first.
-    shadow_detail: as of sun_shadow.ShadowMap. coarse: whether two by two pixels that see one facet,
-    without prints or damage near, are shaded at once, as Vaidyanathan et al. 2014, Coarse Pixel
-    Shading, do; of one sample a pixel only.
+    shadow_detail: as of sun_shadow.ShadowMap. coarse: whether those of two by two pixels that see
+    one facet, without prints or damage near, are shaded at once, as Vaidyanathan et al. 2014,
+    Coarse Pixel Shading, do; of one sample a pixel only.
     light: gives the prefiltered environment of a name, for example from `load_environment`.
     """
 
@@ -177,7 +178,9 @@ class Renderer:
             [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
         )
         drawn = bands([*regions, *near])
-        samples.begin(damage, drawn, near, holes)
+        # where shaders ask for rest positions, whatever was drawn there before
+        asked = [*near, *cables] if rays is None else drawn
+        samples.begin(damage, drawn, asked, holes)
         self._bind_surface(scene, mesh, spreader)
         self._sample(samples, holes, view, camera, damages, mesh, spreader)
         self._bind_light(samples, light, shadow)

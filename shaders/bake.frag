@@ -1,4 +1,4 @@
-// The material at a texel of the atlas, unlit: the layers that shade.frag lights, for export.
+// The material at a texel of the atlas, unlit: the layers that shade.glsl lights, for export.
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"

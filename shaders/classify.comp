@@ -39,7 +39,6 @@ int damage_near(vec3 rest_mm) {
 #endif
 
 void write_labels(ivec2 pixel, uint key, float depth) {
-    if (key == 0u) return;
     uint labels = key_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (SOUND_CONTAINER << 16);
     imageStore(label_image, pixel, uvec4(labels));
     imageStore(depth_image, pixel, vec4(depth));
@@ -75,8 +74,9 @@ void main() {
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
         if (any(greaterThanEqual(pixel - region.xy, region.zw))) key[i] = 0u;
+        if (key[i] == 0u) continue;
         write_labels(pixel, key[i], depth[i]);
-        uint bit = key[i] != 0u ? 1u << i : 0u;
+        uint bit = 1u << i;
 #if DAMAGED
         int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]));
         if (near > 1) holed |= bit;
@@ -134,7 +134,7 @@ void main() {
     bool decal = false;
     for (int i = 0; i < (SAMPLES_PER_AXIS > 1 ? 3 : 1); ++i)
         decal = decal || (part[i] != 0u && near_decals(key_zone(part[i]), texelFetch(sheet_points, part_at[i], 0).xy));
-    write_labels(pixel, key, texelFetch(sheet_depths, middle, 0).r);
+    if (key != 0u) write_labels(pixel, key, texelFetch(sheet_depths, middle, 0).r);
     uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
 #if SAMPLES_PER_AXIS > 1
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;

@@ -13,8 +13,3 @@ vec2 from_center(vec2 offset) {
 
 // the place of a sample in the image
 vec2 place_of(ivec2 sample_at) { return 0.5 + from_center(vec2(sample_at - middle_of(ivec2(0)))); }
-
-// width on the sheet, in mm, of a lookup of the layers: the geometric mean of the footprint's two axes
-float lookup_mm(float depth, float facing) {
-    return LOOKUP_PX * depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
-}

@@ -153,7 +153,9 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
-    p.footprint_mm = sqrt(shaded_at_once) * lookup_mm(p.depth, facing);
+    // the geometric mean of the footprint's two axes on the sheet
+    p.footprint_mm = sqrt(shaded_at_once) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
+                     inversesqrt(max(facing, 0.05));
     p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (key_zone(key) >= SPREADER_ZONE) {

@@ -7,13 +7,11 @@ import pytest
 
 from fastgen import Config
 from fastgen.container import build_container
-from fastgen.drawing.decal_tables import CELL_SLOTS, SceneError, pack_decals
+from fastgen.drawing.decal_tables import CELL_SLOTS, MARGIN_MM, SceneError, pack_decals
 from fastgen.drawing.programs import DECAL_CELL_MM
 from fastgen.prints.artwork import art_images, glyph_tiles
 from fastgen.sampling import sample_scene
 from fastgen.scene import Decal
-
-MARGIN_MM = 26.0
 
 
 def packed(scene):

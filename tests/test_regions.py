@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.drawing.regions import bands, merged, outside
+from fastgen.drawing.regions import bands, merged, outside, within
 
 
 def painted(regions, size=(40, 30)):
@@ -59,3 +59,15 @@ def test_outside_is_each_pixel_of_some_regions_that_others_lack():
         expected = (painted(kept) > 0) & (painted(others) == 0)
         np.testing.assert_array_equal(painted(given), expected)
         assert all(width > 0 and height > 0 for _, _, width, height in given)
+
+
+def test_within_is_what_regions_and_another_share():
+    rng = np.random.default_rng(10)
+    for _ in range(200):
+        low = rng.integers(0, [30, 20], (rng.integers(1, 4), 2))
+        kept = bands([(*map(int, a), *map(int, rng.integers(1, 10, 2))) for a in low])
+        other = (*map(int, rng.integers(0, 20, 2)), *map(int, rng.integers(1, 20, 2)))
+        given = within(kept, other)
+        expected = (painted(kept) > 0) & (painted([other]) > 0)
+        np.testing.assert_array_equal(painted(given), expected)
+    assert within([None], (3, 4, 5, 6)) == [(3, 4, 5, 6)]

@@ -29,7 +29,8 @@ class Clusters:
 
     @staticmethod
     def most_runs(mesh: Mesh) -> int:
-        """The longest list that `seen_in` may give."""
+        """The longest list that `seen_in` may give, and each of those that `parted` cuts a run of
+        triangles into."""
         return (math.ceil(len(mesh.triangles) / _SIZE) + 1) // 2
 
     def seen_in(self, view: View, region: Region | None, moved_mm: float) -> list[slice]:

@@ -24,7 +24,7 @@ GLYPH_COLUMNS = 256
 
 MARGIN_MM = 26.0
 """Antialiasing reaches this far beyond a decal's edge: half a lookup, of programs.LOOKUP_PX, in the
-coarsest usual view, which has 39 mm a pixel at 640 pixels across."""
+coarsest usual view, which has 39 mm a pixel at 640 pixels across; beyond it edges are cut."""
 
 
 class SceneError(FastgenError):

@@ -45,7 +45,7 @@ PIXEL_CLASSES = {
     "cable": (),
 }
 """Pixels that see more than sky, by what is to be done there: several surfaces to filter, decals,
-damage or holes near; two by two pixels of one facet to shade at once; cables that cover part of the
+damage or holes near; those of two by two pixels that see one facet; cables that cover part of the
 sky. Each class has a list, see shaders/classify.comp.
 """
 

@@ -75,6 +75,18 @@ def outside(regions: Sequence[Region], others: Sequence[Region]) -> list[Region]
     return left
 
 
+def within(regions: Sequence[Region | None], other: Region) -> list[Region]:
+    """What of each of `regions`, None for the whole image, lies in `other`."""
+    x, y, width, height = other
+    found = []
+    for left, top, across, down in (region or other for region in regions):
+        first, last = max(left, x), min(left + across, x + width)
+        upper, lower = max(top, y), min(top + down, y + height)
+        if first < last and upper < lower:
+            found.append((first, upper, last - first, lower - upper))
+    return found
+
+
 def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
     """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
     if view.distortion:  # what lies between two corners may bow out farther than both

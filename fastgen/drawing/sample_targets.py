@@ -10,16 +10,12 @@ import numpy as np
 from fastgen.drawing.programs import OUT_OF_REACH_MM
 from fastgen.drawing.regions import Region
 from fastgen.drawing.sample_lattice import SampleLattice
+from fastgen.drawing.textures import DEPTHS, FLOATS, NUMBERS, texture_clearing
 from fastgen.gl import GLContext
 
 T = TypeVar("T")
 
 _GL_SCISSOR_TEST = 0x0C11
-_FAR = (ctypes.c_float * 1)(1.0)
-_OUT_OF_REACH = (ctypes.c_float * 1)(OUT_OF_REACH_MM)
-_KEYS_FORMAT, _DEPTH_FORMAT = (0x8D94, 0x1405), (0x1902, 0x1406)
-_REST_FORMAT = (0x1903, 0x1406)
-"""GL_RED_INTEGER of GL_UNSIGNED_INT, GL_DEPTH_COMPONENT and GL_RED of GL_FLOAT."""
 
 
 class SampleTargets:
@@ -51,10 +47,7 @@ class SampleTargets:
         self._scissor = gl.function("glScissorIndexed", None, ctypes.c_uint, *[ctypes.c_int] * 4)
         self._enable = gl.function("glEnablei", None, ctypes.c_uint, ctypes.c_uint)
         self._disable = gl.function("glDisablei", None, ctypes.c_uint, ctypes.c_uint)
-        box = (ctypes.c_int,) * 7  # mip level, x, y, z, width, height, depth
-        self._clear_texture = gl.function(
-            "glClearTexSubImage", None, ctypes.c_uint, *box, *[ctypes.c_uint] * 2, ctypes.c_void_p
-        )
+        self._clear = texture_clearing(gl)
 
     def begin(
         self,
@@ -71,16 +64,15 @@ class SampleTargets:
         name.
         """
         self._make_room(damage)
-        boxes = [*map(self._texels, seen), *map(self._texels_inside, inside)]
-        # clearing framebuffers, llvmpipe takes four times as long, and longer for a part
-        for box in boxes:
-            self._empty(self.keys, box, _KEYS_FORMAT, None)
+        for box in (*map(self._texels, seen), *map(self._texels_inside, inside)):
+            self._clear(self.keys, box, NUMBERS, 0)
         # of single samples it tells the sky from all else, see Targets.begin
-        for box in [self._texels(None), *boxes] if self.per_axis == 1 else boxes:
-            self._empty(self.depth_buffer, box, _DEPTH_FORMAT, _FAR)
-        for box in map(self._texels, touched):
+        outer = [None] if self.per_axis == 1 else seen
+        for box in (*map(self._texels, outer), *map(self._texels_inside, inside)):
+            self._clear(self.depth_buffer, box, DEPTHS, 1.0)
+        for box in map(self._texels, touched) if damage != "sound" else ():
             for rest in self.rest:
-                self._empty(rest, box, _REST_FORMAT, _OUT_OF_REACH)
+                self._clear(rest, box, FLOATS, OUT_OF_REACH_MM)
         self._use(self._sound)
 
     def begin_damaged(self) -> None:
@@ -145,13 +137,6 @@ class SampleTargets:
         """As `_texels`, of the inner view: it is mirrored, and begins below the outer one."""
         left, top, width, height = self._texels(region)
         return self._fine[0] - left - width, self.inner_row + top, width, height
-
-    def _empty(
-        self, texture: moderngl.Texture, box: Region, stored_as: tuple[int, int], value: Any
-    ) -> None:
-        """Fill the texels of `box` with a value, None for zeros."""
-        x, y, width, height = box
-        self._clear_texture(texture.glo, 0, x, y, 0, width, height, 1, *stored_as, value)
 
     def release(self) -> None:
         """Free all GL objects."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import moderngl
 
+from fastgen.drawing.pixel_lists import PixelLists
 from fastgen.drawing.programs import (
     LIST_GROUP,
     PIXEL_CLASSES,
@@ -12,7 +13,7 @@ from fastgen.drawing.programs import (
     link_compute,
     listed_classes,
 )
-from fastgen.drawing.regions import Region, outside
+from fastgen.drawing.regions import Region, outside, within
 from fastgen.drawing.targets import Targets
 
 UNITS = {
@@ -93,21 +94,34 @@ class Shading:
         """
         self._draw_sky(targets, bent)
         targets.bind_images()
-        targets.lists.begin()
-        everything = (0, 0, *targets.size)
-        near, cabled, seen = (
-            [region or everything for region in each] for each in (near_damage, cables, regions)
-        )
         if self._samples_per_axis == 1:
-            cabled = []
+            cables = []
+        width, height = targets.size
+        for top in range(0, height, targets.lists.rows):
+            band = (0, top, width, min(targets.lists.rows, height - top))
+            seen, near, cabled = (within(each, band) for each in (regions, near_damage, cables))
+            self._ctx.memory_barrier()  # what was cleared or listed before is done with
+            self._shade(targets.lists, seen, damage, near, cabled, suns)
+        self._ctx.memory_barrier()
+
+    def _shade(
+        self,
+        lists: PixelLists,
+        seen: Sequence[Region],
+        damage: str,
+        near: Sequence[Region],
+        cabled: Sequence[Region],
+        suns: int,
+    ) -> None:
+        """As `draw`, pixels that see more than sky, as many as lists have room for."""
+        lists.begin()
         self._classify(outside(seen, [*near, *cabled]), "sound", cables=False)
         self._classify(outside(near, cabled), damage, cables=False)
         self._classify(cabled, damage, cables=True)
         self._ctx.memory_barrier()
         for name in listed_classes(self._samples_per_axis):
             if self._comes(name, damage, bool(cabled)):
-                targets.lists.dispatch(name, self._shader(name, suns))
-        self._ctx.memory_barrier()
+                lists.dispatch(name, self._shader(name, suns))
 
     def _comes(self, name: str, damage: str, cables: bool) -> bool:
         """Whether a frame may hold pixels of a class."""

@@ -9,14 +9,12 @@ import numpy as np
 from fastgen.drawing.pixel_lists import PixelLists
 from fastgen.drawing.programs import listed_classes
 from fastgen.drawing.sample_targets import SampleTargets
+from fastgen.drawing.textures import FLOATS, NUMBERS, texture_clearing
 from fastgen.gl import GLContext
 from fastgen.sample import Frame
 
 _GL_R32UI = 0x8236
 _GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D = 0x8D40, 0x8D00, 0x0DE1
-_LABELS, _DEPTH = (0x8D94, 0x1405), (0x1903, 0x1406)
-"""GL_RED_INTEGER of GL_UNSIGNED_INT, GL_RED of GL_FLOAT."""
-_VOID_DEPTH = (ctypes.c_float * 1)(np.inf)
 
 
 class Targets:
@@ -40,26 +38,20 @@ class Targets:
         self._attach = gl.function(
             "glFramebufferTexture2D", None, *[ctypes.c_uint] * 4, ctypes.c_int
         )
-        box = (ctypes.c_int,) * 7  # mip level, x, y, z, width, height, depth
-        self._clear_texture = gl.function(
-            "glClearTexSubImage", None, ctypes.c_uint, *box, *[ctypes.c_uint] * 2, ctypes.c_void_p
-        )
+        self._clear = texture_clearing(gl)
 
     def begin(self) -> bool:
         """Empty the image and bind its colour alone. Whether its depth test knows which pixels see
         sky alone: those of a depth of 1."""
-        box = (0, 0, 0, 0, *self.size, 1)
-        # clearing framebuffers, llvmpipe takes four times as long
-        for texture, stored_as, value in zip(
-            self._image[1:], (_LABELS, _DEPTH), (None, _VOID_DEPTH), strict=True
-        ):
-            self._clear_texture(texture.glo, *box, *stored_as, value)
+        _, labels, depth = self._image
+        self._clear(labels, (0, 0, *self.size), NUMBERS, 0)
+        self._clear(depth, (0, 0, *self.size), FLOATS, np.inf)
         self._color.use()
         if self.samples.per_axis > 1:
             return False
         # moderngl asks that all be of one size; of holed scenes the samples' depth is higher
-        depth = self.samples.depth_buffer.glo
-        self._attach(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D, depth, 0)
+        tested = self.samples.depth_buffer.glo
+        self._attach(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D, tested, 0)
         return True
 
     def bind_images(self) -> None:

@@ -1,7 +1,7 @@
 """Textures of a GL context made from arrays."""
 
 import ctypes
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import moderngl
 import numpy as np
@@ -58,6 +58,33 @@ def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:
     texture = ctx.texture((columns, rows), channels, filled.tobytes(), dtype=dtype)
     texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
     return texture
+
+
+NUMBERS, FLOATS, DEPTHS = (0x8D94, 0x1405), (0x1903, 0x1406), (0x1902, 0x1406)
+"""How a texel's value is told: GL_RED_INTEGER of GL_UNSIGNED_INT, and of GL_FLOAT GL_RED and
+GL_DEPTH_COMPONENT."""
+
+
+def texture_clearing(
+    gl: GLContext,
+) -> Callable[[moderngl.Texture, tuple[int, int, int, int], tuple[int, int], float], None]:
+    """What fills texels of a texture with one value: takes it, a box (x, y, width, height), one of
+    the formats above and the value. Clearing framebuffers, llvmpipe takes four times as long, and
+    longer for a part."""
+    box = (_INT,) * 7  # mip level, x, y, z, width, height, depth
+    clear = gl.function("glClearTexSubImage", None, _ENUM, *box, _ENUM, _ENUM, ctypes.c_void_p)
+
+    def fill(
+        texture: moderngl.Texture,
+        box: tuple[int, int, int, int],
+        stored_as: tuple[int, int],
+        value: float,
+    ) -> None:
+        x, y, width, height = box
+        held = (_ENUM * 1)(int(value)) if stored_as == NUMBERS else (ctypes.c_float * 1)(value)
+        clear(texture.glo, 0, x, y, 0, width, height, 1, *stored_as, held)
+
+    return fill
 
 
 def _clamped(texture: moderngl.TextureArray) -> moderngl.TextureArray:

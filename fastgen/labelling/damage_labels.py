@@ -102,8 +102,8 @@ def _damaged(
 
 
 def _distinct(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
-    """How many cells [P] of a grid differ: coverage.surface_points bounds their number, and sorting
-    them takes ten times as long."""
+    """How many cells [P] of a grid differ: surface_points.py bounds their number, and sorting them
+    takes ten times as long."""
     if not len(columns):
         return 0
     columns, rows = columns - columns.min(), rows - rows.min()

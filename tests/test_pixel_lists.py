@@ -1,0 +1,90 @@
+"""Frames by lists of pixels: each pixel in one, and the same whatever came before, in any bands."""
+
+import numpy as np
+import pytest
+
+from fastgen import Config, Generator
+from fastgen.drawing import pixel_lists
+from fastgen.drawing.sample_targets import SampleTargets
+
+SIZE = (201, 150)
+KINDS = {
+    "sound": {"damage": {"probability": 0}},
+    "holed": {"damage": {"probability": 1, "count": [2, 4], "kinds": ["perforation", "concave"]}},
+}
+
+
+def drawn(values, quality, scenes=2):
+    """Frames of two cameras of each scene, and how often each pixel of them is listed."""
+    config = Config.from_values({**values, "spreader": {"probability": 1}})
+    found = []
+    with Generator(config, seed=3, size=SIZE, quality=quality) as generator:
+        renderer = generator._gpu.renderer()
+        for scene in map(generator.scene, range(scenes)):
+            for camera in (scene.camera("A"), scene.camera("Cr")):
+                targets = renderer.draw(scene, camera, SIZE)
+                found.append((targets.read(), listed(targets.lists.entries())))
+    return found
+
+
+def listed(lists):
+    """How often each pixel [H, W] is in one of the lists."""
+    count = np.zeros(SIZE[::-1], int)
+    for name, entries in lists.items():
+        x, y, group = entries & 0x3FFF, entries >> 14 & 0x3FFF, entries >> 28
+        assert (group > 0).all()
+        if name != "coarse":
+            assert (group == 1).all()
+        for bit in range(4):
+            chosen = (group >> bit & 1) == 1
+            np.add.at(count, (y[chosen] + (bit >> 1), x[chosen] + (bit & 1)), 1)
+    return count
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_each_pixel_that_sees_an_object_is_in_one_list(kind, quality):
+    for frame, count in drawn(KINDS[kind], quality):
+        assert count.max() == 1
+        assert (count[(frame.ids > 0) | (frame.cover > 0)] == 1).all()
+        if quality == "draft":  # no filter reaches beyond a pixel
+            holes = frame.damage // 100 == 5
+            np.testing.assert_array_equal(count == 1, (frame.ids > 0) | holes)
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_bands_of_an_image_are_what_the_whole_is(monkeypatch, quality):
+    whole = drawn(KINDS["holed"], quality)
+    monkeypatch.setattr(pixel_lists, "ROOM", 17 * SIZE[0])  # 16 rows
+    for (one, _), (other, _) in zip(whole, drawn(KINDS["holed"], quality), strict=True):
+        for name in ("image", "cover", "ids", "damage", "depth"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced", "high"])
+def test_a_frame_is_the_same_whatever_was_drawn_before(monkeypatch, quality):
+    """Where no damage is near, nothing asks which damage an earlier scene had there."""
+    scenes = 1 if quality == "high" else 2
+    first = drawn(KINDS["holed"], quality, scenes)
+    config = Config.from_values({**KINDS["holed"], "spreader": {"probability": 1}})
+    origins = [
+        damage.origin_mm
+        for index in range(scenes)
+        for damage in Generator(config, seed=3, size=SIZE).scene(index).damages
+    ]
+    begin = SampleTargets.begin
+    spoilt = []
+
+    def spoil(targets, damage, *rest):
+        targets._make_room(damage)
+        origin = origins[len(spoilt) % len(origins)]
+        for texture, value in zip(targets.rest, origin, strict=False):
+            texture.write(np.full(texture.size[::-1], value, np.float32).tobytes())
+            spoilt.append(value)
+        begin(targets, damage, *rest)
+
+    monkeypatch.setattr(SampleTargets, "begin", spoil)
+    for (one, _), (other, _) in zip(first, drawn(KINDS["holed"], quality, scenes), strict=True):
+        for name in ("image", "cover", "ids", "damage", "depth"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
+    assert spoilt
