@@ -5,7 +5,8 @@
 
 Prints, for each camera, core-milliseconds (process CPU time, so other load on the machine counts
 little) and thousands of pixels of each pass in one process, means over scenes of the least of
-`repeats` draws. Each pass is waited for by itself, which a real frame is not.
+`repeats` draws. Each pass is waited for by itself, which a real frame is not. What draft shades at
+once counts as one pixel.
 """
 
 import argparse
@@ -64,7 +65,10 @@ class PassTimer:
                 query = self._ctx.query(samples=True)
                 with query:
                     original(this, *args, **named_args)
-                self.pixels[name] = self.pixels.get(name, 0) + query.samples
+                # compute shaders touch no samples: what they work off stands in a list
+                listed = isinstance(this, PixelLists)
+                count = len(this.entries()[name]) if listed else query.samples
+                self.pixels[name] = self.pixels.get(name, 0) + count
                 return
             self._ctx.finish()
             began = time.process_time()

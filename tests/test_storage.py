@@ -98,7 +98,8 @@ def test_a_scene_that_kills_its_worker_is_given_up_and_no_other(whole, tmp_path,
 
 def test_a_scene_that_hangs_its_worker_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setenv("FAULT", "hang")
-    made = make(tmp_path / "out", 8, 2, hang_s=4.0)
+    # beside other work a worker takes seconds to start
+    made = make(tmp_path / "out", 8, 2, hang_s=10.0)
     (failed,) = made["failed"]
     assert failed["scene"] == FAULTY_SCENE
     assert "no sign of life" in failed["error"]
