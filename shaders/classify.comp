@@ -53,22 +53,20 @@ void list_each(uint list, ivec2 block, uint bits) {
         if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_group(i), 1u);
 }
 
-// from the order of textureGather to that of in_group
-vec4 by_rows(vec4 v) { return v.wzxy; }
-
 // those of two by two pixels that see one facet, without prints or damage near, are shaded at once
 void main() {
     ivec2 in_region = 2 * ivec2(gl_GlobalInvocationID.xy);
     if (in_region.x >= region.z) return;
     ivec2 block = region.xy + in_region;
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_keys, 0));
+    // wzxy: from the order of textureGather to that of in_group
     uvec4 key = textureGather(surface_keys, middle).wzxy;
-    vec4 sheet_x = by_rows(textureGather(sheet_points, middle, 0));
-    vec4 sheet_y = by_rows(textureGather(sheet_points, middle, 1));
-    vec4 depth = by_rows(textureGather(sheet_depths, middle));
+    vec4 sheet_x = textureGather(sheet_points, middle, 0).wzxy;
+    vec4 sheet_y = textureGather(sheet_points, middle, 1).wzxy;
+    vec4 depth = textureGather(sheet_depths, middle).wzxy;
 #if DAMAGED
-    vec4 rest_mm[3] = vec4[3](by_rows(textureGather(rest_x, middle)), by_rows(textureGather(rest_y, middle)),
-                              by_rows(textureGather(rest_z, middle)));
+    vec4 rest_mm[3] = vec4[3](textureGather(rest_x, middle).wzxy, textureGather(rest_y, middle).wzxy,
+                              textureGather(rest_z, middle).wzxy);
 #endif
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
     for (int i = 0; i < 4; ++i) {

@@ -141,7 +141,7 @@ class Shading:
         key = (damage, cables)
         if key not in self._classifiers:
             self._classifiers[key] = link_compute(
-                self._ctx, "classify.comp", UNITS, **self._variant("decal", damage), cables=cables
+                self._ctx, "classify.comp", UNITS, **self._variant("plain", damage), cables=cables
             )
         program = self._classifiers[key]
         side = 2 if self._coarse else 1
