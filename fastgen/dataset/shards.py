@@ -7,6 +7,7 @@ that files over the whole dataset are made from. What has no manifest was never 
 import io
 import os
 import tarfile
+import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -35,6 +36,13 @@ _PRELOAD_IMAGES = 1000
 FORMATS = tuple(SHARD_SCENES)
 MADE_BY = ("backend", "renderer")
 """What manifests say of the process that made them."""
+
+_REPORT_S = 0.25
+"""Images are counted to the parent no more often: each report wakes it, on a core that is in use."""
+
+_HOLD_IMAGES = 256
+"""After so many, memory that was freed goes back to the system, which must clear each page before it
+is used again."""
 
 ATTEMPTS = 3
 """A scene that failed so often is given up."""
@@ -157,20 +165,31 @@ class Maker:
             self._generator.preload(lambda: report("busy", None))
         names = (self._generator.used_backend, self._generator.renderer_name)
         self._made_by = dict(zip(MADE_BY, names, strict=True))
+        self._held = 0  # images since memory was returned
 
     def __call__(self, task: Task) -> None:
         """Render, encode and commit one shard."""
-        return_freed_memory()  # of the shard before
+        if self._held >= _HOLD_IMAGES:
+            return_freed_memory()  # of the shards before
+            self._held = 0
         made: list[tuple[Files, Record]] = []
         skip = dict(task.skip)
+        at, untold, told = None, 0, time.monotonic()
         for index, camera in self._job.wanted(task.shard):
             if index in skip:
                 continue
-            self._report("at", index)
+            if index != at:
+                self._report("at", index)
+                at = index
             sample = self._patiently(index, camera, skip)
             if sample is not None:
                 made.append(sample)
-            self._report("images", 1)
+            self._held += 1
+            untold += 1
+            if time.monotonic() - told >= _REPORT_S:
+                self._report("images", untold)
+                untold, told = 0, time.monotonic()
+        self._report("images", untold)
         made = [(files, record) for files, record in made if _index(record) not in skip]
         files = pack(made, task.shard) if self._job.fmt == "webdataset" else _joined(made)
         self._storage.commit(files, f"{task.shard:06d}")
