@@ -56,7 +56,7 @@ class Quality(NamedTuple):
 
 
 QUALITY = {
-    "draft": Quality(1, 1, shadow_detail=0.5, coarse=True),
+    "draft": Quality(1, 1, shadow_detail=0.4, coarse=True),
     "balanced": Quality(3, 2),
     "fine": Quality(5, 25),
     "high": Quality(5, 25, traced=True),

@@ -38,10 +38,10 @@ MADE_BY = ("backend", "renderer")
 """What manifests say of the process that made them."""
 
 _REPORT_S = 0.25
-"""Images are counted to the parent no more often: each report wakes it, on a core that is in use."""
+"""Images are counted to the parent no more often: each report wakes it, on a core in use."""
 
 _HOLD_IMAGES = 256
-"""After so many, memory that was freed goes back to the system, which must clear each page before it
+"""After so many, freed memory goes back to the system, which must clear each page before it
 is used again."""
 
 ATTEMPTS = 3
@@ -144,6 +144,9 @@ class Maker:
     threads.
     """
 
+    _held = 0
+    """Images made since freed memory was returned."""
+
     def __init__(self, job: Job, whole_machine: bool, report: Report) -> None:
         if whole_machine:
             # llvmpipe reads it at its first context
@@ -165,7 +168,6 @@ class Maker:
             self._generator.preload(lambda: report("busy", None))
         names = (self._generator.used_backend, self._generator.renderer_name)
         self._made_by = dict(zip(MADE_BY, names, strict=True))
-        self._held = 0  # images since memory was returned
 
     def __call__(self, task: Task) -> None:
         """Render, encode and commit one shard."""
