@@ -20,7 +20,7 @@
 
 layout(local_size_x = LIST_GROUP) in;
 
-uniform ivec4 region;   // x, y, width and height in pixels
+uniform ivec4 region;   // x, y, width and height in pixels, whose invocations follow row by row
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 
@@ -37,6 +37,13 @@ int damage_near(vec3 rest_mm) {
     return near;
 }
 #endif
+
+// of `size` elements across and down, the one for this invocation; beyond them after the last
+ivec2 in_turn(ivec2 size) {
+    int number = int(gl_GlobalInvocationID.x);
+    int row = int((float(number) + 0.5) / float(size.x));   // exact below 2^22
+    return ivec2(number - row * size.x, row);
+}
 
 void write_labels(ivec2 pixel, uint key, float depth) {
     uint labels = key_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (SOUND_CONTAINER << 16);
@@ -55,8 +62,8 @@ void list_each(uint list, ivec2 block, uint bits) {
 
 // those of two by two pixels that see one facet, without prints or damage near, are shaded at once
 void main() {
-    ivec2 in_region = 2 * ivec2(gl_GlobalInvocationID.xy);
-    if (in_region.x >= region.z) return;
+    ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
+    if (in_region.y >= region.w) return;
     ivec2 block = region.xy + in_region;
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_keys, 0));
     // wzxy: from the order of textureGather to that of in_group
@@ -110,8 +117,8 @@ void main() {
 }
 #else
 void main() {
-    ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
-    if (in_region.x >= region.z) return;
+    ivec2 in_region = in_turn(region.zw);
+    if (in_region.y >= region.w) return;
     ivec2 pixel = region.xy + in_region;
     ivec2 middle = middle_of(pixel);
     uint keys[FILTER_NEAR] = keys_near(middle);

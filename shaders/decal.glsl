@@ -1,7 +1,7 @@
 // DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
 
 uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decal_tables.py
-uniform sampler2D glyph_table;      // centre x, y in mm of the decal, tile layer, -
+uniform sampler2D glyph_table;      // as of glyph_runs.py
 uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
 uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline; share of ink
 
@@ -35,15 +35,20 @@ float glyph_ink(vec2 d, float layer, float cap_mm, float footprint_mm) {
     return mix(sharp, texel.g, smoothstep(0.25, 1.25, lod));
 }
 
+vec4 glyph_texel(uint glyph) { return texelFetch(glyph_table, ivec2(glyph & 255u, glyph >> 8), 0); }
+
 float text_coverage(vec2 p, vec4 run, float footprint_mm) {
     float cap_mm = run.x;
+    uint start = uint(run.y);
+    float along = run.w < 0.0 ? p.y : p.x;
+    float part = clamp(fma(along, abs(run.w), 0.5 * run.z), 0.0, run.z - 1.0);
+    uint reach = uint(glyph_texel(start + uint(part)).w);
+    uint g = start + reach / GLYPH_RANGE, end = start + reach % GLYPH_RANGE;
     // centre and layer of the two nearest glyphs: from afar, two share a footprint
     vec4 first = vec4(1e9, 1e9, 0.0, 1e9);
     vec4 second = first;
-    int g = int(run.y);
-    int end = g + int(run.z);
     do {
-        vec4 glyph = texelFetch(glyph_table, ivec2(g & 255, g >> 8), 0);
+        vec4 glyph = glyph_texel(g);
         vec2 d = p - glyph.xy;
         vec4 found = vec4(d, glyph.z, g < end ? max(abs(d.x), abs(d.y)) : 1e9);
         if (found.w < first.w) { second = first; first = found; }

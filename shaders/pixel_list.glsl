@@ -14,7 +14,8 @@ uint list_start(uint list) { return list * (uint(list_entries.length()) / LISTS)
 uint listed(uint list, uint count) {
     uint head = LIST_HEADER * list;
     uint at = atomicAdd(list_heads[head + 3u], count);
-    atomicMax(list_heads[head], (at + count + LIST_GROUP - 1u) / LIST_GROUP);
+    uint groups = (at + count + LIST_GROUP - 1u) / LIST_GROUP;
+    if (groups > (at + LIST_GROUP - 1u) / LIST_GROUP) atomicMax(list_heads[head], groups);
     return list_start(list) + at;
 }
 

@@ -44,7 +44,8 @@ def test_cells_hold_all_points_near_decals_and_few_others():
                 half[1] = half[0]
             decal = (kind, center, half, turn_deg)
             found = decals_near(row(*decal)[None], SIZE_MM)
-            assert found.shape == (rows, columns)
+            assert found.shape == (rows, columns + -columns % 4)
+            found = found[:, :columns]
             beyond = beyond_mm(*decal, points).reshape(rows, 8, columns, 8)
             nearest = beyond.min(axis=(1, 3))
             assert found[nearest <= MARGIN_MM].all()

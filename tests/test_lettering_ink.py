@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from fastgen.drawing.glyph_runs import glyph_run
 from fastgen.gl import open_context
 from fastgen.prints.artwork import glyph_coverage, glyph_tiles
 from fastgen.prints.lettering import layout
@@ -17,35 +18,48 @@ BODY = (
     "struct Material { vec3 albedo; };\n"
     '#include "tone.glsl"\n#include "layers.glsl"\n'
     '#include "decal_cell.glsl"\n#include "decal.glsl"\n'
-    "vec4 f(vec4 x) { return vec4(text_coverage(x.xy, vec4(%r, 0.0, %d.0, 0.0), x.z)); }"
+    "vec4 f(vec4 x) { return vec4(text_coverage(x.xy, vec4(%r, 0.0, %d.0, %r), x.z)); }"
 )
 
 
-@pytest.fixture(scope="module")
-def text():
-    """A line of letters: its glyphs, and its ink on a grid of 1 mm, [H, W] from the lower left."""
+@pytest.fixture(
+    scope="module",
+    params=[
+        (("CSQU 305438",), False),
+        (("CSQU", "305438", "22G1 45R1 I"), False),
+        (("CSQU305438", "22G1"), True),
+    ],
+    ids=["line", "lines", "columns"],
+)
+def text(request):
+    """A text: how its letters stand, and its ink on a grid of 1 mm, [H, W] from the lower left."""
     tiles, fonts = glyph_tiles()
-    glyphs = layout(("CSQU 305438",), next(iter(fonts.values())), CAP_MM).glyphs
+    lines, vertical = request.param
+    lettering = layout(lines, next(iter(fonts.values())), CAP_MM, vertical)
+    glyphs = lettering.glyphs
     side = round(glyphs[0].x1 - glyphs[0].x0)
-    left, low = min(g.x0 for g in glyphs), glyphs[0].y0
-    ink = np.zeros((side, round(max(g.x1 for g in glyphs) - left) + 1))
+    left, low = min(g.x0 for g in glyphs), min(g.y0 for g in glyphs)
+    width, height = max(g.x1 for g in glyphs) - left, max(g.y1 for g in glyphs) - low
+    ink = np.zeros((round(height) + 1, round(width) + 1))
     for glyph in glyphs:
         fine = cv2.resize(tiles[glyph.tile].astype(np.float32), (side, side))[::-1]
-        x = round(glyph.x0 - left)
-        ink[:, x : x + side] = np.maximum(ink[:, x : x + side], fine >= 127.5)
-    return glyphs, ink, (left, low)
+        x, y = round(glyph.x0 - left), round(glyph.y0 - low)
+        window = ink[y : y + side, x : x + side]
+        np.maximum(window, fine >= 127.5, out=window)
+    return lettering, ink, (left, low)
 
 
 def seen_ink(text, footprint_mm):
     """Coverage by the shader on a grid of STEP_MM: points [N, 2] in mm and values [N]."""
-    glyphs, ink, (left, low) = text
+    lettering, ink, (left, low) = text
     height, width = ink.shape
     x = np.arange(-MARGIN_MM, width + MARGIN_MM, STEP_MM) + left
     y = np.arange(-MARGIN_MM, height + MARGIN_MM, STEP_MM) + low
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     table = np.zeros((1, 256, 4), np.float32)
-    for row, g in zip(table[0], glyphs, strict=False):
-        row[:3] = (g.x0 + g.x1) / 2, (g.y0 + g.y1) / 2, g.tile
+    made, parts_per_mm = glyph_run(lettering)
+    table[0, : len(made)] = made
+    from_middle = points - np.array(lettering.size_mm) / 2
     tiles, _ = glyph_tiles()
     with open_context() as gl:
         texels = np.ascontiguousarray(np.stack([tiles, glyph_coverage(tiles)], axis=-1))
@@ -58,9 +72,10 @@ def seen_ink(text, footprint_mm):
         held = blocks(gl)
         textures = {"glyph_tiles": array, "glyph_table": placed}
         values = []
-        for rows in np.array_split(points, -(-len(points) // 8192)):
+        for rows in np.array_split(from_middle, -(-len(points) // 8192)):
             inputs = np.c_[rows, np.full(len(rows), footprint_mm), np.zeros(len(rows))]
-            values.append(run(gl, BODY % (CAP_MM, len(glyphs)), inputs, textures)[:, 0])
+            body = BODY % (CAP_MM, len(made), parts_per_mm)
+            values.append(run(gl, body, inputs, textures)[:, 0])
         del held
     return points, np.concatenate(values)
 

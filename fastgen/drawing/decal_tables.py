@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import CONTAINER_ID, DAMAGE_VALUES, SPREADER_ID
+from fastgen.drawing.glyph_runs import GLYPH_RANGE, GlyphRun, glyph_run
 from fastgen.drawing.programs import DECAL_CELL_MM, DECAL_KINDS
 from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import Mesh
@@ -36,8 +37,8 @@ class DecalTables:
     """grid: uint32 [rows, columns, 4], two 1-based decal numbers a word, bottom decal first.
     table: float32 [N, DECAL_TEXELS, 4]: (cos, sin, -sin, cos); (centre x, y in atlas mm, half
     width, half height); (albedo rgb, wear); (kind, object id, art layer, 0); (cap height mm,
-    first glyph, glyph count, 0). glyphs: float32 [rows, GLYPH_COLUMNS, 4]: centre x, y in mm from
-    the decal's centre, tile, 0."""
+    first glyph, glyph count, parts a mm). glyphs: float32 [rows, GLYPH_COLUMNS, 4], one run after
+    the other; see GlyphRun."""
 
     grid: NDArray[np.uint32]
     table: NDArray[np.float32]
@@ -67,24 +68,26 @@ def pack_decals(
     table = np.zeros((max(count, 1), DECAL_TEXELS, 4), np.float32)
     table[:count, 0] = np.stack([cos, sin, -sin, cos], axis=1)
     table[:count, 1] = np.concatenate([center, half], axis=1)
-    glyphs: list[tuple[float, float, float, float]] = []
+    runs: list[GlyphRun] = []
+    letters = 0
     for row, decal, object_id in zip(table, decals, object_ids(scene), strict=False):
         kind = decal.art if decal.art == "stripes" else decal.kind
         row[2] = *decal.albedo, decal.wear
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), 0
         if decal.kind == "text":
             run = _glyph_run(decal, fonts[decal.font])
-            row[4] = decal.cap_mm, len(glyphs), len(run), 0
-            glyphs.extend(run)
+            row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm
+            letters += len(run.glyphs)
+            runs.append(run)
     width, height = half.T
     along, across = abs(cos) * width + abs(sin) * height, abs(sin) * width + abs(cos) * height
     reach = np.stack([along, across], axis=1) + MARGIN_MM
     low = np.maximum(center - reach, corner) / DECAL_CELL_MM
     high = np.minimum(center + reach, corner + sheet) / DECAL_CELL_MM
-    glyph_rows = max(-(-len(glyphs) // GLYPH_COLUMNS), 1)
+    glyph_rows = max(-(-letters // GLYPH_COLUMNS), 1)
     glyph_table = np.zeros((glyph_rows * GLYPH_COLUMNS, 4), np.float32)
-    if glyphs:
-        glyph_table[: len(glyphs)] = glyphs
+    if runs:
+        glyph_table[:letters] = np.concatenate([run.glyphs for run in runs])
     return DecalTables(
         _grid(decals, mesh, low, high),
         table,
@@ -142,10 +145,11 @@ def _check(
     )
 
 
-def _glyph_run(decal: Decal, font: Font) -> list[tuple[float, float, float, float]]:
+def _glyph_run(decal: Decal, font: Font) -> GlyphRun:
     lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical)
-    width, height = lettering.size_mm
-    return [
-        ((g.x0 + g.x1) / 2 - width / 2, (g.y0 + g.y1) / 2 - height / 2, float(g.tile), 0.0)
-        for g in lettering.glyphs
-    ]
+    if len(lettering.glyphs) >= GLYPH_RANGE:
+        raise SceneError(
+            f"a text on {decal.face} at {decal.center_mm} has {len(lettering.glyphs)} letters; "
+            f"give fewer than {GLYPH_RANGE}"
+        )
+    return glyph_run(lettering)

@@ -12,11 +12,12 @@ def decals_near(
 ) -> NDArray[np.uint8]:
     """Cells of NEAR_CELL_MM of the atlas, uint8 [rows, columns]: 1 where any point of a cell is no
     farther from a decal than antialiasing reaches, decal_tables.MARGIN_MM; some beside those too.
+    The columns are a multiple of 4, for the shader reads four cells as one number.
 
     table: as of decal_tables.DecalTables, without rows that are no decal's.
     """
     columns, rows = (int(np.ceil(side / NEAR_CELL_MM)) for side in atlas_size_mm)
-    found = np.zeros((rows, columns), np.uint8)
+    found = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
     # from the middle of a cell; no point of it is farther from there
     margin = MARGIN_MM / NEAR_CELL_MM + 0.5**0.5
     for turn, place, _, (kind, *_), _ in table.tolist():

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fastgen import damage as fields
 from fastgen import environment
 from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
+from fastgen.drawing.glyph_runs import GLYPH_RANGE
 from fastgen.drawing.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.drawing.rust import DEFINES as RUST_DEFINES
 from fastgen.drawing.sample_lattice import SampleLattice
@@ -266,6 +267,7 @@ def _constants(
         "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
         "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
         "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
+        "GLYPH_RANGE": f"{GLYPH_RANGE}u",
         **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
         **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},

@@ -148,7 +148,7 @@ class Shading:
         for region in regions:
             program["region"] = region
             across, down = (-(-length // side) for length in region[2:])
-            program.run(-(-across // LIST_GROUP), down)
+            program.run(-(-across * down // LIST_GROUP))
 
     def _draw_sky(self, targets: Targets, bent: bool) -> None:
         """Shade at least the pixels that see sky alone."""
