@@ -11,6 +11,7 @@ from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.damage import LOBE_LIMIT, LOBES
 from fastgen.distributions.damage_config import MAX_INSTANCES
 from fastgen.distributions.sensor_config import CORNERS
+from fastgen.drawing.glyph_runs import GLYPH_RANGE
 from fastgen.drawing.programs import DECAL_KINDS, MAX_DAMAGES
 from fastgen.errors import ConfigError
 from fastgen.geometry.container_layout import KINDS, mm_away
@@ -111,6 +112,9 @@ def _check_decal(decal: Decal, path: str) -> None:
             raise ConfigError(f"{path}.cap_mm: {decal.cap_mm:g} is out of range; give more than 0")
         if not decal.text.strip():
             raise ConfigError(f"{path}.lines: nothing to write")
+        letters = sum(char != " " for char in decal.text)
+        if letters >= GLYPH_RANGE:
+            raise ConfigError(f"{path}.lines: {letters} letters; give fewer than {GLYPH_RANGE}")
         for char in decal.text:
             if char != " ":
                 check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)

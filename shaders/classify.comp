@@ -20,7 +20,7 @@
 
 layout(local_size_x = LIST_GROUP) in;
 
-uniform ivec4 region;   // x, y, width and height in pixels, whose invocations follow row by row
+uniform ivec4 region;   // x, y, width and height in pixels
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 
@@ -38,10 +38,15 @@ int damage_near(vec3 rest_mm) {
 }
 #endif
 
-// of `size` elements across and down, the one for this invocation; beyond them after the last
+// column and row of this invocation among size.x by size.y, counted row by row; a row of size.y or more where
+// none is left
 ivec2 in_turn(ivec2 size) {
     int number = int(gl_GlobalInvocationID.x);
-    int row = int((float(number) + 0.5) / float(size.x));   // exact below 2^22
+    int row = int(float(number) / float(size.x));
+    // a rounding may put what begins or ends a row into the one beside it
+    int column = number - row * size.x;
+    if (column < 0) --row;
+    if (column >= size.x) ++row;
     return ivec2(number - row * size.x, row);
 }
 

@@ -1,7 +1,9 @@
 // bool near_decals(zone, sheet_mm): whether a lookup of the layers at a point of the sheet may meet a decal;
 // none is on the spreader.
 
-uniform usampler2D decal_cells;   // of drawing/decals_near.py four in a number, for llvmpipe reads bytes one by one
+// cells of drawing/decals_near.py, four a number, the first in its lowest byte: llvmpipe fetches single
+// bytes one by one
+uniform usampler2D decal_cells;
 
 bool near_decals(uint zone, vec2 sheet_mm) {
     bool bears = zone < SPREADER_ZONE;   // the cells span the container's atlas only

@@ -4,7 +4,10 @@ import numpy as np
 
 from fastgen.drawing.decal_tables import MARGIN_MM
 from fastgen.drawing.decals_near import decals_near
-from fastgen.drawing.programs import DECAL_KINDS, NEAR_CELL_MM
+from fastgen.drawing.programs import DECAL_KINDS, NEAR_CELL_MM, SPREADER_ZONE
+from fastgen.drawing.textures import data_texture
+from fastgen.gl import open_context
+from tests.glsl import blocks, run
 
 SIZE_MM = (1500.0, 1200.0)
 
@@ -29,6 +32,11 @@ def beyond_mm(kind, center, half, turn_deg, points):
     return np.maximum(x - half[0], y - half[1])
 
 
+def cells(numbers):
+    """The cells [rows, columns] in what the shader reads."""
+    return np.stack([numbers >> 8 * i & 255 for i in range(4)], axis=-1).reshape(len(numbers), -1)
+
+
 def test_cells_hold_all_points_near_decals_and_few_others():
     rng = np.random.default_rng(4)
     columns, rows = (int(np.ceil(side / NEAR_CELL_MM)) for side in SIZE_MM)
@@ -43,9 +51,8 @@ def test_cells_hold_all_points_near_decals_and_few_others():
             if kind == "marker":
                 half[1] = half[0]
             decal = (kind, center, half, turn_deg)
-            found = decals_near(row(*decal)[None], SIZE_MM)
-            assert found.shape == (rows, columns + -columns % 4)
-            found = found[:, :columns]
+            found = cells(decals_near(row(*decal)[None], SIZE_MM))[:, :columns]
+            assert found.shape == (rows, columns)
             beyond = beyond_mm(*decal, points).reshape(rows, 8, columns, 8)
             nearest = beyond.min(axis=(1, 3))
             assert found[nearest <= MARGIN_MM].all()
@@ -60,3 +67,30 @@ def test_no_decal_is_near_where_there_is_none_and_several_add_up():
     both = decals_near(np.stack([a, b]), SIZE_MM)
     alone = decals_near(a[None], SIZE_MM) | decals_near(b[None], SIZE_MM)
     np.testing.assert_array_equal(both, alone)
+
+
+def test_the_shader_finds_each_cell():
+    decals = [row("text", (300, 310), (90, 40), 3.0), row("marker", (1480, 1190), (100, 100), 0.0)]
+    size_mm = (1501.0, 1203.0)
+    near = decals_near(np.stack(decals), size_mm)
+    columns, rows = (int(np.ceil(side / NEAR_CELL_MM)) for side in size_mm)
+    expected = cells(near)[:rows, :columns]
+    assert expected[:, -1].any()
+    assert not expected.all()
+    rng = np.random.default_rng(7)
+    column, line = np.meshgrid(np.arange(columns), np.arange(rows))
+    points = (
+        np.stack([column, line], axis=-1).reshape(-1, 2) + rng.uniform(0.1, 0.9, 2)
+    ) * NEAR_CELL_MM
+    body = (
+        '#include "decals_near.glsl"\n'
+        "vec4 f(vec4 x) { return vec4(near_decals(uint(x.z), x.xy), 0.0, 0.0, 0.0); }"
+    )
+    with open_context() as gl:
+        held = blocks(gl)
+        textures = {"decal_cells": data_texture(gl.ctx, near[..., None])}
+        for zone, shown in ((0, expected), (SPREADER_ZONE, 0 * expected)):
+            inputs = np.c_[points, np.full(len(points), zone), np.zeros(len(points))]
+            found = run(gl, body, inputs, textures)[:, 0].reshape(rows, columns)
+            np.testing.assert_array_equal(found, shown)
+        del held

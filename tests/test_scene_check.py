@@ -186,6 +186,14 @@ def test_a_letter_that_the_font_lacks_is_named(full):
         check_scene(spoilt(full, path, ("ÜBER",)))
 
 
+def test_a_text_of_too_many_letters_is_named(full):
+    i = next(i for i, decal in enumerate(full.decals) if decal.kind == "text")
+    path = ("decals", i, "lines")
+    check_scene(spoilt(full, path, ("A " * 2000, "B" * 2095)))
+    with pytest.raises(ConfigError, match=rf"decals\[{i}\]\.lines: 4096 letters; give fewer"):
+        check_scene(spoilt(full, path, ("A " * 2000, "B" * 2096)))
+
+
 def test_a_decal_beside_its_sheet_is_named():
     with Generator(seed=2, size=SIZE) as generator:
         scene = generator.scene(3)

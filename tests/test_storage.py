@@ -14,12 +14,14 @@ from pathlib import Path
 import psutil
 import pytest
 
+from fastgen.config import Config
 from fastgen.dataset import storage
+from fastgen.dataset.shards import Job, Task
 from fastgen.dataset.storage import Folder, storage_of
 from fastgen.dataset.workers import run
 from fastgen.errors import OutputError
 from fastgen.formats import Same
-from tests.crash_run import FAULTY_SCENE, make
+from tests.crash_run import FAULTY_SCENE, QuickMaker, make
 from tests.folders import content
 
 SCENES = 40
@@ -39,6 +41,20 @@ def is_sound(out):
         for name, (size, digest) in json.loads(path.read_text())["files"].items():
             data = (out / name).read_bytes()
             assert (len(data), hashlib.sha256(data).hexdigest()) == (size, digest)
+
+
+def test_the_parent_hears_of_each_scene_once_and_of_all_images(tmp_path):
+    heard = []
+    job = Job(
+        str(tmp_path), 99, Config.preset(), 1, (64, 64), ("A", "B"), None, "auto", shard_scenes=3
+    )
+    maker = QuickMaker(job, False, lambda *report: heard.append(report))
+    maker(Task(0, {1: "given up"}))
+    assert [value for kind, value in heard if kind == "at"] == [0, 2]
+    assert sum(value for kind, value in heard if kind == "images") == 4
+    heard.clear()
+    maker(Task(1, dict.fromkeys((3, 4, 5), "given up")))
+    assert not heard
 
 
 def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_path):

@@ -187,8 +187,6 @@ class _Actor:
 
     def _report(self, kind: str, value: Any) -> None:
         """Pass on at once that it turns to a scene or is busy; the rest goes along."""
-        if (kind, value) == ("at", self._scene):
-            return
         self._reports.append((kind, value))
         if kind == "at":
             self._scene = value

@@ -38,11 +38,12 @@ MADE_BY = ("backend", "renderer")
 """What manifests say of the process that made them."""
 
 _REPORT_S = 0.25
-"""Images are counted to the parent no more often: each report wakes it, on a core in use."""
+"""Within a shard images are counted to the parent no more often: each report wakes it, on a core in
+use."""
 
 _HOLD_IMAGES = 256
-"""After so many, freed memory goes back to the system, which must clear each page before it
-is used again."""
+"""From the next shard after so many on, freed memory is back with the system, which must clear each
+page before it is used again."""
 
 ATTEMPTS = 3
 """A scene that failed so often is given up."""
@@ -191,7 +192,8 @@ class Maker:
             if time.monotonic() - told >= _REPORT_S:
                 self._report("images", untold)
                 untold, told = 0, time.monotonic()
-        self._report("images", untold)
+        if untold:
+            self._report("images", untold)
         made = [(files, record) for files, record in made if _index(record) not in skip]
         files = pack(made, task.shard) if self._job.fmt == "webdataset" else _joined(made)
         self._storage.commit(files, f"{task.shard:06d}")

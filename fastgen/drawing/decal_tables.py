@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import CONTAINER_ID, DAMAGE_VALUES, SPREADER_ID
-from fastgen.drawing.glyph_runs import GLYPH_RANGE, GlyphRun, glyph_run
+from fastgen.drawing.glyph_runs import GlyphRun, glyph_run
 from fastgen.drawing.programs import DECAL_CELL_MM, DECAL_KINDS
 from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import Mesh
@@ -146,10 +146,4 @@ def _check(
 
 
 def _glyph_run(decal: Decal, font: Font) -> GlyphRun:
-    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical)
-    if len(lettering.glyphs) >= GLYPH_RANGE:
-        raise SceneError(
-            f"a text on {decal.face} at {decal.center_mm} has {len(lettering.glyphs)} letters; "
-            f"give fewer than {GLYPH_RANGE}"
-        )
-    return glyph_run(lettering)
+    return glyph_run(layout(decal.lines, font, decal.cap_mm, decal.vertical))

@@ -9,10 +9,10 @@ from fastgen.drawing.programs import DECAL_KINDS, NEAR_CELL_MM
 
 def decals_near(
     table: NDArray[np.float32], atlas_size_mm: tuple[float, float]
-) -> NDArray[np.uint8]:
-    """Cells of NEAR_CELL_MM of the atlas, uint8 [rows, columns]: 1 where any point of a cell is no
-    farther from a decal than antialiasing reaches, decal_tables.MARGIN_MM; some beside those too.
-    The columns are a multiple of 4, for the shader reads four cells as one number.
+) -> NDArray[np.uint32]:
+    """Cells of NEAR_CELL_MM of the atlas, a byte each: 1 where any point of a cell is no farther
+    from a decal than antialiasing reaches, decal_tables.MARGIN_MM; some beside those too. As the
+    shader reads them, uint32 [rows, columns / 4]: four a number, the first in its lowest byte.
 
     table: as of decal_tables.DecalTables, without rows that are no decal's.
     """
@@ -39,4 +39,4 @@ def decals_near(
             window |= along + beside <= reach[0]
         else:
             window |= (along <= reach[0]) & (beside <= reach[1])
-    return found
+    return found.view("<u4").astype(np.uint32, copy=False)

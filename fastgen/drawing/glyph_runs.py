@@ -8,36 +8,43 @@ from numpy.typing import NDArray
 from fastgen.prints.lettering import Lettering
 
 GLYPH_RANGE = 4096
-"""Two numbers below it are one that float32 holds exactly."""
+"""More than the letters of a text, as scene_check sees to: a * GLYPH_RANGE + b is below 2^24 for
+two of their numbers, and float32 holds it exactly."""
 
 _SLACK = 0.01
 """Of a tile's side, for points that a rounding puts into the part beside their own."""
 
 
 class GlyphRun(NamedTuple):
-    """glyphs: float32 [G, 4]: centre x, y in mm from the middle of the text, ascending along its
-    longer side; tile; and of that one of G equal parts of that side, which glyphs' tiles reach into
-    it, the first * GLYPH_RANGE + the end. What lies beyond an end belongs to the last part there.
-    parts_per_mm: parts a mm, below 0 where they follow along y."""
+    """The G letters of a text along its longer side, which has as many equal parts; the first and
+    the last part go on beyond its ends.
+
+    glyphs: float32 [G, 4]. Row i: centre x, y in mm from the middle of the text; tile; and first *
+    GLYPH_RANGE + end of the rows whose tiles reach into part i. parts_per_mm: parts a mm, below 0
+    where they follow along y.
+    """
 
     glyphs: NDArray[np.float32]
     parts_per_mm: float
 
 
 def glyph_run(lettering: Lettering) -> GlyphRun:
-    """The glyphs of a text, fewer than GLYPH_RANGE."""
+    """The glyphs of a text, at least one and fewer than GLYPH_RANGE."""
     count = len(lettering.glyphs)
-    size = np.array(lettering.size_mm)
-    boxes = np.array([glyph[2:] for glyph in lettering.glyphs]).reshape(count, 2, 2)
-    axis = int(size[1] > size[0])
-    order = np.argsort(boxes[:, 0, axis], kind="stable")
-    low, high = (boxes[order] - size / 2).transpose(1, 2, 0)
-    borders = size[axis] * (np.arange(count + 1) / max(count, 1) - 0.5)
+    rows = np.array([(*glyph[2:], glyph.tile) for glyph in lettering.glyphs])
+    width, height = lettering.size_mm
+    axis = int(height > width)
+    rows = rows[np.argsort(rows[:, axis], kind="stable")]
+    center_x = (rows[:, 0] + rows[:, 2] - width) / 2
+    center_y = (rows[:, 1] + rows[:, 3] - height) / 2
+    side = rows[0, 2] - rows[0, 0]
+    # sizes are rounded, so that those of tiny letters may be nothing
+    length = max(width, height, side)
+    along = center_y if axis else center_x
+    borders = length * (np.arange(count + 1) / count - 0.5)
     borders[[0, -1]] = -np.inf, np.inf
-    slack = _SLACK * (high[axis] - low[axis])
-    first = np.searchsorted(high[axis] + slack, borders[:-1])
-    end = np.searchsorted(low[axis] - slack, borders[1:], side="right")
-    tiles = np.array([glyph.tile for glyph in lettering.glyphs])[order]
-    columns = [*(low + high) / 2, tiles, first * GLYPH_RANGE + end]
-    parts_per_mm = count / size[axis] * (-1 if axis else 1)
-    return GlyphRun(np.stack(columns, axis=1).astype(np.float32), float(parts_per_mm))
+    reach = (0.5 + _SLACK) * side
+    first = np.searchsorted(along, borders[:-1] - reach)
+    end = np.searchsorted(along, borders[1:] + reach, side="right")
+    glyphs = np.stack([center_x, center_y, rows[:, 4], first * GLYPH_RANGE + end], axis=1)
+    return GlyphRun(glyphs.astype(np.float32), (-count if axis else count) / length)

@@ -33,7 +33,7 @@ class SceneDecals:
             "decal_grid": data_texture(ctx, tables.grid),
             "decal_table": data_texture(ctx, tables.table),
             "glyph_table": data_texture(ctx, tables.glyphs),
-            "decal_cells": data_texture(ctx, near.view("<u4")[..., None]),
+            "decal_cells": data_texture(ctx, near[..., None]),
         }
 
     def release(self) -> None:

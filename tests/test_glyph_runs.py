@@ -1,0 +1,74 @@
+"""Which letters of a text the shader looks at, against all letters whose tile holds a point."""
+
+import numpy as np
+import pytest
+
+from fastgen.drawing.glyph_runs import GLYPH_RANGE, glyph_run
+from fastgen.prints.artwork import glyph_tiles
+from fastgen.prints.lettering import layout
+
+
+def texts():
+    """Texts of one to three lines, some with wide gaps, in every direction and size."""
+    rng = np.random.default_rng(5)
+    letters = list("ABCXYZ0123456789")
+    for cap_mm in (0.01, 5.0, 80.0, 600.0):
+        for vertical in (False, True):
+            for count in (1, 2, 3):
+                for _ in range(6):
+                    lines = (
+                        "".join(rng.choice(letters, rng.integers(1, 16))) + " " * gap + "I"
+                        for gap in rng.integers(0, 30, count)
+                    )
+                    yield tuple(lines), cap_mm, vertical
+
+
+def part_of(p, run):
+    """The part of the text that the shader takes for points [N, 2], in its precision."""
+    count = np.float32(len(run.glyphs))
+    along = p[:, int(run.parts_per_mm < 0)]
+    part = along * np.float32(abs(run.parts_per_mm)) + np.float32(0.5) * count
+    return np.clip(part, 0, count - 1).astype(int)
+
+
+def test_a_part_names_every_letter_that_reaches_into_it():
+    font = next(iter(glyph_tiles()[1].values()))
+    rng = np.random.default_rng(6)
+    for lines, cap_mm, vertical in texts():
+        lettering = layout(lines, font, cap_mm, vertical)
+        run = glyph_run(lettering)
+        size = np.array(lettering.size_mm)
+        boxes = np.array([g[2:] for g in lettering.glyphs]).reshape(-1, 2, 2) - size / 2
+        centers = boxes.mean(axis=1)
+        found = run.glyphs[:, :2]
+        assert len(found) == len(centers)
+        tiles = {g.tile for g in lettering.glyphs}
+        assert set(run.glyphs[:, 2].astype(int).tolist()) == tiles
+        # at random, on the parts' borders, and beyond the text's ends
+        reach = size / 2 + cap_mm
+        points = rng.uniform(-reach, reach, (200, 2)).astype(np.float32)
+        borders = np.linspace(-0.5, 0.5, len(found) + 1) * size.max()
+        points[: len(borders), int(run.parts_per_mm < 0)] = borders
+        first, end = np.divmod(run.glyphs[part_of(points, run), 3].astype(int), GLYPH_RANGE)
+        side = boxes[0, 1, 0] - boxes[0, 0, 0]
+        held = (np.abs(points[:, None] - found) <= side / 2).all(axis=2)
+        numbers = np.arange(len(found))
+        named = (numbers >= first[:, None]) & (numbers < end[:, None])
+        assert not (held & ~named).any(), (lines, cap_mm, vertical)
+
+
+def test_a_part_of_a_long_line_names_few_letters():
+    font = next(iter(glyph_tiles()[1].values()))
+    run = glyph_run(layout(("CSQU3054383" * 4,), font, 100.0))
+    first, end = np.divmod(run.glyphs[:, 3].astype(int), GLYPH_RANGE)
+    assert (end - first).mean() < 5
+
+
+@pytest.mark.parametrize("count", [GLYPH_RANGE - 1])
+def test_the_longest_text_keeps_its_numbers(count):
+    font = next(iter(glyph_tiles()[1].values()))
+    run = glyph_run(layout(("A" * count,), font, 10.0))
+    first, end = np.divmod(run.glyphs[:, 3].astype(np.int64), GLYPH_RANGE)
+    assert end[-1] == count
+    assert (np.diff(first) >= 0).all()
+    assert (np.diff(end) >= 0).all()
