@@ -172,8 +172,8 @@ def measure(size: str, backend: str, images: int, scenes: int, quality: str) -> 
 
 
 def long_runs(images: int) -> Rate:
-    """The medians of LONG_RUNS runs of `draft`, on EGL with two workers."""
-    runs = [whole_run(BACKENDS[0], USUAL, images, 2, "draft") for _ in range(LONG_RUNS)]
+    """The medians of LONG_RUNS runs of `draft`, on EGL with the most workers."""
+    runs = [whole_run(BACKENDS[0], USUAL, images, max(WORKERS), "draft") for _ in range(LONG_RUNS)]
     for whole, steady in runs:
         print(f"{images} images of draft: {whole:.1f} images/s, running {steady:.1f}", flush=True)
     return Rate(*(statistics.median(rates) for rates in zip(*runs, strict=True)))

@@ -1,7 +1,6 @@
 """Which letters of a text the shader looks at, against all letters whose tile holds a point."""
 
 import numpy as np
-import pytest
 
 from fastgen.drawing.glyph_runs import GLYPH_RANGE, glyph_run
 from fastgen.prints.artwork import glyph_tiles
@@ -64,8 +63,8 @@ def test_a_part_of_a_long_line_names_few_letters():
     assert (end - first).mean() < 5
 
 
-@pytest.mark.parametrize("count", [GLYPH_RANGE - 1])
-def test_the_longest_text_keeps_its_numbers(count):
+def test_the_longest_text_keeps_its_numbers():
+    count = GLYPH_RANGE - 1
     font = next(iter(glyph_tiles()[1].values()))
     run = glyph_run(layout(("A" * count,), font, 10.0))
     first, end = np.divmod(run.glyphs[:, 3].astype(np.int64), GLYPH_RANGE)

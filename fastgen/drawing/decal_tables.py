@@ -75,7 +75,7 @@ def pack_decals(
         row[2] = *decal.albedo, decal.wear
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), 0
         if decal.kind == "text":
-            run = _glyph_run(decal, fonts[decal.font])
+            run = glyph_run(layout(decal.lines, fonts[decal.font], decal.cap_mm, decal.vertical))
             row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm
             letters += len(run.glyphs)
             runs.append(run)
@@ -143,7 +143,3 @@ def _check(
         f"decals[{i}] ({decal.kind} on {decal.face} at {decal.center_mm}): more than "
         f"{CELL_SLOTS} decals meet within {DECAL_CELL_MM:g} mm; spread them"
     )
-
-
-def _glyph_run(decal: Decal, font: Font) -> GlyphRun:
-    return glyph_run(layout(decal.lines, font, decal.cap_mm, decal.vertical))

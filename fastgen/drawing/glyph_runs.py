@@ -5,11 +5,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.prints.lettering import Lettering
+from fastgen.prints.artwork import GLYPH_TILE_SIZE
+from fastgen.prints.lettering import TILE_CAPS, TILE_RANGE_CAPS, Lettering
 
 GLYPH_RANGE = 4096
 """More than the letters of a text, as scene_check sees to: a * GLYPH_RANGE + b is below 2^24 for
 two of their numbers, and float32 holds it exactly."""
+
+DEFINES = {
+    "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
+    "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
+    "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
+    "GLYPH_RANGE": f"{GLYPH_RANGE}u",
+}
+"""For shaders/decal.glsl."""
 
 _SLACK = 0.01
 """Of a tile's side, for points that a rounding puts into the part beside their own."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from fastgen import damage as fields
 from fastgen import environment
 from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
-from fastgen.drawing.glyph_runs import GLYPH_RANGE
+from fastgen.drawing.glyph_runs import DEFINES as GLYPH_DEFINES
 from fastgen.drawing.noise import NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.drawing.rust import DEFINES as RUST_DEFINES
 from fastgen.drawing.sample_lattice import SampleLattice
@@ -24,8 +24,7 @@ from fastgen.light import tone
 from fastgen.light.openness import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, MIN_ROUGHNESS
 from fastgen.light.sun import MOST_SUNS
-from fastgen.prints.artwork import ART_SIZE, GLYPH_TILE_SIZE
-from fastgen.prints.lettering import TILE_CAPS, TILE_RANGE_CAPS
+from fastgen.prints.artwork import ART_SIZE
 from fastgen.resources import shader_path
 
 LAYERS = (
@@ -264,10 +263,7 @@ def _constants(
         "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
         "NEAR_CELL_MM": f"{NEAR_CELL_MM:.1f}",
         "ART_SIZE": f"{ART_SIZE:.1f}",
-        "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
-        "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
-        "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
-        "GLYPH_RANGE": f"{GLYPH_RANGE}u",
+        **GLYPH_DEFINES,
         **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
         **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},
