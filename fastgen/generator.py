@@ -309,9 +309,8 @@ class Generator:
         for shape in shaped:  # what shadows and labels ask of meshes
             on_step()
             shadow_casters(shape)
-            if self.config.damage.probability > 0:
-                made = shape.container
-                _ = build_container(made.kind, made.profiles).triangle_bounds_mm
+            container = build_container(shape.container.kind, shape.container.profiles)
+            container.preload(damages=self.config.damage.probability > 0)
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             for each in chain(lit, shaped):

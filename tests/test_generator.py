@@ -14,8 +14,10 @@ import pytest
 
 from fastgen.camera import view_of
 from fastgen.config import Config, LabelConfig
+from fastgen.container import build_container
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
+from fastgen.geometry.mesh import SHEET_FACES
 from fastgen.scene import Camera, Scene
 from tests.backends import BACKENDS
 
@@ -204,8 +206,12 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
                 never,
             )
         monkeypatch.setattr("fastgen.renderer.GpuLight", never)
+        monkeypatch.setattr("fastgen.geometry.mesh._Locator.of", never)
         for index in range(30):
-            generator.render(index)
+            sample = generator.render(index)
+            container = sample.scene.container
+            for face in SHEET_FACES:
+                build_container(container.kind, container.profiles).sheet_to_surface(face, [[0, 0]])
 
 
 def test_a_sample_prints_in_one_line(generator):

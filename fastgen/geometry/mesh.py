@@ -167,13 +167,20 @@ class Mesh:
         """
         number = self.chart_index(chart_name)
         points = np.asarray(sheet_mm, np.float64).reshape(-1, 2)
-        if number not in self._locators:
-            self._locators[number] = _Locator.of(self, number)
-        triangle, weights = self._locators[number].find(points)
+        triangle, weights = self._locator(number).find(points)
         corners = self.triangles[triangle]
         positions = np.einsum("kc,kcd->kd", weights, self.positions_mm[corners].astype(np.float64))
         normals = self.normals[corners[:, 0]].astype(np.float64)
         return positions, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    def preload(self, damages: bool) -> None:
+        """Compute now what labels ask of the faces, and damages of triangles; it is kept."""
+        for face in SHEET_FACES:
+            number = self.chart_index(face)
+            self.chart_bounds(number)
+            self._locator(number)
+        if damages:
+            _ = self.triangle_bounds_mm
 
     @cached_property
     def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -227,6 +234,11 @@ class Mesh:
     def _bounds(self) -> dict[int, tuple[NDArray[np.float64], NDArray[np.float64]]]:
         return {}
 
+    def _locator(self, number: int) -> "_Locator":
+        if number not in self._locators:
+            self._locators[number] = _Locator.of(self, number)
+        return self._locators[number]
+
     @cached_property
     def _locators(self) -> dict[int, "_Locator"]:
         return {}
@@ -239,13 +251,13 @@ _CELL_MM = 120.0
 class _Locator:
     """Point location in one chart: each cell of a grid lists the triangles that touch it.
 
-    candidates: int [cells, M] into triangles, -1 where there are fewer. to_weights: float
+    candidates: int32 [cells, M] into triangles, -1 where there are fewer. to_weights: float
     [N, 2, 3], (x, y, 1) to the weights of a triangle's second and third corner.
     """
 
     triangles: NDArray[np.int64]
     to_weights: NDArray[np.float64]
-    candidates: NDArray[np.int64]
+    candidates: NDArray[np.int32]
     shape: tuple[int, int]
 
     @staticmethod
@@ -268,7 +280,7 @@ class _Locator:
         order = np.argsort(cell, kind="stable")
         count = np.bincount(cell, minlength=columns * rows)
         place = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
-        candidates = np.full((columns * rows, count.max()), -1)
+        candidates = np.full((columns * rows, count.max()), -1, np.int32)
         candidates[cell[order], place] = triangle[order]
         return _Locator(triangles, to_weights, candidates, (columns, rows))
 
@@ -287,8 +299,8 @@ class _Locator:
         return self.triangles[best], np.stack(self._weights(points, best), axis=-1)
 
     def _best(
-        self, points: NDArray[np.float64], listed: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        self, points: NDArray[np.float64], listed: NDArray[np.integer]
+    ) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
         """The listed triangle that each point is most inside of, and its least weight there."""
         least = reduce(np.minimum, self._weights(points[:, None], listed))
         least[listed < 0] = -np.inf
@@ -297,7 +309,7 @@ class _Locator:
         return listed[rows, chosen], least[rows, chosen]
 
     def _weights(
-        self, points: NDArray[np.float64], triangle: NDArray[np.int64]
+        self, points: NDArray[np.float64], triangle: NDArray[np.integer]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         x, y = points[..., 0], points[..., 1]
         second, third = (
