@@ -10,20 +10,23 @@ vec3 neutral_tone(vec3 c) {
     // where the peak is below the start, the shoulder's own formula leaves c as it is
     const float d = 1.0 - start;
     float shoulder = max(peak, start);
-    float new_peak = 1.0 - d * d / (shoulder + d - start);
-    float white = TONE_DESATURATION * (shoulder - new_peak) + 1.0;
-    float keep = 1.0 / (shoulder * white);
-    return c * (new_peak * keep) + (new_peak - new_peak * shoulder * keep);
+    // of what comes out, the peak is (over - d * d) / over and the share of white 1 - over / whitened: both
+    // over one divisor, for divisions are dear
+    float over = shoulder + d - start;
+    float whitened = TONE_DESATURATION * (shoulder * over - over + d * d) + over;
+    float kept = (over - d * d) / (over * shoulder * whitened);
+    return c * (over * kept) + (whitened - over) * shoulder * kept;
 }
 
-// IEC 61966-2-1, within 1e-5: the power 1/2.4 as a polynomial of the fourth root, which costs less
+// IEC 61966-2-1, within a twentieth of a step of 255: the power 1/2.4 as a polynomial of the square root
 vec3 srgb_encode(vec3 c) {
-    vec3 x = sqrt(sqrt(c));
-    vec3 curve = fma(vec3(-0.06538064), x, vec3(0.28097106));
-    curve = fma(curve, x, vec3(-0.56738774));
-    curve = fma(curve, x, vec3(1.24977997));
-    curve = fma(curve, x, vec3(0.16349550));
-    curve = fma(curve, x, vec3(-0.06148334));
+    vec3 x = sqrt(c);
+    vec3 curve = fma(vec3(-0.94768983), x, vec3(3.41874960));
+    curve = fma(curve, x, vec3(-5.00325045));
+    curve = fma(curve, x, vec3(3.89849402));
+    curve = fma(curve, x, vec3(-1.89949377));
+    curve = fma(curve, x, vec3(1.57527351));
+    curve = fma(curve, x, vec3(-0.04223207));
     return mix(curve, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 
