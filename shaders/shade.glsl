@@ -82,7 +82,8 @@ Openness openness_at(ivec2 sample_at, uint zone) {
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);
-    return Openness(cone / size, rim, light, stored.w, bounces, vec3(0.0), vec3(0.0), NO_RAYS);
+    return Openness(cone / size, rim, light, stored.w, bounces, 0.0, vec3(0.0), vec3(0.0),
+                    NO_RAYS);
 }
 
 // to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
@@ -192,6 +193,9 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 #endif
     // the paint of the place, for much rust seldom stands alone, but never a print's
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
+    // but of a container's roof the spreader's
+    sky.hung = above.a * sky.bounces * max(p.surface.outward.z, 0.0);
+    sky.beside = mix(sky.beside, above.rgb, sky.hung);
     vec4 sun_seen = vec4(0.0);
     float depth = mean_of(sheet_depths, sample_at).r;
     vec2 place = place_of(sample_at) + 0.5 * vec2(to_last);

@@ -31,7 +31,7 @@ Shaded cable(vec2 center) {
     for (int axis = 0; axis < 2; ++axis) {
         vec3 normal = vec3(0.0);
         normal[axis] = view[axis] < 0.0 ? -1.0 : 1.0;
-        Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), steel.albedo,
+        Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), steel.albedo,
                                   NO_RAYS);
         color += abs(view[axis]) * layer_color(steel, normal, view, whole, vec4(1.0));
     }

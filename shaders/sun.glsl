@@ -85,7 +85,8 @@ float first_sun_share(vec3 from_eye, vec3 normal, float footprint_m) {
 
 // Irradiance / pi, times the share of the hemisphere that hides the sky. What hides it is taken for a
 // wall at right angles to the surface, facing where the open sky leans to, or walls all round where it
-// leans nowhere; it is lit if the sun gets close to the point.
+// leans nowhere; it is lit if the sun gets close to the point. Of what hangs above, a low sun lights sides
+// that the surface does not see: fitted to rays below spreaders.
 vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i) {
     vec3 toward = sun_toward[i].xyz;
     vec3 aside = leaning(sky, normal);
@@ -94,5 +95,6 @@ vec3 sun_thrown(vec3 from_eye, vec3 normal, Openness sky, int i) {
     float facing = mix(walled, max(dot(aside, toward), 0.0) / max(most, 1e-3),
                        smoothstep(0.0, 0.1, most));
     float lit = sun_at(from_eye + 0.02 * sky.direction, i);
-    return sky.rim * sky.rim * facing * lit * sun_light[i].rgb;
+    float seen = mix(1.0, clamp(3.0 * dot(normal, toward), 0.0, 1.0), sky.hung);
+    return sky.rim * sky.rim * facing * lit * seen * sun_light[i].rgb;
 }

@@ -49,7 +49,7 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0),"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
         " NO_RAYS)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
@@ -65,7 +65,7 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(0.0), vec3(1.0),"
+        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
         " NO_RAYS)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
@@ -87,8 +87,8 @@ def test_light_that_rays_found_stands_for_the_sky(gl):
             "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
             f" vec3 open = vec3(x.z); Traced rays = {rays};"
             " return vec4(lit(reflector(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
-            " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, vec3(0.1), vec3(0.3), rays)),"
-            " 1.0); }"
+            " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, 0.0, vec3(0.1), vec3(0.3),"
+            " rays)), 1.0); }"
         )
         return run(gl, body, rows, white_light(gl))[:, :3]
 
@@ -111,7 +111,7 @@ def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " float share = 1.0 - x.w * x.w;"
         " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, vec3(0.0),"
+        " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, 0.0, vec3(0.0),"
         " vec3(0.0, 0.5, 1.0), NO_RAYS)), 1.0); }"
     )
     black, grey, white = run(gl, body, rows, white_light(gl))[:, :3].T

@@ -145,6 +145,7 @@ SCENE_BLOCK = Block(
         ("float", "wear_tile_mm"),
         ("float", "wetness"),
         ("float", "background_size"),
+        ("vec4", "above"),  # albedo of what hangs above the container, and whether anything does
     ),
 )
 

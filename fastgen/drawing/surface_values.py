@@ -96,6 +96,7 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
         "wear_tile_mm": surface.wear.scale_mm * _TILE_OF_SCALE,
         "wetness": scene.weather.wetness,
         "background_size": float(background_size),
+        "above": (*scene.spreader.albedo, float(scene.spreader.present)),
     }
 
 
