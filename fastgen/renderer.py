@@ -160,7 +160,7 @@ class Renderer:
         seen = _view_values(scene, view, samples, self._exposure(scene, camera, view))
         sunny = sun_values(light.ambient.suns, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
-        hung = cable_values(scene, spreader.mesh if spreader else None, view.position_m)
+        hung = cable_values(scene, spreader.mesh if spreader else None, view)
         self._set(VIEW_BLOCK, {**seen, **sunny, **hung})
         if damage != "sound":
             shapes = damage_values(scene, damages, self._mask_threshold_mm, samples.inner_row)

@@ -16,20 +16,18 @@ float turned(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 // cables are upright; pixel: its centre
 float cables_cover(vec2 pixel) {
     vec3 ray = view_ray(pixel);
-    // of four sides along the axes; this and the distances below times the ray's level length
+    // of four sides along the axes; this and what lies aside are times the ray's level length
     float half_width = CABLE_HALF_SIDE_M * (abs(ray.x) + abs(ray.y));
+    vec2 rise = ray.xy * (ray.z / max(dot(ray.xy, ray.xy), 1e-9));   // for a metre of what is level
     float cover = 0.0;
     vec2 last = vec2(1.0, 0.0);   // from where to where the cable before covers; nothing yet
     int i = 0;
     do {
-        vec4 foot = cable_foot[i];
+        vec3 foot = cable_foot[i].xyz;
+        float pixels = cable_foot[i].w;
         float aside = turned(foot.xy, ray.xy);
-        // by how much a pixel to the right or down moves it; what a lens magnifies is left out
-        vec2 slope = vec2(turned(foot.xy, ray_right.xy), turned(foot.xy, ray_down.xy));
-        float pixels = inversesqrt(max(dot(slope, slope), 1e-18));
-        float depth = dot(foot.xy, ray.xy) / max(dot(ray.xy, ray.xy), 1e-9);
-        float height = depth * ray.z - foot.z;
-        bool there = depth > 0.0 && height > 0.0 && height < foot.w;
+        float height = dot(foot.xy, rise) - foot.z;
+        bool there = dot(foot.xy, ray.xy) > 0.0 && height > 0.0 && height < CABLE_LENGTH_M;
         vec2 strip = vec2(filtered_below((aside - half_width) * pixels),
                           filtered_below((aside + half_width) * pixels));
         bool met = there && strip.y > strip.x;

@@ -56,6 +56,13 @@ void write_labels(ivec2 pixel, uint key, float depth) {
     imageStore(depth_image, pixel, vec4(depth));
 }
 
+#if CABLES_NEAR
+// whether cables cover a part of a pixel; bare: nothing but sky is seen beside them
+bool covered_in_part(ivec2 pixel, bool bare) {
+    return bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496;
+}
+#endif
+
 #if COARSE
 // lists those of a block of two by two pixels whose bits are set, each by itself
 void list_each(uint list, ivec2 block, uint bits) {
@@ -81,12 +88,23 @@ void main() {
                               textureGather(rest_z, middle).wzxy);
 #endif
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
+#if CABLES_NEAR
+    uint cables = 0u;
+#endif
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
-        if (any(greaterThanEqual(pixel - region.xy, region.zw))) key[i] = 0u;
+        bool outside = any(greaterThanEqual(pixel - region.xy, region.zw));
+        if (outside) key[i] = 0u;
+        uint bit = 1u << i;
+#if CABLES_NEAR
+        bool covered = !outside && covered_in_part(pixel, key[i] == 0u || float(key_zone(key[i])) == cable_zone);
+        if (covered) cables |= bit;
+#endif
         if (key[i] == 0u) continue;
         write_labels(pixel, key[i], depth[i]);
-        uint bit = 1u << i;
+#if CABLES_NEAR
+        if (covered) continue;
+#endif
 #if DAMAGED
         int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]));
         if (near > 1) holed |= bit;
@@ -97,6 +115,9 @@ void main() {
         else plain |= bit;
     }
     list_each(LIST_DECAL, block, decals);
+#if CABLES_NEAR
+    list_each(LIST_CABLE, block, cables);
+#endif
 #if DAMAGED
     list_each(LIST_DAMAGED, block, damaged);
     list_each(LIST_HOLED, block, holed);
@@ -163,7 +184,7 @@ void main() {
     bool bare = true;
     for (int i = 0; i < FILTER_NEAR; ++i)
         bare = bare && (keys[i] == 0u || float(key_zone(keys[i])) == cable_zone);
-    if (bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496) list = LIST_CABLE;
+    if (covered_in_part(pixel, bare)) list = LIST_CABLE;
 #endif
     if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);
 }

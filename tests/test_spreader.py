@@ -137,7 +137,7 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
 
 
 @pytest.mark.parametrize(
-    ("quality", "camera"), [("balanced", "A"), ("balanced", "B"), ("high", "A")]
+    ("quality", "camera"), [("draft", "B"), ("balanced", "A"), ("balanced", "B"), ("high", "A")]
 )
 def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
     """A cable of a third of a pixel comes out neither in dashes nor in steps."""

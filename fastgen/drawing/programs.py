@@ -19,7 +19,7 @@ from fastgen.drawing.rust import DEFINES as RUST_DEFINES
 from fastgen.drawing.sample_lattice import SampleLattice
 from fastgen.drawing.uniforms import Block
 from fastgen.geometry.mesh import MATERIALS, MAX_ZONES
-from fastgen.geometry.spreader_parts import CABLE_SIDE_MM, CABLES
+from fastgen.geometry.spreader_parts import CABLE_LENGTH_MM, CABLE_SIDE_MM, CABLES
 from fastgen.light import tone
 from fastgen.light.openness import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX, MIN_ROUGHNESS
@@ -180,7 +180,7 @@ VIEW_BLOCK = Block(
         ("int", "sun_count"),
         ("float", "cable_zone"),
         ("vec4", "cable_rusted"),  # mean albedo under rust, and its share
-        ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m, and length, 0 for none
+        ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m; pixels a unit of `aside`
     ),
 )
 
@@ -205,7 +205,7 @@ DAMAGE_BLOCK = Block(
 
 def listed_classes(samples_per_axis: int) -> tuple[str, ...]:
     """The classes that pixels of so many samples may be of, in the order of their lists."""
-    others = ("mixed", "cable") if samples_per_axis == 1 else ("coarse",)
+    others = ("mixed",) if samples_per_axis == 1 else ("coarse",)
     return tuple(name for name in PIXEL_CLASSES if not name.startswith(others))
 
 
@@ -303,6 +303,7 @@ def _constants(
         "OF_CABLES": int(pixel_class == "cable"),
         "COARSE_STEP_PX": COARSE_STEP_PX,
         "CABLES": CABLES,
+        "CABLE_LENGTH_M": f"{CABLE_LENGTH_MM / 1000:.6f}",
         "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
         "CABLE_MATERIAL": list(MATERIALS).index("cable"),
         "SHEET_MATERIAL": list(MATERIALS).index("paint_sheet"),

@@ -94,8 +94,6 @@ class Shading:
         """
         self._draw_sky(targets, bent)
         targets.bind_images()
-        if self._samples_per_axis == 1:
-            cables = []
         width, height = targets.size
         for top in range(0, height, targets.lists.rows):
             band = (0, top, width, min(targets.lists.rows, height - top))

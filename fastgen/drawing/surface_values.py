@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fastgen.camera import View
 from fastgen.damage import mask_values, reach_mm
 from fastgen.drawing.programs import REACH_MARGIN_MM, SPREADER_ZONE, noise_deviation
 from fastgen.drawing.rust import rusted
@@ -13,7 +14,6 @@ from fastgen.geometry.container_layout import KINDS
 from fastgen.geometry.mesh import MATERIALS, Mesh
 from fastgen.geometry.spreader_parts import (
     CABLE_CHART,
-    CABLE_LENGTH_MM,
     CABLES,
     Hang,
     cable_feet_mm,
@@ -136,21 +136,21 @@ def _squared_reach(damage: Damage) -> float:
     return float(np.square(np.array(reach_mm(damage)) + REACH_MARGIN_MM).sum())
 
 
-def cable_values(
-    scene: Scene, mesh: Mesh | None, eye_m: NDArray[np.float64]
-) -> dict[str, ArrayLike]:
+def cable_values(scene: Scene, mesh: Mesh | None, view: View) -> dict[str, ArrayLike]:
     """Members of VIEW_BLOCK about the cables of a scene's spreader, none where `mesh` is None."""
     if mesh is None:
         none: dict[str, ArrayLike] = {"cable_zone": -1.0, "cable_rusted": np.zeros(4)}
         return {**none, "cable_foot": np.zeros((CABLES, 4))}
     feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
-    from_eye = np.array(feet) / 1000 - eye_m
+    from_eye = np.array(feet) / 1000 - view.position_m
+    right, down = view.rotation[:2] / view.focal_px
+    # by how much a pixel to the right or down moves `aside` of cables.glsl; a lens is left out
+    moved = np.hypot(*(np.cross(from_eye, way)[:, 2] for way in (right, down)))
     chart = mesh.chart_index(CABLE_CHART)
     zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
-    lengths = np.full((CABLES, 1), CABLE_LENGTH_MM / 1000)
     albedo, share = (row[MATERIALS.index("cable")] for row in _rusted(scene, (mesh,)))
     return {
         "cable_zone": float(SPREADER_ZONE + zone),
         "cable_rusted": [*albedo, *share],
-        "cable_foot": np.concatenate([from_eye, lengths], axis=1),
+        "cable_foot": np.column_stack([from_eye, 1 / np.maximum(moved, 1e-9)]),
     }
