@@ -46,8 +46,8 @@ CONTACT_SHEET = "contact_sheet.png"
 _MOST = 10**9
 """Images, and what divides them: epochs of fastgen.torch part the scene numbers there too."""
 
-Runner = Callable[[Job, list[Task], Callable[[str, Any], None]], None]
-"""Makes the shards of `tasks` and reports on the way; see `run_here`."""
+Runner = Callable[[Job, Iterable[Task], Callable[[str, Any], None]], None]
+"""Makes the shards of `tasks`, which come one by one, and reports on the way; see `run_here`."""
 
 
 def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[str, Any]:
@@ -69,12 +69,14 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     known(storage, job, settings)  # a lock would be a change to what is not ours
     with storage.locked():
         old = known(storage, job, settings)
-        tasks = _left_to_make(job, storage, old or {})
-        if tasks or old is None:  # until the end nothing says that it is finished
+        made = _made(job, storage, old or {})
+        left = job.images - sum(len(job.wanted(shard)) for shard in made)
+        if left or old is None:  # until the end nothing says that it is finished
             storage.write(MANIFEST, [unsealed({**settings, "images": job.images})])
-        if tasks:
-            todo = sum(len(job.wanted(task.shard)) for task in tasks)
-            progress = Progress(job.images, job.images - todo)
+        if left:
+            # one by one, for there may be millions
+            tasks = (Task(shard) for shard in range(job.shard_count) if shard not in made)
+            progress = Progress(job.images, job.images - left)
 
             def on_report(kind: str, value: Any) -> None:
                 if kind == "images":
@@ -95,13 +97,13 @@ def check_goes_on(job: Job, worker_count: int) -> None:
     """
     job, settings = _settled(job, worker_count)
     storage = storage_of(job.out)
-    _left_to_make(job, storage, known(storage, job, settings) or {})
+    _made(job, storage, known(storage, job, settings) or {})
 
 
 def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Maker) -> Runner:
     """A runner with so many processes on this machine."""
 
-    def run(job: Job, tasks: list[Task], on_report: Callable[[str, Any], None]) -> None:
+    def run(job: Job, tasks: Iterable[Task], on_report: Callable[[str, Any], None]) -> None:
         whole = worker_count >= len(os.sched_getaffinity(0))
         workers.run(
             maker, (job, whole), tasks, worker_count, on_report, Strikes(job), hang_s, whole
@@ -207,22 +209,20 @@ def _make_folder(root: Path) -> None:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
 
 
-def _left_to_make(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> list[Task]:
-    """The shards that are not there with all that is wanted of them, or of which a part has gone.
+def _made(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> set[int]:
+    """The shards that are there with all that is wanted of them, and of which no part has gone.
 
     old: what dataset.json says. Raises OutputError where there are more images than the job's, or
     shards that were made with other settings.
     """
     beyond = "digest" in old and old["images"] > job.images
     present = storage.sizes()
-    tasks = []
-    for shard in sorted({*range(job.shard_count), *shard_numbers(storage)}):
+    made = set()
+    for shard in shard_numbers(storage):
         manifest = read_manifest(storage, shard)
-        wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
-        if manifest is None:
-            if wanted:  # else it is a stray, which `verify` names
-                tasks.append(Task(shard))
+        if manifest is None:  # made again, or beyond the images a stray, which `verify` names
             continue
+        wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
         if manifest["settings"] != job.settings_digest:
             raise OutputError(
                 f"{job.out}: {manifest_path(shard)} was made with other settings; give another "
@@ -231,13 +231,13 @@ def _left_to_make(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) ->
         beyond = beyond or not wanted or not set(manifest["images"]) <= set(wanted)
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
-        if not whole or manifest["images"] != wanted:
-            tasks.append(Task(shard))
+        if whole and manifest["images"] == wanted:
+            made.add(shard)
     if beyond:
         raise OutputError(
             f"{job.out}: holds more than {job.images} images; give --images as before or more"
         )
-    return tasks
+    return made
 
 
 def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tracemalloc
 from pathlib import Path
 
 import cv2
@@ -279,6 +280,27 @@ def test_a_run_whose_scenes_all_fail_ends_as_others_do(tmp_path, monkeypatch):
     made = generate(job, 1, runner=run_inside)
     assert [each["scene"] for each in made["failed"]] == [0, 1]
     assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
+
+
+def test_a_large_run_does_not_list_its_shards_before_they_are_made(tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def first(job, tasks, on_report):
+        assert next(iter(tasks)).shard == 0
+        raise Stopped
+
+    def peak(images, name):
+        job = Job(str(tmp_path / name), images, Config.preset(), 0, (64, 64), ("A",), None, "auto")
+        tracemalloc.start()
+        with pytest.raises(Stopped):
+            generate(job, 1, runner=first)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(4, "warm")
+    assert peak(10**6, "large") < peak(4, "small") + 1e6
 
 
 def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):

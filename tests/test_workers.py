@@ -34,6 +34,16 @@ class StartsSlowly:
         pass
 
 
+class Reports:
+    """Says of each task that it is done."""
+
+    def __init__(self, report):
+        self._report = report
+
+    def __call__(self, task):
+        self._report("did", task)
+
+
 class TellsItsThreads:
     """Reports what is set of matrices' threads, and how many of the process's threads are not
     Python's."""
@@ -109,3 +119,33 @@ def test_a_worker_that_dies_between_tasks_costs_none(tasks):
 
     workers.run(DiesAfterItsTask, ("setup",), tasks, 1, slow, on_death)
     assert heard == tasks
+
+
+def test_tasks_are_asked_for_when_a_worker_is_free():
+    asked, done = [], []
+
+    def tasks():
+        for task in range(20):
+            asked.append(task)
+            yield task
+
+    def hear(_kind, task):
+        done.append(task)
+        assert len(asked) <= len(done) + 2  # what each of two workers is at
+
+    def on_death(task, place, ended):
+        raise AssertionError(ended)
+
+    workers.run(Reports, (), tasks(), 2, hear, on_death)
+    assert sorted(done) == list(range(20))
+
+
+def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_asked():
+    source = iter(range(1000))
+    waiting = workers.Waiting(source)
+    assert waiting.up_to(3) == 3
+    assert waiting.take() == 0
+    waiting.put_back("again")
+    assert [waiting.take() for _ in range(3)] == ["again", 1, 2]
+    assert next(source) == 3
+    assert waiting.up_to(2000) == 996

@@ -11,8 +11,7 @@ import signal
 import socket
 import threading
 import time
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,7 +20,7 @@ from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.seal import digest
 from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
 from fastgen.dataset.storage import storage_of
-from fastgen.dataset.workers import HANG_S, in_words
+from fastgen.dataset.workers import HANG_S, Waiting, in_words
 from fastgen.errors import OutputError
 from fastgen.generate import Runner
 
@@ -54,7 +53,7 @@ def run_on_ray(
     """
     _ray()
 
-    def run(job: Job, tasks: list[Task], on_report: Callable[[str, Any], None]) -> None:
+    def run(job: Job, tasks: Iterable[Task], on_report: Callable[[str, Any], None]) -> None:
         ray = _ray()
         own = _joined(address, count)
         try:
@@ -221,7 +220,7 @@ class _Crew:
     def __init__(
         self,
         job: Job,
-        tasks: list[Task],
+        tasks: Iterable[Task],
         on_report: Callable[[str, Any], None],
         count: int | None,
         hang_s: float,
@@ -230,7 +229,7 @@ class _Crew:
         ray = _ray()
         self._job, self._on_report, self._maker = job, on_report, maker
         self._count, self._hang_s = count, hang_s
-        self._waiting = deque(tasks)
+        self._waiting = Waiting(tasks)
         self._strikes = Strikes(job)
         self._claimed = _mark(job)
         self._members: dict[int, _Member] = {}
@@ -252,7 +251,7 @@ class _Crew:
                 self._hire(int(ray.cluster_resources().get("CPU", 0)))
             for member in self._members.values():
                 if member.call is None and self._waiting:
-                    member.give(self._waiting.popleft())
+                    member.give(self._waiting.take())
             calls = [member.call for member in self._members.values() if member.call is not None]
             if not calls:
                 time.sleep(_POLL_S)
@@ -272,7 +271,8 @@ class _Crew:
 
     def _hire(self, cpus: int) -> None:
         """Have an actor for each CPU, but no more than find work."""
-        wanted = min(cpus, self._count or cpus, len(self._waiting) + len(self._busy()))
+        most = min(cpus, self._count or cpus)
+        wanted = min(most, self._waiting.up_to(most) + len(self._busy()))
         renderer = _ray().remote(num_cpus=1)(_Actor)
         while len(self._members) < wanted:
             self._hired += 1
@@ -322,6 +322,6 @@ class _Crew:
 
     def _replace(self, member: _Member, ended: str) -> None:
         if member.task is not None:
-            self._waiting.appendleft(self._strikes(member.task, member.scene, ended))
+            self._waiting.put_back(self._strikes(member.task, member.scene, ended))
         _ray().kill(member.actor)
         del self._members[member.number]

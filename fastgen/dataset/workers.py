@@ -12,6 +12,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -67,6 +68,32 @@ def _one_matrix_thread() -> Iterator[None]:
             os.environ.pop(_MATRIX_THREADS[0], None)
 
 
+class Waiting:
+    """Tasks that wait to be done, taken from where they come from only as they are looked for: of a
+    large run there are millions."""
+
+    def __init__(self, tasks: Iterable[Any]) -> None:
+        self._rest = iter(tasks)
+        self._ahead: deque[Any] = deque()
+
+    def __bool__(self) -> bool:
+        return self.up_to(1) > 0
+
+    def up_to(self, count: int) -> int:
+        """How many there are, of which no more than `count` are looked for."""
+        self._ahead.extend(islice(self._rest, max(count - len(self._ahead), 0)))
+        return min(len(self._ahead), count)
+
+    def take(self) -> Any:
+        """The next one; there must be one."""
+        self.up_to(1)
+        return self._ahead.popleft()
+
+    def put_back(self, task: Any) -> None:
+        """Have this one done next."""
+        self._ahead.appendleft(task)
+
+
 class _Worker:
     """One process, what it is at and when it last said something."""
 
@@ -112,7 +139,7 @@ def run(
     hang_s: float = HANG_S,
     whole_machine: bool = False,
 ) -> None:
-    """Have `count` processes do all tasks.
+    """Have `count` processes do all tasks, each of which is asked for when a process is free.
 
     on_report: gets what workers report, but for 'at', which names the place that a task is at.
     on_death: gets the task of a worker that crashed or hung, its place and how it ended; returns
@@ -120,19 +147,19 @@ def run(
     matrices need no threads. Raises OutputError with a worker's own words where it met an error
     that no repetition mends. No process outlives the call.
     """
-    waiting = deque(tasks)
+    waiting = Waiting(tasks)
     workers: list[_Worker] = []
     try:
         while waiting and len(workers) < count:
             workers.append(_Worker(setup, arguments, whole_machine))
-            workers[-1].give(waiting.popleft())
+            workers[-1].give(waiting.take())
         while busy := [worker for worker in workers if worker.task is not None]:
             wait([worker.pipe for worker in busy], timeout=_POLL_S)
             for worker in busy:
                 ended = _listen(worker, on_report, hang_s)
                 if ended:
                     if worker.task is not None:  # else it had just done its task
-                        waiting.appendleft(on_death(worker.task, worker.place, ended))
+                        waiting.put_back(on_death(worker.task, worker.place, ended))
                     worker.stop()
                     workers.remove(worker)
                     if not waiting:
@@ -140,7 +167,7 @@ def run(
                     worker = _Worker(setup, arguments, whole_machine)
                     workers.append(worker)
                 if worker.task is None and waiting:
-                    worker.give(waiting.popleft())
+                    worker.give(waiting.take())
     finally:
         for worker in workers:
             worker.stop()
