@@ -19,6 +19,7 @@ from fastgen.config import PRESETS, Config
 from fastgen.config_text import as_yaml
 from fastgen.dataset import stats
 from fastgen.dataset.on_ray import run_on_ray
+from fastgen.dataset.progress import say
 from fastgen.dataset.repair import repair
 from fastgen.dataset.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.dataset.verify import examine
@@ -64,7 +65,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
     except KeyboardInterrupt as stop:
-        _say(STOPPED)
+        say(STOPPED)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
 
@@ -120,13 +121,8 @@ def _stopped_by_sigterm() -> Iterator[None]:
 
 
 def _refused(words: str) -> int:
-    _say(f"fastgen: {' '.join(words.split())}")
+    say(f"fastgen: {' '.join(words.split())}")
     return 2
-
-
-def _say(words: str) -> None:
-    with contextlib.suppress(OSError):  # a log on a full disk; the exit code still tells
-        print(words, file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):

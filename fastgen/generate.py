@@ -17,7 +17,7 @@ from fastgen.config import Config, SplitConfig
 from fastgen.dataset import workers
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
-from fastgen.dataset.progress import Progress
+from fastgen.dataset.progress import Progress, say
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import (
     FORMATS,
@@ -104,12 +104,24 @@ def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Mak
     """A runner with so many processes on this machine."""
 
     def run(job: Job, tasks: Iterable[Task], on_report: Callable[[str, Any], None]) -> None:
+        tell_of_idle_workers(job, worker_count)
         whole = worker_count >= len(os.sched_getaffinity(0))
         workers.run(
             maker, (job, whole), tasks, worker_count, on_report, Strikes(job), hang_s, whole
         )
 
     return run
+
+
+def tell_of_idle_workers(job: Job, worker_count: int) -> None:
+    """Say so where there are fewer shards than workers, and shorter ones would be made sooner."""
+    scenes = -(-job.images // len(job.cameras))
+    shards, fair = job.shard_count, -(-scenes // worker_count)
+    if shards < worker_count and shards < -(-scenes // fair):
+        say(
+            f"fastgen: no more than {shards} of {worker_count} workers have something to do, with "
+            f"{job.shard_scenes} scenes a shard; in a new folder, --shard {fair} shares the work"
+        )
 
 
 def parse_split(text: str | None, config: Config) -> Config:

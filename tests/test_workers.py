@@ -8,6 +8,7 @@ import time
 import pytest
 
 from fastgen.dataset import workers
+from tests.crash_run import make
 
 
 class DiesAfterItsTask:
@@ -149,3 +150,22 @@ def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_aske
     assert [waiting.take() for _ in range(3)] == ["again", 1, 2]
     assert next(source) == 3
     assert waiting.up_to(2000) == 996
+
+
+@pytest.mark.parametrize(
+    ("scenes", "count", "words"),
+    [  # two scenes a shard
+        (2, 2, "no more than 1 of 2 workers have something to do, with 2 scenes a shard; in a new"),
+        (3, 4, "no more than 2 of 4 workers"),
+        (1, 2, ""),  # which no shard shares
+        (3, 2, ""),
+        (5, 4, ""),  # one of four would make two scenes anyway
+    ],
+)
+def test_workers_that_find_nothing_to_do_are_told_of(tmp_path, capsys, scenes, count, words):
+    make(tmp_path / "out", scenes, count)
+    said = [line for line in capsys.readouterr().err.splitlines() if "images" not in line]
+    assert len(said) == bool(words)
+    for line in said:
+        assert line.startswith(f"fastgen: {words}")
+        assert line.endswith("in a new folder, --shard 1 shares the work")

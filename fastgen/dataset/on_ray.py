@@ -22,7 +22,7 @@ from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.workers import HANG_S, Waiting, in_words
 from fastgen.errors import OutputError
-from fastgen.generate import Runner
+from fastgen.generate import Runner, tell_of_idle_workers
 
 Reports = list[tuple[str, Any]]
 """What a maker reports, in order: see shards.Report."""
@@ -57,6 +57,7 @@ def run_on_ray(
         ray = _ray()
         own = _joined(address, count)
         try:
+            tell_of_idle_workers(job, count or max(_cpus(), 1))
             crew = _Crew(_everywhere(job), tasks, on_report, count, hang_s, maker)
             try:
                 crew.work()
@@ -101,6 +102,11 @@ def _joined(address: str | None, count: int | None) -> bool:
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGTERM, at_sigterm)  # Ray's own would end us in its way
     return True
+
+
+def _cpus() -> int:
+    """Of the cluster as it is now."""
+    return int(_ray().cluster_resources().get("CPU", 0))
 
 
 def _probe(address: str) -> None:
@@ -248,7 +254,7 @@ class _Crew:
         while self._waiting or self._busy():
             if time.monotonic() - counted >= _POLL_S:
                 counted = time.monotonic()
-                self._hire(int(ray.cluster_resources().get("CPU", 0)))
+                self._hire(_cpus())
             for member in self._members.values():
                 if member.call is None and self._waiting:
                     member.give(self._waiting.take())
