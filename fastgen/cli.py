@@ -179,7 +179,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     make.set_defaults(run=_generate)
 
-    config = commands.add_parser("config", help="print every key of a configuration")
+    config = commands.add_parser("config", help="print every key of a configuration, checked")
+    _add_hdri(config)
     config.set_defaults(run=_print_config)
 
     show = commands.add_parser("show", help="render one image")
@@ -316,7 +317,12 @@ def _workers(options: argparse.Namespace) -> int:
 
 
 def _print_config(options: argparse.Namespace) -> int:
-    print(as_yaml(_config(options)), end="")
+    config = _config(options)
+    try:  # lenses and names of HDRIs are held to more than the file
+        Generator(config, hdri_dir=options.hdri).scene(0)
+    except ConfigError as error:
+        raise ConfigError(f"{options.config}: {error}" if options.config else str(error)) from None
+    print(as_yaml(config), end="")
     return 0
 
 

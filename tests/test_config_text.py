@@ -1,6 +1,7 @@
 """The whole configuration as commented YAML, read by PyYAML and by hand."""
 
 import dataclasses
+import shutil
 import typing
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from fastgen.cli import main
 from fastgen.config import PRESETS, Config
 from fastgen.config_text import as_yaml, meanings
 from fastgen.errors import ConfigError
+from fastgen.light.hdri import bundled_hdris
 
 OWN = {
     "cameras": {"gate": {"face": "door", "focal_mm": 35, "distance_mm": 4000}},
@@ -37,6 +39,38 @@ def test_the_command_prints_a_file_over_a_preset(tmp_path, capsys):
     printed = yaml.safe_load(capsys.readouterr().out)
     assert printed["damage"]["probability"] == 0.75
     assert printed["cameras"]["A"]["lens"]["model"] == "fisheye"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "cameras: {x: {face: door, focal_mm: 24, distance_mm: 5000, "
+            "lens: {model: fisheye, k1: [-0.5, 0.1]}}}",
+            "cameras.x.lens: its distortion folds the image over",
+        ),
+        (
+            "cameras: {x: {face: door, focal_mm: 3, distance_mm: 5000, lens: {k1: 0}}}",
+            "cameras.x.lens: the image's corners look",
+        ),
+        ("environment: {names: [quay]}", "environment.names: no HDRI 'quay' here"),
+    ],
+)
+def test_what_a_run_would_refuse_is_refused_by_the_file(tmp_path, capsys, text, words):
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    assert main(["config", "--config", str(path)]) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith(f"fastgen: {path}: {words}")
+    assert said.out == ""
+
+
+def test_names_may_be_those_of_a_folder(tmp_path, capsys):
+    shutil.copy(bundled_hdris()["sky"], tmp_path / "quay.exr")
+    (tmp_path / "mine.yaml").write_text("environment: {names: [quay]}")
+    shown = ["config", "--config", str(tmp_path / "mine.yaml"), "--hdri", str(tmp_path)]
+    assert main(shown) == 0
+    assert yaml.safe_load(capsys.readouterr().out)["environment"]["names"] == ["quay"]
 
 
 def records(cls):
