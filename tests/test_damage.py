@@ -339,6 +339,21 @@ def test_a_hundred_of_a_kind_is_refused():
         Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("axis.reach_mm", "axis.depth_mm", "concave.depth_mm", "dented.depth_mm"),
+        *("dented.width_mm", "dented.amplitude_mm", "perforation.depth_mm"),
+    ],
+)
+def test_what_reaches_farther_than_a_container_is_wide_is_refused(name):
+    kind, key = name.split(".")
+    inward = {"concave": {"outward": 0}}
+    Config.from_values({"damage": inward | {kind: inward.get(kind, {}) | {key: 2400}}})
+    with pytest.raises(ConfigError, match=rf"damage.{name}: 2438 is out of range; give \d to 2400"):
+        Config.from_values({"damage": {kind: {key: 2438}}})
+
+
 def test_moves_of_damages_add_up_however_wide_a_crease_is(many):
     dents = [d for scene in many for d in scene.damages if d.kind == "dented"][:4]
     assert len(dents) == 4

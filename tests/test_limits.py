@@ -128,10 +128,12 @@ def test_nothing_in_view_has_objects_without_boxes():
 
 @pytest.mark.parametrize("camera", ["A", "Cr"])
 def test_a_dent_that_comes_out_on_the_other_side_leaves_no_pixel_undrawn(camera):
-    deep = {"kinds": ["axis"], "probability": 1, "count": [4, 4], "axis": {"depth_mm": 12000}}
+    edges = {"kinds": ["axis"], "probability": 1, "count": [4, 4]}
     for seed in (0, 1):
-        with Generator(Config.from_values({"damage": deep}), seed, (128, 96)) as generator:
-            sample = generator.render(index=0, camera=camera)
+        with Generator(Config.from_values({"damage": edges}), seed, (128, 96)) as generator:
+            scene = generator.scene(0)
+            deep = tuple(replace(damage, depth_mm=12000.0) for damage in scene.damages)
+            sample = generator.render(scene=replace(scene, damages=deep), camera=camera)
         assert np.isin(sample.ids, [0, *(item.id for item in sample.objects)]).all()
         np.testing.assert_array_equal(np.isinf(sample.depth), sample.ids == 0)
         assert (sample.depth > 0).all()

@@ -6,10 +6,16 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.damage import LOBE_LIMIT
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import SHEET_FACES
-from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_order
+from fastgen.records import UNIT, Range, bounds, check_known, check_order
 
 EXTENT = bounds(5.0, 20000.0, "mm")
-"""Fields are scaled by their extents, which must not vanish."""
+"""Fields are scaled by their extents, which must not vanish; for those that are cut to a face."""
+
+DEPTH = bounds(0.0, 2400.0, "mm")
+"""A container is 2438 mm wide: what is pushed in deeper comes out on the other side."""
+
+REACH = bounds(5.0, 2400.0, "mm")
+"""As EXTENT, for what no face cuts."""
 
 MAX_INSTANCES = 99
 """A mask value is class * 100 + instance, so that a hundredth would pass for the next class."""
@@ -25,8 +31,8 @@ class AxisConfig:
     """
 
     length_mm: Range = field(default=Range(700, 1900), metadata=EXTENT)
-    reach_mm: Range = field(default=Range(320, 650), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(110, 260), metadata=LENGTH)
+    reach_mm: Range = field(default=Range(320, 650), metadata=REACH)
+    depth_mm: Range = field(default=Range(110, 260), metadata=DEPTH)
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class ConcaveConfig:
 
     length_mm: Range = field(default=Range(900, 2600), metadata=EXTENT)
     width_mm: Range = field(default=Range(800, 2000), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(110, 250), metadata=LENGTH)
+    depth_mm: Range = field(default=Range(110, 250), metadata=DEPTH)
     outward: float = field(default=0.3, metadata=UNIT)
 
 
@@ -61,11 +67,11 @@ class DentedConfig:
     """
 
     length_mm: Range = field(default=Range(600, 1700), metadata=EXTENT)
-    width_mm: Range = field(default=Range(180, 420), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(40, 90), metadata=LENGTH)
+    width_mm: Range = field(default=Range(180, 420), metadata=REACH)
+    depth_mm: Range = field(default=Range(40, 90), metadata=DEPTH)
     crease_mm: Range = field(default=Range(35, 70), metadata=bounds(5, 1000, "mm"))
     sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
-    amplitude_mm: Range = field(default=Range(25, 110), metadata=LENGTH)
+    amplitude_mm: Range = field(default=Range(25, 110), metadata=DEPTH)
     wavelength_mm: Range = field(default=Range(280, 800), metadata=bounds(20, 1e5, "mm"))
     stretch_mm: Range = field(default=Range(250, 600), metadata=bounds(20, 1e5, "mm"))
     turn_deg: Range = field(default=Range(-50, 50), metadata=bounds(-180, 180, "degrees"))
@@ -83,7 +89,7 @@ class PerforationConfig:
 
     diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
     rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
-    depth_mm: Range = field(default=Range(35, 100), metadata=LENGTH)
+    depth_mm: Range = field(default=Range(35, 100), metadata=DEPTH)
     lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, LOBE_LIMIT))
 
 
