@@ -132,8 +132,11 @@ def test_a_sheet_may_bulge_as_far_as_its_damages_reach():
     config(301, {"concave": concave})
     config(501, {"concave": deep})
     for distance_mm in (300, 499):
-        with pytest.raises(ConfigError, match="may bulge by 400 mm"):
+        with pytest.raises(ConfigError, match="may bulge by 400 mm") as caught:
             config(distance_mm, {"concave": deep})
+        # which both stand in another part of the configuration
+        assert "damage.concave.depth_mm" in str(caught.value)
+        assert "damage.concave.outward: 0" in str(caught.value)
 
 
 def test_a_python_rig_of_plain_values_is_read_as_a_file_is():

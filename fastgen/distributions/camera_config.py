@@ -118,12 +118,14 @@ def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: flo
     for kind in kinds:
         nearest_mm = _nearest_mm(rig, kind)
         if nearest_mm < least_mm + _ROUNDED_MM:
-            bulges = f" that may bulge by {bulge_mm:g} mm" if bulge_mm else ""
+            bulges, less = "", "a smaller target_shift_mm"
+            if bulge_mm:
+                bulges = f" that may bulge by {bulge_mm:g} mm (damage.concave.depth_mm)"
+                less = f"{less} or depth_mm, or damage.concave.outward: 0"
             raise ConfigError(
                 f"cameras.{name}: may come within {nearest_mm:.0f} mm of a container of kind "
                 f"{kind}{bulges}, and nothing nearer than {NEAR_M / MM:g} mm is drawn; give a "
-                "larger distance_mm, azimuth_deg and elevation_deg nearer to 0, or a smaller "
-                "target_shift_mm"
+                f"larger distance_mm, azimuth_deg and elevation_deg nearer to 0, or {less}"
             )
 
 
