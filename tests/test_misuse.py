@@ -126,13 +126,26 @@ def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
         assert f"fastgen: {copy}: was made with other settings ({words}" in error
 
 
+def test_all_settings_that_differ_are_told_with_the_options_that_set_them(copy, capsys):
+    more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "2", "--split", "val"]
+    assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
+    error = capsys.readouterr().err
+    told = error.partition("(")[2].partition("); repeat them by ")
+    assert [each.split(" was ")[0] for each in told[0].split("; ")] == [
+        *("formats", "seed", "size", "quality"),
+        "and 4 more",  # shard_scenes, config.split.test, .train, .val
+    ]
+    options = "--also, --seed, --size, --quality, --shard, --split or --config to resume,"
+    assert told[2].startswith(options)
+
+
 def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, capsys):
     (tmp_path / "lights").mkdir()
     shutil.copy(bundled_hdris()["dawn"], tmp_path / "lights/mine.exr")
     assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
     error = capsys.readouterr().err
     assert "environments.city was '" in error
-    assert "repeat them, --hdri too, to resume" in error
+    assert " more); repeat them by --hdri to resume" in error
 
 
 def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp_path, capsys):

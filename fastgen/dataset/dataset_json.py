@@ -5,7 +5,7 @@ Shards' manifests bear a hash of these settings too, so they can tell whose they
 
 import json
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fastgen.dataset.seal import is_sealed
@@ -19,6 +19,22 @@ _words = reprlib.Repr()
 _words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: what differs may be the last
 
 _MISSING = object()
+
+_SHOWN = 4
+"""Of settings that differ, so many are told with their values."""
+
+_OPTIONS = {
+    "format": "--format",
+    "formats": "--also",
+    "seed": "--seed",
+    "size": "--size",
+    "quality": "--quality",
+    "cameras": "--cameras",
+    "environments": "--hdri",
+    "shard_scenes": "--shard",
+    "config": "--preset or --config",
+}
+"""Which option of `fastgen generate` a setting comes from."""
 
 
 def unsealed(manifest: Mapping[str, Any]) -> bytes:
@@ -99,24 +115,35 @@ def _same(old: Any, new: Any) -> bool:
 
 def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -> str:
     """In words, what of a dataset differs from what the job asks for."""
-    key = next(key for key in settings if not _same(told.get(key), settings[key]))
-    them = "them, --hdri too," if key == "environments" else "them"
+    old = {key: told.get(key, _MISSING) for key in settings}
+    unlike = [each for key in settings for each in _differences(key, old[key], settings[key])]
+    shown = [f"{name} was {before}, is now {now}" for name, before, now in unlike[:_SHOWN]]
+    if len(unlike) > _SHOWN:
+        shown.append(f"and {len(unlike) - _SHOWN} more")
+    options = dict.fromkeys(_option(name) for name, *_ in unlike)
+    by = ", ".join(filter(None, options))
     return (
-        f"{job.out}: was made with other settings "
-        f"({_difference(key, told.get(key, _MISSING), settings[key])}); "
-        f"repeat {them} to resume, or give another folder"
+        f"{job.out}: was made with other settings ({'; '.join(shown)}); "
+        f"repeat them{f' by {by}' if by else ''} to resume, or give another folder"
     )
 
 
-def _difference(name: str, old: Any, new: Any) -> str:
-    """The first setting that differs, with both of its values."""
+def _option(name: str) -> str:
+    """The option that a setting comes from; '' for fastgen's version."""
+    if name.startswith("config.split"):
+        return "--split or --config"
+    return _OPTIONS.get(name.split(".")[0], "")
+
+
+def _differences(name: str, old: Any, new: Any) -> Iterator[tuple[str, str, str]]:
+    """Settings that differ, by their names, with both of their values."""
     if isinstance(old, dict) and isinstance(new, dict):
-        if list(old) != list(new) and old.keys() == new.keys():
-            old, new = list(old), list(new)
-        else:
-            keys = sorted(old.keys() | new.keys())
-            unlike = (k for k in keys if (k in old) != (k in new) or not _same(old[k], new[k]))
-            key = next(unlike)
-            return _difference(f"{name}.{key}", old.get(key, _MISSING), new.get(key, _MISSING))
-    said = ["missing" if value is _MISSING else _words.repr(value) for value in (old, new)]
-    return f"{name} was {said[0]}, is now {said[1]}"
+        if old.keys() != new.keys() or list(old) == list(new):
+            for key in sorted(old.keys() | new.keys()):
+                both = (each.get(key, _MISSING) for each in (old, new))
+                yield from _differences(f"{name}.{key}", *both)
+            return
+        old, new = list(old), list(new)  # which decides what is drawn
+    if old is _MISSING or new is _MISSING or not _same(old, new):
+        before, now = ("missing" if each is _MISSING else _words.repr(each) for each in (old, new))
+        yield name, before, now
