@@ -298,7 +298,7 @@ def _generate(options: argparse.Namespace) -> int:
         backend=options.backend,
         fmt=options.format,
         quality=options.quality,
-        formats=tuple(filter(None, options.also.split(","))),
+        formats=tuple(options.also.split(",")) if options.also else (),
         shard_scenes=shard,
     )
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)

@@ -217,10 +217,17 @@ class Config:
         """Hold values to the choices that no single bound can express."""
         if not self.cameras:
             raise ConfigError("cameras: the rig is empty; describe at least one camera")
+        taken: dict[str, str] = {}
         for name in self.cameras:
             if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
                 raise ConfigError(
                     f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
+                )
+            alike = taken.setdefault(name.casefold(), name)
+            if alike != name:
+                raise ConfigError(
+                    f"cameras.{name}: its files would be those of {alike} on disks that do not "
+                    "tell capitals from small letters; rename one"
                 )
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all fractions are 0; give at least one above 0")

@@ -124,6 +124,12 @@ def tell_of_idle_workers(job: Job, worker_count: int) -> None:
         )
 
 
+def check_count(name: str, value: int) -> None:
+    """Raise ConfigError that calls it `name` where a run cannot have so many."""
+    if not 1 <= value <= _MOST:
+        raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
+
+
 def parse_split(text: str | None, config: Config) -> Config:
     """`config` with --split applied: a split's name takes all, 'a,b,c' are the three fractions.
 
@@ -155,13 +161,9 @@ def _settled(job: Job, worker_count: int) -> tuple[Job, dict[str, Any]]:
 
 
 def _checked(job: Job, worker_count: int) -> Job:
-    for name, value in (
-        ("images", job.images),
-        ("workers", worker_count),
-        ("shard", job.shard_scenes),
-    ):
-        if not 1 <= value <= _MOST:
-            raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
+    check_count("images", job.images)
+    check_count("workers", worker_count)
+    check_count("shard", job.shard_scenes)
     check_known("format", job.fmt, FORMATS)
     for name in job.cameras:
         check_known("cameras", name, job.config.cameras)
@@ -169,6 +171,8 @@ def _checked(job: Job, worker_count: int) -> Job:
         raise ConfigError("cameras: name at least one, and each only once")
     check_known("backend", job.backend, BACKENDS)
     formats_of(job.formats)
+    if len(set(job.formats)) != len(job.formats):
+        raise ConfigError("also: name each only once")
     if job.fmt == "webdataset" and "bop" in job.formats:
         raise ConfigError(
             "also: bop keeps poses in files over all images, which webdataset has not; "

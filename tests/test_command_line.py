@@ -21,6 +21,8 @@ from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
         (["generate", "{out}", "--images", "2", "--also", "x"], "from bop, depth, ids, kitti, nor"),
+        (["generate", "{out}", "--images", "2", "--also", "voc,"], "also: '' is unknown"),
+        (["generate", "{out}", "--images", "2", "--also", "voc,voc"], "also: name each only once"),
         (["generate", "{out}", "--images", "2", "--hdri", ""], "'': names no folder"),
         (["generate", "{out}", "--images", "2", "--shard", "0"], "shard: 0 is out of range"),
         (["generate", "{out}", "--images", "2", "--hdri", "{empty}"], "empty"),

@@ -128,6 +128,12 @@ def test_errors_about_names_name_the_file(tmp_path):
         ("damage: {count: 2.5}", r"damage.count\[0\]: expected a whole number, got 2.5"),
         ("damage:\n", "damage: expected a mapping of fields, got None; remove the key"),
         ("markings: {marker_faces: [door, door]}", "markings.marker_faces: one stands twice"),
+        ("damage: {kinds: [axis, axis]}", "damage.kinds: one stands twice"),
+        ("damage: {faces: [roof, door, roof]}", "damage.faces: one stands twice"),
+        (
+            "cameras: {a: {face: front, focal_mm: 12, distance_mm: 5000}, A: {}}",
+            "cameras.A: its files would be those of a on disks",
+        ),
         ("cameras: {A: {target_shift_mm: 20000}}", "cameras.A.target_shift_mm: 20000 is out"),
         ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \['dented'\]"),
         ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),

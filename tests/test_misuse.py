@@ -96,6 +96,11 @@ def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     assert content(copy) == before
 
 
+def test_a_repair_by_no_worker_is_refused_where_nothing_is_to_be_made_too(dataset, capsys):
+    assert main(["verify", str(dataset), "--repair", "--workers", "0"]) == 2
+    assert capsys.readouterr().err == "fastgen: workers: 0 is out of range; give 1 to 1000000000\n"
+
+
 def test_strange_files_among_the_images_do_not_stop_a_run(copy):
     for name in ("stray.jpg", "more_A.jpg", "Thumbs.db"):
         (copy / "images/train" / name).write_bytes(b"no image")

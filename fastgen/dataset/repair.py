@@ -9,7 +9,7 @@ from fastgen.dataset.shards import Job
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
-from fastgen.generate import check_goes_on, generate
+from fastgen.generate import check_count, check_goes_on, generate
 
 
 def repair(
@@ -22,6 +22,7 @@ def repair(
     Returns the faults that were mended and those that are left. Raises OutputError where
     dataset.json does not tell what to make, or the settings that it names cannot be had here.
     """
+    check_count("workers", worker_count)  # also where nothing is to be made
     found = examine(out)
     if not found.manifest:
         raise OutputError(f"{out}: {found.faults[0]}")

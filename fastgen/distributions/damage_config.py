@@ -121,6 +121,9 @@ class DamageConfig:
             check_known(f"kinds[{i}]", kind, DAMAGE_CLASSES)
         for i, face in enumerate(self.faces):
             check_known(f"faces[{i}]", face, SHEET_FACES)
+        for name in ("kinds", "faces"):
+            if len(set(getattr(self, name))) < len(getattr(self, name)):
+                raise ConfigError(f"{name}: one stands twice; each is as likely as any other")
         if not self.faces and set(self.kinds) - {"axis"}:
             raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
         check_order("count", self.count)
