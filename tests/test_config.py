@@ -139,7 +139,11 @@ def test_errors_about_names_name_the_file(tmp_path):
         ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),
         ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .* line 3, column 1"),
         ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),
-        ("cameras: {010: {face: front}, 8: {face: back}}", ".*'8' stands twice"),
+        ("cameras: {0x8: {face: front}, 8: {face: back}}", ".*'8' stands twice"),
+        ("cameras: {010: {face: front}}", ".*YAML reads 010 as 8; write that, or quote it"),
+        ("damage: {count: -0_17}", ".*YAML reads -0_17 as -15; write that, .* line 1, column 17"),
+        ("damage: {count: 1:30}", ".*YAML reads 1:30 as 90; write that"),
+        ("weather: {wind: 1:30.5}", ".*YAML reads 1:30.5 as 90.5; write that"),
         ("weather: {shutter_s: ['1e-3', 0.1]}", "weather.shutter_s.* write 0.001 without quotes"),
         ("cameras: {no: {face: front}}", "cameras: expected a name, got False; put it in quotes"),
     ):
@@ -188,6 +192,13 @@ def test_numbers_are_read_as_json_and_yaml_write_them(tmp_path, number):
     path = tmp_path / "weather.yaml"
     path.write_text(f"weather: {{shutter_s: [{number}, 1e-1]}}")
     assert Config.load(path).weather.shutter_s == (float(number), 0.1)
+
+
+def test_other_ways_of_writing_a_whole_number_mean_what_they_say(tmp_path):
+    path = tmp_path / "port.yaml"
+    for text in ("12", "+12", "1_2", "0xC", "0b1100", "0xc"):
+        path.write_text(f"damage: {{count: [0, {text}]}}")
+        assert Config.load(path).damage.count == (0, 12)
 
 
 def test_one_number_stands_for_both_of_a_pair():

@@ -26,9 +26,18 @@ def loaded(text: str) -> Any:
 
 
 class _Loader(yaml.SafeLoader):
-    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses a key that
-    stands twice, of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2
-    and 3.2.1.1)."""
+    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses those that
+    YAML 1.1 counts by eights or sixties, which people mean otherwise, and a key that stands twice,
+    of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2 and 3.2.1.1).
+    """
+
+    def construct_number(self, node: yaml.ScalarNode) -> float:
+        whole = node.tag.endswith(":int")
+        number = self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
+        if ":" in node.value or (whole and re.match(r"[-+]?0[0-9_]", node.value)):
+            words = f"YAML reads {node.value} as {number:g}; write that, or quote it as a text"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
+        return number
 
     def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> Any:
         text = super().construct_scalar(node)
@@ -43,7 +52,7 @@ class _Loader(yaml.SafeLoader):
         seen: set[str] = set()
         for key in (key for key, _ in node.value if isinstance(key, yaml.ScalarNode)):
             number = key.tag.endswith((":int", ":float"))
-            name = str(self.construct_object(key)) if number else key.value  # 010 is 8
+            name = str(self.construct_object(key)) if number else key.value  # 0x8 is 8
             if name in seen:
                 words = f"the key {name!r} stands twice in one mapping"
                 raise yaml.composer.ComposerError(None, None, words, key.start_mark)
@@ -55,5 +64,7 @@ class Dumper(yaml.SafeDumper):
     """Quotes text that `loaded` would take for a number."""
 
 
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_number)
+_Loader.add_constructor("tag:yaml.org,2002:float", _Loader.construct_number)
 _Loader.add_implicit_resolver(*_JSON_FLOATS)
 Dumper.add_implicit_resolver(*_JSON_FLOATS)
