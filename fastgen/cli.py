@@ -2,12 +2,10 @@
 
 import argparse
 import contextlib
-import io
 import os
 import re
 import shlex
 import signal
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -19,7 +17,6 @@ from fastgen.config import PRESETS, Config
 from fastgen.config_text import as_yaml
 from fastgen.dataset import stats
 from fastgen.dataset.on_ray import run_on_ray
-from fastgen.dataset.progress import say
 from fastgen.dataset.repair import repair
 from fastgen.dataset.shards import FORMATS, SHARD_SCENES, Job
 from fastgen.dataset.verify import examine
@@ -32,6 +29,7 @@ from fastgen.generate import CONTACT_SHEET, generate, parse_split
 from fastgen.generator import QUALITY, Generator, find_camera
 from fastgen.gl import BACKENDS
 from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
+from fastgen.printing import drop_unprinted, mend_streams, say, tell
 from fastgen.records import check_known
 from fastgen.stopping import STOPPED
 
@@ -43,11 +41,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Stopped by a signal, it is 128 and the signal's number: 130 after Ctrl-C, 143 after SIGTERM.
     """
-    _mend_streams()
+    mend_streams()
     try:
         return _run(arguments)
     finally:
-        _drop_unprinted()
+        drop_unprinted()
 
 
 def _run(arguments: Sequence[str] | None) -> int:
@@ -57,7 +55,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             with _stopped_by_sigterm():
                 code: int = options.run(options)
         finally:
-            sys.stdout.flush()
+            tell("", end="")  # what argparse has printed
     except FastgenError as error:
         return _refused(str(error))
     except BrokenPipeError:
@@ -68,26 +66,6 @@ def _run(arguments: Sequence[str] | None) -> int:
         say(STOPPED)
         return 128 + (signal.SIGTERM if isinstance(stop, _Terminated) else signal.SIGINT)
     return code
-
-
-def _mend_streams() -> None:
-    """What is printed to a stream that was closed goes nowhere; escapes stand for letters that
-    standard output has not, as standard error has it by itself."""
-    for name in ("stdout", "stderr"):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
-
-
-def _drop_unprinted() -> None:
-    """Forget what can be printed nowhere: the interpreter would try again as it ends, and Python
-    3.13 puts an exit code of its own in place of ours where it fails."""
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except OSError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 class _Terminated(KeyboardInterrupt):
@@ -305,9 +283,9 @@ def _generate(options: argparse.Namespace) -> int:
     manifest = generate(job, _workers(options), runner)
     total = sum(split["images"] for split in manifest["counts"].values())
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
-    print(f"{total} images in {options.out}{look}")
+    tell(f"{total} images in {options.out}{look}")
     for each in manifest["failed"]:
-        print(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
+        tell(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
     return 1 if manifest["failed"] else 0
 
 
@@ -322,7 +300,7 @@ def _print_config(options: argparse.Namespace) -> int:
         Generator(config, hdri_dir=options.hdri).scene(0)
     except ConfigError as error:
         raise ConfigError(f"{options.config}: {error}" if options.config else str(error)) from None
-    print(as_yaml(config), end="")
+    tell(as_yaml(config), end="")
     return 0
 
 
@@ -372,7 +350,7 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _stats(options: argparse.Namespace) -> int:
-    print(stats.report(options.out))
+    tell(stats.report(options.out))
     return 0
 
 
@@ -380,19 +358,19 @@ def _verify(options: argparse.Namespace) -> int:
     if options.repair:
         mended, faults = repair(options.out, _workers(options), options.hdri)
         for fault in mended:
-            print(f"mended: {fault}")
+            tell(f"mended: {fault}")
         hint = ""
     else:
         found = examine(options.out)
         faults = found.faults
         hint = f"fastgen verify {shlex.quote(options.out)} --repair" if found.broken else ""
-    print("\n".join(faults) if faults else f"{options.out}: whole and consistent")
+    tell("\n".join(faults) if faults else f"{options.out}: whole and consistent")
     if hint:
-        print(f"to make what is damaged or missing again: {hint}")
+        tell(f"to make what is damaged or missing again: {hint}")
     return 1 if faults else 0
 
 
 def _doctor(_: argparse.Namespace) -> int:
     words, works = doctor.report()
-    print(words)
+    tell(words)
     return 0 if works else 1

@@ -6,6 +6,8 @@ sRGB hex in files (people pick them on screens) and linear albedo in scenes.
 """
 
 import re
+import reprlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -279,6 +281,11 @@ class Config:
             raise ConfigError(f"{path}: cannot be read ({words})") from None
         except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
+        if not isinstance(data, Mapping | None):
+            raise ConfigError(
+                f"{path}: holds {reprlib.repr(data)}; give keys with their values, as in "
+                "damage: {probability: 0.5}"
+            )
         try:
             return Config.from_values({} if data is None else data, base)
         except ConfigError as error:

@@ -17,7 +17,7 @@ from fastgen.config import Config, SplitConfig
 from fastgen.dataset import workers
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, known, read_manifest, shard_numbers, unsealed
-from fastgen.dataset.progress import Progress, say
+from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import (
     FORMATS,
@@ -38,6 +38,7 @@ from fastgen.formats.coco import trained_on
 from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
 from fastgen.light.hdri import find_hdris
+from fastgen.printing import say
 from fastgen.records import check_known, nearest
 from fastgen.sampling import SPLITS
 
@@ -216,11 +217,13 @@ def _make_folder(root: Path) -> None:
     except FileExistsError:
         # mkdir says so of a link to nowhere too
         astray = [path for path in (root, *root.parents) if path.is_symlink() and not path.exists()]
-        what = "is a file; give a folder"
+        what = f"{root}: is a file; give a folder"
         if astray:
             to = os.readlink(astray[0])
-            what = f"{astray[0]} is a link to {to}, which is not there; make it, or remove the link"
-        raise OutputError(f"{root}: {what}") from None
+            what = (
+                f"{astray[0]}: is a link to {to}, which is not there; make it, or remove the link"
+            )
+        raise OutputError(what) from None
     except OSError as error:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
 

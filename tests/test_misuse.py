@@ -228,7 +228,7 @@ def test_a_link_to_nowhere_is_called_one(tmp_path, capsys, below):
     link.symlink_to(tmp_path / "unmounted")
     assert main(["generate", str(link / below), *ARGUMENTS, "--workers", "1"]) == 2
     error = capsys.readouterr().err
-    assert f"{link} is a link to {tmp_path / 'unmounted'}, which is not there" in error
+    assert error.startswith(f"fastgen: {link}: is a link to {tmp_path / 'unmounted'}, which is not")
     assert not (tmp_path / "unmounted").exists()
 
 
@@ -240,6 +240,23 @@ def test_a_reader_that_goes_away_is_no_error(dataset, arguments):
     process.stdout.close()
     assert process.stderr.read() == ""
     assert process.wait() in (0, 141)  # argparse ends with 0
+
+
+@pytest.mark.parametrize("arguments", [["stats", "{}"], ["config"]])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_standard_output_that_takes_no_more_is_called_so(dataset, arguments, unbuffered):
+    command = [sys.executable, "-m", "fastgen", *(each.format(dataset) for each in arguments)]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            command,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        )
+    assert done.returncode == 2
+    assert done.stderr == "fastgen: standard output: No space left on device\n"
 
 
 def test_closed_streams_stop_no_run(tmp_path):
@@ -271,7 +288,11 @@ def test_show_takes_the_first_camera_of_a_rig(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[]", r"Config: expected a mapping of fields, got []"),
+        ("[]", "holds []; give keys with their values"),
+        ("a text", "holds 'a text'; give keys"),
+        ("3", "holds 3; give keys"),
+        ("a: [1", "sequence, line 1, column 4: expected ',' or ']', but got '<stream end>', line"),
+        ("a: \0", "special characters are not allowed at position 3"),
         ("surface: {rust_coverage: '1e-2'}", "write 0.01"),
         ("day: 2026-99-99", "not a YAML file"),
         ("a: &a [*a]", "a: unknown key"),
@@ -285,6 +306,7 @@ def test_odd_files_are_named(tmp_path, capsys, text, words):
     error = capsys.readouterr().err
     assert error.startswith(f"fastgen: {path}: ")
     assert words in error
+    assert "<unicode string>" not in error
 
 
 @pytest.mark.parametrize("command", ["generate", "show", "export", "stats", "verify"])

@@ -1,10 +1,5 @@
-"""What a run says on standard error.
+"""A progress line: images a second and time left, on a terminal; now and then a line elsewhere."""
 
-Of its progress a line with images a second and time left, redrawn on a terminal; now and then one
-elsewhere.
-"""
-
-import contextlib
 import os
 import sys
 import time
@@ -12,12 +7,6 @@ from typing import TextIO
 
 _BAR = 28
 _QUIET_S = 15.0
-
-
-def say(words: str) -> None:
-    """A line on standard error, or none where that is a log on a full disk."""
-    with contextlib.suppress(OSError):
-        print(words, file=sys.stderr)
 
 
 class Progress:

@@ -14,15 +14,26 @@ _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
 
 
 def loaded(text: str) -> Any:
-    """The value of a YAML or JSON text. Raises yaml.YAMLError, and ValueError or RecursionError for
-    what PyYAML itself stumbles over."""
+    """The value of a YAML or JSON text. Raises yaml.YAMLError that says where, and ValueError or
+    RecursionError for what PyYAML itself stumbles over."""
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
         bare = re.search(r"[\[{,:]\s*(#[0-9a-fA-F]{6})\b", text)
-        if bare is None:
-            raise
-        raise yaml.YAMLError(f"{error}; put colors in quotes, as in '{bare[1]}'") from None
+        hint = f"; put colors in quotes, as in '{bare[1]}'" if bare else ""
+        raise yaml.YAMLError(_in_words(error) + hint) from None
+
+
+def _in_words(error: yaml.YAMLError) -> str:
+    """What PyYAML says, with line and column, but without a name and an excerpt of the text."""
+    if not isinstance(error, yaml.MarkedYAMLError):
+        return str(error).replace('in "<unicode string>", ', "at ")
+    said = ((error.context, error.context_mark), (error.problem, error.problem_mark))
+    return ": ".join(
+        f"{words}, line {mark.line + 1}, column {mark.column + 1}" if mark else words
+        for words, mark in said
+        if words
+    )
 
 
 class _Loader(yaml.SafeLoader):
