@@ -108,4 +108,6 @@ def test_what_cannot_be_printed_leaves_the_exit_code_as_it_is(tmp_path):
             [*command, "verify", out], stdout=full, stderr=subprocess.PIPE, check=False
         )
     assert told.returncode == 2
-    assert told.stderr.decode().splitlines() == ["fastgen: system: No space left on device"]
+    assert told.stderr.decode().splitlines() == [
+        "fastgen: standard output: No space left on device"
+    ]
