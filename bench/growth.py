@@ -219,6 +219,11 @@ def drift(table: Table) -> str:
             words += (
                 f"\nresident memory from image {counts[at]:.0f} to {counts[-1]:.0f}: {change:+.2%}"
             )
+    if counts[-1] > 2000:  # it wavers as freed memory is held and given back
+        first, last = (memory[part].mean() for part in (counts <= 1000, counts > counts[-1] - 1000))
+        words += (
+            f"\nmean over the last thousand images over that of the first: {last / first - 1:+.2%}"
+        )
     return words
 
 
