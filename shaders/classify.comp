@@ -57,9 +57,31 @@ void write_labels(ivec2 pixel, uint key, float depth) {
 }
 
 #if CABLES_NEAR
+bool sky_or_cable(uint key) { return key == 0u || float(key_zone(key)) == cable_zone; }
+
 // whether cables cover a part of a pixel; bare: nothing but sky is seen beside them
 bool covered_in_part(ivec2 pixel, bool bare) {
     return bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496;
+}
+
+// which of two by two pixels from `block` on see sky, or a cable with nothing but sky to its sides, for a cable
+// may hang before other things; middle: of their keys' texels. Beyond the image is nothing.
+bvec4 seen_bare(uvec4 key, ivec2 block, vec2 middle) {
+    uvec4 left = textureGatherOffset(surface_keys, middle, ivec2(-1, 0)).wzxy;
+    uvec4 right = textureGatherOffset(surface_keys, middle, ivec2(1, 0)).wzxy;
+    uvec4 over = textureGatherOffset(surface_keys, middle, ivec2(0, -1)).wzxy;
+    uvec4 under = textureGatherOffset(surface_keys, middle, ivec2(0, 1)).wzxy;
+    ivec2 last = imageSize(label_image) - 1;
+    bvec4 bare;
+    for (int i = 0; i < 4; ++i) {
+        ivec2 pixel = block + in_group(i);
+        bool alone = sky_or_cable(key[i]) && (pixel.x <= 0 || sky_or_cable(left[i])) &&
+                     (pixel.x >= last.x || sky_or_cable(right[i])) &&
+                     (pixel.y <= 0 || sky_or_cable(over[i])) &&
+                     (pixel.y >= last.y || sky_or_cable(under[i]));
+        bare[i] = key[i] == 0u || alone;
+    }
+    return bare;
 }
 #endif
 
@@ -90,6 +112,7 @@ void main() {
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
 #if CABLES_NEAR
     uint cables = 0u;
+    bvec4 bare = seen_bare(key, block, middle);
 #endif
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
@@ -97,7 +120,7 @@ void main() {
         if (outside) key[i] = 0u;
         uint bit = 1u << i;
 #if CABLES_NEAR
-        bool covered = !outside && covered_in_part(pixel, key[i] == 0u || float(key_zone(key[i])) == cable_zone);
+        bool covered = !outside && covered_in_part(pixel, bare[i]);
         if (covered) cables |= bit;
 #endif
         if (key[i] == 0u) continue;
@@ -183,7 +206,7 @@ void main() {
     // in which nothing but sky is seen beside them, though perhaps all samples see sky, or the cable
     bool bare = true;
     for (int i = 0; i < FILTER_NEAR; ++i)
-        bare = bare && (keys[i] == 0u || float(key_zone(keys[i])) == cable_zone);
+        bare = bare && sky_or_cable(keys[i]);
     if (covered_in_part(pixel, bare)) list = LIST_CABLE;
 #endif
     if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);

@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
@@ -164,6 +165,21 @@ def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
     assert 0.85 < black < 1.0
     assert np.abs(lit / black - expected).max() < 0.15
     assert np.abs(lit / black - expected)[expected > 0.1].mean() < 0.03
+
+
+def test_no_sky_shows_through_cables_that_hang_before_the_spreader():
+    """Whatever covers all of a pixel and of those about it in balanced covers it in draft too."""
+    above = {"face": "door", "focal_mm": 20, "distance_mm": 9000, "elevation_deg": [40, 60]}
+    rig = {"Cl": {}, "Cr": {}, "above": above}
+    config = Config.from_values({"cameras": rig, "spreader": {"probability": 1}})
+    covers = {}
+    for quality in ("balanced", "draft"):
+        with Generator(config, seed=3, size=(320, 320), quality=quality) as generator:
+            frames = [generator.render(index, camera) for index in range(2) for camera in rig]
+        covers[quality] = np.stack([frame.cover for frame in frames])
+    whole = [cv2.erode(cover, np.ones((3, 3))) == 255 for cover in covers["balanced"]]
+    assert np.count_nonzero(whole) > 10000
+    assert (covers["draft"][np.stack(whole)] == 255).all()
 
 
 def test_a_thin_cable_looks_like_the_mean_of_what_is_seen_of_it_from_nearby():
