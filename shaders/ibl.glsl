@@ -49,9 +49,9 @@ const Traced NO_RAYS = Traced(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 0.0);
 // what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
 // its irradiance from there, relative to that of a whole sky about that direction, the share that is
 // open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
-// 1 or 0, whether that hangs above, as a spreader does, irradiance / pi that the suns throw on what hides
-// it and faces here, times its share, and the albedo of what hides it; where there are rays, they stand
-// for all of this
+// 1 or 0, how much of that hangs above as a spreader does, 0 to 1, irradiance / pi that the suns throw on what
+// hides the sky and faces here, times its share, and the albedo of what hides it; where there are rays, they
+// stand for all of this
 struct Openness {
     vec3 direction;
     float rim;

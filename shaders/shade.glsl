@@ -193,7 +193,7 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
 #endif
     // the paint of the place, for much rust seldom stands alone, but never a print's
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
-    // but of a container's roof the spreader's
+    // over a roof, prints too, it is the spreader's
     sky.hung = above.a * sky.bounces * max(p.surface.outward.z, 0.0);
     sky.beside = mix(sky.beside, above.rgb, sky.hung);
     vec4 sun_seen = vec4(0.0);

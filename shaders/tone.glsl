@@ -9,7 +9,7 @@ vec3 neutral_tone(vec3 c) {
     float peak = max(c.r, max(c.g, c.b));
     // where the peak is below the start, the shoulder's own formula leaves c as it is
     const float d = 1.0 - start;
-    float shoulder = max(peak, start);
+    float shoulder = clamp(peak, start, 1e6);   // white anyway, and a fourth power below
     // of what comes out, the peak is (over - d * d) / over and the share of white 1 - over / whitened: both
     // over one divisor, for divisions are dear
     float over = shoulder + d - start;
