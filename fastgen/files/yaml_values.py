@@ -1,6 +1,7 @@
 """YAML as people and other programs write it, JSON among it: what PyYAML leaves undone."""
 
 import re
+import reprlib
 from typing import Any
 
 import yaml
@@ -30,7 +31,7 @@ def _in_words(error: yaml.YAMLError) -> str:
         return str(error).replace('in "<unicode string>", ', "at ")
     said = ((error.context, error.context_mark), (error.problem, error.problem_mark))
     return ": ".join(
-        f"{words}, line {mark.line + 1}, column {mark.column + 1}" if mark else words
+        f"{words} (line {mark.line + 1}, column {mark.column + 1})" if mark else words
         for words, mark in said
         if words
     )
@@ -44,9 +45,16 @@ class _Loader(yaml.SafeLoader):
 
     def construct_number(self, node: yaml.ScalarNode) -> float:
         whole = node.tag.endswith(":int")
-        number = self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
-        if ":" in node.value or (whole and re.match(r"[-+]?0[0-9_]", node.value)):
-            words = f"YAML reads {node.value} as {number:g}; write that, or quote it as a text"
+        try:
+            number = self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
+        except (ArithmeticError, IndexError, ValueError):
+            words = f"{reprlib.repr(node.value)} is no number"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
+        if number and (":" in node.value or (whole and re.match(r"[-+]?0[0-9_]", node.value))):
+            words = (
+                f"YAML reads {reprlib.repr(node.value)} as {reprlib.repr(number)}; write that, or "
+                "put it in quotes as a text"
+            )
             raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
         return number
 
