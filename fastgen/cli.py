@@ -168,8 +168,8 @@ def _parser() -> argparse.ArgumentParser:
         "--layer",
         default="all",
         metavar="|".join(SHOWN_LAYERS),
-        help="one layer of the material, unlit, on white; of reflection the roughness as grey, of "
-        "normals red, green, blue for x, y, z in the container's frame",
+        help="one layer of the material, unlit, on white; reflection is the roughness as grey; "
+        "normals, on grey, are red, green, blue for x, y, z in the container's frame",
     )
     show.add_argument("--overlay", action="store_true", help="draw boxes, names and damage")
     show.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")

@@ -71,13 +71,15 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
     with storage.locked():
         old = known(storage, job, settings)
         made = _made(job, storage, old or {})
-        left = job.images - sum(len(job.wanted(shard)) for shard in made)
+        left = job.images - sum(made.values())
         if left or old is None:  # until the end nothing says that it is finished
             storage.write(MANIFEST, [unsealed({**settings, "images": job.images})])
         if left:
             # one by one, for there may be millions
             tasks = (Task(shard) for shard in range(job.shard_count) if shard not in made)
             progress = Progress(job.images, job.images - left)
+            if runner is None and old is None:
+                _tell_of_idle_workers(job, worker_count)
 
             def on_report(kind: str, value: Any) -> None:
                 if kind == "images":
@@ -105,7 +107,6 @@ def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Mak
     """A runner with so many processes on this machine."""
 
     def run(job: Job, tasks: Iterable[Task], on_report: Callable[[str, Any], None]) -> None:
-        tell_of_idle_workers(job, worker_count)
         whole = worker_count >= len(os.sched_getaffinity(0))
         workers.run(
             maker, (job, whole), tasks, worker_count, on_report, Strikes(job), hang_s, whole
@@ -114,14 +115,14 @@ def run_here(worker_count: int, hang_s: float = workers.HANG_S, maker: Any = Mak
     return run
 
 
-def tell_of_idle_workers(job: Job, worker_count: int) -> None:
+def _tell_of_idle_workers(job: Job, worker_count: int) -> None:
     """Say so where there are fewer shards than workers, and shorter ones would be made sooner."""
     scenes = -(-job.images // len(job.cameras))
     shards, fair = job.shard_count, -(-scenes // worker_count)
     if shards < worker_count and shards < -(-scenes // fair):
         say(
             f"fastgen: no more than {shards} of {worker_count} workers have something to do, with "
-            f"{job.shard_scenes} scenes a shard; in a new folder, --shard {fair} shares the work"
+            f"{job.shard_scenes} scenes a shard; in another folder, --shard {fair} shares the work"
         )
 
 
@@ -228,15 +229,16 @@ def _make_folder(root: Path) -> None:
         raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
 
 
-def _made(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> set[int]:
-    """The shards that are there with all that is wanted of them, and of which no part has gone.
+def _made(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> dict[int, int]:
+    """How many images each shard holds that is there with all that is wanted of it, and of which no
+    part has gone.
 
     old: what dataset.json says. Raises OutputError where there are more images than the job's, or
     shards that were made with other settings.
     """
     beyond = "digest" in old and old["images"] > job.images
     present = storage.sizes()
-    made = set()
+    made = {}
     for shard in shard_numbers(storage):
         manifest = read_manifest(storage, shard)
         if manifest is None:  # made again, or beyond the images a stray, which `verify` names
@@ -251,7 +253,7 @@ def _made(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> set[int
         files = manifest["files"].items()
         whole = all(present.get(path) == size for path, (size, _) in files)
         if whole and manifest["images"] == wanted:
-            made.add(shard)
+            made[shard] = len(wanted)
     if beyond:
         raise OutputError(
             f"{job.out}: holds more than {job.images} images; give --images as before or more"

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from pycocotools.coco import COCO
 
+import fastgen
 from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli import main
 from fastgen.light.hdri import bundled_hdris
@@ -140,8 +141,15 @@ def test_all_settings_that_differ_are_told_with_the_options_that_set_them(copy, 
         *("formats", "seed", "size", "quality"),
         "and 4 more",  # shard_scenes, config.split.test, .train, .val
     ]
-    options = "--also, --seed, --size, --quality, --shard, --split or --config to resume,"
+    options = "--also, --seed, --size, --quality, --shard, --split, --config to resume,"
     assert told[2].startswith(options)
+
+
+def test_what_another_version_made_is_to_be_resumed_with_that(copy, monkeypatch, capsys):
+    words = f"install fastgen {fastgen.__version__} to resume, or give another folder"
+    monkeypatch.setattr(fastgen, "__version__", "99.1.0")
+    assert main(["generate", str(copy), *ARGUMENTS, "--seed", "4"]) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, capsys):
@@ -291,7 +299,7 @@ def test_show_takes_the_first_camera_of_a_rig(tmp_path):
         ("[]", "holds []; give keys with their values"),
         ("a text", "holds 'a text'; give keys"),
         ("3", "holds 3; give keys"),
-        ("a: [1", "sequence, line 1, column 4: expected ',' or ']', but got '<stream end>', line"),
+        ("a: [1", "sequence (line 1, column 4): expected ',' or ']', but got '<stream end>' ("),
         ("a: \0", "special characters are not allowed at position 3"),
         ("surface: {rust_coverage: '1e-2'}", "write 0.01"),
         ("day: 2026-99-99", "not a YAML file"),

@@ -4,11 +4,16 @@ import contextlib
 import os
 import threading
 import time
+from dataclasses import replace
+from functools import partial
 
 import pytest
 
+from fastgen.config import Config
 from fastgen.dataset import workers
-from tests.crash_run import make
+from fastgen.dataset.shards import Job
+from fastgen.generate import generate, run_here
+from tests.crash_run import QuickMaker
 
 
 class DiesAfterItsTask:
@@ -155,17 +160,24 @@ def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_aske
 @pytest.mark.parametrize(
     ("scenes", "count", "words"),
     [  # two scenes a shard
-        (2, 2, "no more than 1 of 2 workers have something to do, with 2 scenes a shard; in a new"),
+        (2, 2, "no more than 1 of 2 workers have something to do, with 2 scenes a shard; in an"),
         (3, 4, "no more than 2 of 4 workers"),
         (1, 2, ""),  # which no shard shares
         (3, 2, ""),
         (5, 4, ""),  # one of four would make two scenes anyway
     ],
 )
-def test_workers_that_find_nothing_to_do_are_told_of(tmp_path, capsys, scenes, count, words):
-    make(tmp_path / "out", scenes, count)
+def test_workers_that_find_nothing_to_do_are_told_of(
+    tmp_path, monkeypatch, capsys, scenes, count, words
+):
+    monkeypatch.setattr("fastgen.generate.run_here", partial(run_here, maker=QuickMaker))
+    size, out = (64, 64), str(tmp_path / "out")
+    job = Job(out, scenes, Config.preset(), 1, size, ("A",), None, "auto", shard_scenes=2)
+    generate(job, count)
     said = [line for line in capsys.readouterr().err.splitlines() if "images" not in line]
     assert len(said) == bool(words)
     for line in said:
         assert line.startswith(f"fastgen: {words}")
-        assert line.endswith("in a new folder, --shard 1 shares the work")
+        assert line.endswith("in another folder, --shard 1 shares the work")
+    generate(replace(job, images=scenes + 2), count)
+    assert "shares the work" not in capsys.readouterr().err  # what is there stays as it is

@@ -24,17 +24,17 @@ _SHOWN = 4
 """Of settings that differ, so many are told with their values."""
 
 _OPTIONS = {
-    "format": "--format",
-    "formats": "--also",
-    "seed": "--seed",
-    "size": "--size",
-    "quality": "--quality",
-    "cameras": "--cameras",
-    "environments": "--hdri",
-    "shard_scenes": "--shard",
-    "config": "--preset or --config",
+    "format": ("--format",),
+    "formats": ("--also",),
+    "seed": ("--seed",),
+    "size": ("--size",),
+    "quality": ("--quality",),
+    "cameras": ("--cameras",),
+    "environments": ("--hdri",),
+    "shard_scenes": ("--shard",),
+    "config": ("--preset", "--config"),
 }
-"""Which option of `fastgen generate` a setting comes from."""
+"""Which options of `fastgen generate` a setting comes from."""
 
 
 def unsealed(manifest: Mapping[str, Any]) -> bytes:
@@ -120,30 +120,33 @@ def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -
     shown = [f"{name} was {before}, is now {now}" for name, before, now in unlike[:_SHOWN]]
     if len(unlike) > _SHOWN:
         shown.append(f"and {len(unlike) - _SHOWN} more")
-    options = dict.fromkeys(_option(name) for name, *_ in unlike)
-    by = ", ".join(filter(None, options))
+    if "version" in told and not _same(told["version"], settings["version"]):
+        how = f"install fastgen {told['version']} to resume"
+    else:
+        options = dict.fromkeys(each for name, *_ in unlike for each in _options(name))
+        how = f"repeat them by {', '.join(options)} to resume"
     return (
         f"{job.out}: was made with other settings ({'; '.join(shown)}); "
-        f"repeat them{f' by {by}' if by else ''} to resume, or give another folder"
+        f"{how}, or give another folder"
     )
 
 
-def _option(name: str) -> str:
-    """The option that a setting comes from; '' for fastgen's version."""
+def _options(name: str) -> tuple[str, ...]:
+    """The options that a setting may come from."""
     if name.startswith("config.split"):
-        return "--split or --config"
-    return _OPTIONS.get(name.split(".")[0], "")
+        return "--split", "--config"
+    return _OPTIONS.get(name.split(".")[0], ())
 
 
 def _differences(name: str, old: Any, new: Any) -> Iterator[tuple[str, str, str]]:
     """Settings that differ, by their names, with both of their values."""
     if isinstance(old, dict) and isinstance(new, dict):
-        if old.keys() != new.keys() or list(old) == list(new):
-            for key in sorted(old.keys() | new.keys()):
-                both = (each.get(key, _MISSING) for each in (old, new))
-                yield from _differences(f"{name}.{key}", *both)
+        for key in sorted(old.keys() | new.keys()):
+            both = (each.get(key, _MISSING) for each in (old, new))
+            yield from _differences(f"{name}.{key}", *both)
+        if old.keys() != new.keys():
             return
-        old, new = list(old), list(new)  # which decides what is drawn
+        old, new = list(old), list(new)  # whose order decides what is drawn
     if old is _MISSING or new is _MISSING or not _same(old, new):
         before, now = ("missing" if each is _MISSING else _words.repr(each) for each in (old, new))
         yield name, before, now

@@ -22,7 +22,7 @@ from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.workers import HANG_S, Waiting, in_words
 from fastgen.errors import OutputError
-from fastgen.generate import Runner, tell_of_idle_workers
+from fastgen.generate import Runner
 
 Reports = list[tuple[str, Any]]
 """What a maker reports, in order: see shards.Report."""
@@ -57,7 +57,6 @@ def run_on_ray(
         ray = _ray()
         own = _joined(address, count)
         try:
-            tell_of_idle_workers(job, count or max(_cpus(), 1))
             crew = _Crew(_everywhere(job), tasks, on_report, count, hang_s, maker)
             try:
                 crew.work()

@@ -20,7 +20,8 @@ def repair(
 
     hdri_dir: where the HDRIs are that the dataset was made with, None for the bundled ones.
     Returns the faults that were mended and those that are left. Raises OutputError where
-    dataset.json does not tell what to make, or the settings that it names cannot be had here.
+    dataset.json does not tell what to make, or the settings that it names cannot be had here;
+    ConfigError for a count of workers that cannot be.
     """
     check_count("workers", worker_count)  # also where nothing is to be made
     found = examine(out)

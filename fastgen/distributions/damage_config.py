@@ -9,13 +9,14 @@ from fastgen.geometry.mesh import SHEET_FACES
 from fastgen.records import UNIT, Range, bounds, check_known, check_order
 
 EXTENT = bounds(5.0, 20000.0, "mm")
-"""Fields are scaled by their extents, which must not vanish; for those that are cut to a face."""
+"""Of what a face cuts off. Fields are scaled by their extents, which must not vanish."""
 
 DEPTH = bounds(0.0, 2400.0, "mm")
-"""A container is 2438 mm wide: what is pushed in deeper comes out on the other side."""
+"""Of what goes in, or to a side: a container is 2438 mm wide, and what is pushed in deeper comes
+out on the other side."""
 
 REACH = bounds(5.0, 2400.0, "mm")
-"""As EXTENT, for what no face cuts."""
+"""As EXTENT, of what no face cuts off."""
 
 MAX_INSTANCES = 99
 """A mask value is class * 100 + instance, so that a hundredth would pass for the next class."""
