@@ -64,24 +64,14 @@ bool covered_in_part(ivec2 pixel, bool bare) {
     return bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496;
 }
 
-// which of two by two pixels from `block` on see sky, or a cable with nothing but sky to its sides, for a cable
-// may hang before other things; middle: of their keys' texels. Beyond the image is nothing.
-bvec4 seen_bare(uvec4 key, ivec2 block, vec2 middle) {
-    uvec4 left = textureGatherOffset(surface_keys, middle, ivec2(-1, 0)).wzxy;
-    uvec4 right = textureGatherOffset(surface_keys, middle, ivec2(1, 0)).wzxy;
-    uvec4 over = textureGatherOffset(surface_keys, middle, ivec2(0, -1)).wzxy;
-    uvec4 under = textureGatherOffset(surface_keys, middle, ivec2(0, 1)).wzxy;
+// of single samples: whether a pixel sees sky, or a cable with nothing but sky to its sides, left, right, over
+// and under it, for a cable may hang before other things; beyond the image is nothing
+bool seen_bare(ivec2 pixel, uint key, uvec4 sides) {
     ivec2 last = imageSize(label_image) - 1;
-    bvec4 bare;
-    for (int i = 0; i < 4; ++i) {
-        ivec2 pixel = block + in_group(i);
-        bool alone = sky_or_cable(key[i]) && (pixel.x <= 0 || sky_or_cable(left[i])) &&
-                     (pixel.x >= last.x || sky_or_cable(right[i])) &&
-                     (pixel.y <= 0 || sky_or_cable(over[i])) &&
-                     (pixel.y >= last.y || sky_or_cable(under[i]));
-        bare[i] = key[i] == 0u || alone;
-    }
-    return bare;
+    bvec4 beyond = bvec4(pixel.x <= 0, pixel.x >= last.x, pixel.y <= 0, pixel.y >= last.y);
+    bool alone = sky_or_cable(key);
+    for (int i = 0; i < 4; ++i) alone = alone && (beyond[i] || sky_or_cable(sides[i]));
+    return key == 0u || alone;
 }
 #endif
 
@@ -112,7 +102,10 @@ void main() {
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
 #if CABLES_NEAR
     uint cables = 0u;
-    bvec4 bare = seen_bare(key, block, middle);
+    uvec4 left = textureGatherOffset(surface_keys, middle, ivec2(-1, 0)).wzxy;
+    uvec4 right = textureGatherOffset(surface_keys, middle, ivec2(1, 0)).wzxy;
+    uvec4 over = textureGatherOffset(surface_keys, middle, ivec2(0, -1)).wzxy;
+    uvec4 under = textureGatherOffset(surface_keys, middle, ivec2(0, 1)).wzxy;
 #endif
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
@@ -120,7 +113,8 @@ void main() {
         if (outside) key[i] = 0u;
         uint bit = 1u << i;
 #if CABLES_NEAR
-        bool covered = !outside && covered_in_part(pixel, bare[i]);
+        bool bare = seen_bare(pixel, key[i], uvec4(left[i], right[i], over[i], under[i]));
+        bool covered = !outside && covered_in_part(pixel, bare);
         if (covered) cables |= bit;
 #endif
         if (key[i] == 0u) continue;
@@ -204,9 +198,13 @@ void main() {
 #endif
 #if CABLES_NEAR
     // in which nothing but sky is seen beside them, though perhaps all samples see sky, or the cable
+#if SAMPLES_PER_AXIS == 1
+    bool bare = seen_bare(pixel, key, uvec4(key_at(middle - ivec2(1, 0)), key_at(middle + ivec2(1, 0)),
+                                            key_at(middle - ivec2(0, 1)), key_at(middle + ivec2(0, 1))));
+#else
     bool bare = true;
-    for (int i = 0; i < FILTER_NEAR; ++i)
-        bare = bare && sky_or_cable(keys[i]);
+    for (int i = 0; i < FILTER_NEAR; ++i) bare = bare && sky_or_cable(keys[i]);
+#endif
     if (covered_in_part(pixel, bare)) list = LIST_CABLE;
 #endif
     if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);
