@@ -72,6 +72,12 @@ def check_order(name: str, pair: tuple[float, float]) -> None:
         raise ConfigError(f"{name}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
 
 
+def check_distinct(name: str, values: Collection[str], hint: str) -> None:
+    """Raise ConfigError that calls them `name` where one stands twice; hint: what to do instead."""
+    if len(set(values)) < len(values):
+        raise ConfigError(f"{name}: one stands twice; {hint}")
+
+
 def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     """`value` if it is a whole number within these limits, of whatever type.
 

@@ -103,11 +103,6 @@ def _joined(address: str | None, count: int | None) -> bool:
     return True
 
 
-def _cpus() -> int:
-    """Of the cluster as it is now."""
-    return int(_ray().cluster_resources().get("CPU", 0))
-
-
 def _probe(address: str) -> None:
     """Fail at once where nobody listens, as Ray tries for minutes and then ends the process."""
     host, _, port = address.rpartition(":")
@@ -253,7 +248,7 @@ class _Crew:
         while self._waiting or self._busy():
             if time.monotonic() - counted >= _POLL_S:
                 counted = time.monotonic()
-                self._hire(_cpus())
+                self._hire(int(ray.cluster_resources().get("CPU", 0)))
             for member in self._members.values():
                 if member.call is None and self._waiting:
                     member.give(self._waiting.take())

@@ -6,7 +6,7 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.damage import LOBE_LIMIT
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import SHEET_FACES
-from fastgen.records import UNIT, Range, bounds, check_known, check_order
+from fastgen.records import UNIT, Range, bounds, check_distinct, check_known, check_order
 
 EXTENT = bounds(5.0, 20000.0, "mm")
 """Of what a face cuts off. Fields are scaled by their extents, which must not vanish."""
@@ -123,8 +123,7 @@ class DamageConfig:
         for i, face in enumerate(self.faces):
             check_known(f"faces[{i}]", face, SHEET_FACES)
         for name in ("kinds", "faces"):
-            if len(set(getattr(self, name))) < len(getattr(self, name)):
-                raise ConfigError(f"{name}: one stands twice; each is as likely as any other")
+            check_distinct(name, getattr(self, name), "each is as likely as any other")
         if not self.faces and set(self.kinds) - {"axis"}:
             raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
         check_order("count", self.count)

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import SHEET_FACES
 from fastgen.prints.artwork import glyph_tiles
-from fastgen.records import LENGTH, UNIT, Range, bounds, check_known, check_order
+from fastgen.records import LENGTH, UNIT, Range, bounds, check_distinct, check_known, check_order
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,6 @@ class MarkingsConfig:
             _, shipped = glyph_tiles()
             for font in self.fonts:
                 check_known("fonts", font, shipped)
-        if len(set(self.marker_faces)) < len(self.marker_faces):
-            raise ConfigError("marker_faces: one stands twice; give more by markers_per_face")
+        check_distinct("marker_faces", self.marker_faces, "give more by markers_per_face")
         for name in ("markers_per_face", "stickers_per_face"):
             check_order(name, getattr(self, name))

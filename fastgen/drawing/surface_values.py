@@ -12,12 +12,7 @@ from fastgen.drawing.programs import REACH_MARGIN_MM, SPREADER_ZONE, noise_devia
 from fastgen.drawing.rust import rusted
 from fastgen.geometry.container_layout import KINDS
 from fastgen.geometry.mesh import MATERIALS, Mesh
-from fastgen.geometry.spreader_parts import (
-    CABLE_CHART,
-    CABLES,
-    Hang,
-    cable_feet_mm,
-)
+from fastgen.geometry.spreader_parts import CABLE_CHART, CABLES, Hang, cable_feet_mm
 from fastgen.light.reflectance import DIELECTRIC_F0, mean_specular_albedo
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
 
