@@ -1,65 +1,228 @@
-"""Images a second to disk, and into CUDA tensors where an NVIDIA GPU draws.
+"""What a GPU gains: images a second to disk, to a training loop and into CUDA tensors.
 
-    python bench/gpu.py [--images 200] [--size 640x640] [--workers 2] [--device-index N]
+    python bench/gpu.py [--qualities draft,balanced,fine] [--size 640x640] [--images 200]
+        [--processes N] [--device-index N]
 
-To disk is `fastgen generate` on EGL's first device, from start to finish. To tensors is one process
-that draws scenes of its own (warm: every light and program was used before) and clones image,
-labels and depth, without objects. Where that cannot be, the reason is printed. Needs PyTorch.
-Leaves bench/results/gpu.json.
+For each quality: milliseconds that the GPU and the processor take for a draw; images a second into
+CUDA tensors, of one process and of N at once, and through fastgen.torch's Loader with N workers,
+boxes and copies to the GPU included; and of `fastgen generate` with N workers, once it runs. Warm:
+lights, shapes and programs were made before. N is by default as many as there are cores. Each
+frame in CUDA's memory is compared with `Generator.render`'s. Where no NVIDIA GPU draws, prints why
+and measures the disk alone. Needs PyTorch. Fills the table in docs/scale.md where all could be
+measured, and leaves bench/results/gpu.json.
 """
 
 import argparse
+import multiprocessing
+import os
+import statistics
 import time
+from dataclasses import asdict, dataclass
+from typing import Any
 
+import numpy as np
 import torch
-from results import machine, origin, parse_size, save
+from results import ROOT, origin, parse_size, save, write_section
 from throughput import whole_run
 
+import fastgen
 from fastgen import Config, Generator
+from fastgen.torch import ContainerDataset, Loader
 
-CAMERAS = tuple(Config.preset().cameras)
+SEED = 7
+COMPARED = 16
+SHARD = 16
+"""Images of a shard of `generate`, and of a batch of the Loader."""
 
 
-def tensor_rate(generator: Generator, images: int) -> float:
-    """Images a second into tensors of their own."""
+@dataclass(frozen=True)
+class Row:
+    """What one quality came to: milliseconds a draw, images a second, and of COMPARED frames how
+    many CUDA has as `render` gives them. None: not to be had here."""
 
-    def run(count: int) -> None:
-        for number in range(count):
-            frame = generator.render_cuda(number // len(CAMERAS), CAMERAS[number % len(CAMERAS)])
-            for array in (frame.image, frame.labels, frame.depth):
-                torch.as_tensor(array, device="cuda").clone()
+    quality: str
+    gpu_ms: float | None
+    cpu_ms: float | None
+    same: int | None
+    tensor: float | None
+    tensors: float | None
+    loader: float | None
+    disk: float
+
+
+def shown(number: int) -> tuple[int, str]:
+    """Scene and camera of image `number`."""
+    names = tuple(Config.preset().cameras)
+    return number // len(names), names[number % len(names)]
+
+
+def in_tensors(generator: Generator, number: int) -> list[torch.Tensor]:
+    """Image, labels and depth of an image, in tensors of their own."""
+    frame = generator.render_cuda(*shown(number))
+    arrays = (frame.image, frame.labels, frame.depth)
+    return [torch.as_tensor(array, device="cuda").clone() for array in arrays]
+
+
+def count_same(generator: Generator) -> int:
+    """Of COMPARED frames, those that CUDA has bit for bit as `render` gives them."""
+    same = 0
+    for number in range(COMPARED):
+        sample = generator.render(*shown(number))
+        image, labels, depth = (t.cpu().numpy() for t in in_tensors(generator, number))
+        pairs = [
+            (image, np.dstack([sample.image, sample.cover])),
+            (labels, sample.ids | sample.damage.astype(np.uint32) << 16),
+            (depth.view(np.uint32), sample.depth.view(np.uint32)),
+        ]
+        same += all(np.array_equal(*pair) for pair in pairs)
+    return same
+
+
+def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
+    """Mean milliseconds of a draw, of the GPU between its first command and its last, and of the
+    processor until all commands are given."""
+    gpu, cpu = [], []
+    with generator._gpu.drawing() as renderer:
+        for number in range(images):
+            index, name = shown(number)
+            scene = generator.scene(index)
+            query = renderer._ctx.query(time=True)
+            began = time.perf_counter()
+            with query:
+                renderer.draw(scene, scene.camera(name), generator.size)
+            cpu.append(time.perf_counter() - began)
+            gpu.append(query.elapsed / 1e6)  # waits for it
+    return statistics.fmean(gpu), statistics.fmean(cpu) * 1e3
+
+
+def fill_tensors(options: argparse.Namespace, quality: str, barrier: Any, spans: Any) -> None:
+    """One process: warm up, then wait for the others, render, and tell from when to when."""
+    size = parse_size(options.size)
+    with Generator(
+        seed=SEED, size=size, backend="egl", quality=quality, device_index=options.device_index
+    ) as generator:
+        generator.preload()
+        for number in range(options.images):
+            in_tensors(generator, number)
         torch.cuda.synchronize()
+        barrier.wait()
+        began = time.perf_counter()
+        for number in range(options.images):
+            in_tensors(generator, number)
+        torch.cuda.synchronize()
+        spans.put((began, time.perf_counter()))
+        barrier.wait()  # nobody's end disturbs the others
 
-    generator.preload()
-    run(images)
-    began = time.perf_counter()
-    run(images)
-    return images / (time.perf_counter() - began)
+
+def tensor_rate(options: argparse.Namespace, quality: str, processes: int) -> float:
+    """Images a second into tensors of so many processes together."""
+    context = multiprocessing.get_context("spawn")
+    barrier, spans = context.Barrier(processes), context.Queue()
+    arguments = options, quality, barrier, spans
+    started = [context.Process(target=fill_tensors, args=arguments) for _ in range(processes)]
+    for process in started:
+        process.start()
+    starts, ends = zip(*(spans.get(timeout=600) for _ in started), strict=True)
+    for process in started:
+        process.join()
+    return processes * options.images / (max(ends) - min(starts))
+
+
+def loader_rate(options: argparse.Namespace, quality: str, workers: int) -> float:
+    """Images a second that reach the GPU through a Loader, in the second half of an epoch, when
+    its workers have met most lights."""
+    length = 4 * workers * -(-options.images // SHARD) * SHARD
+    data = ContainerDataset(
+        "damage",
+        seed=SEED,
+        size=parse_size(options.size),
+        length=length,
+        backend="egl",
+        quality=quality,
+        device_index=options.device_index,
+    )
+    loader = Loader(
+        data, SHARD, num_workers=workers, pin_memory=True, multiprocessing_context="spawn"
+    )
+    came = 0
+    for images, _ in loader:
+        came += len(images)
+        torch.stack(list(images)).cuda(non_blocking=True)
+        torch.cuda.synchronize()
+        if came * 2 == length:
+            began = time.perf_counter()
+    return length / 2 / (time.perf_counter() - began)
+
+
+def measure(options: argparse.Namespace, quality: str, reason: str) -> Row:
+    """One row; reason: why CUDA cannot be reached."""
+    many, size = options.processes, options.size
+    disk = whole_run("egl", size, options.images * many, many, quality).steady
+    if reason:
+        return Row(quality, None, None, None, None, None, None, disk)
+    with Generator(
+        seed=SEED,
+        size=parse_size(size),
+        backend="egl",
+        quality=quality,
+        device_index=options.device_index,
+    ) as generator:
+        generator.preload()
+        same = count_same(generator)
+        draw_ms(generator, options.images)
+        gpu_ms, cpu_ms = draw_ms(generator, options.images)
+    one, all_ = (tensor_rate(options, quality, count) for count in (1, many))
+    return Row(quality, gpu_ms, cpu_ms, same, one, all_, loader_rate(options, quality, many), disk)
+
+
+def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]:
+    """Markdown."""
+    many = options.processes
+    lines = [
+        f"Images of {options.size} on {about}, version {fastgen.__version__}",
+        f"(`python bench/gpu.py`); {many} processes where several work:",
+        "",
+        "| quality | GPU ms a draw | CPU ms a draw | tensors/s, 1 process | tensors/s "
+        "| Loader, images/s | to disk, images/s |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows:
+        cells = [f"{row.gpu_ms:.2f}", f"{row.cpu_ms:.1f}"]
+        cells += [f"{rate:.0f}" for rate in (row.tensor, row.tensors, row.loader, row.disk)]
+        lines.append("| " + " | ".join([f"`{row.quality}`", *cells]) + " |")
+    same, compared = sum(row.same or 0 for row in rows), COMPARED * len(rows)
+    lines += [
+        "",
+        f"{same} of {compared} frames in CUDA's memory are those of `render`, bit for bit.",
+    ]
+    return lines
 
 
 def main() -> None:
-    """Print both rates, or one and the reason."""
+    """Print what each quality comes to, or the reason that there is no more than the disk's."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--images", type=int, default=200)
+    parser.add_argument("--qualities", default="draft,balanced,fine")
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--workers", type=int, default=2, help="of the run to disk")
-    parser.add_argument("--device-index", type=int, help="of the run to tensors, in EGL's order")
+    parser.add_argument("--images", type=int, default=200, help="of each process")
+    parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--device-index", type=int, help="of tensors, in EGL's order")
     options = parser.parse_args()
-    size = parse_size(options.size)
-    about = machine()
-    with Generator(
-        seed=7, size=size, backend="egl", device_index=options.device_index
-    ) as generator:
+    with Generator(backend="egl", device_index=options.device_index) as generator:
         driver, reason = generator.renderer_name, generator.cuda_reason()
-        if not reason and not torch.cuda.is_available():
-            reason = "this build of PyTorch, or its driver, has no CUDA"
-        tensors = None if reason else tensor_rate(generator, options.images)
-    print(f"{about}; {driver}; {options.images} images of {options.size}")
-    disk = whole_run("egl", options.size, options.images, options.workers).whole
-    print(f"to disk, {options.workers} worker(s)  {disk:8.1f} images/s")
-    print(f"to a CUDA tensor  {f'{tensors:8.1f} images/s' if tensors else 'none: ' + reason}")
-    figures = {"to_disk": disk, "to_cuda_tensor": tensors, "reason": reason}
-    save("gpu", {**origin(), "driver": driver, **vars(options), "images_per_s": figures})
+    if not reason and not torch.cuda.is_available():
+        reason = "this build of PyTorch, or its driver, has no CUDA"
+    about = f"{driver} and {origin()['machine']}"
+    print(f"{about}; {options.size}, {options.processes} processes")
+    if reason:
+        print(f"nothing to CUDA: {reason}")
+    rows = []
+    for quality in options.qualities.split(","):
+        rows.append(measure(options, quality, reason))
+        print(rows[-1], flush=True)
+    figures = {**origin(), "driver": driver, "reason": reason, "options": vars(options)}
+    save("gpu", {**figures, "rows": [asdict(row) for row in rows]})
+    if not reason:
+        write_section("gpu", table(rows, about, options), ROOT / "docs" / "scale.md")
 
 
 if __name__ == "__main__":

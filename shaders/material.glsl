@@ -36,36 +36,36 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     vec3 albedo = base.rgb;
     float roughness = base.a;
 
-#if SHOWN(TONE)
+#if SHOWN_TONE
     albedo *= 1.0 + trait.z * tone_variation * (2.0 * coarse.value.x - 1.0);
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
     DecalHit decal = decals_at(zone, albedo, sheet_mm, footprint_mm, coarse);
     s.decal_id = decal.id;
-#if SHOWN(DECALS)
+#if SHOWN_DECALS
     albedo = decal.albedo;
     decal_alpha = decal.alpha;
     roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
 #endif
 #endif
-#if SHOWN(AGEING)
+#if SHOWN_AGEING
     albedo *= 1.0 - 0.85 * trait.z * ageing(corner_mm, narrow_mm, coarse.value.x);
 #endif
-#if SHOWN(REFLECTION)
+#if SHOWN_REFLECTION
     roughness = worn_roughness(roughness, streaks);
 #endif
-#if SHOWN(SCRATCHES)
+#if SHOWN_SCRATCHES
     float scraped = trait.z * scratches(streaks);
     albedo = mix(albedo, vec3(0.38, 0.36, 0.33), 0.5 * scraped);
 #endif
-#if SHOWN(DIRT)
+#if SHOWN_DIRT
     float grime = trait.z * dirt(edge_mm, narrow_mm, streaks);
     albedo = mix(albedo, dirt_albedo, grime);
     roughness = mix(roughness, 0.9, grime);
 #endif
     float rusty = 0.0;
-#if SHOWN(RUST)
+#if SHOWN_RUST
     float sticker = 1.0 - 0.8 * decal_alpha;
     Rust rust = rust_at(edge_mm, narrow_mm, below_mm, (code & ZONE_LEVEL) == 0 ? 1.0 : 0.0,
                         coarse, trait.y);

@@ -21,7 +21,7 @@ Shaded cable(vec2 center) {
     vec3 view = -normalize(ray);
     vec4 base = material_base[CABLE_MATERIAL];
     Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
-#if SHOWN(RUST)
+#if SHOWN_RUST
     steel.albedo = cable_rusted.rgb;
     steel.roughness = mix(steel.roughness, rust_roughness, cable_rusted.a);
     steel.metallic *= 1.0 - cable_rusted.a;

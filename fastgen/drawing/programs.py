@@ -318,7 +318,6 @@ def _constants(
     # lets the vertex stage send an instance to the inner view
     lines = ["#extension GL_ARB_shader_viewport_layer_array : enable"] if damage == "holed" else []
     lines += [f"#define {name} {value}" for name, value in defines.items()]
-    lines.append("#define SHOWN(name) SHOWN_##name")
     lines.append(f"float specular_layer(float roughness) {{ return 0.0{steps}; }}")
     offsets = ", ".join(f"ivec2({x}, {y})" for x, y in lattice.filter)
     weights = ", ".join(f"{weight:.8f}" for weight in lattice.filter.values())
