@@ -4,9 +4,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
+APT_INSTALL := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends
 SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
 
-.PHONY: setup dataset test lint clean system
+.PHONY: setup dataset test lint clean system glslang
 
 setup: $(VENV)/.dev
 
@@ -19,11 +20,15 @@ system:
 	        echo 'As root, run: apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6 python3-venv'; \
 	        exit 1; fi; \
 	    $(SUDO) apt-get update -q && \
-	    $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
-	        libegl1 libegl-mesa0 libgl1-mesa-dri python3-venv && \
-	    { $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
-	        libosmesa6 || echo 'no libosmesa6 in this release: the osmesa backend will be missing'; }; \
+	    $(APT_INSTALL) libegl1 libegl-mesa0 libgl1-mesa-dri python3-venv && \
+	    { $(APT_INSTALL) libosmesa6 || echo 'no libosmesa6 in this release: the osmesa backend will be missing'; }; \
 	else echo 'Install Mesa (EGL, DRI drivers, OSMesa) with your package manager.'; fi
+
+# GLSL's reference compiler, for the tests alone
+glslang:
+	@if command -v glslangValidator >/dev/null; then :; \
+	elif command -v apt-get >/dev/null; then $(SUDO) apt-get update -q && $(APT_INSTALL) glslang-tools; \
+	else echo 'Install glslangValidator with your package manager.'; exit 1; fi
 
 $(BIN)/python: | system
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -48,7 +53,7 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-test: lint
+test: lint glslang
 	$(BIN)/pytest -n 2
 
 clean:

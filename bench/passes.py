@@ -47,6 +47,7 @@ class PassTimer:
             GpuMesh, "draw", lambda program, _: "inside" if program == "holed" else "geometry"
         )
         self._wrap(Shading, "_draw_sky", lambda *_: "sky")
+        self._wrap(Shading, "_store_sky", lambda *_: "sky")
         self._wrap(Shading, "_classify", lambda *_: "classify")
         self._wrap(PixelLists, "dispatch", lambda name, *_: name)
         return self

@@ -28,9 +28,9 @@ class GLContext:
     """A current OpenGL context. A context manager: leaving it releases the context.
 
     ctx: moderngl.Context. backend: 'egl' or 'osmesa'. renderer, vendor, version: the driver's
-    own words. One thread at a time uses it: `let_go` hands it on. Several may live at once, of
-    both backends: call `make_current` before going on with one, and before freeing what was made
-    through `ctx`.
+    own words. software: whether it is one of Mesa's rasterizers on the processor. One thread at a
+    time uses it: `let_go` hands it on. Several may live at once, of both backends: call
+    `make_current` before going on with one, and before freeing what was made through `ctx`.
     """
 
     def __init__(self, native: NativeContext, backend: str) -> None:
@@ -46,6 +46,7 @@ class GLContext:
         self.renderer: str = self.ctx.info["GL_RENDERER"]
         self.vendor: str = self.ctx.info["GL_VENDOR"]
         self.version: str = self.ctx.info["GL_VERSION"]
+        self.software = self.renderer.startswith(("llvmpipe", "softpipe"))
         self._native = native
 
     def function(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:

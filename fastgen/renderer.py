@@ -154,6 +154,7 @@ class Renderer:
                 layer,
                 rays is not None,
                 self._coarse and per_axis == 1,
+                not self._gl.software,
             ),
         )
         shadow = self._shadow(scene)

@@ -54,6 +54,8 @@ class Shading:
 
     They are linked when first needed, and scenes with and without damage share what they can.
     traced: whether light is what rays found, of drawing.light_points. coarse: see Renderer.
+    compute_sky: whether the sky is no fragment shader's: GPUs for data centres have few units for
+    these, and all for compute shaders; llvmpipe takes longer.
     """
 
     def __init__(
@@ -64,10 +66,13 @@ class Shading:
         layer: str,
         traced: bool = False,
         coarse: bool = False,
+        compute_sky: bool = False,
     ) -> None:
         self._ctx = ctx
         self._traced = traced
         self._coarse = coarse
+        self._compute_sky = compute_sky
+        self._sky: moderngl.ComputeShader | None = None
         self._samples_per_axis = samples_per_axis
         self._lookups = lookups
         self._layer = layer
@@ -92,8 +97,12 @@ class Shading:
         disjoint, None where that is not known. cables: likewise, of bundles of them. suns: as many
         as sun_shadow.shader_suns tells, their shadow map bound. bent: if a lens bends the view.
         """
-        self._draw_sky(targets, bent)
-        targets.bind_images()
+        if self._compute_sky:
+            targets.bind_images()
+            self._store_sky(targets.size)
+        else:
+            self._draw_sky(targets, bent)
+            targets.bind_images()
         width, height = targets.size
         for top in range(0, height, targets.lists.rows):
             band = (0, top, width, min(targets.lists.rows, height - top))
@@ -159,6 +168,15 @@ class Shading:
         self._ctx.enable_only(moderngl.DEPTH_TEST if targets.begin() else moderngl.NOTHING)
         self._skies[stages][1].render(moderngl.TRIANGLES, vertices=3 if own else _OCTAHEDRON)
 
+    def _store_sky(self, size: tuple[int, int]) -> None:
+        """Shade all pixels as if they saw sky alone, and store its labels and depth."""
+        if self._sky is None:
+            self._sky = link_compute(
+                self._ctx, "sky.comp", UNITS, **self._variant("plain", "sound")
+            )
+        width, height = size
+        self._sky.run(-(-width // LIST_GROUP), height)
+
     def _shader(self, pixel_class: str, suns: int) -> moderngl.ComputeShader:
         """What shades the listed pixels of a class."""
         key = (pixel_class, suns)
@@ -183,5 +201,7 @@ class Shading:
     def release(self) -> None:
         """Free all GL objects."""
         skies = [item for pair in self._skies.values() for item in reversed(pair)]
+        if self._sky is not None:
+            self._sky.release()
         for item in (*skies, *self._classifiers.values(), *self._shaders.values()):
             item.release()

@@ -1,0 +1,20 @@
+// Shades every pixel as if it saw sky alone, and stores the sky's labels and depth: what else is seen is
+// written over it.
+#version 430 core
+#include "blocks.glsl"
+#include "shade.glsl"
+
+layout(local_size_x = LIST_GROUP) in;   // of a row
+
+layout(r32ui, binding = 0) writeonly uniform uimage2D color_image;   // four bytes, stored as one number
+layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
+layout(r32f, binding = 2) writeonly uniform image2D depth_image;
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= imageSize(color_image).x) return;
+    Shaded s = sky(view_ray(vec2(pixel) + 0.5));
+    imageStore(color_image, pixel, uvec4(packUnorm4x8(vec4(developed(s.color), s.cover))));
+    imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
+    imageStore(depth_image, pixel, vec4(s.depth));
+}
