@@ -63,6 +63,19 @@ def in_tensors(generator: Generator, number: int) -> list[torch.Tensor]:
     return [torch.as_tensor(array, device="cuda").clone() for array in arrays]
 
 
+def opened(options: argparse.Namespace, quality: str) -> Generator:
+    """A generator whose lights and shapes are made."""
+    generator = Generator(
+        seed=SEED,
+        size=parse_size(options.size),
+        backend="egl",
+        quality=quality,
+        device_index=options.device_index,
+    )
+    generator.preload()
+    return generator
+
+
 def count_same(generator: Generator) -> int:
     """Of COMPARED frames, those that CUDA has bit for bit as `render` gives them."""
     same = 0
@@ -95,42 +108,44 @@ def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
     return statistics.fmean(gpu), statistics.fmean(cpu) * 1e3
 
 
-def fill_tensors(options: argparse.Namespace, quality: str, barrier: Any, spans: Any) -> None:
-    """One process: warm up, then wait for the others, render, and tell from when to when."""
-    size = parse_size(options.size)
-    with Generator(
-        seed=SEED, size=size, backend="egl", quality=quality, device_index=options.device_index
-    ) as generator:
-        generator.preload()
-        for number in range(options.images):
-            in_tensors(generator, number)
-        torch.cuda.synchronize()
+def fill_tensors(generator: Generator, images: int) -> tuple[float, float]:
+    """From when to when images come into tensors."""
+    began = time.perf_counter()
+    for number in range(images):
+        in_tensors(generator, number)
+    torch.cuda.synchronize()
+    return began, time.perf_counter()
+
+
+def fill_beside_others(options: argparse.Namespace, quality: str, barrier: Any, spans: Any) -> None:
+    """One process of several: warm up, then wait for the others, and fill tensors."""
+    with opened(options, quality) as generator:
+        fill_tensors(generator, options.images)
         barrier.wait()
-        began = time.perf_counter()
-        for number in range(options.images):
-            in_tensors(generator, number)
-        torch.cuda.synchronize()
-        spans.put((began, time.perf_counter()))
+        spans.put(fill_tensors(generator, options.images))
         barrier.wait()  # nobody's end disturbs the others
 
 
-def tensor_rate(options: argparse.Namespace, quality: str, processes: int) -> float:
-    """Images a second into tensors of so many processes together."""
+def tensor_rate(options: argparse.Namespace, quality: str) -> float:
+    """Images a second into tensors of all processes together."""
     context = multiprocessing.get_context("spawn")
-    barrier, spans = context.Barrier(processes), context.Queue()
+    barrier, spans = context.Barrier(options.processes), context.Queue()
     arguments = options, quality, barrier, spans
-    started = [context.Process(target=fill_tensors, args=arguments) for _ in range(processes)]
+    started = [
+        context.Process(target=fill_beside_others, args=arguments) for _ in range(options.processes)
+    ]
     for process in started:
         process.start()
     starts, ends = zip(*(spans.get(timeout=600) for _ in started), strict=True)
     for process in started:
         process.join()
-    return processes * options.images / (max(ends) - min(starts))
+    return len(started) * options.images / (max(ends) - min(starts))
 
 
-def loader_rate(options: argparse.Namespace, quality: str, workers: int) -> float:
+def loader_rate(options: argparse.Namespace, quality: str) -> float:
     """Images a second that reach the GPU through a Loader, in the second half of an epoch, when
     its workers have met most lights."""
+    workers = options.processes
     length = 4 * workers * -(-options.images // SHARD) * SHARD
     data = ContainerDataset(
         "damage",
@@ -156,23 +171,17 @@ def loader_rate(options: argparse.Namespace, quality: str, workers: int) -> floa
 
 def measure(options: argparse.Namespace, quality: str, reason: str) -> Row:
     """One row; reason: why CUDA cannot be reached."""
-    many, size = options.processes, options.size
-    disk = whole_run("egl", size, options.images * many, many, quality).steady
+    many = options.processes
+    disk = whole_run("egl", options.size, options.images * many, many, quality).steady
     if reason:
         return Row(quality, None, None, None, None, None, None, disk)
-    with Generator(
-        seed=SEED,
-        size=parse_size(size),
-        backend="egl",
-        quality=quality,
-        device_index=options.device_index,
-    ) as generator:
-        generator.preload()
+    with opened(options, quality) as generator:
         same = count_same(generator)
-        draw_ms(generator, options.images)
+        fill_tensors(generator, options.images)
+        began, ended = fill_tensors(generator, options.images)
         gpu_ms, cpu_ms = draw_ms(generator, options.images)
-    one, all_ = (tensor_rate(options, quality, count) for count in (1, many))
-    return Row(quality, gpu_ms, cpu_ms, same, one, all_, loader_rate(options, quality, many), disk)
+    one, together = options.images / (ended - began), tensor_rate(options, quality)
+    return Row(quality, gpu_ms, cpu_ms, same, one, together, loader_rate(options, quality), disk)
 
 
 def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]:

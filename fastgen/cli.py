@@ -202,6 +202,12 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--backend", default="auto", metavar="|".join(BACKENDS), help="default: %(default)s"
         )
+        command.add_argument(
+            "--device-index",
+            type=int,
+            metavar="N",
+            help="which of EGL's devices draws, as doctor numbers them; default: one that works",
+        )
 
     for command in (make, config, show, export):
         command.add_argument(
@@ -275,6 +281,7 @@ def _generate(options: argparse.Namespace) -> int:
         cameras=cameras,
         hdri_dir=options.hdri,
         backend=options.backend,
+        device_index=options.device_index,
         fmt=options.format,
         quality=options.quality,
         formats=tuple(options.also.split(",")) if options.also else (),
@@ -318,6 +325,7 @@ def _show(options: argparse.Namespace) -> int:
         _size(options.size),
         backend=options.backend,
         hdri_dir=options.hdri,
+        device_index=options.device_index,
         quality=options.quality,
     ) as generator:
         sample = generator.render(index=options.index, camera=options.camera, layer=drawn)
@@ -343,6 +351,7 @@ def _export(options: argparse.Namespace) -> int:
         _size(options.size),
         backend=options.backend,
         hdri_dir=options.hdri,
+        device_index=options.device_index,
     ) as generator:
         scene = generator.scene(options.index)
         cameras = None if options.camera is None else [find_camera(scene, options.camera)]

@@ -190,7 +190,13 @@ def _settings(job: Job) -> dict[str, Any]:
 
     # validates seed and size without opening GL
     generator = Generator(
-        job.config, job.seed, job.size, hdri_dir=job.hdri_dir, quality=job.quality
+        job.config,
+        job.seed,
+        job.size,
+        backend=job.backend,
+        hdri_dir=job.hdri_dir,
+        quality=job.quality,
+        device_index=job.device_index,
     )
     names = generator.environments
     generator.scene(0)  # what only sampling can refuse is refused before anything is written

@@ -22,7 +22,7 @@ from fastgen.drawing.programs import LAYERS
 from fastgen.drawing.shapes import shadow_casters, spreader_outline
 from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.errors import ConfigError
-from fastgen.gl import BACKENDS, open_context
+from fastgen.gl import BACKENDS, check_device, open_context
 from fastgen.labelling.visibility import Shot
 from fastgen.labels import label
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
@@ -139,6 +139,7 @@ class Generator:
                 )
         if device_index is not None:
             device_index = whole("device_index", device_index)
+        check_device(backend, device_index)
         if not isinstance(hdri_dir, str | Path | None):
             raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)

@@ -107,9 +107,8 @@ def open_context(
         if threads < 0:
             raise ConfigError(f"threads: {threads} is no count; give 0 or more")
         os.environ.setdefault("LP_NUM_THREADS", str(threads))
+    check_device(backend, device_index)
     if device_index is not None:
-        if backend == "osmesa":
-            raise ConfigError(f"device_index: {device_index}: osmesa has no devices; use egl")
         backend = "egl"
     spare_full_disk()
     failures = []
@@ -121,6 +120,12 @@ def open_context(
         except ContextError as error:
             failures.append(str(error))
     raise ContextError("; ".join(failures))
+
+
+def check_device(backend: str, device_index: int | None) -> None:
+    """Raise ConfigError where `backend` has no devices to choose from."""
+    if device_index is not None and backend == "osmesa":
+        raise ConfigError(f"device_index: {device_index}: osmesa has no devices; use egl")
 
 
 def egl_devices() -> list[EglDevice]:

@@ -32,6 +32,15 @@ from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
         (["generate", "file://{full}/", "--images", "2"], "holds something else"),
         (["generate", "memory:///", "--images", "2"], "memory:///: is the memory of this process"),
         (["generate", "{out}", "--images", "2", "--seed", "-1"], "seed: -1"),
+        (
+            ["generate", "{out}", "--images", "2", "--backend", "osmesa", "--device-index", "0"],
+            "device_index: 0: osmesa has no devices",
+        ),
+        (["show", "--index", "0", "--device-index", "99", "-o", "{out}.png"], "no device 99 among"),
+        (
+            ["export", "--index", "0", "--device-index", "99", "-o", "{out}.glb"],
+            "no device 99 among",
+        ),
         (["show", "--index", "0", "--layer", "rusty", "-o", "{out}.png"], "did you mean rust"),
         (["show", "--index", "0", "-o", "{out}.gif"], "ends in .png or .jpg"),
         (["verify", "{empty}"], "no readable dataset.json; give a dataset's folder"),
@@ -55,6 +64,13 @@ def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, 
     assert error.count("\n") == 1
     assert message in error
     assert not list(tmp_path.glob("out*"))
+
+
+def test_workers_draw_on_the_device_that_is_named_or_not_at_all(tmp_path, capsys):
+    command = ["generate", str(tmp_path / "out"), "--images", "2", "--size", "64x64"]
+    assert main([*command, "--device-index", "99"]) == 2
+    assert "there is no device 99 among" in capsys.readouterr().err
+    assert main([*command, "--device-index", "0"]) == 0
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,7 @@ class Job:
     cameras: tuple[str, ...]
     hdri_dir: str | None
     backend: str
+    device_index: int | None = None
     fmt: str = "seafront"
     formats: tuple[str, ...] = ()
     quality: str = "balanced"
@@ -164,6 +165,7 @@ class Maker:
             backend=job.backend,
             hdri_dir=job.hdri_dir,
             quality=job.quality,
+            device_index=job.device_index,
         )
         if job.images > _PRELOAD_IMAGES:
             self._generator.preload(lambda: report("busy", None))
