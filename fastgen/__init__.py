@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from fastgen.generator import Generator
 
 __all__ = ["Config", "FastgenError", "Generator"]
-__version__ = "0.22.0"
+__version__ = "0.23.0"
 
 _HOMES = {"Config": "config", "FastgenError": "errors", "Generator": "generator"}
 
