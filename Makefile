@@ -25,9 +25,12 @@ system:
 	else echo 'Install Mesa (EGL, DRI drivers, OSMesa) with your package manager.'; fi
 
 # GLSL's reference compiler, for the tests alone
-glslang:
+glslang: | system
 	@if command -v glslangValidator >/dev/null; then :; \
-	elif command -v apt-get >/dev/null; then $(SUDO) apt-get update -q && $(APT_INSTALL) glslang-tools; \
+	elif command -v apt-get >/dev/null; then \
+	    if [ "$$(id -u)" != 0 ] && [ -z "$(SUDO)" ]; then \
+	        echo 'As root, run: apt-get install glslang-tools'; exit 1; fi; \
+	    $(SUDO) apt-get update -q && $(APT_INSTALL) glslang-tools; \
 	else echo 'Install glslangValidator with your package manager.'; exit 1; fi
 
 $(BIN)/python: | system
@@ -53,7 +56,7 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-test: lint glslang
+test: glslang lint
 	$(BIN)/pytest -n 2
 
 clean:

@@ -16,22 +16,26 @@ import cv2
 import numpy as np
 
 TASKS = ("container", "imdg", "damage")  # those with boxes in COCO's format
+SETTINGS = ("version", "seed", "size", "quality", "cameras", "config", "images")
 FAR = 16
 """Steps of 255 by which a pixel is off that one would see."""
 
 
 def pairs(one: Path, other: Path, pattern: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pictures of the same name; of masks that are in one alone, the other's is empty."""
+    """Pictures of the same name; of what is in one alone, the other's is black."""
     names = {path.relative_to(folder) for folder in (one, other) for path in folder.glob(pattern)}
     for name in sorted(names):
         read = [cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED) for folder in (one, other)]
-        found = next(image for image in read if image is not None)
-        first, second = (np.zeros_like(found) if image is None else image for image in read)
+        found = [image for image in read if image is not None]
+        if not found:
+            raise SystemExit(f"{one / name}: is no picture; see fastgen verify {one}")
+        first, second = (np.zeros_like(found[0]) if image is None else image for image in read)
         yield first, second
 
 
 def boxes(folder: Path, task: str) -> dict[tuple[str, int, int], np.ndarray]:
-    """Edges (left, top, right, bottom) by picture, class, and which of these it is there."""
+    """Edges (left, top, right, bottom) by picture, class, and place in the order of these: where
+    one is missing, those after it are taken for others."""
     found: dict[tuple[str, int, int], np.ndarray] = {}
     for path in sorted((folder / task).glob("coco_*.json")):
         coco = json.loads(path.read_text(encoding="utf-8"))
@@ -58,9 +62,12 @@ def main() -> None:
     parser.add_argument("other", type=Path)
     options = parser.parse_args()
     folders = options.one, options.other
-    for folder in folders:
-        made = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))
-        print(f"{folder}: {made['images']} images, {made['renderer']}")
+    made = [json.loads((folder / "dataset.json").read_text(encoding="utf-8")) for folder in folders]
+    unlike = [name for name in SETTINGS if made[0][name] != made[1][name]]
+    if unlike:
+        raise SystemExit(f"{options.one} and {options.other}: differ in {', '.join(unlike)}")
+    for folder, settings in zip(folders, made, strict=True):
+        print(f"{folder}: {settings['images']} images, {settings['renderer']}")
     apart = [
         np.abs(np.subtract(one, other, dtype=np.int16))
         for one, other in pairs(*folders, "images/*/*")
@@ -70,8 +77,8 @@ def main() -> None:
     print(f"pictures: {mean:.2f} of 255 apart, {1e6 * far:.0f} in a million pixels by over {FAR}")
     masks = list(pairs(*folders, "damage/masks/*/*"))
     differing = sum(int((one != other).sum()) for one, other in masks)
-    marked = sum(int((one > 0).sum()) for one, _ in masks)
-    print(f"damage masks: {differing} pixels differ; {marked} are marked")
+    labelled = sum(int((one > 0).sum()) for one, _ in masks)
+    print(f"damage masks: {differing} pixels differ, of {labelled} that show the container")
     for task in TASKS:
         first, second = (boxes(folder, task) for folder in folders)
         steps = [np.abs(first[key] - second[key]).max() for key in first.keys() & second.keys()]

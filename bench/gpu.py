@@ -1,15 +1,16 @@
-"""What a GPU gains: images a second to disk, to a training loop and into CUDA tensors.
+"""What a GPU gains: images a second to disk, to a training loop and into CUDA's memory.
 
-    python bench/gpu.py [--qualities draft,balanced,fine] [--size 640x640] [--images 200]
+    python bench/gpu.py [--qualities draft,balanced] [--size 640x640] [--images 120]
         [--processes N] [--device-index N]
 
-For each quality: milliseconds that the GPU and the processor take for a draw; images a second into
-CUDA tensors, of one process and of N at once, and through fastgen.torch's Loader with N workers,
-boxes and copies to the GPU included; and of `fastgen generate` with N workers, once it runs. Warm:
-lights, shapes and programs were made before. N is by default as many as there are cores. Each
-frame in CUDA's memory is compared with `Generator.render`'s. Where no NVIDIA GPU draws, prints why
-and measures the disk alone. Needs PyTorch. Fills the table in docs/scale.md where all could be
-measured, and leaves bench/results/gpu.json.
+For each quality: milliseconds that the GPU takes for a draw, from its first command to its last,
+and that the processor takes to give these; frames a second into CUDA's memory, each cloned to
+tensors of image, labels and depth, by one process and by N at once; images a second through
+fastgen.torch's Loader with N workers, copied to the GPU, their boxes made beside them; and of
+`fastgen generate` with N workers, once it runs. Warm: lights, shapes and programs were made before.
+N is by default as many as there are cores. Some frames in CUDA's memory are compared with
+`Generator.render`'s. Where no NVIDIA GPU draws, prints why and the disk's rate alone. Needs
+PyTorch. On a GPU it fills the table in docs/scale.md and leaves bench/results/gpu.json.
 """
 
 import argparse
@@ -29,31 +30,37 @@ import fastgen
 from fastgen import Config, Generator
 from fastgen.torch import ContainerDataset, Loader
 
+CAMERAS = tuple(Config.preset().cameras)
 SEED = 7
 COMPARED = 16
 SHARD = 16
-"""Images of a shard of `generate`, and of a batch of the Loader."""
+"""Images of a batch of the Loader, and by default of a shard of `generate`."""
+
+LONGEST_S = 300
+"""For one process to be ready; if another has died, nobody waits longer."""
 
 
 @dataclass(frozen=True)
 class Row:
     """What one quality came to: milliseconds a draw, images a second, and of COMPARED frames how
-    many CUDA has as `render` gives them. None: not to be had here."""
+    many CUDA has as `render` gives them.
+
+    alone, together: into CUDA's memory, by one process and by all.
+    """
 
     quality: str
-    gpu_ms: float | None
-    cpu_ms: float | None
-    same: int | None
-    tensor: float | None
-    tensors: float | None
-    loader: float | None
+    gpu_ms: float
+    cpu_ms: float
+    same: int
+    alone: float
+    together: float
+    loader: float
     disk: float
 
 
 def shown(number: int) -> tuple[int, str]:
     """Scene and camera of image `number`."""
-    names = tuple(Config.preset().cameras)
-    return number // len(names), names[number % len(names)]
+    return number // len(CAMERAS), CAMERAS[number % len(CAMERAS)]
 
 
 def in_tensors(generator: Generator, number: int) -> list[torch.Tensor]:
@@ -96,10 +103,10 @@ def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
     processor until all commands are given."""
     gpu, cpu = [], []
     with generator._gpu.drawing() as renderer:
+        query = renderer._ctx.query(time=True)
         for number in range(images):
             index, name = shown(number)
             scene = generator.scene(index)
-            query = renderer._ctx.query(time=True)
             began = time.perf_counter()
             with query:
                 renderer.draw(scene, scene.camera(name), generator.size)
@@ -126,17 +133,17 @@ def fill_beside_others(options: argparse.Namespace, quality: str, barrier: Any, 
         barrier.wait()  # nobody's end disturbs the others
 
 
-def tensor_rate(options: argparse.Namespace, quality: str) -> float:
-    """Images a second into tensors of all processes together."""
+def rate_together(options: argparse.Namespace, quality: str) -> float:
+    """Frames a second of all processes together."""
     context = multiprocessing.get_context("spawn")
-    barrier, spans = context.Barrier(options.processes), context.Queue()
+    barrier, spans = context.Barrier(options.processes, timeout=LONGEST_S), context.Queue()
     arguments = options, quality, barrier, spans
     started = [
         context.Process(target=fill_beside_others, args=arguments) for _ in range(options.processes)
     ]
     for process in started:
         process.start()
-    starts, ends = zip(*(spans.get(timeout=600) for _ in started), strict=True)
+    starts, ends = zip(*(spans.get(timeout=LONGEST_S) for _ in started), strict=True)
     for process in started:
         process.join()
     return len(started) * options.images / (max(ends) - min(starts))
@@ -169,37 +176,41 @@ def loader_rate(options: argparse.Namespace, quality: str) -> float:
     return length / 2 / (time.perf_counter() - began)
 
 
-def measure(options: argparse.Namespace, quality: str, reason: str) -> Row:
-    """One row; reason: why CUDA cannot be reached."""
+def disk_rate(options: argparse.Namespace, quality: str) -> float:
+    """Images a second of `fastgen generate`."""
     many = options.processes
-    disk = whole_run("egl", options.size, options.images * many, many, quality).steady
-    if reason:
-        return Row(quality, None, None, None, None, None, None, disk)
+    images, device = options.images * many, options.device_index
+    return whole_run("egl", options.size, images, many, quality, device).steady
+
+
+def measure(options: argparse.Namespace, quality: str) -> Row:
+    """One row."""
+    disk = disk_rate(options, quality)
     with opened(options, quality) as generator:
         same = count_same(generator)
         fill_tensors(generator, options.images)
         began, ended = fill_tensors(generator, options.images)
         gpu_ms, cpu_ms = draw_ms(generator, options.images)
-    one, together = options.images / (ended - began), tensor_rate(options, quality)
-    return Row(quality, gpu_ms, cpu_ms, same, one, together, loader_rate(options, quality), disk)
+    alone, together = options.images / (ended - began), rate_together(options, quality)
+    return Row(quality, gpu_ms, cpu_ms, same, alone, together, loader_rate(options, quality), disk)
 
 
 def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]:
     """Markdown."""
     many = options.processes
     lines = [
-        f"Images of {options.size} on {about}, version {fastgen.__version__}",
+        f"Images of {options.size} on {about}",
         f"(`python bench/gpu.py`); {many} processes where several work:",
         "",
-        "| quality | GPU ms a draw | CPU ms a draw | tensors/s, 1 process | tensors/s "
-        "| Loader, images/s | to disk, images/s |",
+        "| quality | GPU ms a draw | CPU ms a draw | frames/s into CUDA, 1 process | "
+        f"{many} processes | Loader, images/s | to disk, images/s |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in rows:
         cells = [f"{row.gpu_ms:.2f}", f"{row.cpu_ms:.1f}"]
-        cells += [f"{rate:.0f}" for rate in (row.tensor, row.tensors, row.loader, row.disk)]
+        cells += [f"{rate:.0f}" for rate in (row.alone, row.together, row.loader, row.disk)]
         lines.append("| " + " | ".join([f"`{row.quality}`", *cells]) + " |")
-    same, compared = sum(row.same or 0 for row in rows), COMPARED * len(rows)
+    same, compared = sum(row.same for row in rows), COMPARED * len(rows)
     lines += [
         "",
         f"{same} of {compared} frames in CUDA's memory are those of `render`, bit for bit.",
@@ -210,11 +221,11 @@ def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]
 def main() -> None:
     """Print what each quality comes to, or the reason that there is no more than the disk's."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--qualities", default="draft,balanced,fine")
+    parser.add_argument("--qualities", default="draft,balanced")
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--images", type=int, default=200, help="of each process")
+    parser.add_argument("--images", type=int, default=120, help="of each process")
     parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--device-index", type=int, help="of tensors, in EGL's order")
+    parser.add_argument("--device-index", type=int, help="in EGL's order")
     options = parser.parse_args()
     with Generator(backend="egl", device_index=options.device_index) as generator:
         driver, reason = generator.renderer_name, generator.cuda_reason()
@@ -222,16 +233,20 @@ def main() -> None:
         reason = "this build of PyTorch, or its driver, has no CUDA"
     about = f"{driver} and {origin()['machine']}"
     print(f"{about}; {options.size}, {options.processes} processes")
+    qualities = options.qualities.split(",")
     if reason:
         print(f"nothing to CUDA: {reason}")
+        for quality in qualities:
+            print(f"{quality}: {disk_rate(options, quality):.1f} images/s to disk", flush=True)
+        return
     rows = []
-    for quality in options.qualities.split(","):
-        rows.append(measure(options, quality, reason))
+    for quality in qualities:
+        rows.append(measure(options, quality))
         print(rows[-1], flush=True)
-    figures = {**origin(), "driver": driver, "reason": reason, "options": vars(options)}
+    figures = {**origin(), "driver": driver, "options": vars(options)}
     save("gpu", {**figures, "rows": [asdict(row) for row in rows]})
-    if not reason:
-        write_section("gpu", table(rows, about, options), ROOT / "docs" / "scale.md")
+    about = f"{about}, version {fastgen.__version__}"
+    write_section("gpu", table(rows, about, options), ROOT / "docs" / "scale.md")
 
 
 if __name__ == "__main__":

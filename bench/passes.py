@@ -6,7 +6,8 @@
 Prints, for each camera, core-milliseconds (process CPU time, so other load on the machine counts
 little) and thousands of pixels of each pass in one process, means over scenes of the least of
 `repeats` draws. Each pass is waited for by itself, which a real frame is not. What draft shades at
-once counts as one pixel.
+once counts as one pixel. Where a GPU draws, milliseconds are the GPU's by its own clock, and pixels
+are not counted: a list that was read back is slow from then on.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import statistics
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 # one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
@@ -32,10 +34,14 @@ from fastgen.generator import QUALITY
 
 
 class PassTimer:
-    """Stands in front of the methods that draw; leaving it puts them back."""
+    """Stands in front of the methods that draw; leaving it puts them back.
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    on_gpu: whether times are a GPU's, else the process's.
+    """
+
+    def __init__(self, ctx: moderngl.Context, on_gpu: bool) -> None:
         self._ctx = ctx
+        self.on_gpu = on_gpu
         self._kept: list[tuple[type, str, Callable[..., Any]]] = []
         self.count_pixels = False
         self.seconds: dict[str, float] = {}
@@ -71,13 +77,23 @@ class PassTimer:
                 count = len(this.entries()[name]) if listed else query.samples
                 self.pixels[name] = self.pixels.get(name, 0) + count
                 return
-            self._ctx.finish()
-            began = time.process_time()
-            original(this, *args, **named_args)
-            self._ctx.finish()
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - began
+            spent = self.spent(lambda: original(this, *args, **named_args))
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
 
         setattr(owner, method, timed)
+
+    def spent(self, work: Callable[[], Any]) -> float:
+        """Seconds that drawing takes."""
+        self._ctx.finish()
+        if self.on_gpu:
+            query = self._ctx.query(time=True)
+            with query:
+                work()
+            return query.elapsed / 1e9
+        began = time.process_time()
+        work()
+        self._ctx.finish()
+        return time.process_time() - began
 
 
 def measure(
@@ -88,32 +104,29 @@ def measure(
     drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with Generator(config, seed=7, size=size, backend="egl", quality=quality) as generator:
         renderer = generator._gpu.renderer()
-        ctx = renderer._ctx
+        ctx, on_gpu = renderer._ctx, not generator._gpu.context().software
         for index in range(scenes):
             scene = generator.scene(index)
             for camera in scene.cameras:
-                renderer.draw(scene, camera, size)
-                whole = []
-                for _ in range(repeats):
-                    ctx.finish()
-                    began = time.process_time()
-                    renderer.draw(scene, camera, size)
-                    ctx.finish()
-                    whole.append(time.process_time() - began)
-                spent[camera.name]["draw"].append(min(whole) * 1e3)
-                with PassTimer(ctx) as timer:
-                    timer.count_pixels = True
-                    renderer.draw(scene, camera, size)
+                timer = PassTimer(ctx, on_gpu)
+                draw = partial(renderer.draw, scene, camera, size)
+                draw()
+                spent[camera.name]["draw"].append(
+                    min(timer.spent(draw) for _ in range(repeats)) * 1e3
+                )
+                with timer:
+                    timer.count_pixels = not on_gpu
+                    draw()
                     timer.count_pixels = False
                     least: dict[str, float] = {}
                     for _ in range(repeats):
                         timer.seconds = {}
-                        renderer.draw(scene, camera, size)
+                        draw()
                         for name, value in timer.seconds.items():
                             least[name] = min(least.get(name, value), value)
                 for name, value in least.items():
                     spent[camera.name][name].append(value * 1e3)
-                    drawn[camera.name][name].append(timer.pixels[name])
+                    drawn[camera.name][name].append(timer.pixels.get(name, 0))
     # a pass that a scene does without counts as nothing there
     mean_ms = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in spent.items()}
     pixels = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in drawn.items()}

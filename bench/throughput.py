@@ -103,13 +103,19 @@ def stages(
 
 
 def generate_command(
-    out: str, images: int, workers: int, size: str, backend: str, quality: str = "balanced"
+    out: str,
+    images: int,
+    workers: int,
+    size: str,
+    backend: str,
+    quality: str = "balanced",
+    device_index: int | None = None,
 ) -> list[str]:
     """The command line that makes a dataset of `images` images in the folder `out`."""
     command = [sys.executable, "-m", "fastgen", "generate", out, "--images", str(images)]
     command += ["--size", size, "--seed", "7", "--workers", str(workers)]
     command += ["--backend", backend, "--quality", quality]
-    return command
+    return command if device_index is None else [*command, "--device-index", str(device_index)]
 
 
 class Rate(NamedTuple):
@@ -121,12 +127,17 @@ class Rate(NamedTuple):
 
 
 def whole_run(
-    backend: str, size: str, images: int, workers: int, quality: str = "balanced"
+    backend: str,
+    size: str,
+    images: int,
+    workers: int,
+    quality: str = "balanced",
+    device_index: int | None = None,
 ) -> Rate:
     """How fast the command makes a dataset."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
-        command = generate_command(str(out), images, workers, size, backend, quality)
+        command = generate_command(str(out), images, workers, size, backend, quality, device_index)
         began = time.perf_counter()
         subprocess.run(
             command,

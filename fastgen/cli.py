@@ -202,12 +202,7 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--backend", default="auto", metavar="|".join(BACKENDS), help="default: %(default)s"
         )
-        command.add_argument(
-            "--device-index",
-            type=int,
-            metavar="N",
-            help="which of EGL's devices draws, as doctor numbers them; default: one that works",
-        )
+        _add_device(command)
 
     for command in (make, config, show, export):
         command.add_argument(
@@ -238,12 +233,22 @@ def _parser() -> argparse.ArgumentParser:
     )
     command.add_argument("--workers", type=int, metavar="K", help="of a repair: default one a core")
     _add_hdri(command)
+    _add_device(command)
     commands.add_parser("doctor", help="try the OpenGL backends").set_defaults(run=_doctor)
     return parser
 
 
 def _add_hdri(command: argparse.ArgumentParser) -> None:
     command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
+
+
+def _add_device(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--device-index",
+        type=int,
+        metavar="N",
+        help="which of EGL's devices draws, as doctor numbers them; default: one that works",
+    )
 
 
 def _place(text: str) -> str:
@@ -366,7 +371,7 @@ def _stats(options: argparse.Namespace) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     if options.repair:
-        mended, faults = repair(options.out, _workers(options), options.hdri)
+        mended, faults = repair(options.out, _workers(options), options.hdri, options.device_index)
         for fault in mended:
             tell(f"mended: {fault}")
         hint = ""

@@ -188,7 +188,7 @@ def _checked(job: Job, worker_count: int) -> Job:
 def _settings(job: Job) -> dict[str, Any]:
     from fastgen import __version__
 
-    # validates seed and size without opening GL
+    # validates seed, size and device without opening GL
     generator = Generator(
         job.config,
         job.seed,
@@ -270,7 +270,7 @@ def _made(job: Job, storage: Folder | Remote, old: Mapping[str, Any]) -> dict[in
 def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dict[str, Any]:
     """Write the files over all samples, and dataset.json, which seals everything, last."""
     shards: dict[str, str] = {}
-    made_by: dict[str, str] = {}
+    makers: list[dict[str, str]] = []
     failed: list[dict[str, Any]] = []
     images: list[tuple[str, str]] = []
     counts = {
@@ -280,7 +280,9 @@ def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dic
         data = storage.read(manifest_path(shard))
         shards[str(shard)] = digest(data)
         manifest = json.loads(data)
-        made_by = made_by or {name: manifest[name] for name in MADE_BY}
+        made_by = {name: manifest[name] for name in MADE_BY}
+        if made_by not in makers:
+            makers.append(made_by)
         failed += manifest["failed"]
         for record in manifest["records"]:
             counts[record["split"]].update(_counts(record))
@@ -304,7 +306,7 @@ def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dic
             put(CONTACT_SHEET, [png(contact_sheet(storage.root, images))])
     result = {
         **settings,
-        **made_by,
+        **makers[0],
         "images": job.images,
         "counts": {split: dict(count) for split, count in counts.items()},
         "failed": failed,
@@ -312,6 +314,9 @@ def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dic
         "shards": shards,
     }
     storage.write(MANIFEST, [seal(unsealed(result))])
+    if len(makers) > 1:
+        names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
+        say(f"fastgen: {job.out} was drawn by {names}: they may round differently")
     return result
 
 

@@ -46,7 +46,7 @@ class GLContext:
         self.renderer: str = self.ctx.info["GL_RENDERER"]
         self.vendor: str = self.ctx.info["GL_VENDOR"]
         self.version: str = self.ctx.info["GL_VERSION"]
-        self.software = self.renderer.startswith(("llvmpipe", "softpipe"))
+        self.software = is_software(self.renderer)
         self._native = native
 
     def function(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
@@ -87,6 +87,11 @@ class GLContext:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def is_software(renderer: str) -> bool:
+    """Whether a driver of this name draws on the processor, or has one that does draw for it."""
+    return any(name in renderer for name in ("llvmpipe", "softpipe"))
 
 
 def open_context(

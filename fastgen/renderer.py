@@ -152,9 +152,9 @@ class Renderer:
                 per_axis,
                 self._lookups,
                 layer,
-                rays is not None,
-                self._coarse and per_axis == 1,
-                not self._gl.software,
+                traced=rays is not None,
+                coarse=self._coarse and per_axis == 1,
+                compute_sky=not self._gl.software,
             ),
         )
         shadow = self._shadow(scene)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -24,6 +25,7 @@ from fastgen.generate import generate
 from fastgen.generator import Generator
 from fastgen.sampling import split_of
 from fastgen.scene import Scene
+from tests.backends import needs_osmesa
 from tests.folders import content
 
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
@@ -192,6 +194,15 @@ def test_more_images_extend_a_dataset(dataset, tmp_path):
     after = content(out / "images")
     assert len(after) == 17
     assert before.items() <= after.items()
+
+
+@needs_osmesa
+def test_who_else_drew_some_of_it_is_told(tmp_path, capfd):
+    command = ["generate", str(tmp_path / "out"), "--size", "64x64", "--shard", "1", "--images"]
+    assert main([*command, "4", "--backend", "egl"]) == 0
+    assert "was drawn by" not in capfd.readouterr().err
+    assert main([*command, "8", "--backend", "osmesa"]) == 0
+    assert re.search(r"was drawn by egl \S.* and by osmesa \S.*: they", capfd.readouterr().err)
 
 
 def test_verify_passes_sound_data(dataset):

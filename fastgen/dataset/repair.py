@@ -1,5 +1,6 @@
 """`fastgen verify --repair`: what is damaged or missing made again, and nothing else."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,16 @@ from fastgen.generate import check_count, check_goes_on, generate
 
 
 def repair(
-    out: str, worker_count: int, hdri_dir: str | Path | None = None
+    out: str,
+    worker_count: int,
+    hdri_dir: str | Path | None = None,
+    device_index: int | None = None,
 ) -> tuple[list[str], list[str]]:
     """Make again every shard with a file that is not as it was written, and scenes that failed, or
     finish what was begun.
 
     hdri_dir: where the HDRIs are that the dataset was made with, None for the bundled ones.
+    device_index: which of EGL's devices draws.
     Returns the faults that were mended and those that are left. Raises OutputError where
     dataset.json does not tell what to make, or the settings that it names cannot be had here;
     ConfigError for a count of workers that cannot be.
@@ -30,7 +35,7 @@ def repair(
     finished = "digest" in found.manifest  # else this may be the rest of a repair
     if finished and not found.broken and not found.manifest["failed"]:
         return [], found.faults
-    job = _job(out, found.manifest, hdri_dir)
+    job = replace(_job(out, found.manifest, hdri_dir), device_index=device_index)
     check_goes_on(job, worker_count)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():

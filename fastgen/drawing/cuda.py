@@ -1,8 +1,8 @@
 """Frames as CUDA memory: what GL drew, for PyTorch or CuPy, without a way through the host.
 
 The drawn textures are copied on the GPU into GL buffers that are registered with CUDA's driver
-(libcuda.so.1, nothing else is needed). Tests have a stand-in for it; bench/gpu.py compares frames
-on a real one (last on an H200, driver 580).
+(libcuda.so.1, nothing else is needed). Tests have a stand-in for that; on a GPU bench/gpu.py
+compares frames with those that are read back.
 """
 
 import ctypes

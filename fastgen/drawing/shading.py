@@ -54,8 +54,9 @@ class Shading:
 
     They are linked when first needed, and scenes with and without damage share what they can.
     traced: whether light is what rays found, of drawing.light_points. coarse: see Renderer.
-    compute_sky: whether the sky is no fragment shader's: GPUs for data centres have few units for
-    these, and all for compute shaders; llvmpipe takes longer.
+    compute_sky: whether a compute shader stores the sky, where else a fragment shader draws it: few
+    multiprocessors of a data centre's GPU run fragment shaders, all run compute shaders. llvmpipe
+    takes twice as long.
     """
 
     def __init__(
@@ -98,6 +99,7 @@ class Shading:
         as sun_shadow.shader_suns tells, their shadow map bound. bent: if a lens bends the view.
         """
         if self._compute_sky:
+            self._ctx.memory_barrier()  # whatever still reads the last image is done with it
             targets.bind_images()
             self._store_sky(targets.size)
         else:
@@ -107,7 +109,7 @@ class Shading:
         for top in range(0, height, targets.lists.rows):
             band = (0, top, width, min(targets.lists.rows, height - top))
             seen, near, cabled = (within(each, band) for each in (regions, near_damage, cables))
-            self._ctx.memory_barrier()  # what was cleared or listed before is done with
+            self._ctx.memory_barrier()  # what was cleared, stored or listed is done with
             self._shade(targets.lists, seen, damage, near, cabled, suns)
         self._ctx.memory_barrier()
 
