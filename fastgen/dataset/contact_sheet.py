@@ -1,16 +1,16 @@
-"""A contact sheet of a dataset, with the boxes as its label files on disk have them."""
+"""A contact sheet of a dataset, with boxes and outlines as its label files on disk have them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DETECTION_CLASSES
+from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
 from fastgen.formats.yolo import pixel_box
-from fastgen.labelling.overlay import draw_box
+from fastgen.labelling.overlay import draw_box, draw_outline
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
@@ -60,9 +60,17 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
     tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    labels = out / "imdg/labels" / path.parent.name / f"{path.stem}.txt"
-    for line in labels.read_text(encoding="utf-8").splitlines():
-        index, *numbers = line.split()
-        box = pixel_box([float(v) for v in numbers], size)
-        draw_box(tile, box, DETECTION_CLASSES[int(index)])
+    name = f"{path.parent.name}/{path.stem}.txt"
+    for index, numbers in _labels(out / "imdg/labels" / name):
+        draw_box(tile, pixel_box(numbers, size), DETECTION_CLASSES[index])
+    for index, numbers in _labels(out / "damage/yolo" / name):
+        if index:  # not the container, whose outline is that of its box in the main
+            draw_outline(tile, np.reshape(numbers, (-1, 2)) * size, SEGMENTATION_CLASSES[index])
     return tile
+
+
+def _labels(path: Path) -> Iterator[tuple[int, list[float]]]:
+    """Class and numbers of each line of a YOLO file."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        index, *numbers = line.split()
+        yield int(index), [float(v) for v in numbers]

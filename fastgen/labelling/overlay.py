@@ -36,16 +36,33 @@ def draw_box(image: Image, box: tuple[float, float, float, float], name: str) ->
 
     In large images lines and letters grow, so that they show when the whole is looked at.
     """
-    color = class_color(name)
     x0, y0, x1, y1 = (round(v) for v in box)
-    line = max(round(max(image.shape[:2]) / _LINE_PX), 1)
-    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), color, line)
-    font, scale = cv2.FONT_HERSHEY_SIMPLEX, 0.36 * line
-    (width, height), base = cv2.getTextSize(name, font, scale, line)
-    top = y0 - height - base if y0 - height - base >= 0 else y0
-    left = min(x0, image.shape[1] - width)
-    cv2.rectangle(image, (left, top), (left + width, top + height + base), color, -1)
-    cv2.putText(image, name, (left, top + height), font, scale, (0, 0, 0), line, cv2.LINE_AA)
+    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), class_color(name), _line(image))
+    _write(image, x0, y0, name)
+
+
+def draw_outline(image: Image, points: NDArray[np.floating], name: str) -> None:
+    """As `draw_box`, of a closed polygon [N, 2]."""
+    pixels = np.rint(points).astype(np.int32)
+    cv2.polylines(image, [pixels], True, class_color(name), _line(image), cv2.LINE_AA)
+    left, top = pixels.min(axis=0).tolist()
+    _write(image, left, top, name)
+
+
+def _line(image: Image) -> int:
+    """Width of lines in pixels."""
+    return max(round(max(image.shape[:2]) / _LINE_PX), 1)
+
+
+def _write(image: Image, left: int, bottom: int, name: str) -> None:
+    """Write a name on its class's colour, above a row where there is room."""
+    line, font = _line(image), cv2.FONT_HERSHEY_SIMPLEX
+    (width, height), base = cv2.getTextSize(name, font, 0.36 * line, line)
+    top = bottom - height - base if bottom - height - base >= 0 else bottom
+    left = min(left, image.shape[1] - width)
+    cv2.rectangle(image, (left, top), (left + width, top + height + base), class_color(name), -1)
+    place = left, top + height
+    cv2.putText(image, name, place, font, 0.36 * line, (0, 0, 0), line, cv2.LINE_AA)
 
 
 def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
