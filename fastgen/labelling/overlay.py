@@ -1,7 +1,6 @@
 """Boxes and labels drawn over images, for people."""
 
 import colorsys
-import hashlib
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -9,7 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import CONTAINER_ID, DAMAGE_VALUES, SOUND_CONTAINER, SPREADER_ID
+from fastgen.classes import (
+    CONTAINER_ID,
+    DAMAGE_CLASSES,
+    DAMAGE_VALUES,
+    MARKER_CLASSES,
+    SOUND_CONTAINER,
+    SPREADER_ID,
+)
 from fastgen.sample import Sample
 
 Image = NDArray[np.uint8]
@@ -22,12 +28,14 @@ DAMAGE_GREYS = MappingProxyType({SOUND_CONTAINER: 200})
 
 _GOLDEN = (5**0.5 - 1) / 2
 
+_CLASSES = ("container", "text", *DAMAGE_CLASSES, *MARKER_CLASSES)
+
 
 def class_color(name: str) -> tuple[int, int, int]:
-    """A bright RGB colour that stays with a class name."""
-    hue = hashlib.blake2b(name.encode(), digest_size=2).digest()
-    pixel = np.array([[[int.from_bytes(hue, "little") % 180, 190, 255]]], np.uint8)
-    r, g, b = (int(v) for v in cv2.cvtColor(pixel, cv2.COLOR_HSV2RGB)[0, 0])
+    """A bright RGB colour that stays with a class name: hues a golden ratio apart, so that those of
+    containers, texts and damages are far from each other. All but known classes share one."""
+    number = _CLASSES.index(name) if name in _CLASSES else len(_CLASSES)
+    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(number * _GOLDEN % 1, 0.75, 1.0))
     return r, g, b
 
 
