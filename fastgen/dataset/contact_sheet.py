@@ -64,7 +64,7 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
     for index, numbers in _labels(out / "imdg/labels" / name):
         draw_box(tile, pixel_box(numbers, size), DETECTION_CLASSES[index])
     for index, numbers in _labels(out / "damage/yolo" / name):
-        if index:  # not the container, whose outline is that of its box in the main
+        if index:  # the container has its box
             draw_outline(tile, np.reshape(numbers, (-1, 2)) * size, SEGMENTATION_CLASSES[index])
     return tile
 
