@@ -11,37 +11,64 @@ import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import results  # noqa: F401 finds the fastgen beside this folder
+
+from fastgen.dataset.verify import examine
+from fastgen.errors import FastgenError
 
 TASKS = ("container", "imdg", "damage")  # those with boxes in COCO's format
-SETTINGS = ("version", "seed", "size", "quality", "cameras", "config", "images")
+SETTINGS = ("version", "seed", "size", "quality", "cameras", "environments", "config", "images")
 FAR = 16
 """Steps of 255 by which a pixel is off that one would see."""
 
 
+def checked(one: Path, other: Path) -> list[dict[str, Any]]:
+    """What the dataset.json of each says. Ends the program unless both are whole and alike."""
+    made = []
+    for folder in (one, other):
+        try:
+            found = examine(str(folder))
+        except FastgenError as error:
+            raise SystemExit(str(error)) from None
+        if found.faults:
+            raise SystemExit(f"{folder}: {found.faults[0]}")
+        if found.manifest["format"] != "seafront":
+            raise SystemExit(f"{folder}: holds tars; make it with --format seafront")
+        made.append(found.manifest)
+    unlike = [name for name in SETTINGS if made[0][name] != made[1][name]]
+    if unlike:
+        raise SystemExit(f"{one} and {other}: were made with other settings: {', '.join(unlike)}")
+    return made
+
+
 def pairs(one: Path, other: Path, pattern: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pictures of the same name; of what is in one alone, the other's is black."""
-    names = {path.relative_to(folder) for folder in (one, other) for path in folder.glob(pattern)}
-    for name in sorted(names):
-        read = [cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED) for folder in (one, other)]
-        found = [image for image in read if image is not None]
-        if not found:
-            raise SystemExit(f"{one / name}: is no picture; see fastgen verify {one}")
-        first, second = (np.zeros_like(found[0]) if image is None else image for image in read)
+    """Pictures of the same name."""
+    for path in sorted(one.glob(pattern)):
+        first, second = (
+            cv2.imread(str(folder / path.relative_to(one)), cv2.IMREAD_UNCHANGED)
+            for folder in (one, other)
+        )
+        assert first is not None
+        assert second is not None
         yield first, second
 
 
 def boxes(folder: Path, task: str) -> dict[tuple[str, int, int], np.ndarray]:
     """Edges (left, top, right, bottom) by picture, class, and place in the order of these: where
-    one is missing, those after it are taken for others."""
+    one is missing, those after it are taken for others. Of the container, which every task has,
+    those of its own alone."""
     found: dict[tuple[str, int, int], np.ndarray] = {}
     for path in sorted((folder / task).glob("coco_*.json")):
         coco = json.loads(path.read_text(encoding="utf-8"))
         names = {image["id"]: image["file_name"] for image in coco["images"]}
         seen: Counter[tuple[str, int]] = Counter()
         for item in coco["annotations"]:
+            if item["category_id"] == 1 and task != "container":
+                continue
             key = names[item["image_id"]], item["category_id"]
             x, y, width, height = item["bbox"]
             found[*key, seen[key]] = np.array([x, y, x + width, y + height])
@@ -58,16 +85,12 @@ def texts(folder: Path) -> set[str]:
 def main() -> None:
     """Print a line for each kind of content."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("one", type=Path)
-    parser.add_argument("other", type=Path)
+    parser.add_argument("one", type=Path, help="a dataset's folder")
+    parser.add_argument("other", type=Path, help="that of another driver's")
     options = parser.parse_args()
     folders = options.one, options.other
-    made = [json.loads((folder / "dataset.json").read_text(encoding="utf-8")) for folder in folders]
-    unlike = [name for name in SETTINGS if made[0][name] != made[1][name]]
-    if unlike:
-        raise SystemExit(f"{options.one} and {options.other}: differ in {', '.join(unlike)}")
-    for folder, settings in zip(folders, made, strict=True):
-        print(f"{folder}: {settings['images']} images, {settings['renderer']}")
+    for folder, made in zip(folders, checked(*folders), strict=True):
+        print(f"{folder}: {made['images']} images, {made['backend']} {made['renderer']}")
     apart = [
         np.abs(np.subtract(one, other, dtype=np.int16))
         for one, other in pairs(*folders, "images/*/*")
@@ -82,14 +105,14 @@ def main() -> None:
     for task in TASKS:
         first, second = (boxes(folder, task) for folder in folders)
         steps = [np.abs(first[key] - second[key]).max() for key in first.keys() & second.keys()]
-        alike = sum(step == 0 for step in steps)
+        moved = [step for step in steps if step > 0]
         alone = len(first.keys() ^ second.keys())
         print(
-            f"{task}: {len(steps)} boxes, {alike} the same, the others by up to "
-            f"{max(steps, default=0):g} pixels; in one alone {alone}"
+            f"{task}: of {len(steps)} boxes {len(moved)} differ, by up to "
+            f"{max(moved, default=0):g} pixels; {alone} are in one alone"
         )
     said, written = (texts(folder) for folder in folders)
-    print(f"texts: {len(said & written)} the same, in one alone {len(said ^ written)}")
+    print(f"texts: {len(said & written)} are the same, {len(said ^ written)} in one alone")
 
 
 if __name__ == "__main__":

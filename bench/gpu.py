@@ -28,6 +28,9 @@ from throughput import whole_run
 
 import fastgen
 from fastgen import Config, Generator
+from fastgen.errors import FastgenError
+from fastgen.generator import QUALITY
+from fastgen.records import check_known
 from fastgen.torch import ContainerDataset, Loader
 
 CAMERAS = tuple(Config.preset().cameras)
@@ -227,6 +230,9 @@ def main() -> None:
     parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--device-index", type=int, help="in EGL's order")
     options = parser.parse_args()
+    parse_size(options.size)
+    if options.processes < 1 or options.images < 3 * SHARD:
+        raise SystemExit(f"give --processes of 1 or more and --images of {3 * SHARD} or more")
     with Generator(backend="egl", device_index=options.device_index) as generator:
         driver, reason = generator.renderer_name, generator.cuda_reason()
     if not reason and not torch.cuda.is_available():
@@ -234,6 +240,8 @@ def main() -> None:
     about = f"{driver} and {origin()['machine']}"
     print(f"{about}; {options.size}, {options.processes} processes")
     qualities = options.qualities.split(",")
+    for quality in qualities:
+        check_known("qualities", quality, tuple(QUALITY))
     if reason:
         print(f"nothing to CUDA: {reason}")
         for quality in qualities:
@@ -250,4 +258,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except FastgenError as error:
+        raise SystemExit(f"gpu.py: {error}") from None

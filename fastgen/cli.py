@@ -233,7 +233,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     command.add_argument("--workers", type=int, metavar="K", help="of a repair: default one a core")
     _add_hdri(command)
-    _add_device(command)
+    _add_device(command, "of a repair: ")
     commands.add_parser("doctor", help="try the OpenGL backends").set_defaults(run=_doctor)
     return parser
 
@@ -242,12 +242,12 @@ def _add_hdri(command: argparse.ArgumentParser) -> None:
     command.add_argument("--hdri", metavar="DIR", help=".hdr and .exr files to light with")
 
 
-def _add_device(command: argparse.ArgumentParser) -> None:
+def _add_device(command: argparse.ArgumentParser, what: str = "") -> None:
     command.add_argument(
         "--device-index",
         type=int,
         metavar="N",
-        help="which of EGL's devices draws, as doctor numbers them; default: one that works",
+        help=f"{what}which of EGL's devices draws, as doctor numbers them; default: one that works",
     )
 
 

@@ -4,6 +4,7 @@ Which files come is decided by the job alone, so any number of workers makes the
 running again on the same place makes only what is missing.
 """
 
+import contextlib
 import hashlib
 import json
 import os
@@ -31,7 +32,7 @@ from fastgen.dataset.shards import (
 )
 from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.environment import load_environment
-from fastgen.errors import ConfigError, OutputError
+from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.files.encode import png
 from fastgen.formats import SEAFRONT, Record, formats_of
 from fastgen.formats.coco import trained_on
@@ -72,6 +73,7 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
         old = known(storage, job, settings)
         made = _made(job, storage, old or {})
         left = job.images - sum(made.values())
+        before = _content(storage, MANIFEST)
         if left or old is None:  # until the end nothing says that it is finished
             storage.write(MANIFEST, [unsealed({**settings, "images": job.images})])
         if left:
@@ -81,15 +83,39 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             if runner is None and old is None:
                 _tell_of_idle_workers(job, worker_count)
 
+            begun = False
+
             def on_report(kind: str, value: Any) -> None:
+                nonlocal begun
                 if kind == "images":
+                    begun = True
                     progress.add(value)
 
             try:
                 (runner or run_here(worker_count))(job, tasks, on_report)
+            except FastgenError:  # refused, say for a device that is not there
+                if not begun:
+                    _put_back(storage, MANIFEST, before)
+                raise
             finally:
                 progress.close()
         return _finish(job, storage, settings)
+
+
+def _content(storage: Folder | Remote, name: str) -> bytes | None:
+    try:
+        return storage.read(name)
+    except FileNotFoundError:
+        return None
+
+
+def _put_back(storage: Folder | Remote, name: str, content: bytes | None) -> None:
+    """As `_content` found it; where that cannot be, a run that goes on makes it anyway."""
+    with contextlib.suppress(FastgenError, OSError):
+        if content is None:
+            storage.remove(name)
+        else:
+            storage.write(name, [content])
 
 
 def check_goes_on(job: Job, worker_count: int) -> None:
@@ -210,7 +236,11 @@ def _settings(job: Job) -> dict[str, Any]:
         "size": list(job.size),
         "quality": job.quality,
         "cameras": list(job.cameras),
-        "environments": {name: generator.environment_digest(name) for name in names},
+        # the weights decide what is drawn too: those of a folder are not the bundled ones'
+        "environments": {
+            name: {"sha256": generator.environment_digest(name), "weight": weight}
+            for name, weight in names.items()
+        },
         "shard_scenes": job.shard_scenes,
         "config": generator.config.to_plain(),
     }
@@ -316,7 +346,10 @@ def _finish(job: Job, storage: Folder | Remote, settings: dict[str, Any]) -> dic
     storage.write(MANIFEST, [seal(unsealed(result))])
     if len(makers) > 1:
         names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
-        say(f"fastgen: {job.out} was drawn by {names}: they may round differently")
+        say(
+            f"fastgen: {job.out} was drawn by {names}: they may round differently; for the same "
+            "bytes everywhere make it anew with one of them"
+        )
     return result
 
 

@@ -14,6 +14,8 @@ from pycocotools.coco import COCO
 import fastgen
 from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli import main
+from fastgen.dataset.contact_sheet import contact_sheet
+from fastgen.errors import OutputError
 from fastgen.light.hdri import bundled_hdris
 from tests.folders import content
 
@@ -109,6 +111,44 @@ def test_strange_files_among_the_images_do_not_stop_a_run(copy):
     assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
 
 
+def test_a_refused_device_leaves_everything_as_it_was(copy, tmp_path, capsys):
+    before = content(copy)
+    more = [*ARGUMENTS[2:], "--device-index", "99"]
+    assert main(["generate", str(copy), "--images", "10", *more]) == 2
+    assert "no device 99 among" in capsys.readouterr().err
+    assert content(copy) == before
+    next(copy.glob("images/*/000000_A.jpg")).unlink()
+    assert main(["verify", str(copy), "--repair", "--device-index", "99"]) == 2
+    capsys.readouterr()
+    assert main(["verify", str(copy)]) == 1
+    told = capsys.readouterr().out
+    assert "000000_A.jpg: missing" in told
+    assert "not finished" not in told
+    assert main(["generate", str(tmp_path / "new"), "--images", "2", *more]) == 2
+    assert content(tmp_path / "new") == {}
+
+
+def test_a_folder_of_the_shipped_hdris_is_another_choice(copy, tmp_path, capsys):
+    """Their weights in the draw are not those of a folder's, which are all alike."""
+    (tmp_path / "hdri").mkdir()
+    for path in bundled_hdris().values():
+        (tmp_path / "hdri" / path.name).symlink_to(path)
+    command = ["generate", str(copy), "--images", "10", *ARGUMENTS[2:]]
+    assert main([*command, "--hdri", str(tmp_path / "hdri")]) == 2
+    error = capsys.readouterr().err
+    assert re.search(r"made with other settings \(environments\.\w+\.weight was ", error)
+    assert "repeat them by --hdri to resume" in error
+
+
+@pytest.mark.parametrize("line", ["-1 0.1 0.1 0.2 0.2 0.1 0.2", "1 nan 0.1 0.2 0.2 0.1 0.2", "9 x"])
+def test_labels_that_the_contact_sheet_cannot_show_are_told(copy, line):
+    images = [(path.parent.name, path.stem) for path in copy.glob("images/*/*.jpg")]
+    contact_sheet(copy, images)
+    next(copy.glob("damage/yolo/*/*.txt")).write_text(line)
+    with pytest.raises(OutputError, match=f"its labels are damaged; run fastgen verify {copy} --r"):
+        contact_sheet(copy, images)
+
+
 def test_a_damaged_image_of_the_contact_sheet_is_named(copy, capsys):
     for path in copy.glob("images/*/*_A.jpg"):
         path.write_bytes(bytes(path.stat().st_size))
@@ -157,7 +197,7 @@ def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, c
     shutil.copy(bundled_hdris()["dawn"], tmp_path / "lights/mine.exr")
     assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
     error = capsys.readouterr().err
-    assert "environments.city was '" in error
+    assert "environments.city was {'sha256'" in error
     assert " more); repeat them by --hdri to resume" in error
 
 

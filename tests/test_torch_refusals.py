@@ -8,6 +8,7 @@ import pytest
 
 from fastgen import Config
 from fastgen.errors import ConfigError
+from fastgen.light.hdri import bundled_hdris
 from fastgen.torch import ContainerDataset, Loader, ShardSampler
 from tests.test_torch import SMALL, dataset, stream
 
@@ -108,6 +109,12 @@ def test_a_state_fits_loaders_of_the_same_light_alone(tmp_path):
     for loader in (other, Loader(dataset())):
         with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
             loader.load_state_dict(state)
+
+
+def test_a_state_fits_no_loader_that_draws_the_same_light_more_often():
+    shipped = next(iter(bundled_hdris().values())).parent
+    with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
+        Loader(dataset(hdri_dir=shipped)).load_state_dict(Loader(dataset()).state_dict())
 
 
 def test_a_state_fits_loaders_whose_curriculum_teaches_the_same():

@@ -1,5 +1,6 @@
 """A contact sheet of a dataset, with boxes and outlines as its label files on disk have them."""
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.ui
             tiles.append(_tile(out, image_path))
         except (cv2.error, OSError, ValueError, IndexError):
             raise OutputError(
-                f"{image_path}: it or its labels are damaged; run fastgen verify --repair"
+                f"{image_path}: it or its labels are damaged; run fastgen verify {out} --repair"
             ) from None
     height, width = tiles[0].shape[:2]  # of all: a dataset has one size
     columns = min(count, _COLUMNS)
@@ -70,7 +71,10 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
 
 
 def _labels(path: Path) -> Iterator[tuple[int, list[float]]]:
-    """Class and numbers of each line of a YOLO file."""
+    """Class and numbers of each line of a YOLO file. Raises ValueError for what is none."""
     for line in path.read_text(encoding="utf-8").splitlines():
-        index, *numbers = line.split()
-        yield int(index), [float(v) for v in numbers]
+        index, *texts = line.split()
+        numbers = [float(text) for text in texts]
+        if int(index) < 0 or not all(map(math.isfinite, numbers)):
+            raise ValueError
+        yield int(index), numbers

@@ -28,33 +28,39 @@ DAMAGE_GREYS = MappingProxyType({SOUND_CONTAINER: 200})
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-_CLASSES = ("container", "text", *DAMAGE_CLASSES, *MARKER_CLASSES)
+_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader")
 
 
 def class_color(name: str) -> tuple[int, int, int]:
-    """A bright RGB colour that stays with a class name: hues a golden ratio apart, so that those of
-    containers, texts and damages are far from each other. All but known classes share one."""
-    number = _CLASSES.index(name) if name in _CLASSES else len(_CLASSES)
-    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(number * _GOLDEN % 1, 0.75, 1.0))
+    """An RGB colour that stays with a class name: markers' are pale, all others strong and far from
+    each other."""
+    names, saturation = (_STRONG, 0.85) if name in _STRONG else (MARKER_CLASSES, 0.4)
+    hue = names.index(name) * _GOLDEN % 1
+    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(hue, saturation, 1.0))
     return r, g, b
 
 
-def draw_box(image: Image, box: tuple[float, float, float, float], name: str) -> None:
-    """Draw box (x0, y0, x1, y1; x1 and y1 exclusive) with its name into uint8 RGB, in place.
+def draw_box(
+    image: Image, box: tuple[float, float, float, float], class_name: str, caption: str = ""
+) -> None:
+    """Draw box (x0, y0, x1, y1; x1 and y1 exclusive) in its class's colour into uint8 RGB, in
+    place, with a caption, by default the class's name.
 
     In large images lines and letters grow, so that they show when the whole is looked at.
     """
     x0, y0, x1, y1 = (round(v) for v in box)
-    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), class_color(name), _line(image))
-    _write(image, x0, y0, name)
+    color = class_color(class_name)
+    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), color, _line(image))
+    _write(image, x0, y0, caption or class_name, color)
 
 
-def draw_outline(image: Image, points: NDArray[np.floating], name: str) -> None:
-    """As `draw_box`, of a closed polygon [N, 2]."""
-    pixels = np.rint(points).astype(np.int32)
-    cv2.polylines(image, [pixels], True, class_color(name), _line(image), cv2.LINE_AA)
+def draw_outline(image: Image, points: NDArray[np.floating], class_name: str) -> None:
+    """As `draw_box`, of a closed polygon [N, 2] along the pixels' outer borders."""
+    pixels = np.rint(np.minimum(points, np.array(image.shape[1::-1]) - 1)).astype(np.int32)
+    color = class_color(class_name)
+    cv2.polylines(image, [pixels], True, color, _line(image), cv2.LINE_AA)
     left, top = pixels.min(axis=0).tolist()
-    _write(image, left, top, name)
+    _write(image, left, top, class_name, color)
 
 
 def _line(image: Image) -> int:
@@ -62,15 +68,15 @@ def _line(image: Image) -> int:
     return max(round(max(image.shape[:2]) / _LINE_PX), 1)
 
 
-def _write(image: Image, left: int, bottom: int, name: str) -> None:
-    """Write a name on its class's colour, above a row where there is room."""
+def _write(image: Image, left: int, bottom: int, text: str, color: tuple[int, int, int]) -> None:
+    """Write on a ground of `color`, above a row where there is room."""
     line, font = _line(image), cv2.FONT_HERSHEY_SIMPLEX
-    (width, height), base = cv2.getTextSize(name, font, 0.36 * line, line)
+    (width, height), base = cv2.getTextSize(text, font, 0.36 * line, line)
     top = bottom - height - base if bottom - height - base >= 0 else bottom
-    left = min(left, image.shape[1] - width)
-    cv2.rectangle(image, (left, top), (left + width, top + height + base), class_color(name), -1)
+    left = max(min(left, image.shape[1] - width), 0)
+    cv2.rectangle(image, (left, top), (left + width, top + height + base), color, -1)
     place = left, top + height
-    cv2.putText(image, name, place, font, 0.36 * line, (0, 0, 0), line, cv2.LINE_AA)
+    cv2.putText(image, text, place, font, 0.36 * line, (0, 0, 0), line, cv2.LINE_AA)
 
 
 def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
@@ -102,5 +108,6 @@ def overlay(sample: Sample, image: Image | None = None) -> Image:
         drawn[damaged] = (0.55 * drawn[damaged] + 0.45 * tint).astype(np.uint8)
     for item in sample.objects:
         if item.bbox is not None:
-            draw_box(drawn, item.bbox, f"{item.class_name} {item.instance}")
+            caption = f"{item.class_name} {item.instance}"
+            draw_box(drawn, item.bbox, item.class_name, caption)
     return drawn

@@ -114,14 +114,17 @@ class ContainerDataset(Dataset[Item]):
 
     @property
     def description(self) -> dict[str, Any]:
-        """What decides the samples, as plain values; of files and of the curriculum, SHA-256.
+        """What decides the samples, as plain values; of files and of the curriculum, SHA-256, and of
+        HDRIs their weights in the draw.
 
         The curriculum stands here by what it gives for epochs 0 and 1 and the present one.
         """
         if "hdri_dir" not in self._made:  # reads every HDRI
             generator = self._generator.get()
-            names = generator.environments
-            self._made["hdri_dir"] = {name: generator.environment_digest(name) for name in names}
+            self._made["hdri_dir"] = {
+                name: {"sha256": generator.environment_digest(name), "weight": weight}
+                for name, weight in generator.environments.items()
+            }
         epochs = sorted({0, 1, self.epoch})
         return {**self._made, "curriculum": self.curriculum_digests(epochs)}
 
