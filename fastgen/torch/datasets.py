@@ -114,8 +114,8 @@ class ContainerDataset(Dataset[Item]):
 
     @property
     def description(self) -> dict[str, Any]:
-        """What decides the samples, as plain values; of files and of the curriculum, SHA-256, and of
-        HDRIs their weights in the draw.
+        """What decides the samples, as plain values; of files and of the curriculum, SHA-256.
+        HDRIs' weights in the draw are among them.
 
         The curriculum stands here by what it gives for epochs 0 and 1 and the present one.
         """
