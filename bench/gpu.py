@@ -142,7 +142,8 @@ def rate_together(options: argparse.Namespace, quality: str) -> float:
     barrier, spans = context.Barrier(options.processes, timeout=LONGEST_S), context.Queue()
     arguments = options, quality, barrier, spans
     started = [
-        context.Process(target=fill_beside_others, args=arguments) for _ in range(options.processes)
+        context.Process(target=fill_beside_others, args=arguments, daemon=True)
+        for _ in range(options.processes)
     ]
     for process in started:
         process.start()

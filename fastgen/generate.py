@@ -36,7 +36,6 @@ from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.files.encode import png
 from fastgen.formats import SEAFRONT, Record, formats_of
 from fastgen.formats.coco import trained_on
-from fastgen.generator import Generator
 from fastgen.gl import BACKENDS
 from fastgen.light.hdri import find_hdris
 from fastgen.printing import say
@@ -73,8 +72,8 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
         old = known(storage, job, settings)
         made = _made(job, storage, old or {})
         left = job.images - sum(made.values())
-        before = _content(storage, MANIFEST)
         if left or old is None:  # until the end nothing says that it is finished
+            before = _content(storage, MANIFEST)
             storage.write(MANIFEST, [unsealed({**settings, "images": job.images})])
         if left:
             # one by one, for there may be millions
@@ -83,18 +82,14 @@ def generate(job: Job, worker_count: int, runner: Runner | None = None) -> dict[
             if runner is None and old is None:
                 _tell_of_idle_workers(job, worker_count)
 
-            begun = False
-
             def on_report(kind: str, value: Any) -> None:
-                nonlocal begun
                 if kind == "images":
-                    begun = True
                     progress.add(value)
 
             try:
                 (runner or run_here(worker_count))(job, tasks, on_report)
             except FastgenError:  # refused, say for a device that is not there
-                if not begun:
+                if not progress.made:
                     _put_back(storage, MANIFEST, before)
                 raise
             finally:
@@ -214,17 +209,7 @@ def _checked(job: Job, worker_count: int) -> Job:
 def _settings(job: Job) -> dict[str, Any]:
     from fastgen import __version__
 
-    # validates seed, size and device without opening GL
-    generator = Generator(
-        job.config,
-        job.seed,
-        job.size,
-        backend=job.backend,
-        hdri_dir=job.hdri_dir,
-        quality=job.quality,
-        device_index=job.device_index,
-    )
-    names = generator.environments
+    generator = job.generator()  # validates seed, size and device without opening GL
     generator.scene(0)  # what only sampling can refuse is refused before anything is written
     for path in find_hdris(job.hdri_dir) if job.hdri_dir else ():
         load_environment(path)  # names a broken file now, and caches the light for the workers
@@ -236,11 +221,7 @@ def _settings(job: Job) -> dict[str, Any]:
         "size": list(job.size),
         "quality": job.quality,
         "cameras": list(job.cameras),
-        # the weights decide what is drawn too: those of a folder are not the bundled ones'
-        "environments": {
-            name: {"sha256": generator.environment_digest(name), "weight": weight}
-            for name, weight in names.items()
-        },
+        "environments": generator.environment_record,
         "shard_scenes": job.shard_scenes,
         "config": generator.config.to_plain(),
     }

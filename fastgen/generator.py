@@ -164,9 +164,11 @@ class Generator:
         """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
         return dict(self._weights)
 
-    def environment_digest(self, name: str) -> str:
-        """SHA-256 in hexadecimal of an HDRI's file. Raises ConfigError for an unknown name."""
-        return hashlib.sha256(_hdri(self._hdris, name).read_bytes()).hexdigest()
+    @property
+    def environment_record(self) -> dict[str, dict[str, Any]]:
+        """What decides scenes' light: by name, an HDRI's SHA-256 and its weight in the draw."""
+        sha256 = {n: hashlib.sha256(p.read_bytes()).hexdigest() for n, p in self._hdris.items()}
+        return {n: {"sha256": sha256[n], "weight": w} for n, w in self._weights.items()}
 
     @property
     def renderer_name(self) -> str:
@@ -376,14 +378,10 @@ class Generator:
         return scene
 
 
-def _hdri(hdris: Mapping[str, Path], name: str) -> Path:
+def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     if name not in hdris:
         raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, hdris)}")
-    return hdris[name]
-
-
-def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
-    return load_environment(_hdri(hdris, name))
+    return load_environment(hdris[name])
 
 
 def _whole_size(size: Any) -> tuple[int, int]:

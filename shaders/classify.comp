@@ -8,6 +8,7 @@
 #include "samples.glsl"
 #include "keys_around.glsl"
 #include "pixel_list.glsl"
+#include "images.glsl"
 #if DAMAGED
 #include "damage.glsl"
 #include "rest.glsl"
@@ -23,9 +24,6 @@ layout(local_size_x = LIST_GROUP) in;
 uniform ivec4 region;   // x, y, width and height in pixels
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
-
-layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
-layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 
 #if DAMAGED
 // 1 near a damage, 2 near a hole, else 0

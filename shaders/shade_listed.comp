@@ -2,16 +2,13 @@
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
+#include "images.glsl"
 #include "pixel_list.glsl"
 #if OF_CABLES
 #include "cables.glsl"
 #endif
 
 layout(local_size_x = LIST_GROUP) in;
-
-layout(r32ui, binding = 0) writeonly uniform uimage2D color_image;   // four bytes, stored as one number
-layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
-layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 
 #if OF_CABLES
 // steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye

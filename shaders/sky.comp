@@ -3,12 +3,9 @@
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
+#include "images.glsl"
 
 layout(local_size_x = LIST_GROUP) in;   // of a row
-
-layout(r32ui, binding = 0) writeonly uniform uimage2D color_image;   // four bytes, stored as one number
-layout(r32ui, binding = 1) writeonly uniform uimage2D label_image;
-layout(r32f, binding = 2) writeonly uniform image2D depth_image;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

@@ -23,7 +23,6 @@ from fastgen.dataset.shards import Job, Maker
 from fastgen.dataset.storage import storage_of
 from fastgen.generate import generate
 from fastgen.generator import Generator
-from fastgen.labelling.overlay import class_color
 from fastgen.sampling import split_of
 from fastgen.scene import Scene
 from tests.backends import needs_osmesa
@@ -113,29 +112,6 @@ def test_contact_sheet_shows_every_image_of_a_small_dataset(dataset):
     assert sheet.shape == (3 * 333, 6 * 400, 3)  # of images of 96x80, without gaps
     tiles = sheet.reshape(3, 333, 6, 400, 3).swapaxes(1, 2).reshape(-1, 333 * 400 * 3)
     assert sum(np.ptp(tile) > 0 for tile in tiles) == 14
-
-
-def test_contact_sheet_outlines_damages_along_their_masks(tmp_path):
-    (tmp_path / "damaged.yaml").write_text(
-        "damage: {probability: 1, kinds: [perforation], faces: [no_door]}"
-    )
-    command = ["generate", str(tmp_path / "out"), "--images", "4", "--size", "400x400"]
-    more = ["--config", str(tmp_path / "damaged.yaml"), "--cameras", "Cl", "--split", "val"]
-    assert main([*command, *more]) == 0
-    sheet = cv2.imread(str(tmp_path / "out/contact_sheet.png")).astype(int)
-    color = np.array(class_color("perforation"))[::-1]
-    masks = sorted((tmp_path / "out/damage/masks/val").iterdir())
-    assert len(masks) == 4
-    seen = 0
-    for tile, path in zip(np.split(sheet, 4, axis=1), masks, strict=True):
-        inside = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) >= 200).astype(np.uint8)
-        around = cv2.dilate(inside, np.ones((5, 5))) - cv2.erode(inside, np.ones((3, 3)))
-        drawn = np.abs(tile - color).max(axis=-1) < 40
-        assert drawn[around == 1].sum() >= 0.15 * around.sum()
-        within = cv2.erode(inside, np.ones((9, 9))) == 1  # where names of others may stand
-        assert drawn[within].sum() <= 0.1 * within.sum()
-        seen += inside.any()
-    assert seen >= 2
 
 
 def test_crops_hold_the_text_that_the_labels_say(tmp_path):

@@ -1,7 +1,7 @@
 """A contact sheet of a dataset, with boxes and outlines as its label files on disk have them."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
-from fastgen.formats.yolo import pixel_box
+from fastgen.formats.yolo import pixel_box, rows
 from fastgen.labelling.overlay import draw_box, draw_outline
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
@@ -70,11 +70,9 @@ def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
     return tile
 
 
-def _labels(path: Path) -> Iterator[tuple[int, list[float]]]:
-    """Class and numbers of each line of a YOLO file. Raises ValueError for what is none."""
-    for line in path.read_text(encoding="utf-8").splitlines():
-        index, *texts = line.split()
-        numbers = [float(text) for text in texts]
-        if int(index) < 0 or not all(map(math.isfinite, numbers)):
-            raise ValueError
-        yield int(index), numbers
+def _labels(path: Path) -> list[tuple[int, list[float]]]:
+    """As yolo.rows. Raises ValueError for what cannot be drawn."""
+    found = rows(path.read_text(encoding="utf-8"))
+    if any(index < 0 or not all(map(math.isfinite, numbers)) for index, numbers in found):
+        raise ValueError
+    return found

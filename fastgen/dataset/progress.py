@@ -18,6 +18,11 @@ class Progress:
         self._began = self._shown = time.monotonic()
         self._live = self._stream.isatty()
 
+    @property
+    def made(self) -> int:
+        """Images counted since it began."""
+        return self._done - self._first
+
     def add(self, images: int) -> None:
         """Count `images` more and redraw when it is time. What a worker that died had done is made
         again, and counts twice, but nothing beyond the total does."""
@@ -34,8 +39,7 @@ class Progress:
             self._show("\n")
 
     def _draw(self) -> None:
-        made = self._done - self._first
-        rate = made / max(time.monotonic() - self._began, 1e-9)
+        rate = self.made / max(time.monotonic() - self._began, 1e-9)
         left_s = int((self._total - self._done) / rate) if rate > 0 else 0
         filled = _BAR * self._done // max(self._total, 1)
         bar = "#" * filled + "." * (_BAR - filled)

@@ -86,6 +86,18 @@ class Job:
         count = len(self.cameras)
         return [(number // count, self.cameras[number % count]) for number in numbers]
 
+    def generator(self) -> Generator:
+        """What draws it. Raises ConfigError for values that cannot be."""
+        return Generator(
+            self.config,
+            self.seed,
+            self.size,
+            backend=self.backend,
+            hdri_dir=self.hdri_dir,
+            quality=self.quality,
+            device_index=self.device_index,
+        )
+
 
 @dataclass(frozen=True)
 class Task:
@@ -158,15 +170,7 @@ class Maker:
         self._report = report
         self._formats = formats_of(job.formats)
         self._storage = storage_of(job.out)
-        self._generator = Generator(
-            job.config,
-            job.seed,
-            job.size,
-            backend=job.backend,
-            hdri_dir=job.hdri_dir,
-            quality=job.quality,
-            device_index=job.device_index,
-        )
+        self._generator = job.generator()
         if job.images > _PRELOAD_IMAGES:
             self._generator.preload(lambda: report("busy", None))
         names = (self._generator.used_backend, self._generator.renderer_name)

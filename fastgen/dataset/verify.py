@@ -17,7 +17,7 @@ from fastgen.dataset.shards import manifest_path
 from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record, coco
-from fastgen.formats.yolo import pixel_box
+from fastgen.formats.yolo import pixel_box, rows
 from fastgen.records import from_plain
 from fastgen.sampling import SPLITS
 from fastgen.scene import Scene
@@ -184,9 +184,9 @@ def _sample(data: dict[str, bytes], record: Record) -> list[tuple[str, str]]:
         from_plain(Scene, scene["scene"], "scene")
     except FastgenError as error:
         faults.append(("scene", str(error)))
-    if not _same_boxes(_rows(data["boxes"]), scene):
+    if not _same_boxes(rows(data["boxes"].decode()), scene):
         faults.append(("boxes", "differs from the scene file's objects"))
-    faults += [("outlines", fault) for fault in _outline_faults(_rows(data["outlines"]))]
+    faults += [("outlines", fault) for fault in _outline_faults(rows(data["outlines"].decode()))]
     mask = cv2.imdecode(np.frombuffer(data["mask"], np.uint8), cv2.IMREAD_UNCHANGED)
     if mask is None or mask.shape != (height, width) or mask.dtype != np.uint16:
         faults.append(("mask", f"not a whole 16-bit PNG of {width}x{height}"))
@@ -213,16 +213,10 @@ def _same_masks(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
     return sorted(seen, key=repr) == sorted(held, key=repr)
 
 
-def _rows(text: bytes) -> list[tuple[int, list[float]]]:
-    """Lines of a YOLO file as class and numbers."""
-    lines = [line.split() for line in text.decode().splitlines()]
-    return [(int(index), [float(v) for v in values]) for index, *values in lines]
-
-
-def _same_boxes(rows: list[tuple[int, list[float]]], scene: dict[str, Any]) -> bool:
+def _same_boxes(found: list[tuple[int, list[float]]], scene: dict[str, Any]) -> bool:
     """The marker labels are the visible boxes of the scene file's objects, to 0.1 pixel."""
     held = [
-        (index, [round(v, 1) for v in pixel_box(values, scene["size"])]) for index, values in rows
+        (index, [round(v, 1) for v in pixel_box(values, scene["size"])]) for index, values in found
     ]
     wanted = [
         (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
@@ -232,9 +226,9 @@ def _same_boxes(rows: list[tuple[int, list[float]]], scene: dict[str, Any]) -> b
     return sorted(held) == sorted(wanted)
 
 
-def _outline_faults(rows: list[tuple[int, list[float]]]) -> list[str]:
+def _outline_faults(found: list[tuple[int, list[float]]]) -> list[str]:
     faults = []
-    for index, values in rows:
+    for index, values in found:
         if not 0 <= index < len(SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:
             faults.append(f"class {index} with {len(values)} numbers cannot be")
         elif not (min(values) >= 0 and max(values) <= 1):

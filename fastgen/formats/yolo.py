@@ -47,6 +47,12 @@ def line(index: int, values: Iterable[float]) -> str:
     return f"{index}{' %.6f' * len(clipped)}\n" % clipped
 
 
+def rows(text: str) -> list[tuple[int, list[float]]]:
+    """Class and numbers of each `line` of a file. Raises ValueError for text that is none."""
+    lines = [each.split() for each in text.splitlines()]
+    return [(int(index), [float(v) for v in values]) for index, *values in lines]
+
+
 def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     """One closed polygon [N, 2] along the pixels' outer borders, around all parts of a mask.
 

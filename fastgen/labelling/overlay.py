@@ -35,8 +35,13 @@ def class_color(name: str) -> tuple[int, int, int]:
     """An RGB colour that stays with a class name: markers' are pale, all others strong and far from
     each other."""
     names, saturation = (_STRONG, 0.85) if name in _STRONG else (MARKER_CLASSES, 0.4)
-    hue = names.index(name) * _GOLDEN % 1
-    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(hue, saturation, 1.0))
+    return _color(names.index(name), saturation, 1.0)
+
+
+def _color(number: int, saturation: float, brightness: float) -> tuple[int, int, int]:
+    """Hues of numbers in a row lie a golden ratio apart, which no run of numbers repeats."""
+    hue = number * _GOLDEN % 1
+    r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(hue, saturation, brightness))
     return r, g, b
 
 
@@ -91,12 +96,11 @@ def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
 
 
 def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
-    """Hues a golden ratio apart, which no run of numbers repeats, at nine tones in turn."""
+    """Those of `_color`, at nine tones in turn."""
     if value == 0 or value in greys:
         return (greys.get(value, 0),) * 3
     saturation, brightness = (0.75, 0.45, 0.95)[value % 3], (1.0, 0.8, 0.6)[value // 3 % 3]
-    color = colorsys.hsv_to_rgb(value * _GOLDEN % 1, saturation, brightness)
-    return tuple(round(255 * part) for part in color)
+    return _color(value, saturation, brightness)
 
 
 def overlay(sample: Sample, image: Image | None = None) -> Image:

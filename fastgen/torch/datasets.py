@@ -120,11 +120,7 @@ class ContainerDataset(Dataset[Item]):
         The curriculum stands here by what it gives for epochs 0 and 1 and the present one.
         """
         if "hdri_dir" not in self._made:  # reads every HDRI
-            generator = self._generator.get()
-            self._made["hdri_dir"] = {
-                name: {"sha256": generator.environment_digest(name), "weight": weight}
-                for name, weight in generator.environments.items()
-            }
+            self._made["hdri_dir"] = self._generator.get().environment_record
         epochs = sorted({0, 1, self.epoch})
         return {**self._made, "curriculum": self.curriculum_digests(epochs)}
 

@@ -1,0 +1,46 @@
+"""Boxes and outlines drawn over images, by `overlay` and in contact sheets."""
+
+import cv2
+import numpy as np
+
+from fastgen import Config, Generator
+from fastgen.classes import DAMAGE_CLASSES
+from fastgen.cli import main
+from fastgen.labelling.overlay import class_color, overlay
+
+
+def test_boxes_have_the_colours_of_their_classes():
+    with Generator(Config.from_values({"damage": {"probability": 1}}), seed=3) as generator:
+        sample = generator.render(index=1, camera="Cr")
+    shown = overlay(sample, np.zeros_like(sample.image)).reshape(-1, 3)
+    strong = {"container", "text", "spreader", *DAMAGE_CLASSES}
+    seen = {item.class_name for item in sample.objects if item.bbox is not None}
+    assert len(seen & strong) >= 3
+    for name in seen & strong:
+        assert (shown == class_color(name)).all(axis=1).sum() > 20
+    colors = np.array([class_color(name) for name in sorted(strong)])
+    apart = np.abs(colors[:, None] - colors).max(axis=-1)
+    assert apart[~np.eye(len(colors), dtype=bool)].min() > 60
+
+
+def test_contact_sheet_outlines_damages_along_their_masks(tmp_path):
+    (tmp_path / "damaged.yaml").write_text(
+        "damage: {probability: 1, kinds: [perforation], faces: [no_door]}"
+    )
+    command = ["generate", str(tmp_path / "out"), "--images", "4", "--size", "400x400"]
+    more = ["--config", str(tmp_path / "damaged.yaml"), "--cameras", "Cl", "--split", "val"]
+    assert main([*command, *more]) == 0
+    sheet = cv2.imread(str(tmp_path / "out/contact_sheet.png")).astype(int)
+    color = np.array(class_color("perforation"))[::-1]
+    masks = sorted((tmp_path / "out/damage/masks/val").iterdir())
+    assert len(masks) == 4
+    seen = 0
+    for tile, path in zip(np.split(sheet, 4, axis=1), masks, strict=True):
+        inside = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) >= 200).astype(np.uint8)
+        around = cv2.dilate(inside, np.ones((5, 5))) - cv2.erode(inside, np.ones((3, 3)))
+        drawn = np.abs(tile - color).max(axis=-1) < 40
+        assert drawn[around == 1].sum() >= 0.15 * around.sum()
+        within = cv2.erode(inside, np.ones((9, 9))) == 1  # where names of others may stand
+        assert drawn[within].sum() <= 0.1 * within.sum()
+        seen += inside.any()
+    assert seen >= 2
