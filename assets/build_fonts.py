@@ -14,8 +14,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import distance_transform_edt
 
-from fastgen.prints.artwork import GLYPH_TILE_SIZE as TILE
-from fastgen.prints.lettering import TILE_BASELINE_CAPS, TILE_CAPS, TILE_RANGE_CAPS
+from fastgen.decals.artwork import GLYPH_TILE_SIZE as TILE
+from fastgen.decals.lettering import TILE_BASELINE_CAPS, TILE_CAPS, TILE_RANGE_CAPS
 
 FOLDER = Path(__file__).parent / "fonts"
 CHARS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-./:,&'()+"

@@ -1,15 +1,22 @@
-"""What is each modelled element worth, and what does it cost?
+"""Measure what each modelled element changes in the image and what it costs.
 
     python bench/ablation.py [--cases 16] [--only WORD] [--repeats 6]
 
-Takes one element at a time out of the scenes of bench/references (ablation_elements.py says how)
-and draws them again. Printed are the FLIP that this changes over the pixels of container and
-spreader at 640x640, mean over the cases and worst case; the share of those pixels that change
-visibly, by more than VISIBLE; by how much the image without it is farther from Cycles' reference at
-320x320 (negative: nearer); and the processor time of a draw that is saved, a mean with its standard
-error. Elements that a case does not have count as no change. The row "nothing" says what two
-equal draws differ by. Leaves its table in docs/accuracy.md and bench/results/ablation.json; with
---only, neither.
+Removes one element at a time from the scenes of bench/references (see ablation_elements.py) and
+renders them again. Prints a row for each element:
+
+FLIP between the images with and without the element, over the pixels of container and spreader at
+640x640 (mean over the cases, and the worst case).
+
+Visible change: the share of these pixels with a FLIP above VISIBLE.
+
+Farther from Cycles: how much the FLIP to the Cycles reference at 320x320 rises without the element
+(negative: it falls).
+
+CPU time saved per draw: mean and standard error.
+
+Cases that do not contain an element count as no change. The row "nothing" compares two identical
+draws. Writes the table to docs/accuracy.md and bench/results/ablation.json, unless --only is given.
 """
 
 import argparse
@@ -31,23 +38,25 @@ from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import machine, origin, parse_size, save, write_section
 
 from fastgen import Config, Generator
-from fastgen.sample import Frame
+from fastgen.frame import Frame
 from fastgen.scene import Scene
 
 NOTHING = Element("", "nothing")
 QUALITY = "balanced"
 VISIBLE = 0.1
 MARGIN_PX = 32
-"""Around the objects, beyond what FLIP's filters carry over to them from the border."""
+"""Margin around the objects, wide enough for FLIP's filters."""
 
 
 Array = NDArray[np.floating]
 
 
 class Drawer:
-    """Draws scenes without an element; a context manager over a generator of its own.
+    """Context manager that renders scenes without one element.
 
-    whole: draws with everything in; where only the scene differs, its generator does for both.
+    Args:
+        absence: The element to remove.
+        whole: A Drawer with all elements. Its generator is shared if only the scene differs.
     """
 
     def __init__(self, absence: Absence, whole: "Drawer | None" = None) -> None:
@@ -66,13 +75,13 @@ class Drawer:
             self._generator.close()
 
     def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
-        """The case's view of the scene."""
+        """Render the case's view of a scene."""
         with self._absence.gone():
             renderer = self._generator._gpu.renderer()
             return renderer.render(self._absence.scene(scene), scene.camera(case.camera), size)
 
     def seconds(self, case: Case, scene: Scene, size: tuple[int, int]) -> float:
-        """Processor time of a draw that is warm."""
+        """Return the CPU time in seconds of one draw with warm caches."""
         with self._absence.gone():
             renderer = self._generator._gpu.renderer()
             less, camera = self._absence.scene(scene), scene.camera(case.camera)
@@ -83,14 +92,20 @@ class Drawer:
             return time.process_time() - began
 
     def exposure(self, case: Case, scene: Scene) -> float:
-        """Of the case's camera."""
+        """Return the exposure of the case's camera."""
         return self._generator.exposure(scene, scene.camera(case.camera))
 
 
 @dataclass(frozen=True, eq=False)
 class Whole:
-    """A case with everything in it. image: sRGB in 0..1 at the size asked for; there: its pixels of
-    objects; around: the window of it that holds them; error: mean FLIP to Cycles' image."""
+    """A case rendered with every element.
+
+    Attributes:
+        image: sRGB [H, W, 3] in 0..1 at the requested size.
+        there: Mask [H, W] of the pixels of objects.
+        around: Window that contains all objects.
+        error: Mean FLIP to the Cycles image over the objects, at 320x320.
+    """
 
     case: Case
     reference: Reference
@@ -102,7 +117,7 @@ class Whole:
 
     @staticmethod
     def of(case: Case, full: Drawer, size: tuple[int, int]) -> "Whole":
-        """Drawn by `full`."""
+        """Render a case with `full`, a Drawer that removes nothing."""
         reference = load(case.number)
         frame = full.frame(case, reference.scene, size)
         there = frame.ids > 0
@@ -117,7 +132,7 @@ class Whole:
 
 
 def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
-    """Mean FLIP to Cycles' image over the pixels of objects."""
+    """Return the mean FLIP to the Cycles image over the pixels of objects."""
     expected = displayed(reference.radiance[FILTERS[QUALITY]], exposure)
     return float(flip(expected, frame.image / 255.0)[reference.inside].mean())
 
@@ -125,7 +140,7 @@ def error_to(reference: Reference, exposure: float, frame: Frame) -> float:
 def without(
     element: Element, wholes: list[Whole], full: Drawer, size: tuple[int, int], repeats: int
 ) -> dict[str, Any]:
-    """The row of an element."""
+    """Return the table row of an element, averaged over the cases."""
     absence = Absence(element)
     changes, visible, farther, saved = [], [], [], []
     with Drawer(absence, full) as less:
@@ -140,7 +155,7 @@ def without(
             farther.append(error_to(whole.reference, whole.exposure, small) - whole.error)
             spent: dict[Drawer, list[float]] = {full: [], less: []}
             for turn in range(repeats):
-                # who comes second finds more at hand: they take turns
+                # the second draw finds warmer caches, so the order alternates
                 for drawer in (full, less) if turn % 2 else (less, full):
                     spent[drawer].append(drawer.seconds(case, scene, size))
             saved.append(1e3 * float(np.median(spent[full]) - np.median(spent[less])))
@@ -157,12 +172,12 @@ def without(
 
 
 def main() -> None:
-    """Print the table as it grows."""
+    """Print each row as soon as it is measured, then write the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=16)
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--repeats", type=int, default=6)
-    parser.add_argument("--only", default="", help="elements whose group or name holds this")
+    parser.add_argument("--only", default="", help="measure only elements whose group or name contains this")
     options = parser.parse_args()
     size = parse_size(options.size)
     chosen = traced(options.cases)
@@ -171,7 +186,7 @@ def main() -> None:
         f"{len(chosen)} cases, draws at {options.size}, {QUALITY}, {about}, no GPU.",
         "",
         "| without | FLIP of objects, mean (worst case) | visible change | farther from Cycles "
-        "| core-ms saved |",
+        "| CPU ms saved |",
         "| --- | --- | --- | --- | --- |",
     ]
     rows: dict[str, Any] = {}

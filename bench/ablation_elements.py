@@ -1,4 +1,4 @@
-"""What can be taken out of an image, and how: by the scene, by shader text, or by mesh parts."""
+"""Elements that can be removed from an image: by the scene, by shader text, or by mesh parts."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -9,21 +9,33 @@ from unittest import mock
 
 import numpy as np
 
-from fastgen.drawing import programs, shapes
-from fastgen.geometry.mesh import FACE_AXES, Mesh
-from fastgen.light import openness
-from fastgen.light.interreflection import FormFactors
-from fastgen.light.sky_probe import Lit, SkyProbe
+from fastgen.geometry.mesh import Mesh
+from fastgen.light import sky_visibility as openness
+from fastgen.light.indirect_light import FormFactors
+from fastgen.render import programs, shapes
+from fastgen.render.sky_visibility_probe import Lit, SkyProbe
 from fastgen.scene import Scene, Spreader
+from fastgen.scene.faces import FACE_AXES
 
 MeshEdit = Callable[[Mesh], Mesh]
 
 
 @dataclass(frozen=True)
 class Element:
-    """One thing that is modelled. Its absence is a scene without it, other shader text (each old
-    piece must be found in some shader), or other meshes of the container or the spreader; the shade
-    of what is gone from a mesh stays."""
+    """One modelled element, and how to remove it.
+
+    Sky visibility is still computed with the unedited meshes.
+
+    Attributes:
+        group: Group in the table.
+        name: Name in the table.
+        scene: Function that returns the scene without the element.
+        text: Pairs of old and new shader text. Every old text must occur in some shader.
+        container: Edit of the container's mesh.
+        spreader: Edit of the spreader's mesh.
+        open_sky: Remove the occlusion of the sky.
+        thrown: False to remove indirect light from surfaces on the spreader.
+    """
 
     group: str
     name: str
@@ -33,40 +45,43 @@ class Element:
     spreader: MeshEdit | None = None
     open_sky: bool = False
     thrown: bool = True
-    """Whether surfaces throw light on the spreader."""
 
 
 class Absence:
-    """Takes an element out of all that is drawn while the context `gone` is entered."""
+    """Removes an element from all renders made while the context `gone` is active."""
 
     def __init__(self, element: Element) -> None:
         self.element = element
         self._found: set[str] = set()
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene without the element."""
+        """Return the scene without the element."""
         return self.element.scene(scene) if self.element.scene else scene
 
     @contextmanager
     def gone(self) -> Iterator[None]:
-        """Renderers that are made and used in here do without the element."""
+        """Make renderers that are created and used in this context omit the element."""
         with ExitStack() as stack:
             for owner, name, value in self._replacements():
                 stack.enter_context(mock.patch.object(owner, name, value))
             yield
 
     def check(self) -> None:
-        """Ends the program where shader text that was to change was never met."""
+        """Check that all shader text to be replaced was found.
+
+        Raises:
+            SystemExit: Some text was not in any shader that was compiled.
+        """
         for old, _ in self.element.text:
             if old not in self._found:
-                raise SystemExit(f"{self.element.name}: no shader holds {old!r} any more")
+                raise SystemExit(f"{self.element.name}: no shader contains {old!r}; update ablation_elements.py")
 
     def _replacements(self) -> Iterator[tuple[Any, str, Any]]:
         element = self.element
         if element.text:
             yield programs, "expand", self._edited(programs.expand)
         if element.container:
-            for name in ("build_container", "container_outline"):  # drawn, and the sun's shadow
+            for name in ("build_container", "container_outline"):  # the visible mesh, and the one for sun shadows
                 yield shapes, name, _built(getattr(shapes, name), element.container)
         if element.spreader:
             yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
@@ -88,7 +103,7 @@ class Absence:
 
 
 _SOURCES: dict[Mesh, Mesh] = {}
-"""Edited meshes and what they were made of."""
+"""The unedited mesh of each edited one."""
 
 
 @lru_cache(maxsize=512)
@@ -109,8 +124,7 @@ def _all_open(mesh: Mesh) -> Lit:
 
 
 def _probe(measured: Callable[..., Lit], open_sky: bool) -> Callable[..., Lit]:
-    """In place of a method of SkyProbe that lights the first of some meshes: what it finds for the
-    unedited ones, or no occlusion at all."""
+    """Wrap a SkyProbe method to use the unedited meshes, or to return unoccluded sky."""
 
     def found(self: SkyProbe, mesh: Mesh, *others: Any) -> Lit:
         if open_sky:
@@ -125,7 +139,7 @@ def _unedited(item: Any) -> Any:
 
 
 def without_charts(*words: str) -> MeshEdit:
-    """Leaves out the triangles of charts whose name holds one of `words`."""
+    """Return an edit that removes the triangles of charts whose name contains one of `words`."""
 
     def edit(mesh: Mesh) -> Mesh:
         dropped = np.array([any(word in chart.name for word in words) for chart in mesh.charts])
@@ -141,7 +155,7 @@ def without_charts(*words: str) -> MeshEdit:
 
 
 def filled_pockets(mesh: Mesh) -> Mesh:
-    """The castings' apertures closed flush with their faces."""
+    """Close the castings' apertures flush with their faces."""
     positions = mesh.positions_mm.copy()
     for number, chart in enumerate(mesh.charts):
         if chart.name.endswith(".pocket"):
@@ -177,10 +191,10 @@ ELEMENTS = (
     Element("surface", "rust", text=_layer("RUST")),
     Element("surface", "scratches", text=_layer("SCRATCHES")),
     Element("surface", "worn reflection", text=_layer("REFLECTION")),
-    Element("prints", "markers", _without_decals("marker")),
-    Element("prints", "texts", _without_decals("text")),
-    Element("prints", "stickers, emblems, stripes", _without_decals("sticker", "emblem")),
-    Element("prints", "wear of prints", _fresh_print),
+    Element("decals", "markers", _without_decals("marker")),
+    Element("decals", "texts", _without_decals("text")),
+    Element("decals", "stickers, emblems, stripes", _without_decals("sticker", "emblem")),
+    Element("decals", "wear of decals", _fresh_print),
     Element("shape", "damage", lambda scene: replace(scene, damages=())),
     Element(
         "shape",

@@ -1,17 +1,20 @@
-"""How far are the images from a path tracer's?
+"""Compare the images with those of a path tracer.
 
     python bench/accuracy.py [--cases 32] [--qualities draft,balanced,fine,high]
 
-Renders the 32 cases of bench/references at every quality and compares with what Cycles made of the
-same exported scenes at 1,024 samples, under the same light, exposure, tone curve and pixel filter:
-FLIP, SSIM and PSNR over the whole image and over the pixels of the container and its spreader.
-Before that, silhouettes and depths through the pixel centres must coincide. Beside it stand Cycles'
-own noise (the same measure between two of its renders of different seeds) and, for each quality, at
-how many samples Cycles is as far from the reference as we are, and what that takes it.
+Renders the 32 cases of bench/references at every quality. The references are Cycles renders of the
+same exported scenes at 1,024 samples, with the same light, exposure, tone curve and pixel filter.
+Reports FLIP, SSIM and PSNR over the whole image and over the pixels of the container and its
+spreader. First checks that silhouettes and depths through the pixel centres agree.
 
-Needs no Blender; `--blender-python PYTHON` traces what is missing, see trace_references.py.
-Leaves its tables in docs/accuracy.md, bench/results/accuracy.json, docs/accuracy.jpg, and a picture
-a case in --out. Also needs what `pip install '.[accuracy]'` brings.
+Two figures put the errors in perspective. Cycles' own noise is the same measure between two of its
+renders with different seeds. For each quality, the table also shows at how many samples Cycles has
+the same error, and the CPU time it needs for them.
+
+Works without Blender; `--blender-python PYTHON` traces missing references (see
+trace_references.py). Writes tables to docs/accuracy.md, bench/results/accuracy.json,
+docs/accuracy.jpg, and a picture per case into --out. Needs the packages of `pip install
+'.[accuracy]'`.
 """
 
 import argparse
@@ -47,17 +50,23 @@ Array = NDArray[np.floating]
 GROUPS: dict[str, Callable[[Case], str]] = {
     "camera": lambda case: case.camera,
     "light": lambda case: case.light,
-    "damage": lambda case: "damaged" if case.damaged else "sound",
+    "damage": lambda case: "damaged" if case.damaged else "undamaged",
     "rust": lambda case: "rusty" if case.rusty else "clean",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A case at one quality. measures: as Comparison.both gives them; rounding: the same of the
-    reference in eight bits a channel, as our images are; parts: by part of the image, pixels, their
-    sum of FLIP and the median of stops by which ours is brighter; seconds: processor time of a
-    labelled image; panels: ours, the reference's and FLIP."""
+    """A case at one quality.
+
+    Attributes:
+        measures: Measures from Comparison.both.
+        rounding: The same measures of the reference rounded to 8 bits per channel, like our images.
+        parts: By part of the image: number of pixels, sum of their FLIP, and median stops by which
+            our image is brighter.
+        seconds: CPU time of a labelled image.
+        panels: Our image, the reference, and the FLIP map.
+    """
 
     case: Case
     measures: tuple[float, ...]
@@ -68,13 +77,21 @@ class Result:
 
 
 def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[float, float]:
-    """Share of pixels whose silhouette coincides, and the 99 % quantile of depth error in mm."""
+    """Check that an image shows the same geometry as its reference.
+
+    Returns:
+        Share of pixels with the same silhouette, and the 99 % quantile of the depth error in mm.
+
+    Raises:
+        SystemExit: The silhouettes differ in more than 1 - MIN_COINCIDENCE of the pixels.
+    """
     inside = sample.ids > 0
     same = float((inside == reference.inside).mean())
     if same < MIN_COINCIDENCE:
         raise SystemExit(
-            f"case {case.number}: {1 - same:.2%} of pixels see another object than the reference: "
-            "the geometry has changed; delete its files in bench/references and trace it again"
+            f"case {case.number}: the silhouette differs from the reference in {1 - same:.2%} of "
+            "pixels, so the geometry has changed; delete the case's files in bench/references "
+            "and trace it again with --blender-python"
         )
     step = (slice(None, None, DEPTH_STEP),) * 2
     both = inside[step] & np.isfinite(reference.depth_m)
@@ -85,7 +102,7 @@ def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[fl
 def compared(
     generator: Generator, case: Case, reference: Reference, filter_name: str, sample: Sample
 ) -> Result:
-    """The measures of `sample`, and the time that another one like it takes."""
+    """Measure `sample` against the reference, and time repeated renders of the same view."""
     scene, camera = reference.scene, reference.scene.camera(case.camera)
     exposure = generator.exposure(scene, camera)
     expected = displayed(reference.radiance[filter_name], exposure)
@@ -111,7 +128,7 @@ def compared(
 
 
 def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
-    """Every case at a quality, and a line on how geometry coincides."""
+    """Return the results of all cases at a quality, and a line on how well the geometry agrees."""
     found, same, apart = [], [], []
     with Generator(Config.preset(), SEED, SIZE, quality=quality) as generator:
         for case in chosen:
@@ -122,14 +139,15 @@ def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str
             apart.append(apart_mm)
             found.append(compared(generator, case, reference, FILTERS[quality], sample))
     coincidence = (
-        f"{quality}: silhouettes coincide in {np.mean(same):.4%} of pixels (least "
-        f"{min(same):.3%}), 99 % of depths to {np.median(apart):.2f} mm (worst {max(apart):.2f})"
+        f"{quality}: silhouettes agree in {np.mean(same):.4%} of pixels (worst case "
+        f"{min(same):.3%}), 99 % of depths within {np.median(apart):.2f} mm "
+        f"(worst case {max(apart):.2f})"
     )
     return found, coincidence
 
 
 def row(title: str, rows: list[tuple[float, ...]]) -> str:
-    """A line of mean (worst) FLIP, SSIM and PSNR of the whole image, then of objects."""
+    """Return a table row of mean (worst) FLIP, SSIM and PSNR, first whole image, then objects."""
     values = np.array(rows)
     worst = [values[:, i].max() if i % 3 == 0 else values[:, i].min() for i in range(6)]
     digits = (3, 3, 1, 3, 3, 1)
@@ -141,13 +159,14 @@ def row(title: str, rows: list[tuple[float, ...]]) -> str:
 
 
 def overall(results: dict[str, list[Result]], figures: Figures) -> list[str]:
-    """A row a quality, then what rounding to eight bits and Cycles' own noise amount to."""
+    """Return a table with a row per quality, then one for 8-bit rounding and one for Cycles'
+    noise."""
     columns = [f"{m}, {where}" for where in ("whole", "objects") for m in ("FLIP", "SSIM", "PSNR")]
     lines = ["| mean (worst) | " + " | ".join(columns) + " |", "| --- |" + " --- |" * 6]
     lines += [row(name, [result.measures for result in r]) for name, r in results.items()]
     by_filter = {FILTERS[quality]: r for quality, r in results.items()}
     for name, r in sorted(by_filter.items()):
-        lines.append(row(f"the reference in 8 bits, {name}", [result.rounding for result in r]))
+        lines.append(row(f"8-bit reference, {name}", [result.rounding for result in r]))
     for name in sorted(set(FILTERS.values())):
         rows = figures.floor_rows(name)
         if rows:
@@ -156,7 +175,7 @@ def overall(results: dict[str, list[Result]], figures: Figures) -> list[str]:
 
 
 def by_group(results: dict[str, list[Result]]) -> list[str]:
-    """Mean (worst) object FLIP of each group of cases, a column a quality."""
+    """Return a table of mean (worst) object FLIP by group of cases, with a column per quality."""
     lines = ["| object FLIP, mean (worst) | cases | " + " | ".join(results) + " |"]
     lines.append("| --- |" + " --- |" * (len(results) + 1))
     for group in GROUPS.values():
@@ -171,13 +190,16 @@ def by_group(results: dict[str, list[Result]]) -> list[str]:
 
 
 def by_part(quality: str, listed: list[Result]) -> list[str]:
-    """Where in the images the error lies."""
+    """Return a table of the error in each part of the images."""
     shares: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for result in listed:
         for part, values in result.parts.items():
             shares[part].append(values)
     totals = np.array([[p[:2] for p in values] for values in shares.values()]).sum(axis=(0, 1))
-    lines = [f"| part of the image, {quality} | of pixels | of error | FLIP | brighter, stops |"]
+    lines = [
+        f"| part of the image, {quality} | share of pixels | share of error | FLIP "
+        "| too bright by, stops |"
+    ]
     lines.append("| --- | --- | --- | --- | --- |")
     for part, values in shares.items():
         pixels, error, stops = np.array(values).T
@@ -190,9 +212,12 @@ def by_part(quality: str, listed: list[Result]) -> list[str]:
 
 
 def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
-    """'As accurate as Cycles at N samples' of each quality, over the cases that have a series."""
-    columns = ("quality", "pixels", "FLIP", "core-ms")
-    columns += ("as Cycles at", "which takes", "denoised at", "which takes")
+    """Return a table of the Cycles samples with the same error as each quality.
+
+    Covers the cases that have a Cycles series.
+    """
+    columns = ("quality", "pixels", "FLIP", "CPU ms")
+    columns += ("Cycles with the same FLIP", "takes", "denoised Cycles", "takes")
     lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 7]
     for quality, listed in results.items():
         timed = [r for r in listed if r.case.number in figures.series]
@@ -215,7 +240,7 @@ def main() -> None:
     parser.add_argument("--qualities", default="draft,balanced,fine,high")
     parser.add_argument("--blender-python", type=Path)
     parser.add_argument("--picture", type=Path, default=ROOT / "docs" / "accuracy.jpg")
-    parser.add_argument("--out", type=Path, help="folder of a picture a case and quality")
+    parser.add_argument("--out", type=Path, help="folder for a picture per case and quality")
     options = parser.parse_args()
     if options.blender_python:
         command = [sys.executable, str(Path(__file__).with_name("trace_references.py"))]
@@ -225,7 +250,7 @@ def main() -> None:
         subprocess.run([sys.executable, packer], check=True)
     chosen = traced(options.cases)
     if len(chosen) < options.cases:
-        print(f"{options.cases - len(chosen)} references are missing: give --blender-python")
+        print(f"{options.cases - len(chosen)} references are missing: give --blender-python PYTHON")
     if not chosen:
         raise SystemExit(2)
     figures = Figures.load()
@@ -237,7 +262,7 @@ def main() -> None:
     title = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}, no GPU."
     lines = [title, "", *overall(results, figures), "", *lines, ""]
     if figures.series:
-        lines += [f"Over the {len(figures.series)} cases that have a series of Cycles:", ""]
+        lines += [f"Over the {len(figures.series)} cases with a Cycles series:", ""]
         lines += [*as_samples(results, figures), ""]
     lines += [*by_group(results), ""]
     for quality, listed in results.items():

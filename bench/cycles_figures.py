@@ -1,4 +1,4 @@
-"""What is known of Cycles' own errors and times, from bench/references/cycles.json."""
+"""Errors and CPU times of Cycles itself, from bench/references/cycles.json."""
 
 import json
 from collections.abc import Sequence
@@ -9,12 +9,16 @@ import numpy as np
 from reference_set import FOLDER
 
 Curve = list[tuple[int, float, float]]
-"""(samples, error, processor seconds) in rising order of samples."""
+"""(samples, error, CPU seconds), sorted by samples."""
 
 
 @dataclass(frozen=True)
 class Equal:
-    """At how many samples an error is reached, and the seconds that takes. 0 where it never is."""
+    """The number of samples at which Cycles reaches an error, and the CPU seconds they take.
+
+    Both are 0 without a curve. Outside the curve they are those of its nearest end, and `words`
+    says "fewer than" or "more than".
+    """
 
     samples: float
     seconds: float
@@ -23,27 +27,33 @@ class Equal:
 
 @dataclass(frozen=True)
 class Figures:
-    """floor: by case and filter, the measures between two seeds. series: by case, way (spp or
-    denoised) and samples, the seconds and the measures against the reference's box. Measures are
-    FLIP, SSIM and PSNR of the whole image, then of objects."""
+    """Measured errors and times of Cycles.
+
+    Measures are FLIP, SSIM and PSNR of the whole image, then of the objects.
+
+    Attributes:
+        floor: By case and filter, the measures between renders with two seeds.
+        series: By case, way ("spp" or "denoised") and samples, the CPU seconds and the measures
+            against the reference with the box filter.
+    """
 
     floor: dict[int, dict[str, list[float]]]
     series: dict[int, dict[str, dict[str, dict[str, object]]]]
 
     @staticmethod
     def load(path: Path = FOLDER / "cycles.json") -> "Figures":
-        """All that was packed; nothing where the file is not there."""
+        """Read the packed figures, or return empty ones if the file does not exist."""
         if not path.exists():
             return Figures({}, {})
         data = json.loads(path.read_text(encoding="utf-8"))
         return Figures(*({int(n): v for n, v in data[k].items()} for k in ("floor", "series")))
 
     def floor_rows(self, filter_name: str) -> list[tuple[float, ...]]:
-        """Measures of each case that was traced twice."""
+        """Return the measures of each case that was traced twice."""
         return [tuple(by_filter[filter_name]) for by_filter in self.floor.values()]
 
     def curve(self, numbers: Sequence[int], way: str, column: int) -> Curve:
-        """Means over cases of one measure by samples."""
+        """Return one measure by number of samples, averaged over the cases `numbers`."""
         of_case = [self.series[n][way] for n in numbers if way in self.series.get(n, {})]
         if not of_case:
             return []
@@ -58,8 +68,11 @@ class Figures:
 
 
 def equal_samples(curve: Curve, error: float) -> Equal:
-    """Where a falling curve meets `error`: straight lines between its points on both logarithms for
-    samples, and between the logarithm of samples and of seconds for the time."""
+    """Return where a falling curve reaches `error`.
+
+    Interpolates samples over error with both on logarithmic scales, and seconds over samples
+    likewise.
+    """
     if not curve:
         return Equal(0.0, 0.0, "no known number of")
     samples, errors, seconds = (np.array(column, float) for column in zip(*curve, strict=True))

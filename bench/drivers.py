@@ -1,9 +1,10 @@
-"""How alike two datasets are that different drivers made with the same settings.
+"""Compare two datasets made by different drivers with the same settings.
 
     python bench/drivers.py ONE OTHER
 
-Both are folders of `fastgen generate` with the same options, for example one made by a GPU and one
-by Mesa's rasterizer. Prints how far apart pictures, damage masks, boxes and texts are.
+Both are folders written by `fastgen generate` with the same options, for example one on a GPU and
+one with Mesa's software rasterizer. Prints the differences of images, damage masks, boxes and
+texts.
 """
 
 import argparse
@@ -20,14 +21,18 @@ import results  # noqa: F401 finds the fastgen beside this folder
 from fastgen.dataset.verify import examine
 from fastgen.errors import FastgenError
 
-TASKS = ("container", "imdg", "damage")  # those with boxes in COCO's format
+TASKS = ("container", "imdg", "damage")  # the tasks with boxes in COCO format
 SETTINGS = ("version", "seed", "size", "quality", "cameras", "environments", "config", "images")
 FAR = 16
-"""Steps of 255 by which a pixel is off that one would see."""
+"""Visible difference of a pixel, in steps of 255."""
 
 
 def checked(one: Path, other: Path) -> list[dict[str, Any]]:
-    """What the dataset.json of each says. Ends the program unless both are whole and alike."""
+    """Return the contents of both dataset.json files.
+
+    Raises:
+        SystemExit: A dataset is incomplete, or the two were made with different settings.
+    """
     made = []
     for folder in (one, other):
         try:
@@ -37,16 +42,16 @@ def checked(one: Path, other: Path) -> list[dict[str, Any]]:
         if found.faults:
             raise SystemExit(f"{folder}: {found.faults[0]}")
         if found.manifest["format"] != "seafront":
-            raise SystemExit(f"{folder}: holds tars; make it with --format seafront")
+            raise SystemExit(f"{folder}: contains tar files; make it with --format seafront")
         made.append(found.manifest)
     unlike = [name for name in SETTINGS if made[0][name] != made[1][name]]
     if unlike:
-        raise SystemExit(f"{one} and {other}: were made with other settings: {', '.join(unlike)}")
+        raise SystemExit(f"{one} and {other} differ in these settings: {', '.join(unlike)}")
     return made
 
 
 def pairs(one: Path, other: Path, pattern: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Pictures of the same name."""
+    """Yield the images with the same name in both folders."""
     for path in sorted(one.glob(pattern)):
         first, second = (
             cv2.imread(str(folder / path.relative_to(one)), cv2.IMREAD_UNCHANGED)
@@ -58,9 +63,12 @@ def pairs(one: Path, other: Path, pattern: str) -> Iterator[tuple[np.ndarray, np
 
 
 def boxes(folder: Path, task: str) -> dict[tuple[str, int, int], np.ndarray]:
-    """Edges (left, top, right, bottom) by picture, class, and place in the order of these: where
-    one is missing, those after it are taken for others. Of the container, which every task has,
-    those of its own alone."""
+    """Return the box edges (left, top, right, bottom) of a task.
+
+    The key is the image, the class, and a running number within both. If one dataset lacks a box,
+    the boxes after it are compared with the wrong ones. Container boxes are in every task and count
+    only for the task `container`.
+    """
     found: dict[tuple[str, int, int], np.ndarray] = {}
     for path in sorted((folder / task).glob("coco_*.json")):
         coco = json.loads(path.read_text(encoding="utf-8"))
@@ -77,16 +85,16 @@ def boxes(folder: Path, task: str) -> dict[tuple[str, int, int], np.ndarray]:
 
 
 def texts(folder: Path) -> set[str]:
-    """Lines of all text labels."""
+    """Return the lines of all text labels."""
     files = folder.glob("text/*/labels.txt")
     return {line for path in files for line in path.read_text(encoding="utf-8").splitlines()}
 
 
 def main() -> None:
-    """Print a line for each kind of content."""
+    """Print a line per kind of content."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("one", type=Path, help="a dataset's folder")
-    parser.add_argument("other", type=Path, help="that of another driver's")
+    parser.add_argument("one", type=Path, help="folder of a dataset")
+    parser.add_argument("other", type=Path, help="folder of the other driver's dataset")
     options = parser.parse_args()
     folders = options.one, options.other
     for folder, made in zip(folders, checked(*folders), strict=True):
@@ -97,22 +105,25 @@ def main() -> None:
     ]
     mean = np.mean([image.mean() for image in apart])
     far = np.mean([(image.max(axis=-1) > FAR).mean() for image in apart])
-    print(f"pictures: {mean:.2f} of 255 apart, {1e6 * far:.0f} in a million pixels by over {FAR}")
+    print(
+        f"images: mean difference {mean:.2f} of 255; "
+        f"{1e6 * far:.0f} pixels per million differ by more than {FAR}"
+    )
     masks = list(pairs(*folders, "damage/masks/*/*"))
     differing = sum(int((one != other).sum()) for one, other in masks)
     labelled = sum(int((one > 0).sum()) for one, _ in masks)
-    print(f"damage masks: {differing} pixels differ, of {labelled} that show the container")
+    print(f"damage masks: {differing} pixels differ; {labelled} show the container")
     for task in TASKS:
         first, second = (boxes(folder, task) for folder in folders)
         steps = [np.abs(first[key] - second[key]).max() for key in first.keys() & second.keys()]
         moved = [step for step in steps if step > 0]
         alone = len(first.keys() ^ second.keys())
         print(
-            f"{task}: of {len(steps)} boxes {len(moved)} differ, by up to "
-            f"{max(moved, default=0):g} pixels; {alone} are in one alone"
+            f"{task}: {len(moved)} of {len(steps)} boxes differ, by up to "
+            f"{max(moved, default=0):g} pixels; {alone} are in only one dataset"
         )
     said, written = (texts(folder) for folder in folders)
-    print(f"texts: {len(said & written)} are the same, {len(said ^ written)} in one alone")
+    print(f"texts: {len(said & written)} are the same, {len(said ^ written)} in only one dataset")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Pictures of errors: ours, the path tracer's, and FLIP."""
+"""Images of errors: our render, the path tracer's, and FLIP."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,39 +9,43 @@ from numpy.typing import NDArray
 from reference_set import Case
 
 FLIP_SHOWN = 0.5
-"""FLIP that the error maps show as their brightest."""
+"""FLIP value that the error maps show as the brightest colour."""
 
 _HEAD_PX = 24
 
 Array = NDArray[np.floating]
 Picture = NDArray[np.uint8]
 Panels = tuple[Array, Array, Array]
-"""Ours and the reference's as sRGB [H, W, 3] in 0..1, FLIP [H, W]."""
+"""Our image and the reference as sRGB [H, W, 3] in 0..1, and FLIP [H, W]."""
 
 
 def heat(error: Array) -> Picture:
-    """FLIP from black over red to white at FLIP_SHOWN, BGR."""
+    """Return FLIP as BGR colours from black over red to the brightest at FLIP_SHOWN."""
     levels = np.asarray(np.clip(error / FLIP_SHOWN, 0, 1) * 255 + 0.5, np.uint8)
     return np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_INFERNO), np.uint8)
 
 
 def bgr(image: Array) -> Picture:
-    """sRGB in 0..1 as OpenCV keeps it."""
+    """Convert sRGB in 0..1 to 8-bit BGR for OpenCV."""
     return np.ascontiguousarray(np.asarray(image * 255 + 0.5, np.uint8)[..., ::-1])
 
 
 def picture(test: Array, reference: Array, error: Array) -> Picture:
-    """Ours, the reference's, FLIP, and who is brighter (red: we are), BGR [H, 4W, 3]."""
+    """Return our image, the reference, FLIP and the signed difference, BGR [H, 4W, 3].
+
+    In the signed difference, red means that our image is brighter and blue that it is darker.
+    """
     signed = (test - reference).mean(axis=2)
     lean = np.stack([np.maximum(signed, 0), np.zeros_like(signed), np.maximum(-signed, 0)], axis=2)
     return np.hstack([bgr(test), bgr(reference), heat(error), bgr(np.clip(lean * 4, 0, 1))])
 
 
 def contact_picture(rows: Sequence[tuple[Case, Panels]]) -> Picture:
-    """Two cases side by side on each row, each as ours, the reference's and FLIP, with captions."""
+    """Return two cases per row, each with our image, the reference and FLIP under captions."""
     tiles = []
     for case, (test, reference, error) in rows:
-        state = f"{'damaged' if case.damaged else 'sound'}, {'rusty' if case.rusty else 'clean'}"
+        damage = "damaged" if case.damaged else "undamaged"
+        state = f"{damage}, {'rusty' if case.rusty else 'clean'}"
         names = (f"fastgen: {case.light}, {case.camera}, {state}", "Cycles, 1024 samples", "FLIP")
         panels = (bgr(test), bgr(reference), heat(error))
         tiles.append(np.hstack([_titled(p, n) for p, n in zip(panels, names, strict=True)]))
@@ -65,7 +69,7 @@ def _write(image: Picture, text: str, x: int) -> None:
 
 
 def _scale(width: int) -> Picture:
-    """The colours of FLIP with their values."""
+    """Return a colour bar of FLIP with its values."""
     strip = np.full((_HEAD_PX, width, 3), 255, np.uint8)
     bar = heat(np.repeat(np.linspace(0, FLIP_SHOWN, 300)[None], _HEAD_PX - 8, axis=0))
     _write(strip, "FLIP 0", 4)
@@ -75,7 +79,7 @@ def _scale(width: int) -> Picture:
 
 
 def write_picture(path: Path, image: Picture) -> None:
-    """PNG, or JPEG at quality 88, by the ending of the name."""
+    """Write PNG, or JPEG at quality 88 if the name ends in .jpg."""
     path.parent.mkdir(parents=True, exist_ok=True)
     options = [cv2.IMWRITE_JPEG_QUALITY, 88] if path.suffix == ".jpg" else []
     if not cv2.imwrite(str(path), image, options):

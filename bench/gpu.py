@@ -1,16 +1,23 @@
-"""What a GPU gains: images a second to disk, to a training loop and into CUDA's memory.
+"""Measure what a GPU gains: rates to disk, to a training loop and into CUDA memory.
 
     python bench/gpu.py [--qualities draft,balanced] [--size 640x640] [--images 120]
         [--processes N] [--device-index N]
 
-For each quality: milliseconds that the GPU takes for a draw, from its first command to its last,
-and that the processor takes to give these; frames a second into CUDA's memory, each cloned to
-tensors of image, labels and depth, by one process and by N at once; images a second through
-fastgen.torch's Loader with N workers, copied to the GPU, their boxes made beside them; and of
-`fastgen generate` with N workers, once it runs. Warm: lights, shapes and programs were made before.
-N is by default as many as there are cores. Some frames in CUDA's memory are compared with
-`Generator.render`'s. Where no NVIDIA GPU draws, prints why and the disk's rate alone. Needs
-PyTorch. On a GPU it fills the table in docs/scale.md and leaves bench/results/gpu.json.
+Measures for each quality, with warm caches (lights, meshes and programs):
+
+GPU time of a draw, from its first command to its last, and CPU time to issue the commands.
+
+Frames per second into CUDA memory, with one process and with N at once. Each frame is cloned into
+tensors of image, labels and depth.
+
+Images per second through the Loader of fastgen.torch with N workers, copied to the GPU, boxes
+included.
+
+Images per second of `fastgen generate` with N workers, after its start-up.
+
+N defaults to the number of cores. Some frames in CUDA memory are compared with `Generator.render`.
+Without an NVIDIA GPU, prints the reason and measures only the rate to disk. Needs PyTorch. On a
+GPU, writes the table in docs/scale.md and bench/results/gpu.json.
 """
 
 import argparse
@@ -30,25 +37,31 @@ import fastgen
 from fastgen import Config, Generator
 from fastgen.errors import FastgenError
 from fastgen.generator import QUALITY
-from fastgen.records import check_known
 from fastgen.torch import ContainerDataset, Loader
+from fastgen.validation import check_known
 
 CAMERAS = tuple(Config.preset().cameras)
 SEED = 7
 COMPARED = 16
 SHARD = 16
-"""Images of a batch of the Loader, and by default of a shard of `generate`."""
+"""Images per Loader batch; also the default shard size of `generate`."""
 
 LONGEST_S = 300
-"""For one process to be ready; if another has died, nobody waits longer."""
+"""Longest wait for another process, so that nobody hangs if one has died."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one quality came to: milliseconds a draw, images a second, and of COMPARED frames how
-    many CUDA has as `render` gives them.
+    """Results of one quality.
 
-    alone, together: into CUDA's memory, by one process and by all.
+    Attributes:
+        gpu_ms: GPU time of a draw.
+        cpu_ms: CPU time to issue the commands of a draw.
+        same: Number of COMPARED frames that are bit-identical in CUDA memory and from `render`.
+        alone: Frames per second into CUDA memory with one process.
+        together: Frames per second into CUDA memory, all processes together.
+        loader: Images per second through the Loader.
+        disk: Images per second of `fastgen generate`.
     """
 
     quality: str
@@ -62,19 +75,19 @@ class Row:
 
 
 def shown(number: int) -> tuple[int, str]:
-    """Scene and camera of image `number`."""
+    """Return the scene index and the camera of image `number`."""
     return number // len(CAMERAS), CAMERAS[number % len(CAMERAS)]
 
 
 def in_tensors(generator: Generator, number: int) -> list[torch.Tensor]:
-    """Image, labels and depth of an image, in tensors of their own."""
+    """Return image, labels and depth of an image in newly allocated tensors."""
     frame = generator.render_cuda(*shown(number))
     arrays = (frame.image, frame.labels, frame.depth)
     return [torch.as_tensor(array, device="cuda").clone() for array in arrays]
 
 
 def opened(options: argparse.Namespace, quality: str) -> Generator:
-    """A generator whose lights and shapes are made."""
+    """Return a generator with lights and meshes loaded."""
     generator = Generator(
         seed=SEED,
         size=parse_size(options.size),
@@ -87,7 +100,7 @@ def opened(options: argparse.Namespace, quality: str) -> Generator:
 
 
 def count_same(generator: Generator) -> int:
-    """Of COMPARED frames, those that CUDA has bit for bit as `render` gives them."""
+    """Return how many of COMPARED frames are bit-identical in CUDA memory and from `render`."""
     same = 0
     for number in range(COMPARED):
         sample = generator.render(*shown(number))
@@ -102,8 +115,11 @@ def count_same(generator: Generator) -> int:
 
 
 def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
-    """Mean milliseconds of a draw, of the GPU between its first command and its last, and of the
-    processor until all commands are given."""
+    """Return the mean milliseconds of a draw.
+
+    Returns:
+        GPU time between first and last command, and time on the CPU until all commands are issued.
+    """
     gpu, cpu = [], []
     with generator._gpu.drawing() as renderer:
         query = renderer._ctx.query(time=True)
@@ -114,12 +130,12 @@ def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
             with query:
                 renderer.draw(scene, scene.camera(name), generator.size)
             cpu.append(time.perf_counter() - began)
-            gpu.append(query.elapsed / 1e6)  # waits for it
+            gpu.append(query.elapsed / 1e6)  # waits for the GPU
     return statistics.fmean(gpu), statistics.fmean(cpu) * 1e3
 
 
 def fill_tensors(generator: Generator, images: int) -> tuple[float, float]:
-    """From when to when images come into tensors."""
+    """Copy images into tensors; return the start and the end in seconds."""
     began = time.perf_counter()
     for number in range(images):
         in_tensors(generator, number)
@@ -128,16 +144,16 @@ def fill_tensors(generator: Generator, images: int) -> tuple[float, float]:
 
 
 def fill_beside_others(options: argparse.Namespace, quality: str, barrier: Any, spans: Any) -> None:
-    """One process of several: warm up, then wait for the others, and fill tensors."""
+    """Run one of several processes: warm up, wait for the others, then fill tensors."""
     with opened(options, quality) as generator:
         fill_tensors(generator, options.images)
         barrier.wait()
         spans.put(fill_tensors(generator, options.images))
-        barrier.wait()  # nobody's end disturbs the others
+        barrier.wait()  # no process shuts down while others still measure
 
 
 def rate_together(options: argparse.Namespace, quality: str) -> float:
-    """Frames a second of all processes together."""
+    """Return the frames per second of all processes together."""
     context = multiprocessing.get_context("spawn")
     barrier, spans = context.Barrier(options.processes, timeout=LONGEST_S), context.Queue()
     arguments = options, quality, barrier, spans
@@ -154,8 +170,10 @@ def rate_together(options: argparse.Namespace, quality: str) -> float:
 
 
 def loader_rate(options: argparse.Namespace, quality: str) -> float:
-    """Images a second that reach the GPU through a Loader, in the second half of an epoch, when
-    its workers have met most lights."""
+    """Return the images per second that reach the GPU through a Loader.
+
+    Measures the second half of an epoch, when the workers have loaded most lights.
+    """
     workers = options.processes
     length = 4 * workers * -(-options.images // SHARD) * SHARD
     data = ContainerDataset(
@@ -181,14 +199,14 @@ def loader_rate(options: argparse.Namespace, quality: str) -> float:
 
 
 def disk_rate(options: argparse.Namespace, quality: str) -> float:
-    """Images a second of `fastgen generate`."""
+    """Return the images per second of `fastgen generate`."""
     many = options.processes
     images, device = options.images * many, options.device_index
     return whole_run("egl", options.size, images, many, quality, device).steady
 
 
 def measure(options: argparse.Namespace, quality: str) -> Row:
-    """One row."""
+    """Measure one quality."""
     disk = disk_rate(options, quality)
     with opened(options, quality) as generator:
         same = count_same(generator)
@@ -200,13 +218,13 @@ def measure(options: argparse.Namespace, quality: str) -> Row:
 
 
 def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]:
-    """Markdown."""
+    """Return the rows as Markdown."""
     many = options.processes
     lines = [
         f"Images of {options.size} on {about}",
-        f"(`python bench/gpu.py`); {many} processes where several work:",
+        f"(`python bench/gpu.py`); {many} processes or workers where not stated otherwise:",
         "",
-        "| quality | GPU ms a draw | CPU ms a draw | frames/s into CUDA, 1 process | "
+        "| quality | GPU ms per draw | CPU ms per draw | frames/s into CUDA, 1 process | "
         f"{many} processes | Loader, images/s | to disk, images/s |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
@@ -217,34 +235,34 @@ def table(rows: list[Row], about: str, options: argparse.Namespace) -> list[str]
     same, compared = sum(row.same for row in rows), COMPARED * len(rows)
     lines += [
         "",
-        f"{same} of {compared} frames in CUDA's memory are those of `render`, bit for bit.",
+        f"{same} of {compared} frames in CUDA memory are bit-identical to those of `render`.",
     ]
     return lines
 
 
 def main() -> None:
-    """Print what each quality comes to, or the reason that there is no more than the disk's."""
+    """Print the results of each quality, or why only the rate to disk can be measured."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--qualities", default="draft,balanced")
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--images", type=int, default=120, help="of each process")
+    parser.add_argument("--images", type=int, default=120, help="images per process")
     parser.add_argument("--processes", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--device-index", type=int, help="in EGL's order")
+    parser.add_argument("--device-index", type=int, help="GPU to use, in the order of EGL devices")
     options = parser.parse_args()
     parse_size(options.size)
     if options.processes < 1 or options.images < 3 * SHARD:
-        raise SystemExit(f"give --processes of 1 or more and --images of {3 * SHARD} or more")
+        raise SystemExit(f"--processes must be at least 1 and --images at least {3 * SHARD}")
     with Generator(backend="egl", device_index=options.device_index) as generator:
         driver, reason = generator.renderer_name, generator.cuda_reason()
     if not reason and not torch.cuda.is_available():
-        reason = "this build of PyTorch, or its driver, has no CUDA"
+        reason = "PyTorch cannot use CUDA: its build or the driver lacks it"
     about = f"{driver} and {origin()['machine']}"
     print(f"{about}; {options.size}, {options.processes} processes")
     qualities = options.qualities.split(",")
     for quality in qualities:
         check_known("qualities", quality, tuple(QUALITY))
     if reason:
-        print(f"nothing to CUDA: {reason}")
+        print(f"CUDA not measured: {reason}")
         for quality in qualities:
             print(f"{quality}: {disk_rate(options, quality):.1f} images/s to disk", flush=True)
         return

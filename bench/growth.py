@@ -1,10 +1,10 @@
-"""How does the cost of an image grow with its pixels, markers, damages, light, workers and number?
+"""Measure how the cost of an image grows with pixels, markers, damage, light, workers and count.
 
     python bench/growth.py [--images 400] [--parts pixels,markers,damages,hdri,workers,length]
     python bench/growth.py --parts length --images 20000     # a long run: rate and memory
 
-Times are medians of `Generator.render`, labels included, in one process. Parts that were measured
-before are kept: bench/results/growth.json gathers them, and docs/growth.png shows them all.
+Times are medians of `Generator.render`, labels included, in one process. bench/results/growth.json
+keeps the latest results of every part, and docs/growth.png shows them all.
 """
 
 import argparse
@@ -32,7 +32,7 @@ from throughput import fill_caches, generate_command, whole_run
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
-from fastgen.environment import load_environment
+from fastgen.light.environment import load_environment
 from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.scene import Decal, Scene
 
@@ -44,14 +44,15 @@ SCENES = 3
 LENGTH_STEP = 100
 _POLL_S = 0.5
 _COLUMNS, _STEP_MM, _SIZE_MM = 8, 240.0, 200.0
-"""Of markers on the door."""
+"""Layout of the markers on the door."""
 
 Table = dict[str, list[float]]
-"""Columns of equal length by name."""
+"""Columns of equal length, by name."""
 
 
 def frame_ms(generator: Generator, views: Sequence[tuple[Scene, str]], rounds: int) -> float:
-    """Median milliseconds of a labelled image over `views`, each drawn once before."""
+    """Return the median milliseconds of a labelled image over `views`, after one warm-up draw
+    each."""
     for scene, camera in views:
         generator.render(scene=scene, camera=camera)
     taken = []
@@ -64,7 +65,7 @@ def frame_ms(generator: Generator, views: Sequence[tuple[Scene, str]], rounds: i
 
 
 def pixels(rounds: int) -> Table:
-    """Against the size of the image."""
+    """Measure the time against the size of the image."""
     table: Table = {"pixels": [], "ms": []}
     for text in SIZES:
         width, height = parse_size(text)
@@ -77,7 +78,7 @@ def pixels(rounds: int) -> Table:
 
 
 def with_markers(scene: Scene, count: int) -> Scene:
-    """`scene` with `count` markers in rows on its door, and nothing else on it."""
+    """Return `scene` with `count` markers in rows on its door and no other decals or damage."""
     decals = []
     for i in range(count):
         row, column = divmod(i, _COLUMNS)
@@ -88,7 +89,7 @@ def with_markers(scene: Scene, count: int) -> Scene:
 
 
 def markers(rounds: int) -> Table:
-    """Against markers on the door, at 640x640."""
+    """Measure the time against the number of markers on the door, at 640x640."""
     table: Table = {"markers": [], "ms": []}
     with Generator(Config.preset(), seed=1) as generator:
         scenes = [generator.scene(i) for i in range(SCENES)]
@@ -100,7 +101,10 @@ def markers(rounds: int) -> Table:
 
 
 def damages(rounds: int) -> Table:
-    """Against damages of a container, of all kinds, at 640x640; all else of a scene is the same."""
+    """Measure the time against the number of damages, at 640x640.
+
+    Damages are sampled from all kinds. The rest of a scene is the same for all counts.
+    """
     table: Table = {"damages": [], "ms": []}
     for count in DAMAGES:
         values = {"probability": float(count > 0), "count": [max(count, 1)] * 2}
@@ -113,12 +117,12 @@ def damages(rounds: int) -> Table:
 
 
 def hdri(rounds: int) -> Table:
-    """Against the width of the HDRI: an image, preparing the light once, and reading it again."""
+    """Measure image time, first light preparation and reload from the cache against HDRI width."""
     table: Table = {"width": [], "ms": [], "prepare_s": [], "reopen_ms": []}
     radiance = load_radiance(bundled_hdris()["venice"])
     for width in HDRI_WIDTHS:
         with tempfile.TemporaryDirectory() as place:
-            os.environ["XDG_CACHE_HOME"] = f"{place}/cache"  # neither use nor fill the user's own
+            os.environ["XDG_CACHE_HOME"] = f"{place}/cache"  # leave the user's cache alone
             path = Path(place) / "light" / "light.hdr"
             path.parent.mkdir()
             larger = cv2.resize(radiance, (width, width // 2), interpolation=cv2.INTER_LINEAR)
@@ -139,7 +143,8 @@ def hdri(rounds: int) -> Table:
 
 
 def workers(images: int) -> Table:
-    """Images a second of `fastgen generate` against worker processes, up to twice the cores."""
+    """Measure the images per second of `fastgen generate` with up to twice as many workers as
+    cores."""
     cores = len(os.sched_getaffinity(0))
     counts = sorted({1, 2, cores, 2 * cores})
     fill_caches("auto", images)
@@ -148,10 +153,11 @@ def workers(images: int) -> Table:
 
 
 def length(images: int, size: str) -> Table:
-    """Rate and resident memory of one `fastgen generate`, each time 100 more images are there.
+    """Record rate and resident memory of one `fastgen generate` after every LENGTH_STEP images.
 
-    resident_mb sums the command and its workers; pages that they share count once for each. The
-    command is given LENGTH_STEP images more, so that its workers are still at work at the last row.
+    resident_mb is the sum over the command and its workers. Shared pages count once per process.
+    The command makes LENGTH_STEP more images, so its workers still run when the last row is
+    recorded.
     """
     table: Table = {"images": [], "seconds": [], "resident_mb": []}
     cores = len(os.sched_getaffinity(0))
@@ -180,7 +186,7 @@ def _images_in(out: Path) -> int:
 
 
 def _resident_mb(pid: int) -> float:
-    """Resident memory of a process and all below it, in MB."""
+    """Return the resident memory in MB of a process and all its descendants."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
         children = [
@@ -188,13 +194,13 @@ def _resident_mb(pid: int) -> float:
             for task in Path(f"/proc/{pid}/task").iterdir()
             for child in (task / "children").read_text(encoding="ascii").split()
         ]
-    except OSError:  # it has ended
+    except OSError:  # the process has ended
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6 + sum(map(_resident_mb, children))
 
 
 def show(name: str, table: Table) -> None:
-    """Print a part's table, a long run's in at most twenty rows, and what it comes to."""
+    """Print the table of a part in at most about twenty rows, and the drift of a long run."""
     rows = list(zip(*table.values(), strict=True))
     print(f"\n{name}\n" + "".join(f"{column:>14}" for column in table))
     for row in rows[:: max(len(rows) // 20, 1)]:
@@ -204,14 +210,14 @@ def show(name: str, table: Table) -> None:
 
 
 def drift(table: Table) -> str:
-    """How rate and memory changed over a long run, in words."""
+    """Describe how rate and memory changed over a long run."""
     counts, seconds, memory = (np.array(table[k]) for k in ("images", "seconds", "resident_mb"))
     rates = np.diff(counts) / np.diff(seconds)
     tenth = max(len(rates) // 10, 1)
     words = (
         f"rate: first tenth {rates[:tenth].mean():.2f}/s, last tenth {rates[-tenth:].mean():.2f}/s"
     )
-    # up to some 1000 images HDRIs and meshes come by for the first time, and stay
+    # HDRIs and meshes are loaded during about the first 1000 images and then stay in memory
     for start in (100, 1000, 5000):
         if start < counts[-1]:
             at = int(np.searchsorted(counts, start))
@@ -219,16 +225,16 @@ def drift(table: Table) -> str:
             words += (
                 f"\nresident memory from image {counts[at]:.0f} to {counts[-1]:.0f}: {change:+.2%}"
             )
-    if counts[-1] > 2000:  # it wavers as freed memory is held and given back
+    if counts[-1] > 2000:  # means, because memory fluctuates as the allocator frees it late
         first, last = (memory[part].mean() for part in (counts <= 1000, counts > counts[-1] - 1000))
         words += (
-            f"\nmean over the last thousand images over that of the first: {last / first - 1:+.2%}"
+            f"\nmean memory of the last 1000 images against the first 1000: {last / first - 1:+.2%}"
         )
     return words
 
 
 def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
-    """A panel for each part that was measured."""
+    """Draw a chart with a panel for each part."""
     figure, panels = plt.subplots(2, 3, figsize=(12, 7))
     painters: dict[str, Callable[[Axes, Table], None]] = {
         "pixels": _draw_pixels,
@@ -242,11 +248,11 @@ def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
         if name in parts:
             paint(axes, parts[name]["table"])
             if "size" in parts[name]:
-                axes.set_xlabel(f"images of {parts[name]['size']} made")
+                axes.set_xlabel(f"images made, {parts[name]['size']}")
         else:
             axes.set_title(f"{name}: not measured")
     machines = "; ".join(sorted({part["machine"] for part in parts.values()}))
-    figure.text(0.5, 0.005, f"{machines}; 640x640 unless said", ha="center", fontsize=8)
+    figure.text(0.5, 0.005, f"{machines}; 640x640 unless stated otherwise", ha="center", fontsize=8)
     figure.tight_layout(rect=(0, 0.02, 1, 1))
     chart.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(chart, dpi=110)
@@ -254,7 +260,7 @@ def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
 
 def _draw_ms(axes: Axes, x: list[float], ms: list[float], label: str) -> None:
     axes.plot(x, ms, "o-")
-    axes.set(xlabel=label, ylabel="ms a labelled image", ylim=(0, None), xlim=(0, None))
+    axes.set(xlabel=label, ylabel="ms per labelled image", ylim=(0, None), xlim=(0, None))
 
 
 def _draw_pixels(axes: Axes, table: Table) -> None:
@@ -262,8 +268,8 @@ def _draw_pixels(axes: Axes, table: Table) -> None:
 
 
 def _draw_hdri(axes: Axes, table: Table) -> None:
-    axes.plot(table["width"], table["ms"], "o-", label="an image, ms")
-    axes.plot(table["width"], table["reopen_ms"], "^-", label="opening it again, ms")
+    axes.plot(table["width"], table["ms"], "o-", label="image, ms")
+    axes.plot(table["width"], table["reopen_ms"], "^-", label="reload from the cache, ms")
     axes.plot(table["width"], [1e3 * s for s in table["prepare_s"]], "s-", label="first use, ms")
     axes.set(xlabel="width of the HDRI in texels", ylabel="ms", xscale="log", yscale="log")
     axes.set_xticks(table["width"], [f"{w:.0f}" for w in table["width"]])
@@ -273,14 +279,14 @@ def _draw_hdri(axes: Axes, table: Table) -> None:
 
 def _draw_workers(axes: Axes, table: Table) -> None:
     axes.plot(table["workers"], table["images_per_s"], "o-")
-    axes.set(xlabel="workers", ylabel="images a second, start-up included")
+    axes.set(xlabel="workers", ylabel="images per second, start-up included")
     axes.set(ylim=(0, None), xlim=(0, None))
 
 
 def _draw_length(axes: Axes, table: Table) -> None:
     counts, seconds = np.array(table["images"]), np.array(table["seconds"])
     axes.plot(counts[1:], np.diff(counts) / np.diff(seconds), ".", ms=3)
-    axes.set(xlabel="images made", ylabel="images a second", ylim=(0, None), xlim=(0, None))
+    axes.set(xlabel="images made", ylabel="images per second", ylim=(0, None), xlim=(0, None))
     memory = axes.twinx()
     memory.plot(counts, table["resident_mb"], "C1")
     memory.set_ylim(0, None)
@@ -288,13 +294,13 @@ def _draw_length(axes: Axes, table: Table) -> None:
 
 
 def main() -> None:
-    """Measure the parts asked for, print them and draw the chart."""
+    """Measure the requested parts, print them and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers,length")
-    parser.add_argument("--images", type=int, default=400, help="of the long run")
-    parser.add_argument("--size", default="640x640", help="of the long run's images")
-    parser.add_argument("--run-images", type=int, default=200, help="of each run of `workers`")
-    parser.add_argument("--rounds", type=int, default=5, help="of each view")
+    parser.add_argument("--images", type=int, default=400, help="images of the long run")
+    parser.add_argument("--size", default="640x640", help="image size of the long run")
+    parser.add_argument("--run-images", type=int, default=200, help="images per run of the part `workers`")
+    parser.add_argument("--rounds", type=int, default=5, help="draws per view")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "growth.png")
     options = parser.parse_args()
     measures: dict[str, Callable[[], Table]] = {
@@ -308,7 +314,7 @@ def main() -> None:
     wanted = options.parts.split(",")
     for name in wanted:
         if name not in measures:
-            parser.error(f"--parts: {name!r} is unknown; there are {', '.join(measures)}")
+            parser.error(f"--parts: {name!r} is unknown; use {', '.join(measures)}")
     stored = RESULTS / "growth.json"
     parts: dict[str, dict[str, Any]] = (
         json.loads(stored.read_text(encoding="utf-8")) if stored.exists() else {}

@@ -1,4 +1,4 @@
-"""Error measures between images, and the way from radiance to what is displayed."""
+"""Error measures between images, and the conversion from radiance to displayed sRGB."""
 
 import importlib
 from dataclasses import dataclass
@@ -10,21 +10,25 @@ from numpy.typing import NDArray
 from fastgen.classes import SPREADER_ID
 from fastgen.sample import Sample
 
-STEP_M = 0.15
-OCCLUDED = 0.8  # ambient occlusion below this is a corner or the valley of a wave
+STEP_M = 0.15  # more than the depth of a wall's corrugation
+OCCLUDED = 0.8  # sky visibility below this means a corner or the valley of a corrugation
 
 Array = NDArray[np.floating]
 Measures = tuple[float, float, float]
-"""Mean FLIP, SSIM, PSNR in dB."""
+"""Mean FLIP, mean SSIM, and PSNR in dB."""
 
 
 def displayed(radiance: Array, exposure: float) -> Array:
-    """Linear radiance [..., 3] as sRGB in 0..1, by the renderer's exposure and tone curve."""
+    """Return linear radiance [..., 3] as sRGB in 0..1, exposed and tone-mapped like the renderer
+    does."""
     return srgb_encode(neutral_tone(exposure * radiance))
 
 
 def neutral_tone(color: Array) -> Array:
-    """Khronos PBR Neutral tone curve, twin of shaders/tone.glsl; linear [..., 3] in and out."""
+    """Apply the Khronos PBR Neutral tone curve to linear colours [..., 3].
+
+    Twin of shaders/tone.glsl.
+    """
     start, desaturation = 0.8 - 0.04, 0.15
     low = color.min(axis=-1, keepdims=True)
     color = color - np.where(low < 0.08, low - 6.25 * low * low, 0.04)
@@ -37,20 +41,26 @@ def neutral_tone(color: Array) -> Array:
 
 
 def srgb_encode(color: Array) -> Array:
-    """Linear [..., 3] in 0..1 to sRGB in 0..1 (IEC 61966-2-1)."""
+    """Convert linear [..., 3] in 0..1 to sRGB in 0..1 (IEC 61966-2-1)."""
     color = np.clip(color, 0.0, 1.0)
     curve = 1.055 * np.maximum(color, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(color <= 0.0031308, 12.92 * color, curve)
 
 
 def srgb_decode(color: Array) -> Array:
-    """sRGB [..., 3] in 0..1 to linear in 0..1."""
+    """Convert sRGB [..., 3] in 0..1 to linear in 0..1."""
     return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two sRGB images in 0..1, [H, W, 3], and their difference by pixel."""
+    """Per-pixel difference [H, W] between two sRGB images in 0..1.
+
+    Attributes:
+        flip_map: FLIP (Andersson et al. 2020).
+        similarity_map: SSIM, mean over the channels.
+        squared: Squared difference, mean over the channels.
+    """
 
     flip_map: Array
     similarity_map: Array
@@ -58,8 +68,10 @@ class Comparison:
 
     @staticmethod
     def of(reference: Array, test: Array) -> "Comparison":
-        """Compare `test` with `reference`. Andersson et al. 2020, FLIP; at its default viewing
-        distance, 67 pixels a degree."""
+        """Compare `test` with `reference`, both sRGB [H, W, 3] in 0..1.
+
+        FLIP assumes its default viewing distance, 67 pixels per degree.
+        """
         metrics = _imported("skimage.metrics")
         a, b = reference.astype(np.float32), test.astype(np.float32)
         _, similarity = metrics.structural_similarity(
@@ -68,17 +80,17 @@ class Comparison:
         return Comparison(flip(a, b), similarity.mean(axis=2), ((a - b) ** 2).mean(axis=2))
 
     def measures(self, where: NDArray[np.bool_]) -> Measures:
-        """Over a mask [H, W]."""
+        """Return FLIP, SSIM and PSNR over the mask `where` [H, W]."""
         psnr = -10 * np.log10(max(float(self.squared[where].mean()), 1e-12))
         return float(self.flip_map[where].mean()), float(self.similarity_map[where].mean()), psnr
 
     def both(self, inside: NDArray[np.bool_]) -> tuple[float, ...]:
-        """Measures over the whole image, then over the pixels `inside` of objects."""
+        """Return the measures over the whole image, then over the mask `inside` of the objects."""
         return *self.measures(inside | True), *self.measures(inside)
 
 
 def flip(reference: Array, test: Array) -> Array:
-    """FLIP [H, W] alone, between sRGB images in 0..1."""
+    """Return the FLIP map [H, W] between two sRGB images in 0..1."""
     evaluator = _imported("flip_evaluator")
     a, b = reference.astype(np.float32), test.astype(np.float32)
     found: Array = evaluator.evaluate(a, b, "LDR", applyMagma=False)[0][..., 0]
@@ -86,15 +98,21 @@ def flip(reference: Array, test: Array) -> Array:
 
 
 def _imported(name: str) -> Any:
-    """A module of the extra `accuracy`, imported at its use, so that --help needs none of it."""
+    """Import a module of the `accuracy` extra only when it is used, so that --help works without
+    it."""
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise SystemExit("FLIP and SSIM need what pip install '.[accuracy]' brings") from None
+        raise SystemExit("FLIP and SSIM need more packages: run pip install '.[accuracy]'") from None
 
 
 def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:
-    """Pixels beside a change of object, or a step in depth larger than a wall's waves."""
+    """Return a mask of the pixels next to another object or to a depth step above STEP_M.
+
+    Args:
+        ids: Object ids [H, W].
+        depth_m: Depth [H, W] in metres, inf where nothing is hit.
+    """
     near = np.where(np.isfinite(depth_m), depth_m, 1e3)
     found = np.zeros(ids.shape, bool)
     for axis in (0, 1):
@@ -109,7 +127,12 @@ def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:
 
 
 def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
-    """Masks [H, W] of the parts of an image in which errors have causes of their own."""
+    """Return a mask [H, W] for each part of an image where errors have a cause of their own.
+
+    Args:
+        sample: The rendered image.
+        openness: Sky visibility [H, W] from the reference's ambient occlusion, 1 in the open.
+    """
     inside = sample.ids > 0
     edges = borders(sample.ids, sample.depth)
     plain = inside & ~edges & (sample.ids == 1)
@@ -124,7 +147,10 @@ def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
 
 
 def stops_over(test: Array, reference: Array) -> float:
-    """Median stops by which displayed linear light of pixels [N, 3] exceeds the reference's."""
+    """Return the median number of stops by which `test` is brighter than `reference`.
+
+    Both are sRGB pixels [N, 3]. The result is nan if there are none.
+    """
     if not len(test):
         return float("nan")
     light, expected = (srgb_decode(image).mean(axis=-1) + 1e-4 for image in (test, reference))

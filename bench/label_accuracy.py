@@ -1,12 +1,14 @@
-"""Are the labels exact, and what does the paper's way of making them cost?
+"""Check that the labels are exact, and measure the cost of the paper's way to make them.
 
     python bench/label_accuracy.py [--scenes 500] [--size 256] [--chart docs/label_accuracy.png]
 
-Compares ids, damage and depth with rays that Embree casts through every pixel centre at the mesh
-deformed in numpy (tests/oracle.py), over random scenes and hard views. A pixel that differs must
-lie within 0.01 px of an edge: some ray so close to its centre then sees what we say. Then makes the
-boxes of markers as the paper does (3.3.3), by a binary mask render and connected components for
-each marker, on the same scenes.
+Compares ids, damage and depth with rays that Embree casts through every pixel centre, over random
+scenes and difficult views. The rays hit the mesh deformed in numpy (tests/oracle.py). A pixel may
+differ only within 0.01 px of an edge: some ray that close to its centre must see what our label
+says.
+
+Then makes the boxes of markers like the paper (3.3.3), with a binary mask render and connected
+components for each marker, on the same scenes.
 """
 
 import argparse
@@ -30,7 +32,7 @@ from results import ROOT, origin, save
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
-from fastgen.container import build_container
+from fastgen.geometry.container import build_container
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Camera, Decal, Scene
 from tests import oracle
@@ -41,7 +43,11 @@ COUNTS = (1, 2, 4, 8, 16, 32)
 
 
 def hard_cameras(scene: Scene, mesh: Mesh) -> Iterator[Camera]:
-    """Grazing along a wall, markers of a few pixels, cut by the border, through the near plane."""
+    """Yield difficult views of a container.
+
+    They graze along a wall, show markers of a few pixels, put the wall through the near plane, and
+    cut a marker at the image border.
+    """
     low, high = mesh.bounds_mm
     x, y, z = float(high[0]), float(low[1]), float(high[2])
     yield Camera("grazing", (x + 1500, y - 130, z / 2), (-x, y + 150, z / 2), 28.0)
@@ -54,7 +60,12 @@ def hard_cameras(scene: Scene, mesh: Mesh) -> Iterator[Camera]:
 
 
 def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) -> Counter[str]:
-    """Pixels compared, pixels that differ, and those that no edge explains."""
+    """Compare a view with ray casting.
+
+    Returns:
+        Counts of compared pixels, pixels with different labels or depth, and differences that no
+            edge explains.
+    """
     sample = generator.render(scene=scene, camera=camera)
     threshold = generator.config.damage.mask_threshold_mm
 
@@ -76,10 +87,10 @@ def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) 
     if rows.size:
         turn = np.arange(_AROUND) * 2 * np.pi / _AROUND
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1) * EDGE_PX
-        # slivers of cables are thinner than the disc
+        # circles of several radii, because slivers of cables are thinner than the largest
         around = np.concatenate([circle * share for share in (0.125, 0.25, 0.5, 1.0)])
         centers = np.stack([columns, rows], axis=-1) + 0.5
-        # all that rays within EDGE_PX see: ours must be among it
+        # our label must be among those of the rays within EDGE_PX
         near = truth(np.concatenate([centers[:, None], centers[:, None] + around], axis=1))
         ours = np.stack([sample.ids[rows, columns], sample.damage[rows, columns]], axis=-1)
         known = (near[..., :2] == ours[:, None]).all(axis=2).any(axis=1)
@@ -101,7 +112,7 @@ def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) 
 
 
 def exactness(scenes: int, side: int) -> dict[str, Counter[str]]:
-    """Count over random scenes and each kind of hard view; by kind of view, printed too."""
+    """Count and print the differences by kind of view, over random scenes."""
     config = Config.from_values({"damage": {"probability": 0.5}})
     totals: dict[str, Counter[str]] = {}
     with Generator(config, seed=2024, size=(side, side)) as generator:
@@ -125,7 +136,7 @@ def exactness(scenes: int, side: int) -> dict[str, Counter[str]]:
 
 
 def with_markers(scene: Scene, count: int) -> Scene:
-    """`scene` with `count` markers that touch one another on its door, and nothing else on it."""
+    """Return `scene` with `count` touching markers on its door and no other decals or damage."""
     decals = []
     for i in range(count):
         row, column = divmod(i, 8)
@@ -138,7 +149,7 @@ def with_markers(scene: Scene, count: int) -> Scene:
 def masks_one_by_one(
     generator: Generator, scene: Scene, camera: str
 ) -> list[list[tuple[int, ...]]]:
-    """The paper's way: for each marker its own binary render, then components' boxes."""
+    """Render each marker alone as a binary mask, like the paper; return its components' boxes."""
     found = []
     for decal in (d for d in scene.decals if d.kind == "marker"):
         alone = replace(scene, decals=(decal,))
@@ -150,7 +161,7 @@ def masks_one_by_one(
 
 
 def against_the_paper(scenes: int, chart: Path) -> dict[str, Any]:
-    """Time against number of markers, and how often components mislead; printed and drawn too."""
+    """Compare time and boxes with the paper's way; print and draw the results."""
     ours: dict[int, float] = {}
     theirs: dict[int, float] = {}
     with Generator(Config.preset(), seed=5, size=(640, 640)) as generator:
@@ -167,12 +178,12 @@ def against_the_paper(scenes: int, chart: Path) -> dict[str, Any]:
                 taken["theirs"].append(time.perf_counter() - began)
             ours[count] = statistics.median(taken["ours"]) * 1e3
             theirs[count] = statistics.median(taken["theirs"]) * 1e3
-    print(f"\n{'markers':>8}{'one draw, ms':>14}{'a draw a marker, ms':>21}")
+    print(f"\n{'markers':>8}{'one draw, ms':>14}{'draw per marker, ms':>21}")
     for count in COUNTS:
         print(f"{count:8d}{ours[count]:14.1f}{theirs[count]:21.1f}")
     outcomes = component_outcomes(scenes)
     total = sum(outcomes.values())
-    print(f"\nboxes from connected components, {total} visible markers of {scenes} scenes")
+    print(f"\nboxes from connected components, {total} visible markers in {scenes} scenes")
     for name, number in outcomes.most_common():
         print(f"{name:34}{number:7d}  {number / total:.2%}")
     _draw(ours, theirs, outcomes, chart)
@@ -180,7 +191,7 @@ def against_the_paper(scenes: int, chart: Path) -> dict[str, Any]:
 
 
 def component_outcomes(scenes: int) -> Counter[str]:
-    """What the largest component's box makes of each visible marker, at 640x640."""
+    """Count for how many visible markers the largest component has the correct box, at 640x640."""
     outcomes: Counter[str] = Counter()
     with Generator(Config.preset(), seed=77, size=(640, 640)) as generator:
         for index in range(scenes):
@@ -204,13 +215,13 @@ def _draw(
 ) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
     left.plot(list(ours), list(ours.values()), "o-", label="ids in the same draw")
-    left.plot(list(theirs), list(theirs.values()), "s-", label="a mask render for each marker")
-    left.set(xlabel="markers in the image", ylabel="ms an image, 640x640", ylim=(0, None))
+    left.plot(list(theirs), list(theirs.values()), "s-", label="one mask render per marker")
+    left.set(xlabel="markers in the image", ylabel="ms per image, 640x640", ylim=(0, None))
     left.legend()
     total = sum(outcomes.values())
     names = list(outcomes)
     right.barh(names, [100 * outcomes[name] / total for name in names])
-    right.set(xlabel="% of visible markers, box by connected components")
+    right.set(xlabel="% of visible markers, box from connected components")
     figure.tight_layout()
     chart.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(chart, dpi=110)

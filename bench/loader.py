@@ -1,10 +1,10 @@
-"""How much of a training step is spent waiting for data: rendered as it goes, or read as JPEG.
+"""Measure the share of a training step spent waiting for data, rendered or read from JPEG.
 
     python bench/loader.py [--steps 40] [--batch 8] [--size 320x320]
 
-Trains convolutional nets of several sizes on one core, on the same images from both sources, and
-tells what share of a step they wait for their batch, once the workers have met most lights. Fills
-the table in docs/training.md and leaves bench/results/loader.json. Needs `.[torch,examples]`.
+Trains convolutional networks of several sizes on one core, with the same images from both sources.
+Measuring starts when the workers have loaded most lights. Writes the table in docs/training.md and
+bench/results/loader.json. Needs `.[torch,examples]`.
 """
 
 import argparse
@@ -23,17 +23,17 @@ from torch import nn
 from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
 
-from fastgen.files.encode import jpeg, write
+from fastgen.files.images import jpeg, write
 from fastgen.torch import ContainerDataset, class_names, collate_yolo
 
 WARM_STEPS = 40
-"""Until then workers open lights and link programs, which later steps do not."""
+"""Steps before measuring starts, in which workers load lights and link programs."""
 
 WORKERS = (1, 2)
 
 
 class JpegDataset(Dataset[Any]):
-    """Images and YOLO targets that `save_items` wrote."""
+    """Images and YOLO targets written by `save_items`."""
 
     def __init__(self, folder: Path, length: int) -> None:
         self._folder, self._length = folder, length
@@ -48,7 +48,7 @@ class JpegDataset(Dataset[Any]):
 
 
 def save_items(data: ContainerDataset, folder: Path) -> None:
-    """Write every item as a JPEG and its target beside it."""
+    """Write every item as a JPEG with its target next to it."""
     for position in range(len(data)):
         image, target = data[position]
         write(folder / f"{position}.jpg", jpeg(image.permute(1, 2, 0).numpy()))
@@ -56,7 +56,7 @@ def save_items(data: ContainerDataset, folder: Path) -> None:
 
 
 def convolutions() -> nn.Module:
-    """Four strided convolutions: next to no work, so that the source is the limit."""
+    """Return four strided convolutions: so little work that the data source is the limit."""
     channels = (8, 16, 32, 64)
     layers: list[nn.Module] = []
     for before, after in zip((3, *channels), channels, strict=False):
@@ -66,7 +66,7 @@ def convolutions() -> nn.Module:
 
 
 class ResNet(nn.Module):
-    """A residual net with basic blocks, `width` times ResNet-18's channels."""
+    """A ResNet with basic blocks and `width` times the channels of ResNet-18."""
 
     def __init__(self, width: float) -> None:
         super().__init__()
@@ -81,7 +81,7 @@ class ResNet(nn.Module):
         self.net = ResNetForImageClassification(config)
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
-        """Logits [N, classes] of images [N, 3, H, W]."""
+        """Return logits [N, classes] of images [N, 3, H, W]."""
         return self.net(pixel_values=images).logits
 
 
@@ -94,7 +94,13 @@ NETS: dict[str, Callable[[], nn.Module]] = {
 
 @dataclass(frozen=True)
 class Row:
-    """What one run came to. waiting: share of the time; the rest are means of a step."""
+    """The result of one run.
+
+    Attributes:
+        waiting: Share of the time spent waiting for a batch.
+        step_ms: Mean time of a step.
+        images_per_s: Mean rate.
+    """
 
     net: str
     source: str
@@ -105,7 +111,7 @@ class Row:
 
 
 def run(net: str, source: str, data: Dataset[Any], workers: int, batch: int) -> Row:
-    """Train for as many steps as `data` holds; the first WARM_STEPS do not count."""
+    """Train on all batches of `data`, and measure after the first WARM_STEPS steps."""
     torch.manual_seed(0)
     model = NETS[net]()
     optimizer = torch.optim.SGD(model.parameters(), 0.01)
@@ -131,11 +137,11 @@ def run(net: str, source: str, data: Dataset[Any], workers: int, batch: int) -> 
 
 
 def table(rows: list[Row], options: argparse.Namespace) -> list[str]:
-    """The rows as Markdown."""
+    """Return the rows as a Markdown table."""
     return [
         f"{machine()}, no GPU; {options.size}, batch {options.batch}, {options.steps} steps.",
         "",
-        "| net | images are | workers | waiting | ms a step | images/s |",
+        "| network | images are | workers | waiting | ms per step | images/s |",
         "| --- | --- | --- | --- | --- | --- |",
         *(
             f"| {r.net} | {r.source} | {r.workers} | {r.waiting:.0%} | {r.step_ms:.0f} "
@@ -146,7 +152,7 @@ def table(rows: list[Row], options: argparse.Namespace) -> list[str]:
 
 
 def main() -> None:
-    """Measure, and fill the table."""
+    """Run all measurements and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--steps", type=int, default=40)
     parser.add_argument("--batch", type=int, default=8)

@@ -1,10 +1,10 @@
-"""Makes the small files of bench/references from what `bench/trace_references.py` traced.
+"""Make the small files of bench/references from the output of `bench/trace_references.py`.
 
     python bench/pack_references.py [--raw bench/.raw_references]
 
-Each case becomes NN.exr and NN.npz, see reference_set.py. What Cycles' own images are off by, at
-SAMPLES samples with another seed and at 1 to 256 samples, goes with the processor seconds they took
-to cycles.json, so that only the references need keeping. Prints what compression changes.
+Each case becomes NN.exr and NN.npz (see reference_set.py). cycles.json stores the errors of Cycles'
+own images with their CPU seconds: at SAMPLES samples with another seed, and at 1 to 256 samples.
+The images themselves need not be kept. Prints the error that compression adds.
 """
 
 import argparse
@@ -37,26 +37,26 @@ Array = NDArray[np.floating]
 
 
 def channels(path: Path) -> dict[str, Array]:
-    """Planes [H, W] of an EXR file as Cycles names them."""
+    """Return the planes [H, W] of an EXR file by Cycles' channel name."""
     file = OpenEXR.File(str(path), separate_channels=True)
     return {name.removeprefix("ViewLayer."): c.pixels for name, c in file.channels().items()}
 
 
 def radiance(path: Path) -> tuple[Array, NDArray[np.bool_]]:
-    """Linear radiance [H, W, 3] of Cycles' file, and where it was rendered."""
+    """Return linear radiance [H, W, 3] of a Cycles file, and a mask of what was rendered."""
     planes = channels(path)
     return np.stack([planes[f"Combined.{c}"] for c in "RGB"], axis=-1), planes["Combined.A"] > 0.5
 
 
 def whole_radiance(raw: Path, number: int, seed: int) -> Array:
-    """The image as a whole with what was rendered finer around the objects."""
+    """Return the whole image, with the finer render pasted in around the objects."""
     whole, _ = radiance(raw / f"{number:02d}_{seed}_whole.exr")
     finer, there = radiance(raw / f"{number:02d}_{seed}.exr")
     return np.where(there[..., None], finer, whole)
 
 
 def traced(raw: Path, case: Case) -> Reference:
-    """The reference of a traced case, nothing lost yet."""
+    """Return the reference of a traced case before compression."""
     number = case.number
     centers = channels(raw / f"{number:02d}_centers.exr")
     inside = centers["IndexOB.X"] > 0.5
@@ -67,13 +67,13 @@ def traced(raw: Path, case: Case) -> Reference:
 
 
 def exposure_of(case: Case, scene: Scene) -> float:
-    """What the case's camera exposes with."""
+    """Return the exposure of the case's camera."""
     with Generator(case.config, SEED, SIZE) as generator:
         return generator.exposure(scene, scene.camera(case.camera))
 
 
 def floor(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
-    """Measures by filter between two seeds; empty where the second was not traced."""
+    """Return the measures between two seeds by filter; empty if the second was not traced."""
     exposure = reference.exposure
     if not (raw / f"{number:02d}_2.exr").exists():
         return {}
@@ -86,7 +86,10 @@ def floor(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
 
 
 def series(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
-    """Seconds and measures against the box by way (spp or denoised) and number of samples."""
+    """Return CPU seconds and measures by way ("spp" or "denoised") and number of samples.
+
+    The measures compare with the reference's box filter.
+    """
     exposure = reference.exposure
     expected = displayed(reference.radiance["box"], exposure)
     found: dict[str, Any] = {}
@@ -104,7 +107,7 @@ def series(raw: Path, number: int, reference: Reference) -> dict[str, Any]:
 
 
 def loss(whole: Reference, stored: Reference) -> float:
-    """Greatest mean FLIP over object pixels between what was traced and what is kept."""
+    """Return the largest mean FLIP over object pixels between the traced and the stored images."""
     pairs = (
         [displayed(reference.radiance[name], whole.exposure) for reference in (whole, stored)]
         for name in whole.radiance
@@ -113,7 +116,7 @@ def loss(whole: Reference, stored: Reference) -> float:
 
 
 def main() -> None:
-    """Pack what was traced since the last time."""
+    """Pack the cases that were traced since the last run."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--raw", type=Path, default=Path(__file__).parent / ".raw_references")
     options = parser.parse_args()

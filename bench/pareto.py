@@ -1,16 +1,20 @@
-"""What does accuracy cost? Images a second against the distance to the path tracer.
+"""Measure what accuracy costs: images per second against the error to the path tracer.
 
     python bench/pareto.py [--cases 8] [--repeats 3]
 
-Sweeps what fastgen can leave out or do finer, each over the same cases of bench/references at
-320x320: FLIP over the pixels of objects against Cycles at 1,024 samples, and labelled images a
-second of one core, from processor time. On the same axes: Cycles at 1 to 256 samples with and
-without denoising (from bench/references/cycles.json: colour only, opening the scene left out), and
-pyrender, where `python bench/peers.py --install --only pyrender` was done. pyrender has no
-image-based light; its picture is scaled to the mean light of the reference's object pixels.
-Every variant takes turns with `balanced`, and its rate is that of `balanced` over the whole run
-times the ratio of the two: a machine's pace changes between one variant and the next.
-Leaves its table in docs/accuracy.md, bench/results/pareto.json and docs/pareto.png.
+Renders the same cases of bench/references at 320x320 with several variants of fastgen, each with
+one feature removed, simplified or refined. The error is FLIP over the pixels of objects against
+Cycles at 1,024 samples. The rate is labelled images per second of one core, from CPU time.
+
+The chart also shows Cycles at 1 to 256 samples with and without denoising, from
+bench/references/cycles.json (colour only, without the time to open the scene). It includes pyrender
+if `python bench/peers.py --install --only pyrender` was run. pyrender has no image-based light, so
+its image is scaled to the mean light of the reference's object pixels.
+
+The speed of a machine changes during a run. Each variant therefore alternates with `balanced`. Its
+rate is that of `balanced` over the whole run times the ratio of the two.
+
+Writes the table in docs/accuracy.md, bench/results/pareto.json and docs/pareto.png.
 """
 
 import argparse
@@ -41,10 +45,11 @@ from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
 from results import ROOT, machine, origin, save, write_section
 
-from fastgen import Config, Generator, environment
-from fastgen.camera import view_of
-from fastgen.drawing import shapes
+from fastgen import Config, Generator
+from fastgen.camera.projection import view_of
 from fastgen.export import export_glb
+from fastgen.light import environment
+from fastgen.render import shapes
 from fastgen.scene import Camera, Scene
 
 PYRENDER_TEXEL_MM = 6.0
@@ -54,8 +59,15 @@ Patches = list[tuple[Any, str, Any]]
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to render. absent: names of ablation_elements.ELEMENTS to do without; patches: what
-    else is replaced, a function as building it is to be left to those who draw it."""
+    """One way to render.
+
+    Attributes:
+        name: Name in the table and the chart.
+        quality: Quality preset.
+        absent: Names in ablation_elements.ELEMENTS to render without.
+        patches: Function that returns further attributes to replace. It runs only when the variant
+            is used, because building replacements can be slow.
+    """
 
     name: str
     quality: str = "balanced"
@@ -64,7 +76,11 @@ class Variant:
 
     @contextmanager
     def entered(self, absences: Sequence[Absence]) -> Iterator[None]:
-        """Generators that are used in here render this way. absences: of `absent`."""
+        """Make generators used in this context render this way.
+
+        Args:
+            absences: The Absence of each name in `absent`.
+        """
         with ExitStack() as stack:
             for absence in absences:
                 stack.enter_context(absence.gone())
@@ -79,7 +95,7 @@ def _coarse_mesh() -> Patches:
 
 
 def _light_maps(scale: float) -> Callable[[], Patches]:
-    """Prefiltered maps of `scale` times the side, made anew instead of read from the cache."""
+    """Scale the side of the prefiltered maps, and rebuild them instead of reading the cache."""
 
     def load_anew(path: Path) -> environment.EnvironmentLight:
         return environment.prefilter_environment(path.stem, environment.load_radiance(path))
@@ -115,7 +131,14 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Measured:
-    """A mean error, and what an image took a variant and `balanced` beside it, in core-seconds."""
+    """Results of a variant.
+
+    Attributes:
+        name: Name of the variant.
+        error: Mean FLIP over the objects.
+        seconds: Mean CPU seconds per image.
+        balanced: Mean CPU seconds per image of `balanced`, measured in alternation.
+    """
 
     name: str
     error: float
@@ -124,14 +147,14 @@ class Measured:
 
 
 def spent(generator: Generator, scene: Scene, camera: Camera) -> float:
-    """Core-seconds of a labelled image."""
+    """Return the CPU seconds of a labelled image."""
     began = time.process_time()
     generator.render(scene=scene, camera=camera)
     return time.process_time() - began
 
 
 def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats: int) -> Measured:
-    """A variant over all cases, in turns with a Generator of nothing but presets."""
+    """Measure a variant over all cases, alternating with a generator of the default settings."""
     errors, seconds = [], []
     named = {element.name: element for element in ELEMENTS}
     absences = [Absence(named[name]) for name in variant.absent]
@@ -144,7 +167,7 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
                 exposure = generator.exposure(scene, camera)
             expected = displayed(reference.radiance[FILTERS[variant.quality]], exposure)
             errors.append(float(flip(expected, image)[reference.inside].mean()))
-            spent(balanced, scene, camera)  # what it makes but once
+            spent(balanced, scene, camera)  # not counted: fills the caches
             turns = []
             for _ in range(repeats):
                 beside = spent(balanced, scene, camera)
@@ -158,7 +181,7 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
 
 
 def ours(variants: list[Variant], chosen: list[Case], repeats: int) -> list[Point]:
-    """The variants' points."""
+    """Return a point for each variant."""
     with Generator(Config.preset(), SEED, SIZE) as balanced:
         found = [measured(variant, balanced, chosen, repeats) for variant in variants]
     pace = statistics.fmean(each.balanced for each in found)
@@ -169,7 +192,7 @@ def ours(variants: list[Variant], chosen: list[Case], repeats: int) -> list[Poin
 
 
 def cycles(chosen: list[Case], figures: Figures) -> list[Point]:
-    """Cycles' points, over those of the cases that have a series."""
+    """Return Cycles' points, over the chosen cases that have a series."""
     numbers = [case.number for case in chosen if case.number in figures.series]
     names = {"spp": "Cycles", "denoised": "Cycles, denoised"}
     return [
@@ -180,7 +203,10 @@ def cycles(chosen: list[Case], figures: Figures) -> list[Point]:
 
 
 def write_pyrender_job(chosen: list[Case], repeats: int, folder: Path) -> None:
-    """The cases as peer_renderers/measure.py wants them; what is no container counts as markers."""
+    """Write the cases as a job for peer_renderers/measure.py.
+
+    The spreader counts as a marker, everything else as the container.
+    """
     folder.mkdir()
     scenes = []
     with Generator(Config.preset(), SEED, SIZE) as generator:
@@ -204,7 +230,7 @@ def write_pyrender_job(chosen: list[Case], repeats: int, folder: Path) -> None:
 
 
 def as_bright(image: np.ndarray, reference: Reference, expected: np.ndarray) -> np.ndarray:
-    """sRGB `image` with the mean linear light of `expected` over object pixels."""
+    """Scale the sRGB `image` to the mean linear light of `expected` over the object pixels."""
     inside = reference.inside
     light = srgb_decode(image)
     gain = srgb_decode(expected)[inside].mean() / max(float(light[inside].mean()), 1e-6)
@@ -212,7 +238,7 @@ def as_bright(image: np.ndarray, reference: Reference, expected: np.ndarray) -> 
 
 
 def pyrender(chosen: list[Case], repeats: int) -> list[Point]:
-    """pyrender's point; none where it is not installed."""
+    """Return pyrender's point, or nothing if it is not installed."""
     (peer,) = (p for p in peers.PEERS if p.script == "with_pyrender.py")
     if not peer.interpreter.exists():
         print("pyrender: not installed: python bench/peers.py --install --only pyrender")
@@ -243,7 +269,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=8)
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--only", default="", help="variants whose name holds this")
+    parser.add_argument("--only", default="", help="measure only variants whose name contains this")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "pareto.png")
     options = parser.parse_args()
     chosen = traced(options.cases)
@@ -256,7 +282,7 @@ def main() -> None:
     lines = [
         f"{caption}, no GPU.",
         "",
-        "| renderer | setting | images/s of a core | FLIP of objects | on the front |",
+        "| renderer | setting | images/s per core | FLIP of objects | on the Pareto front |",
         "| --- | --- | --- | --- | --- |",
     ]
     for point in points:

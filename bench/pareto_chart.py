@@ -1,4 +1,4 @@
-"""Draws images a second against error, with the front of what nothing beats in both."""
+"""Chart of images per second against error, with the Pareto front."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +13,19 @@ MARKS = {
     "Cycles, denoised": ("D", "#5f9fd0"),
     "pyrender": ("^", "#4f7f3a"),
 }
-"""Of each renderer: marker and colour."""
+"""Marker and colour of each renderer."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """renderer: a key of MARKS. rate: images a second of one core. error: FLIP."""
+    """One setting of a renderer.
+
+    Attributes:
+        renderer: A key of MARKS.
+        setting: Name of the setting.
+        rate: Images per second of one core.
+        error: FLIP.
+    """
 
     renderer: str
     setting: str
@@ -27,7 +34,8 @@ class Point:
 
 
 def front(points: Sequence[Point]) -> list[Point]:
-    """Points that no other beats in rate without being farther off, from fast to slow."""
+    """Return the Pareto front: points with the lowest error at their rate or more, fastest
+    first."""
     found: list[Point] = []
     for point in sorted(points, key=lambda p: (-p.rate, p.error)):
         if not found or point.error < found[-1].error:
@@ -36,8 +44,11 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 
 def draw(points: Sequence[Point], caption: str, path: Path) -> None:
-    """Write the chart as PNG: all points on logarithmic axes, and ours again, named, beside them.
-    Better is down and to the right."""
+    """Write the chart as PNG.
+
+    The left panel shows all points on logarithmic axes. The right panel shows fastgen's own again,
+    with names. Better is down and to the right.
+    """
     figure, (whole, near) = plt.subplots(1, 2, figsize=(13, 6.5), width_ratios=(3, 2))
     best = front(points)
     whole.plot(
@@ -61,7 +72,7 @@ def draw(points: Sequence[Point], caption: str, path: Path) -> None:
             for point in mine:
                 _note(whole, point, point.setting, color)
     whole.set(xscale="log", yscale="log")
-    whole.set_xlabel(f"images a second of one core (Cycles: colour only)\n{caption}")
+    whole.set_xlabel(f"images per second of one core (Cycles: colour only)\n{caption}")
     whole.set_ylabel("FLIP of objects against Cycles at 1,024 samples")
     ticks = [0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7]
     low, high = min(p.error for p in points) / 1.2, max(p.error for p in points) * 1.2
@@ -71,7 +82,7 @@ def draw(points: Sequence[Point], caption: str, path: Path) -> None:
     whole.set_ylim(low, high)
     whole.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     whole.grid(alpha=0.3)
-    whole.legend(loc="upper left", title="numbers: samples a pixel", fontsize=9)
+    whole.legend(loc="upper left", title="numbers: samples per pixel", fontsize=9)
     _name_ours([p for p in points if p.renderer == "fastgen"], near)
     figure.tight_layout()
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +102,7 @@ def _note(axes: plt.Axes, point: Point, text: str, color: str) -> None:
 
 
 def _name_ours(points: Sequence[Point], axes: plt.Axes) -> None:
-    """Numbered points with their settings below; linear axes."""
+    """Draw numbered points on linear axes, with their settings listed below."""
     marker, color = MARKS["fastgen"]
     ranked = sorted(points, key=lambda p: p.error)
     for number, point in enumerate(ranked, 1):
@@ -102,7 +113,7 @@ def _name_ours(points: Sequence[Point], axes: plt.Axes) -> None:
     columns = ["\n".join(names[:half]), "\n".join(names[half:])]
     for x, text in zip((0.0, 0.56), columns, strict=True):
         axes.text(x, -0.16, text, transform=axes.transAxes, fontsize=8, va="top")
-    axes.set_title("fastgen alone", fontsize=10, color=color)
-    axes.set_xlabel("labelled images a second of one core")
+    axes.set_title("fastgen only", fontsize=10, color=color)
+    axes.set_xlabel("labelled images per second of one core")
     axes.margins(0.1)
     axes.grid(alpha=0.3)

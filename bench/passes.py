@@ -1,13 +1,15 @@
-"""What each pass of a draw costs, and for how many pixels.
+"""Measure the time and the pixels of each render pass.
 
     python bench/passes.py [--scenes 6] [--repeats 3] [--size 640x640] [--damage 0.4]
         [--quality balanced]
 
-Prints, for each camera, core-milliseconds (process CPU time, so other load on the machine counts
-little) and thousands of pixels of each pass in one process, means over scenes of the least of
-`repeats` draws. Each pass is waited for by itself, which a real frame is not. What draft shades at
-once counts as one pixel. Where a GPU draws, milliseconds are the GPU's by its own clock, and pixels
-are not counted: a list that was read back is slow from then on.
+Prints CPU ms and thousands of pixels of each pass by camera, from one process. Values are means
+over scenes, times the fastest of `repeats` draws. CPU time of the process is hardly affected by
+other load on the machine. The timer waits for each pass to finish, which does not happen in a real
+frame. A 2x2 block that `draft` shades once counts as one pixel.
+
+On a GPU, times come from the GPU's own clock and pixels are not counted, because reading a list
+back makes it slow from then on.
 """
 
 import argparse
@@ -19,24 +21,26 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-# one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
+# one thread per process, like in `fastgen generate`; llvmpipe reads it at the first context
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
 import moderngl
 from results import parse_size
 
 from fastgen import Config, Generator
-from fastgen.drawing.gpu_mesh import GpuMesh
-from fastgen.drawing.pixel_lists import PixelLists
-from fastgen.drawing.sample_targets import SampleTargets
-from fastgen.drawing.shading import Shading
 from fastgen.generator import QUALITY
+from fastgen.render.gpu_mesh import GpuMesh
+from fastgen.render.pixel_lists import PixelLists
+from fastgen.render.sample_targets import SampleTargets
+from fastgen.render.shading import Shading
 
 
 class PassTimer:
-    """Stands in front of the methods that draw; leaving it puts them back.
+    """Context manager that wraps the drawing methods to time them, and restores them at exit.
 
-    on_gpu: whether times are a GPU's, else the process's.
+    Args:
+        ctx: The GL context.
+        on_gpu: Time with the GPU's clock instead of the CPU time of the process.
     """
 
     def __init__(self, ctx: moderngl.Context, on_gpu: bool) -> None:
@@ -72,7 +76,7 @@ class PassTimer:
                 query = self._ctx.query(samples=True)
                 with query:
                     original(this, *args, **named_args)
-                # compute shaders touch no samples: what they work off stands in a list
+                # compute shaders write no samples, so their pixel lists are counted
                 listed = isinstance(this, PixelLists)
                 count = len(this.entries()[name]) if listed else query.samples
                 self.pixels[name] = self.pixels.get(name, 0) + count
@@ -83,7 +87,7 @@ class PassTimer:
         setattr(owner, method, timed)
 
     def spent(self, work: Callable[[], Any]) -> float:
-        """Seconds that drawing takes."""
+        """Return the seconds that drawing takes."""
         self._ctx.finish()
         if self.on_gpu:
             query = self._ctx.query(time=True)
@@ -99,7 +103,10 @@ class PassTimer:
 def measure(
     config: Config, size: tuple[int, int], quality: str, scenes: int, repeats: int
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, float]]]:
-    """Mean milliseconds and mean pixels, by camera and pass; 'draw' is a whole draw untouched."""
+    """Return mean milliseconds and mean pixels, by camera and pass.
+
+    The pass 'draw' is a whole draw without the timers.
+    """
     spent: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with Generator(config, seed=7, size=size, backend="egl", quality=quality) as generator:
@@ -127,7 +134,7 @@ def measure(
                 for name, value in least.items():
                     spent[camera.name][name].append(value * 1e3)
                     drawn[camera.name][name].append(timer.pixels.get(name, 0))
-    # a pass that a scene does without counts as nothing there
+    # a scene without a pass counts as 0, so the sum is divided by all scenes
     mean_ms = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in spent.items()}
     pixels = {c: {n: sum(v) / scenes for n, v in rows.items()} for c, rows in drawn.items()}
     return mean_ms, pixels
@@ -153,7 +160,7 @@ def main() -> None:
     )
     cameras = list(times)
     names = list(dict.fromkeys(name for rows in times.values() for name in rows))
-    print("ms (thousands of pixels)")
+    print("ms per pass (thousands of pixels)")
     print(f"{'pass':14}" + "".join(f"{c:>16}" for c in cameras) + f"{'mean':>9}")
     for name in names:
         cells = [times[c].get(name, 0.0) for c in cameras]

@@ -1,16 +1,21 @@
-"""Renders an exported scene with Cycles, Blender's path tracer.
+"""Render an exported scene with Cycles, Blender's path tracer.
 
     PYTHON bench/path_traced.py FILE.glb --camera A --hdri FILE.exr --samples 256 -o FILE.exr [...]
 
-PYTHON is a Python 3.11 into which `pip install bpy==4.5.15` was done; it needs nothing of fastgen.
-All that decides the image stands in the GLB file and its extras: geometry, textures, camera, image
-size, the yaw of the environment. Output is a 32-bit multilayer EXR: scene-linear radiance without
-exposure or tone curve, each pixel the plain mean over its square. --background N gives that many
-samples to the image as a whole, which goes to --whole, and --samples only to the rectangle around
-all objects; -o is empty outside of it. --centers FILE gets depth, object index and ambient
-occlusion of what the ray through each pixel centre meets. Several numbers of --samples, say 1,4,16,
-make one image each, `{samples}` in the name of the output standing for the number. The processor
-seconds of each number are printed as JSON.
+PYTHON is a Python 3.11 with `bpy==4.5.15` installed; it does not need fastgen. The GLB file and its
+extras define the image: geometry, textures, camera, image size and yaw of the environment.
+
+Writes a 32-bit multilayer EXR of scene-linear radiance without exposure or tone curve. Each pixel
+is the plain mean over its square.
+
+--samples may list several numbers, such as 1,4,16. Each makes one image, and its number replaces
+`{samples}` in the name of the output. The CPU seconds of each number are printed as JSON.
+
+--background N renders the whole image with N samples into --whole. The image of -o then covers only
+the rectangle around all objects and is empty outside it.
+
+--centers FILE also writes depth, object index and ambient occlusion at the point that the ray
+through each pixel centre hits.
 """
 
 import argparse
@@ -25,13 +30,13 @@ from typing import Any
 import bpy
 from bpy_extras.object_utils import world_to_camera_view
 
-_CENTER_SAMPLES = 16  # of ambient occlusion; depth and index take the first
+_CENTER_SAMPLES = 16  # for ambient occlusion; depth and index use the first sample
 _MARGIN_PX = 4
-_CENTER_WIDTH_PX = 0.01  # the narrowest filter that Cycles takes: a ray through the pixel centre
+_CENTER_WIDTH_PX = 0.01  # Cycles' narrowest filter: rays go through the pixel centre
 
 
 def read_tree(path: Path) -> dict[str, Any]:
-    """The JSON part of a GLB file (glTF 2.0, section 4.4)."""
+    """Return the JSON chunk of a GLB file (glTF 2.0, section 4.4)."""
     with path.open("rb") as file:
         file.seek(12)
         (length,) = struct.unpack("<I", file.read(4))
@@ -41,7 +46,13 @@ def read_tree(path: Path) -> dict[str, Any]:
 
 
 def load(path: Path, camera: str, hdri: Path) -> None:
-    """Make the GLB file the current scene, seen by `camera` and lit by `hdri` (equirectangular)."""
+    """Load a GLB file as the current scene.
+
+    Args:
+        path: The GLB file.
+        camera: Name of the camera to render from.
+        hdri: Equirectangular environment that lights the scene.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(path))
     tree = read_tree(path)
@@ -61,7 +72,7 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     picture.image = bpy.data.images.load(str(hdri))
     picture.image.colorspace_settings.name = "Linear Rec.709"
     place = nodes.new("ShaderNodeMapping")
-    # radiance(d) = map(Rz(-yaw) d), and the node turns d by its rotation
+    # radiance(d) = map(Rz(-yaw) d); the node rotates d by its Rotation input
     yaw_deg = tree["scenes"][0]["extras"]["environment"]["yaw_deg"]
     place.inputs["Rotation"].default_value = (0.0, 0.0, -math.radians(yaw_deg))
     coordinates = nodes.new("ShaderNodeTexCoord")
@@ -71,7 +82,13 @@ def load(path: Path, camera: str, hdri: Path) -> None:
 
 
 def prepare(seed: int, threads: int, scale: int) -> None:
-    """Settings that all images share; `scale` times as many pixels a side as the file says."""
+    """Apply the settings that all images share.
+
+    Args:
+        seed: Seed of Cycles' sampling.
+        threads: Number of render threads.
+        scale: Factor on the file's resolution per side.
+    """
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.threads_mode = "FIXED"
@@ -93,7 +110,7 @@ def prepare(seed: int, threads: int, scale: int) -> None:
 
 
 def frame_objects() -> None:
-    """From now on only the rectangle around all objects is rendered."""
+    """Restrict the following renders to the rectangle around all objects."""
     scene = bpy.context.scene
     graph = bpy.context.evaluated_depsgraph_get()
     seen = []
@@ -111,7 +128,7 @@ def frame_objects() -> None:
 
 
 def look_through_centers() -> None:
-    """From now on only rays through the pixel centres, and what they meet."""
+    """Make the following renders trace only pixel centres and write what they hit."""
     bpy.context.scene.render.resolution_percentage = 100
     bpy.context.scene.render.use_border = False
     cycles = bpy.context.scene.cycles
@@ -122,9 +139,15 @@ def look_through_centers() -> None:
 
 
 def render(path: Path, samples: int, denoise: bool) -> float:
-    """Path-trace the current scene into an EXR file; returns processor seconds, of all threads.
+    """Path-trace the current scene into an EXR file.
 
-    denoise: by Open Image Denoise, guided by albedo and normals, as Blender sets it up.
+    Args:
+        path: The EXR file to write.
+        samples: Paths per pixel.
+        denoise: Apply Open Image Denoise, guided by albedo and normals as Blender sets it up.
+
+    Returns:
+        CPU seconds of all threads.
     """
     scene = bpy.context.scene
     scene.cycles.samples = samples
@@ -138,7 +161,7 @@ def render(path: Path, samples: int, denoise: bool) -> float:
 
 
 def main() -> None:
-    """Run the command."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("file", type=Path)
     parser.add_argument("--camera", required=True)
@@ -146,7 +169,7 @@ def main() -> None:
     parser.add_argument("--samples", default="256")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--scale", type=int, default=1, help="times as many pixels a side")
+    parser.add_argument("--scale", type=int, default=1, help="factor on the file's resolution per side")
     parser.add_argument("--denoise", action="store_true")
     parser.add_argument("--background", type=int)
     parser.add_argument("--whole", type=Path)
@@ -160,7 +183,7 @@ def main() -> None:
         render(options.whole, options.background, options.denoise)
         frame_objects()
     counts = [int(word) for word in options.samples.split(",")]
-    if len(counts) > 1:  # the first render also builds what the later ones find ready
+    if len(counts) > 1:  # a first render builds the scene data, so that no timed one does
         render(Path(options.out.replace("{samples}", "0")), 1, options.denoise)
     seconds = {}
     for count in counts:

@@ -1,11 +1,13 @@
-"""Renders many exported scenes with Cycles in one process, as one who wants training images would.
+"""Render many exported scenes with Cycles in one process, like for a training set.
 
     PYTHON bench/path_traced_many.py JOBS.json --samples 64
 
-PYTHON is a Python 3.11 with bpy (path_traced.py). JOBS is a list of objects: glb, hdri, seed, and
-views, each with a camera and an out. Images are denoised with Open Image Denoise, guided by albedo
-and normals. Beside each EXR file, scene-linear radiance in half floats, stands what it cost as
-JSON: core_s, seconds of all cores in the render call alone, without start, import and export.
+PYTHON is a Python 3.11 with bpy (see path_traced.py). JOBS is a list of objects with the fields
+glb, hdri, seed, and views; each view has a camera and an out. Images are denoised with Open Image
+Denoise, guided by albedo and normals. The EXR files contain scene-linear radiance in half floats.
+
+A JSON file next to each EXR holds the cost: core_s is the CPU time in seconds of the render call,
+without start-up, import and export.
 """
 
 import argparse
@@ -21,12 +23,12 @@ from path_traced import load
 
 
 def prepare(samples: int, threads: int) -> None:
-    """Set the current scene up for denoised images of `samples` paths a pixel."""
+    """Set the current scene up for denoised images with `samples` paths per pixel."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.threads_mode = "FIXED"
     scene.render.threads = threads
-    scene.render.use_persistent_data = True  # the second view of a scene finds it set up
+    scene.render.use_persistent_data = True  # the second view reuses the scene data
     scene.cycles.device = "CPU"
     scene.cycles.samples = samples
     scene.cycles.use_adaptive_sampling = False
@@ -39,7 +41,7 @@ def prepare(samples: int, threads: int) -> None:
 
 
 def trace(view: dict[str, Any]) -> float:
-    """Render the current scene into the view's file; what that cost in core-seconds."""
+    """Render the current scene into the view's file; return the CPU seconds."""
     out = Path(view["out"])
     aside = out.with_suffix(".part.exr")
     scene = bpy.context.scene
@@ -54,7 +56,7 @@ def trace(view: dict[str, Any]) -> float:
 
 
 def main() -> None:
-    """Run the command."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("jobs", type=Path)
     parser.add_argument("--samples", type=int, default=64)
@@ -69,7 +71,7 @@ def main() -> None:
         prepare(options.samples, options.threads)
         bpy.context.scene.cycles.seed = job["seed"]
         for view in views:
-            print(f"{view['out']}: {trace(view):.1f} core-seconds", file=sys.stderr, flush=True)
+            print(f"{view['out']}: {trace(view):.1f} CPU seconds", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

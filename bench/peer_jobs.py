@@ -1,9 +1,9 @@
-"""Scenes of fastgen as job folders that any renderer can be given: GLB, HDR light, cameras.
+"""Export of fastgen scenes as job folders for any renderer: GLB, HDR light and cameras.
 
-The container is what `fastgen export` writes, its layers and prints baked into textures ahead.
-Every marker is a mesh of its own besides, which follows the corrugation 3 mm before the sheet with
-its artwork as texture, because peers can only tell apart what is an object. There are no damages
-and no spreader.
+The container is exported as by `fastgen export`, with surface layers and decals baked into
+textures. Other renderers can only label separate objects, so every marker is also a mesh of its
+own. It follows the corrugation 3 mm in front of the sheet, textured with the marker's artwork.
+Damage and spreader are removed.
 """
 
 import json
@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fastgen import Generator
-from fastgen.camera import MM, View
-from fastgen.container import build_container
-from fastgen.damage import deform
-from fastgen.drawing.decal_tables import object_ids
+from fastgen.camera.projection import View
 from fastgen.export import export_glb
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import deform
 from fastgen.geometry.mesh import Mesh
 from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.resources import asset_path
 from fastgen.scene import Decal, Scene, Spreader
+from fastgen.scene.limits import MM
+from fastgen.scene.object_ids import object_ids
 
 _LIFT_MM = 3.0
 _CELLS = 24
@@ -36,11 +37,22 @@ _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 def write_jobs(
     generator: Generator, indices: list[int], cameras: list[str], repeats: int, folder: Path
 ) -> list[tuple[int, str, NDArray[np.uint16]]]:
-    """Write one job folder; returns scene, camera and fastgen's own ids [H, W] of each view."""
+    """Write a job folder.
+
+    Args:
+        generator: Generator of the scenes.
+        indices: Scene indices.
+        cameras: Camera names.
+        repeats: Number of draws per view.
+        folder: Folder to write.
+
+    Returns:
+        Scene index, camera name and fastgen's own ids [H, W] of each view.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     scenes, truths = [], []
     for index in indices:
-        # peers get neither holes nor a spreader: fastgen draws what they draw
+        # fastgen must draw the same scene as its peers, which get no damage and no spreader
         scene = replace(generator.scene(index), damages=(), spreader=Spreader())
         markers = _markers(scene)
         _write_glb(generator, scene, markers, folder / f"{index:06d}.glb")
@@ -54,7 +66,7 @@ def write_jobs(
             seen = sorted(visible & markers.keys())
             shots.append(shot(name, sample.view, exposure, seen))
             keep = [0, 1, *markers]
-            # texts are part of the container here, as they are no objects of the peers
+            # peers have no separate objects for texts, so these count as container
             ids = np.where(np.isin(sample.ids, keep), sample.ids, 1).astype(np.uint16)
             truths.append((index, name, ids))
         scenes.append(
@@ -73,20 +85,20 @@ def write_jobs(
 
 
 def with_effort(folder: Path, samples: int, repeats: int) -> None:
-    """Set how many samples a pixel, and how often each view is drawn, in a job folder."""
+    """Set the samples per pixel and the number of draws per view of a job folder."""
     path = folder / "job.json"
     job = json.loads(path.read_text(encoding="utf-8"))
     path.write_text(json.dumps({**job, "samples": samples, "repeats": repeats}), encoding="utf-8")
 
 
 def _markers(scene: Scene) -> dict[int, Decal]:
-    """The scene's markers by id."""
+    """Return the scene's markers by id."""
     numbered = zip(object_ids(scene), scene.decals, strict=True)
     return {number: decal for number, decal in numbered if decal.kind == "marker"}
 
 
 def shot(name: str, view: View, exposure: float, markers: list[int]) -> dict[str, Any]:
-    """A view as peer_renderers/measure.py wants it."""
+    """Return a view in the form that peer_renderers/measure.py reads."""
     pose = np.eye(4)
     right, down, forward = view.rotation
     pose[:3, :3] = np.stack([right, -down, -forward], axis=1)
@@ -118,7 +130,7 @@ def _write_glb(generator: Generator, scene: Scene, markers: dict[int, Decal], pa
 
 
 def _marker_mesh(scene: Scene, mesh: Mesh, decal: Decal) -> trimesh.Trimesh:
-    """The decal's diamond as a grid of triangles on the sheet, lifted off it, metres, y up."""
+    """Return the marker's diamond as a grid of triangles in front of the sheet, metres, y up."""
     steps = np.linspace(-0.5, 0.5, _CELLS + 1)
     s, t = (a.ravel() for a in np.meshgrid(steps, steps))
     local = np.stack([s - t, s + t], axis=-1) / 2  # a diamond in [-1/2, 1/2] squared

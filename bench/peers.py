@@ -1,14 +1,14 @@
-"""What does a labelled image cost with the tools that a user would otherwise take?
+"""Compare the cost of a labelled image with that of other tools.
 
     python bench/peers.py --install                      # once: an environment for each peer
     python bench/peers.py [--scenes 2] [--cameras A,B,Cl,Cr] [--size 640x640]
 
-Every peer draws the same scenes from the same cameras at the same size, each in a process and a
-virtual environment of its own (they pin packages that exclude one another), fastgen among them in
-the same run. What they are given is simpler than what fastgen draws, see peer_jobs.py, and their
-labels are bare id pictures where fastgen's are finished boxes, masks and polygons. That they drew
-the same is checked by overlap with fastgen's ids. Opening a scene is left out of the sum.
-A peer that cannot run is listed with its reason. Leaves bench/results/peers.json, docs/peers.png.
+All tools, fastgen included, draw the same scenes from the same cameras at the same size in one run.
+Each has its own process and virtual environment, because their pinned packages conflict. The scenes
+are simpler than fastgen's own (see peer_jobs.py). The peers' labels are plain id images, while
+fastgen's include boxes, masks and polygons. The overlap with fastgen's ids checks that the images
+agree. The time to open a scene is not included in the cost of an image. Peers that cannot run are
+listed with the reason. Writes bench/results/peers.json and docs/peers.png.
 """
 
 import argparse
@@ -43,10 +43,16 @@ TIMEOUT_S = 3600
 class Peer:
     """A tool to measure.
 
-    script: in peer_renderers, with its own arguments after. environment: folder of its virtual
-    environment, '' for this one. requirements: what pip installs there. python: the only version
-    that the tool's wheels exist for. samples: a pixel, where that can be chosen. slow: views are
-    drawn once instead of several times. settings: environment variables.
+    Attributes:
+        name: Name in the table.
+        script: Script in peer_renderers.
+        arguments: Extra arguments of the script.
+        environment: Folder of its virtual environment, or '' for the current one.
+        requirements: Packages that pip installs there.
+        python: The only Python version with wheels of the tool, or '' for any.
+        samples: Samples per pixel, if the tool lets us choose.
+        slow: Draw each view only once.
+        settings: Environment variables.
     """
 
     name: str
@@ -61,7 +67,7 @@ class Peer:
 
     @property
     def interpreter(self) -> Path:
-        """The Python that runs it."""
+        """The Python that runs the script."""
         if not self.environment:
             return Path(sys.executable)
         return ENVIRONMENTS / self.environment / "bin" / "python"
@@ -82,7 +88,7 @@ PEERS = (
         "pyrender, colour + segmentation",
         "with_pyrender.py",
         environment="pyrender",
-        # it uses np.infty, which numpy 2 dropped
+        # it uses np.infty, which numpy 2 removed
         requirements=("pyrender==0.1.45", "numpy<2", "trimesh", "pillow"),
     ),
     Peer(
@@ -99,12 +105,12 @@ PEERS = (
         settings=(("XDG_RUNTIME_DIR", tempfile.gettempdir()),),
     ),
     Peer("Cycles 16 spp denoised + id render", arguments=("denoise",), samples=16, **_CYCLES),
-    Peer("Cycles 128 spp + a mask a marker", arguments=("masks",), samples=128, **_CYCLES),
+    Peer("Cycles 128 spp + a mask per marker", arguments=("masks",), samples=128, **_CYCLES),
 )
 
 
 def install(peer: Peer) -> str:
-    """Make the peer's environment; returns why that failed, or ''."""
+    """Create the peer's environment; return why that failed, or ''."""
     if not peer.environment:
         return ""
     folder = ENVIRONMENTS / peer.environment
@@ -112,7 +118,7 @@ def install(peer: Peer) -> str:
     if peer.python == f"{sys.version_info.major}.{sys.version_info.minor}":
         wanted = sys.executable
     if shutil.which(wanted) is None:
-        return f"needs {wanted}, which is not on the PATH"
+        return f"needs {wanted}, which is not on the PATH; install it and try again"
     for command in (
         [wanted, "-m", "venv", str(folder)],
         [str(peer.interpreter), "-m", "pip", "install", "--quiet", *peer.requirements],
@@ -124,7 +130,7 @@ def install(peer: Peer) -> str:
 
 
 def run(peer: Peer, job: Path, out: Path) -> dict[str, Any]:
-    """Run a peer's script on a job: its result.json, or {'failed': reason}."""
+    """Run a peer's script on a job; return its result.json, or {'failed': reason}."""
     if not peer.interpreter.exists():
         return {"failed": "not installed: python bench/peers.py --install"}
     command = [
@@ -135,7 +141,7 @@ def run(peer: Peer, job: Path, out: Path) -> dict[str, Any]:
     ]
     variables = {**os.environ, **dict(peer.settings)}
     if peer.environment:
-        variables.pop("LP_NUM_THREADS", None)  # peers use all cores, as they do by default
+        variables.pop("LP_NUM_THREADS", None)  # peers use all cores, which is their default
         variables.pop("PYTHONPATH", None)
     else:
         variables["PYTHONPATH"] = str(ROOT)
@@ -149,7 +155,7 @@ def run(peer: Peer, job: Path, out: Path) -> dict[str, Any]:
         )
     except subprocess.TimeoutExpired:
         return {"failed": f"took longer than {TIMEOUT_S} s"}
-    # some libraries crash while they exit, after the work is done
+    # some libraries crash at exit, after the result is written
     if not (out / "result.json").exists():
         return {"failed": _last_words(done.stderr) or f"exit code {done.returncode}"}
     result: dict[str, Any] = json.loads((out / "result.json").read_text(encoding="utf-8"))
@@ -164,7 +170,7 @@ def _last_words(text: str) -> str:
 def summary(
     result: dict[str, Any], out: Path, truths: list[tuple[int, str, NDArray[np.uint16]]]
 ) -> dict[str, Any]:
-    """Medians in ms, and the mean overlap of container and markers with fastgen's ids."""
+    """Return median times in ms, and the overlap of container and markers with fastgen's ids."""
     laps = result["laps"]
     walls, cores = (
         {stage: statistics.median(lap[i] for lap in laps[stage]) for stage in laps} for i in (0, 1)
@@ -174,7 +180,7 @@ def summary(
     for index, camera, truth in truths:
         with np.load(out / f"{index:06d}_{camera}.npz") as stored:
             ids = stored["ids"]
-        if (ids == 1).any():  # binary masks are of markers only
+        if (ids == 1).any():  # binary masks contain only markers
             whole.append(_overlap(ids > 0, truth > 0))
         marks += [_overlap(ids == i, truth == i) for i in np.unique(truth[truth > 1])]
     return {
@@ -190,7 +196,7 @@ def summary(
 
 
 def _overlap(a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float:
-    """Intersection over union."""
+    """Return the intersection over union of two masks."""
     return float((a & b).sum() / max((a | b).sum(), 1))
 
 
@@ -207,15 +213,15 @@ def show(found: dict[str, dict[str, Any]]) -> None:
             for key in ("container overlap", "marker overlap")
         )
         print(f"{name:42}" + "".join(f"{row[c]:10.1f}" for c in columns) + f"{overlaps:>14}")
-    print("\nset-up: of a scene, not in the sum. image: colour + labels, wall time on all cores.")
-    print("cores: processor time of an image. overlap: container/markers with fastgen's ids.")
+    print("\nset-up: per scene, not part of `image`. image: colour + labels, wall time, all cores.")
+    print("cores: CPU time per image. overlap: IoU of container/markers with fastgen's ids.")
 
 
 def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
-    """Bars of wall and processor time of a labelled image on a logarithmic axis."""
+    """Draw bars of wall and CPU time per labelled image on a logarithmic axis."""
     rows = {name: row for name, row in found.items() if "failed" not in row}
     figure, axes = plt.subplots(figsize=(9, 0.7 * len(rows) + 1.6))
-    for shift, key, label in ((-0.2, "image", "wall time"), (0.2, "cores", "processor time")):
+    for shift, key, label in ((-0.2, "image", "wall time"), (0.2, "cores", "CPU time")):
         places = np.arange(len(rows)) + shift
         values = [row[key] for row in rows.values()]
         bars = axes.barh(places, values, height=0.38, label=label)
@@ -224,7 +230,7 @@ def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.set_xlim(1, axes.get_xlim()[1] * 5)
-    axes.set_xlabel(f"ms a labelled image (median)\n{caption}")
+    axes.set_xlabel(f"ms per labelled image (median)\n{caption}")
     axes.legend(loc="upper right")
     figure.tight_layout()
     chart.parent.mkdir(parents=True, exist_ok=True)
@@ -232,15 +238,15 @@ def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
 
 
 def main() -> None:
-    """Install the peers, or measure them."""
+    """Install or measure the peers."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--install", action="store_true")
-    parser.add_argument("--only", default="", help="measure peers whose name holds this")
+    parser.add_argument("--only", default="", help="use only peers whose name contains this")
     parser.add_argument("--scenes", type=int, default=2)
     parser.add_argument("--cameras", default="A,B,Cl,Cr")
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--repeats", type=int, default=5, help="of each view; Cycles draws once")
-    parser.add_argument("--samples", type=int, help="for Cycles, in place of 16 and 128")
+    parser.add_argument("--repeats", type=int, default=5, help="draws per view; Cycles draws each once")
+    parser.add_argument("--samples", type=int, help="samples per pixel of Cycles, instead of 16 and 128")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "peers.png")
     options = parser.parse_args()
     peers = [peer for peer in PEERS if options.only.lower() in peer.name.lower()]
@@ -264,7 +270,7 @@ def main() -> None:
     about = machine()
     caption = f"{options.size}, {len(truths)} views, {about}"
     if options.samples:
-        caption += f"; a trial: Cycles at {options.samples} spp"
+        caption += f"; trial run: Cycles at {options.samples} spp"
     print(caption)
     show(found)
     save("peers", {**origin(), "size": options.size, "views": len(truths), "peers": found})

@@ -1,9 +1,8 @@
-"""The scenes that path-traced references exist of, and the references themselves.
+"""The test cases, and their path-traced references.
 
-A case joins one of four cameras with one of eight lights, and is damaged or sound, rusty or clean.
-Any prefix of a multiple of 8 cases holds every light as often as every other, every camera and
-every state too. What a case shows is kept as a Scene beside its reference, so that neither other
-distributions nor other environments change it.
+A case combines one of four cameras with one of eight lights, and is damaged or not, rusty or clean.
+The first 8, 16 or 24 cases contain every light, camera and state equally often. Each reference
+stores its scene, so changes to the sampling or the environments do not affect it.
 """
 
 import json
@@ -22,20 +21,30 @@ SIZE = (320, 320)
 SEED = 3
 SAMPLES = 1024
 SCALE = 2
-"""References are traced with this many pixels a side for one, at SAMPLES / SCALE**2 samples each:
-from half pixels both filters follow that images are compared under."""
+"""Resolution factor per side of the traced images, each at SAMPLES / SCALE**2 samples.
+
+The pixel filters of FILTERS are computed from these half pixels.
+"""
 
 CAMERAS = ("A", "B", "Cl", "Cr")
 LIGHTS = ("venice", "sunrise", "night", "park", "city_2", "sky", "sunset", "dawn")
 RUSTY = 0.2
-_TIMES_TWO = (0, 2, 3, 1)  # in the field of four elements: makes two orthogonal Latin squares
+_TIMES_TWO = (0, 2, 3, 1)  # times two in GF(4), which gives two orthogonal Latin squares
 
 Array = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class Case:
-    """One image to compare. rusty: RUSTY of the sheet, else none; damaged: certainly or never."""
+    """One image to compare.
+
+    Attributes:
+        number: Position in `cases()`.
+        camera: Camera name.
+        light: Name of the environment.
+        damaged: Damaged for certain, or never.
+        rusty: Rust covers the share RUSTY, or nothing.
+    """
 
     number: int
     camera: str
@@ -45,7 +54,7 @@ class Case:
 
     @property
     def config(self) -> Config:
-        """The distribution that its scene is drawn from."""
+        """The configuration that the case's scene is sampled from."""
         return Config.from_values(
             {
                 "environment": {"names": [self.light]},
@@ -55,12 +64,12 @@ class Case:
         )
 
     def drawn(self) -> Scene:
-        """Its scene as the present sampling draws it."""
+        """Sample the scene of the case with the current code."""
         return Generator(self.config, SEED, SIZE).scene(self.number)
 
 
 def cases() -> list[Case]:
-    """All 32 cases, in the order in which they are traced."""
+    """Return all 32 cases, in the order in which they are traced."""
     found = []
     for block in range(4):
         for i, light in enumerate(LIGHTS):
@@ -71,18 +80,22 @@ def cases() -> list[Case]:
 
 
 def traced(count: int) -> list[Case]:
-    """Those of the first `count` cases whose reference is at hand."""
+    """Return the cases among the first `count` that have a stored reference."""
     return [case for case in cases()[:count] if (FOLDER / f"{case.number:02d}.npz").exists()]
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What Cycles makes of a case.
+    """The path-traced reference of a case.
 
-    scene: what was traced. exposure: of its camera then. radiance: linear float32 [H, W, 3], not
-    yet exposed, by filter, see FILTERS. inside: which rays through pixel centres [H, W] hit
-    something; depth_m: how far along the axis, of every DEPTH_STEP-th one, inf where nothing;
-    openness: ambient occlusion there [H, W], 1 in the open.
+    Attributes:
+        scene: The scene that was traced.
+        exposure: Exposure of its camera at that time.
+        radiance: Linear float32 [H, W, 3] before exposure, by filter (see FILTERS).
+        inside: Mask [H, W] of the pixel centres whose ray hits something.
+        depth_m: Distance along the optical axis in metres, for every DEPTH_STEP-th row and column.
+            inf where nothing is hit.
+        openness: Sky visibility [H, W] (Cycles' ambient occlusion), 1 in the open.
     """
 
     scene: Scene
@@ -94,13 +107,20 @@ class Reference:
 
 
 FILTERS = {"draft": "box", "balanced": "box", "fine": "box", "high": "box"}
-"""The pixel filter of each quality at SIZE: a box is the pixel's square; `draft` has none and is
-held to it. A tent reaches a pixel to each side; only images too large for nine samples have it."""
+"""Pixel filter of each quality at SIZE.
+
+A box is the pixel's own square. `draft` has no filter and is compared with the box. A tent reaches
+one pixel farther on each side; only images too large for nine samples per pixel use it.
+"""
 
 DEPTH_STEP = 8
 
 _BRIGHTEST = 1000.0
-"""Displayed as white; nearer the end of half floats compression could pass it."""
+"""Upper limit of stored radiance after exposure.
+
+It is displayed as white. Compression could push values near the end of the half-float range beyond
+it.
+"""
 
 _EXR = {
     "compression": OpenEXR.DWAB_COMPRESSION,
@@ -110,9 +130,9 @@ _EXR = {
 
 
 def filtered(halves: Array) -> dict[str, Array]:
-    """Radiance [2H, 2W, 3] of half pixels as that of pixels [H, W, 3], by filter.
+    """Filter radiance [2H, 2W, 3] of half pixels to pixels [H, W, 3], by filter name.
 
-    The half pixel beyond the border of the image, which a tent asks for, repeats the last one.
+    A tent also reads the half pixel beyond the image border, which repeats the last one.
     """
     return {
         name: _along(_along(halves.astype(np.float64), 0, weights), 1, weights).astype(np.float32)
@@ -128,8 +148,11 @@ def _along(image: Array, axis: int, eighths: tuple[int, ...]) -> Array:
 
 
 def save(reference: Reference, folder: Path, number: int) -> None:
-    """Write NN.npz and NN.exr: exposed radiance in half floats that DWAB compresses, which takes
-    what is below 1 for display."""
+    """Write a reference as NN.npz and NN.exr.
+
+    The EXR holds half floats compressed with DWAB. Radiance is stored after exposure, because DWAB
+    treats values below 1 as displayable.
+    """
     planes = {"openness.Y": reference.openness}
     for name, image in reference.radiance.items():
         for c, channel in enumerate("RGB"):
@@ -148,7 +171,11 @@ def save(reference: Reference, folder: Path, number: int) -> None:
 
 
 def load(number: int, folder: Path = FOLDER) -> Reference:
-    """The reference of a case, without Blender. FileNotFoundError where it was never traced."""
+    """Read the reference of a case. Blender is not needed.
+
+    Raises:
+        FileNotFoundError: The case has not been traced.
+    """
     with np.load(folder / f"{number:02d}.npz") as stored:
         scene = Scene.from_json(stored["scene"].tobytes().decode())
         inside = np.unpackbits(stored["inside"], axis=1, count=SIZE[0]).astype(bool)

@@ -1,4 +1,4 @@
-"""Where the figures of a bench go, and what machine they come from."""
+"""Output of the benchmarks: result files, tables in the docs, and the machine they ran on."""
 
 import json
 import os
@@ -15,12 +15,12 @@ RESULTS = ROOT / "bench" / "results"
 
 
 def origin() -> dict[str, str]:
-    """What figures are of: the machine, and the version of fastgen."""
+    """Return the machine and the fastgen version that figures belong to."""
     return {"machine": machine(), "fastgen": fastgen.__version__}
 
 
 def machine() -> str:
-    """Processor and the cores that this process may use."""
+    """Return the processor model and the number of cores that this process may use."""
     model = "unknown processor"
     for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
         if line.startswith("model name"):
@@ -30,11 +30,15 @@ def machine() -> str:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """(width, height) of text such as 640x480; ends the program with a message for other text."""
+    """Parse a size such as 640x480 into (width, height).
+
+    Raises:
+        SystemExit: The text is not WIDTHxHEIGHT.
+    """
     try:
         width, height = (int(part) for part in text.split("x"))
     except ValueError:
-        raise SystemExit(f"{text!r} is no size; write WIDTHxHEIGHT") from None
+        raise SystemExit(f"{text!r} is not a size; write WIDTHxHEIGHT") from None
     return width, height
 
 
@@ -48,14 +52,17 @@ def save(name: str, figures: dict[str, Any]) -> None:
 def write_section(
     name: str, lines: list[str], document: Path = ROOT / "docs" / "accuracy.md"
 ) -> None:
-    """Print `lines` of Markdown, and put them between the marks `begin NAME` and `end NAME` of the
-    document."""
+    """Print Markdown lines and write them between `begin NAME` and `end NAME` of a document.
+
+    Raises:
+        SystemExit: The document has no such markers.
+    """
     print("\n".join(lines))
     text = document.read_text(encoding="utf-8")
     begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
     before, found, rest = text.partition(begin)
     _, closed, after = rest.partition(end)
     if not (found and closed):
-        raise SystemExit(f"{document}: has no place for {name}: {begin.strip()} ... {end}")
+        raise SystemExit(f"{document}: add the markers {begin.strip()} ... {end} for {name}")
     whole = before + begin + "\n" + "\n".join(lines) + "\n\n" + end + after
     document.write_text(whole, encoding="utf-8")

@@ -1,13 +1,14 @@
-"""Where the time of a labelled image goes, and how many come in a second.
+"""Measure the CPU time of a labelled image by stage, and the images per second.
 
     python bench/throughput.py [--images 200] [--scenes 12] [--sizes 320x320,640x640,...]
         [--long 2000]
 
-For each size, on EGL and OSMesa, and for each quality at 640x640: core-milliseconds an image by
-stage in one process (warm: every HDRI and mesh was used before), and images a second of `fastgen
-generate`, from start to finish and once it runs; in a short run that still meets shapes for the
-first time. Then long runs of `draft`, in which all are made ahead. Leaves
-bench/results/throughput.json, docs/throughput.png and a table in README.md. `bench/peers.py`
+Runs every size on EGL and OSMesa, and every quality at 640x640. Stages are timed in one process
+with warm caches, so every HDRI and mesh was used before. The rate of `fastgen generate` is given
+from start to finish and after start-up. In these short runs the workers still prepare some meshes
+for the first time. Long runs of `draft` follow, where all meshes are prepared early.
+
+Writes bench/results/throughput.json, docs/throughput.png and a table in README.md. `bench/peers.py`
 measures other tools.
 """
 
@@ -23,7 +24,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
+# one thread per process, like in `fastgen generate`; llvmpipe reads it at the first context
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -33,12 +34,12 @@ from results import ROOT, machine, origin, parse_size, save, write_section
 
 import fastgen
 from fastgen import Config, Generator
-from fastgen.camera import view_of
+from fastgen.camera.projection import view_of
 from fastgen.dataset.storage import Folder
-from fastgen.drawing.shapes import spreader_outline
 from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
-from fastgen.labelling.visibility import Shot
-from fastgen.labels import label
+from fastgen.labels.objects import label
+from fastgen.labels.visibility import Shot
+from fastgen.render.shapes import spreader_outline
 from fastgen.sample import Sample
 
 STAGES = ("sample", "draw", "read", "label", "encode", "write")
@@ -53,7 +54,7 @@ LONG_RUNS = 3
 def stages(
     backend: str, size: tuple[int, int], scenes: int, quality: str
 ) -> tuple[str, dict[str, float]]:
-    """The driver's name, and mean core-milliseconds an image of each stage over all cameras."""
+    """Return the driver's name, and the mean CPU ms of each stage per image, over all cameras."""
     times: dict[str, list[float]] = defaultdict(list)
     config = Config.preset()
     with (
@@ -62,12 +63,12 @@ def stages(
     ):
         storage, formats = Folder(Path(folder)), formats_of(SEAFRONT)
         for index in range(scenes):
-            for name in config.cameras:  # make meshes, lights and programs
+            for name in config.cameras:  # prepare meshes, lights and programs
                 generator.render(index=index, camera=name)
         driver = generator.renderer_name
         renderer = generator._gpu.renderer()
         finish = renderer._ctx.finish
-        clock = time.process_time  # of all threads, so that other programs do not count
+        clock = time.process_time  # CPU time of all threads: other programs do not count
         for index in range(scenes):
             began = clock()
             scene = generator.scene(index)
@@ -111,7 +112,7 @@ def generate_command(
     quality: str = "balanced",
     device_index: int | None = None,
 ) -> list[str]:
-    """The command line that makes a dataset of `images` images in the folder `out`."""
+    """Return the command line that writes a dataset of `images` images to the folder `out`."""
     command = [sys.executable, "-m", "fastgen", "generate", out, "--images", str(images)]
     command += ["--size", size, "--seed", "7", "--workers", str(workers)]
     command += ["--backend", backend, "--quality", quality]
@@ -119,8 +120,12 @@ def generate_command(
 
 
 class Rate(NamedTuple):
-    """Images a second of a whole run, start-up and contact sheet included, and of its last two
-    thirds; the same for both where all came at once."""
+    """Images per second of a run.
+
+    Attributes:
+        whole: Of the whole run, start-up and contact sheet included.
+        steady: Of its last two thirds, or the same as `whole` if all images were written at once.
+    """
 
     whole: float
     steady: float
@@ -134,7 +139,7 @@ def whole_run(
     quality: str = "balanced",
     device_index: int | None = None,
 ) -> Rate:
-    """How fast the command makes a dataset."""
+    """Make a dataset with `fastgen generate` and return its rate."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         command = generate_command(str(out), images, workers, size, backend, quality, device_index)
@@ -156,12 +161,12 @@ def whole_run(
 
 
 def fill_caches(backend: str, images: int) -> None:
-    """Make the dataset once, small: the rates are not those of a machine's very first run."""
+    """Make a small dataset once, so that the rates are not those of a machine's very first run."""
     whole_run(backend, "64x64", images, max(WORKERS))
 
 
 def measure(size: str, backend: str, images: int, scenes: int, quality: str) -> dict[str, Any]:
-    """One row of the table, printed as soon as it is known."""
+    """Measure and print one row of the table."""
     driver, found = stages(backend, parse_size(size), scenes, quality)
     rates = {str(w): whole_run(backend, size, images, w, quality) for w in WORKERS}
     print(
@@ -183,22 +188,29 @@ def measure(size: str, backend: str, images: int, scenes: int, quality: str) -> 
 
 
 def long_runs(images: int) -> Rate:
-    """The medians of LONG_RUNS runs of `draft`, on EGL with the most workers."""
+    """Return the median rates of LONG_RUNS runs of `draft`, on EGL with the most workers."""
     runs = [whole_run(BACKENDS[0], USUAL, images, max(WORKERS), "draft") for _ in range(LONG_RUNS)]
     for whole, steady in runs:
-        print(f"{images} images of draft: {whole:.1f} images/s, running {steady:.1f}", flush=True)
+        print(f"{images} images, draft: {whole:.1f} images/s, steady {steady:.1f}", flush=True)
     return Rate(*(statistics.median(rates) for rates in zip(*runs, strict=True)))
 
 
 def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, Rate]) -> list[str]:
-    """Markdown of the rows on EGL, and of a long run: its images and rate."""
+    """Return a Markdown table of the rows on EGL, and a line on the long run.
+
+    Args:
+        rows: Rows from `measure`.
+        about: Description of the machine.
+        images: Number of images of the short runs.
+        long: Number of images and rate of the long runs.
+    """
     shown = [row for row in rows if row["backend"] == "egl"]
     lines = [
-        "What a labelled image takes in core-milliseconds, and images a second of `fastgen",
-        f"generate` with two workers: over {images}, with all that its start takes, and once it",
-        f"runs (`python bench/throughput.py`, {about}, version {fastgen.__version__}):",
+        "CPU time in ms of a labelled image by stage, and images per second of `fastgen generate`",
+        f"with two workers: over a run of {images} images including start-up, and after start-up",
+        f"(`python bench/throughput.py`, {about}, version {fastgen.__version__}):",
         "",
-        "| quality | size | scene | draw | labels | files | core-ms | images/s, all | running |",
+        "| quality | size | scene | draw | labels | files | CPU ms | images/s, run | steady |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in sorted(
@@ -212,15 +224,15 @@ def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, 
     count, rate = long
     lines += [
         "",
-        f"Runs of {count:,} images of `draft` at {USUAL}, the median of {LONG_RUNS}: "
+        f"Runs of {count:,} images with `draft` at {USUAL}, median of {LONG_RUNS}: "
         f"{rate.whole:.1f} images/s,",
-        f"{rate.steady:.1f} once they run.",
+        f"{rate.steady:.1f} after start-up.",
     ]
     return lines
 
 
 def draw(rows: list[dict[str, Any]], caption: str, chart: Path) -> None:
-    """Stacked stages on the left, images a second on the right."""
+    """Draw the stages stacked on the left and the images per second on the right."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(15, 4.6))
     names = [f"{row['size']}\n{row['backend']}\n{row['quality']}" for row in rows]
     places = np.arange(len(rows))
@@ -229,12 +241,12 @@ def draw(rows: list[dict[str, Any]], caption: str, chart: Path) -> None:
         values = np.array([row["stages_ms"][stage] for row in rows])
         left.bar(places, values, bottom=below, label=stage)
         below += values
-    left.set(ylabel="core-ms a labelled image", title="one process, by stage")
+    left.set(ylabel="CPU ms per labelled image", title="one process, by stage")
     for shift, workers in zip((-0.2, 0.2), WORKERS, strict=True):
         rates = [row["images_per_s"][str(workers)] for row in rows]
         bars = right.bar(places + shift, rates, width=0.38, label=f"{workers} worker(s)")
         right.bar_label(bars, fmt="%.1f", fontsize=7)
-    right.set(ylabel="images a second", title="fastgen generate, start-up included")
+    right.set(ylabel="images per second", title="fastgen generate, start-up included")
     for axes in (left, right):
         axes.set_xticks(places, names, fontsize=7)
         axes.legend(fontsize=8)
@@ -248,15 +260,15 @@ def main() -> None:
     """Print the table and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--images", type=int, default=200)
-    parser.add_argument("--scenes", type=int, default=12, help="for the stages, 4 images each")
+    parser.add_argument("--scenes", type=int, default=12, help="scenes for the stages, 4 images each")
     parser.add_argument("--sizes", default=SIZES)
     parser.add_argument("--long", type=int, default=2000, help="images of the long runs")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "throughput.png")
     options = parser.parse_args()
     about = machine()
-    print(f"{about}, no GPU unless the driver says so; {options.images} images a run\n")
-    rates = "".join(f"{f'{w} work.':>9}{'running':>9}" for w in WORKERS)
-    print(f"{'core-ms':29}" + "".join(f"{s:>8}" for s in STAGES) + f"{'sum':>8}{rates}")
+    print(f"{about}, no GPU unless the driver says so; {options.images} images per run\n")
+    rates = "".join(f"{f'{w} work.':>9}{'steady':>9}" for w in WORKERS)
+    print(f"{'CPU ms':29}" + "".join(f"{s:>8}" for s in STAGES) + f"{'sum':>8}{rates}")
     for backend in BACKENDS:
         fill_caches(backend, options.images)
     ways = [
@@ -268,8 +280,8 @@ def main() -> None:
         for size, backend, quality in ways
     ]
     driver = ", ".join(sorted({row["driver"] for row in rows}))
-    caption = f"{about}; {driver}; {options.images} images a run"
-    print(f"\n{driver}; N work.: images a second with N workers")
+    caption = f"{about}; {driver}; {options.images} images per run"
+    print(f"\n{driver}; N work.: images per second with N workers; steady: after start-up")
     long = options.long, long_runs(options.long)
     told = {"images": long[0], "images_per_s": long[1].whole, "steady_images_per_s": long[1].steady}
     save("throughput", {**origin(), "images": options.images, "rows": rows, "long_runs": told})

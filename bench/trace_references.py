@@ -1,13 +1,14 @@
-"""Path-traces what `bench/accuracy.py` compares with; run once, in the background.
+"""Path-trace the references that `bench/accuracy.py` compares with.
 
     python bench/trace_references.py --blender-python PYTHON [--cases 32] [--twice 8] [--series 8]
 
-PYTHON is a Python 3.11 with bpy==4.5.15. What is there already is not traced again, so a run that
-was stopped goes on where it was; as is, it takes 45 minutes of two cores. What Cycles writes goes
-to --raw; `bench/pack_references.py` makes bench/references from it. A case that bench/references
-holds shows the scene that is kept there. `--twice`: so many cases are traced a second time with
-another seed, to know Cycles' own noise. `--series`: of so many, images at 1 to 256 samples follow,
-and denoised ones.
+Run it once, in the background: with these defaults it takes 45 minutes on two cores. PYTHON is a
+Python 3.11 with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be
+continued. Cases that are already in bench/references keep the scene stored there.
+
+Cycles writes into --raw; `bench/pack_references.py` then makes bench/references from it. The first
+--twice cases are traced a second time with another seed, to measure Cycles' own noise. The first
+--series cases are also traced at 1 to 256 samples, with and without denoising.
 """
 
 import argparse
@@ -27,11 +28,13 @@ from fastgen.light.hdri import bundled_hdris
 
 SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
 BACKGROUND_SAMPLES = 16
-"""Of each half pixel outside the rectangle around all objects: what is there is a smooth picture,
-and light never meets anything."""
+"""Samples per half pixel outside the rectangle around all objects.
+
+Only the environment is visible there: it is smooth, and its light hits nothing on the way.
+"""
 
 TEXEL_MM = 3.0
-"""A quarter of the closest camera's pixel: finer than what 320 pixels a side can show."""
+"""A quarter of a pixel of the closest camera, finer than 320 pixels per side can show."""
 
 
 class Tracer:
@@ -44,7 +47,7 @@ class Tracer:
         folder.mkdir(parents=True, exist_ok=True)
 
     def reference(self, case: Case, seed: int) -> None:
-        """NN_seed.exr and NN_seed_whole.exr, and of the first seed NN_centers.exr."""
+        """Write NN_seed.exr and NN_seed_whole.exr, and for seed 1 also NN_centers.exr."""
         name = f"{case.number:02d}"
         done = self._folder / f"{name}_{seed}.exr"
         if done.exists():
@@ -58,9 +61,11 @@ class Tracer:
         part.replace(done)
 
     def series(self, case: Case, way: str) -> None:
-        """NN_way_N.exr for each number N of samples, and their seconds in NN_way.json.
+        """Write NN_way_N.exr for each number N of samples, and their CPU seconds to NN_way.json.
 
-        way: a key of SERIES.
+        Args:
+            case: The case to trace.
+            way: A key of SERIES.
         """
         name = f"{case.number:02d}_{way}"
         seconds = self._folder / f"{name}.json"
@@ -72,7 +77,7 @@ class Tracer:
         seconds.write_text(found, encoding="utf-8")
 
     def _run(self, case: Case, out: Path, seed: int, samples: str, more: Sequence[object]) -> str:
-        """What the tracer says of its seconds."""
+        """Run the tracer and return the CPU seconds that it prints."""
         glb = self._exported(case)
         tracer = Path(__file__).with_name("path_traced.py")
         command = [self._python, tracer, glb, "--camera", case.camera]
@@ -86,7 +91,7 @@ class Tracer:
         return line.removeprefix("seconds ")
 
     def _exported(self, case: Case) -> Path:
-        """The GLB file, beside it the scene that it was made from."""
+        """Return the GLB file of a case; its scene is stored next to it."""
         glb = self._folder / f"{case.number:02d}.glb"
         if not glb.exists():
             scene = load(case.number).scene if case in traced(len(cases())) else case.drawn()
@@ -100,7 +105,7 @@ class Tracer:
 
 
 def main() -> None:
-    """Trace what is missing."""
+    """Trace the missing references."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--blender-python", type=Path, required=True)
     parser.add_argument("--cases", type=int, default=32)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from fastgen import Config, Generator
-from fastgen.files.encode import jpeg, write
+from fastgen.camera.electronics import stamped
+from fastgen.files.images import jpeg, write
 from fastgen.scene import Camera, Scene
-from fastgen.sensor.electronics import stamped
-from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 
 SIZE = (320, 240)
 INDEX = 3

@@ -20,8 +20,8 @@ from torch import nn
 from torch.nn import functional
 from torch.utils.data import Dataset
 
+from fastgen.decals.iso6346 import check_digit
 from fastgen.errors import ConfigError
-from fastgen.prints.identifier import check_digit
 from fastgen.torch import ContainerDataset
 
 PLANS = {

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fastgen.config import Config
+    from fastgen.config.config import Config
     from fastgen.errors import FastgenError
     from fastgen.generator import Generator
 

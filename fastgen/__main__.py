@@ -2,14 +2,14 @@
 
 import sys
 
-from fastgen.stopping import ended_at_once
+from fastgen.cli.stopping import ended_at_once
 
 
 def main() -> int:
-    """Run the command line; returns its exit code, see `fastgen.cli.main`."""
+    """Run the command line; returns its exit code, see `fastgen.cli.main.main`."""
     with ended_at_once():
-        from fastgen import cli
-    return cli.main()
+        from fastgen.cli.main import main as run
+    return run()
 
 
 if __name__ == "__main__":

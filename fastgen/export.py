@@ -12,21 +12,22 @@ from typing import Any
 import numpy as np
 
 import fastgen
-from fastgen.camera import MM, view_of
-from fastgen.container import build_container
-from fastgen.damage import variant
-from fastgen.drawing.bake import Atlas, atlas_size, least_texel_mm
-from fastgen.drawing.programs import INSIDE_ALBEDO
-from fastgen.drawing.shapes import spreader_mesh
+from fastgen.camera.projection import view_of
 from fastgen.errors import OutputError
-from fastgen.files.encode import png, write
 from fastgen.files.gltf import Glb
+from fastgen.files.images import png, write
 from fastgen.formats import view_values
 from fastgen.generator import Generator
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
-from fastgen.records import to_plain
+from fastgen.render.bake import Atlas, atlas_size, least_texel_mm
+from fastgen.render.programs import INSIDE_ALBEDO
+from fastgen.render.shapes import spreader_mesh
 from fastgen.scene import Camera, Scene
-from fastgen.scene_check import check_camera, check_scene
+from fastgen.scene.check import check_camera, check_scene
+from fastgen.scene.limits import MM
+from fastgen.validation import to_plain
 
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """glTF 2.0, section 3.4: y is up."""

@@ -11,36 +11,37 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.camera import View, view_of
-from fastgen.config import Config, LabelConfig
-from fastgen.container import build_container
-from fastgen.damage import seen_damages, variant
-from fastgen.distributions.sensor_sampling import extreme_lenses
-from fastgen.drawing.bake import Atlas
-from fastgen.drawing.cuda import CudaFrame, cuda_reason
-from fastgen.drawing.programs import LAYERS
-from fastgen.drawing.shapes import shadow_casters, spreader_outline
-from fastgen.environment import EnvironmentLight, irradiance_at, load_environment
+from fastgen.camera.projection import View, view_of
+from fastgen.camera.sensor import develop, is_needed
+from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import ConfigError
-from fastgen.gl import BACKENDS, check_device, open_context
-from fastgen.labelling.visibility import Shot
-from fastgen.labels import label
+from fastgen.frame import Frame
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import seen_damages, variant
+from fastgen.labels.objects import label
+from fastgen.labels.visibility import Shot
+from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.light.ray_bodies import check_rays
-from fastgen.light.sun_shadow import shader_suns
-from fastgen.opened import Opened
-from fastgen.records import check_fields, check_known, nearest, whole
-from fastgen.renderer import Renderer
-from fastgen.sample import Frame, Sample
-from fastgen.sampling import (
+from fastgen.render.bake import Atlas
+from fastgen.render.cuda import CudaFrame, cuda_reason
+from fastgen.render.gl import BACKENDS, check_device, open_context
+from fastgen.render.programs import LAYERS
+from fastgen.render.renderer import Renderer
+from fastgen.render.session import Opened
+from fastgen.render.shadow_map import shader_suns
+from fastgen.render.shapes import shadow_casters, spreader_outline
+from fastgen.sample import Sample
+from fastgen.sampling.scene import (
     one_container_each,
     one_damage_each,
     possible_shapes,
     sample_scene,
 )
+from fastgen.sampling.sensor import extreme_lenses
 from fastgen.scene import Camera, Color, EnvironmentView, Scene
-from fastgen.scene_check import check_camera, check_scene
-from fastgen.sensor.develop import develop, is_needed
+from fastgen.scene.check import check_camera, check_scene
+from fastgen.validation import check_fields, check_known, nearest, whole
 
 MIN_SIZE, MAX_SIZE = 64, 4096
 

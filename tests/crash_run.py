@@ -16,11 +16,11 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import numpy as np
 import simplejpeg
 
-from fastgen.config import Config
+from fastgen.config.config import Config
+from fastgen.dataset.generate import generate, run_here
 from fastgen.dataset.shards import Job, Maker, stem_of
 from fastgen.dataset.storage import storage_of
-from fastgen.generate import generate, run_here
-from fastgen.sampling import split_of
+from fastgen.sampling.scene import split_of
 
 FAULTY_SCENE = 5
 

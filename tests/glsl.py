@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.drawing.programs import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK, expand
+from fastgen.render.programs import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK, expand
 from fastgen.resources import shader_path
 
 HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'

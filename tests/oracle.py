@@ -6,12 +6,12 @@ import numpy as np
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import damage as fields
-from fastgen.camera import View
+from fastgen.camera.projection import View
+from fastgen.geometry import damage_law
 from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.spreader import build_spreader
 from fastgen.scene import Decal, Scene
-from fastgen.spreader import build_spreader
 
 _MOST_LAYERS = 12
 
@@ -51,7 +51,7 @@ def cast(
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
     tears = ~np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
-    moved = fields.deform(damages, rest)
+    moved = damage_law.deform(damages, rest)
     # Embree sees metres around the origin, where its float32 is finest
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
     start, rays = view.rays(pixels)
@@ -78,7 +78,7 @@ def cast(
         travelled[active] = np.maximum(distance, travelled[active] + 0.02)
         torn = np.full(len(active), -1)
         for i, damage in enumerate(damages):
-            torn[fields.in_hole(damage, point) & tears[triangle]] = i
+            torn[damage_law.in_hole(damage, point) & tears[triangle]] = i
         inside = hole[active] >= 0
         # outsides end a ray from outside, insides one that came in through a hole
         wall = facing != inside
@@ -178,7 +178,7 @@ def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
     target = np.where(hits.hit, 101, 0).astype(np.uint16)
     most = np.full(target.shape, threshold_mm)
     for damage, value in zip(scene.damages, values, strict=True):
-        amount = np.abs(fields.amount_mm(damage, hits.rest_mm))
+        amount = np.abs(damage_law.amount_mm(damage, hits.rest_mm))
         more = hits.hit & (hits.hole < 0) & (amount > most)
         target[more], most[more] = value, amount[more]
     for i, value in enumerate(values):

@@ -6,9 +6,9 @@ import pytest
 from PIL import Image, ImageDraw, ImageFont
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.drawing.textures import art_texture
-from fastgen.gl import open_context
-from fastgen.prints.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
+from fastgen.decals.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
+from fastgen.render.gl import open_context
+from fastgen.render.textures import art_texture
 from fastgen.resources import asset_path
 
 RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125, 26)

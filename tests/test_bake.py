@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen.config import Config
-from fastgen.container import build_container
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.export import export_glb
 from fastgen.generator import Generator
+from fastgen.geometry.container import build_container
+from fastgen.geometry.spreader import build_spreader
 from fastgen.scene import Spreader
-from fastgen.spreader import build_spreader
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_a_spreaders_texels_are_the_containers_but_where_its_atlas_would_be_too_
         generator, "bake_spreader", lambda scene, mm: asked.append(mm) or baked(scene, mm)
     )
     for most in (4000, int(max(container.atlas_size_mm) / 16)):
-        monkeypatch.setattr("fastgen.drawing.bake.MAX_ATLAS", most)
+        monkeypatch.setattr("fastgen.render.bake.MAX_ATLAS", most)
         export_glb(generator, scene, tmp_path / "box.glb", [], 16.1)
     widest = max(build_spreader(scene.container.kind).atlas_size_mm)
     assert asked[0] == 16.1

@@ -16,11 +16,11 @@ import reference_set
 from reference_set import FILTERS
 
 from fastgen import Config, Generator
-from fastgen.container import build_container
-from fastgen.drawing import programs
-from fastgen.geometry.mesh import FACE_AXES
+from fastgen.geometry.container import build_container
+from fastgen.geometry.spreader import build_spreader
+from fastgen.render import programs
 from fastgen.resources import shader_path
-from fastgen.spreader import build_spreader
+from fastgen.scene.faces import FACE_AXES
 
 
 @pytest.mark.parametrize("count", [8, 16, 24, 32])

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.camera import FAR_M, NEAR_M, view_of
+from fastgen.camera.projection import view_of
 from fastgen.scene import Camera
+from fastgen.scene.limits import FAR_M, NEAR_M
 
 SIZE = (640, 480)
 

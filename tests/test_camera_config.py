@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config
-from fastgen.distributions.camera_config import CameraConfig
+from fastgen.config.cameras import CameraConfig
 from fastgen.errors import ConfigError
 
 HALF_WIDTH_MM, HALF_LENGTH_MM = 1219.0, 3029.0  # of a 20-foot container, ISO 668

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
-from fastgen.cli import main
-from fastgen.labelling.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
+from fastgen.cli.main import main
+from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.environment import load_environment
-from fastgen.gl import is_software, open_context
+from fastgen.light.environment import load_environment
 from fastgen.light.hdri import bundled_hdris
-from fastgen.renderer import Renderer
+from fastgen.render.gl import is_software, open_context
+from fastgen.render.renderer import Renderer
 from fastgen.scene import Lens
 
 SIZE = (203, 131)  # no row of an image fills work groups

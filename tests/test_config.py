@@ -8,12 +8,12 @@ import typing
 import numpy as np
 import pytest
 
-from fastgen.config import Config
-from fastgen.damage import deform
-from fastgen.distributions.camera_config import CameraConfig
+from fastgen.config.cameras import CameraConfig
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
-from fastgen.records import Range
-from fastgen.sampling import possible_shapes, sample_scene
+from fastgen.geometry.damage_law import deform
+from fastgen.sampling.scene import possible_shapes, sample_scene
+from fastgen.validation import Range
 
 NASTY = (
     *(math.nan, math.inf, -math.inf, 1e300, 10**400, -1, 0, 0.5, None, True, "", "x", "#+1+2+3"),

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fastgen.cli import main
-from fastgen.config import PRESETS, Config
-from fastgen.config_text import as_yaml, meanings
+from fastgen.cli.main import main
+from fastgen.config.commented_yaml import as_yaml, meanings
+from fastgen.config.config import PRESETS, Config
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import bundled_hdris
 

@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from fastgen.container import (
-    KINDS,
-    WallProfiles,
-    Wave,
-    build_container,
-    container_outline,
-)
 from fastgen.errors import ConfigError
-from fastgen.geometry.mesh import FACES, GROUP_SLACK_MM
+from fastgen.geometry.container import build_container, container_outline
+from fastgen.geometry.mesh import GROUP_SLACK_MM
+from fastgen.scene.container_kinds import KINDS, WallProfiles, Wave
+from fastgen.scene.faces import FACES
 from tests.mesh_probe import (
     ISO_668,
     OUT,

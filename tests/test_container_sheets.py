@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from fastgen.container import build_container
-from fastgen.geometry.container_layout import WallProfiles
-from fastgen.geometry.mesh import FACES, MATERIALS, Mesh
+from fastgen.geometry.container import build_container
+from fastgen.geometry.mesh import MATERIALS, Mesh
+from fastgen.scene.container_kinds import WallProfiles
+from fastgen.scene.faces import FACES
 from tests.mesh_probe import (
     ISO_668,
     OUT,

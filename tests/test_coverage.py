@@ -7,15 +7,15 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import damage as fields
-from fastgen.camera import View
+from fastgen.camera.projection import View
 from fastgen.classes import DAMAGE_CLASSES
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.generator import Generator
-from fastgen.labelling.coverage import covered
-from fastgen.labels import decal_of
+from fastgen.geometry import damage_law
+from fastgen.geometry.spreader import build_spreader
+from fastgen.labels.coverage import covered
+from fastgen.labels.objects import decal_of
 from fastgen.scene import Camera, Spreader
-from fastgen.spreader import build_spreader
 from tests import oracle
 
 SIZE = (200, 150)
@@ -32,7 +32,7 @@ def unbounded(view):
 def all_hits(mesh, triangles, view, damages):
     """Every meeting of every pixel's ray with some triangles: ray, rest point, atlas point."""
     rest = mesh.positions_mm.astype(np.float64)
-    moved = fields.deform(damages, rest)
+    moved = damage_law.deform(damages, rest)
     part = mesh.triangles[triangles]
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, part, process=False))
     start, rays = view.rays()
@@ -57,7 +57,7 @@ def dense(decal, mesh, damages):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     sheet = points @ turn.T + np.array(decal.center_mm)
     sheet = sheet[oracle.inside(decal, sheet)]
-    return fields.deform(damages, mesh.sheet_to_surface(decal.face, sheet)[0])
+    return damage_law.deform(damages, mesh.sheet_to_surface(decal.face, sheet)[0])
 
 
 def near(count, truth):
@@ -142,8 +142,8 @@ def test_damages_cover_what_rays_say(generator):
             assert item.class_name == damage.kind
             if not item.area:
                 continue
-            part = np.abs(fields.amount_mm(damage, rest)) > threshold
-            part |= fields.in_hole(damage, rest)
+            part = np.abs(damage_law.amount_mm(damage, rest)) > threshold
+            part |= damage_law.in_hole(damage, rest)
             covered = np.zeros(view.size[::-1], bool)
             covered.ravel()[ray[part]] = True
             box = np.array(oracle.box_of(covered)) - PAD
@@ -168,7 +168,7 @@ def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
         camera = scene.camera("Cr")
         camera = dataclasses.replace(camera, target_mm=tuple(target.tolist()), focal_mm=120.0)
         wanted = small.render(scene=scene, camera=camera).objects
-        monkeypatch.setattr("fastgen.labelling.surface_points._MOST_POINTS", 40_000)
+        monkeypatch.setattr("fastgen.labels.surface_points._MOST_POINTS", 40_000)
         found = large.render(scene=scene, camera=camera).objects
     pairs = [(a, b) for a, b in zip(wanted, found, strict=True) if a.class_name == "concave"]
     assert len(pairs) == 2
@@ -219,7 +219,7 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
     for sample in views(generator):
         mesh = generator._gpu.renderer().mesh(sample.scene.container)
         low, high = mesh.bounds_mm
-        moved = fields.deform(sample.scene.damages, mesh.positions_mm)
+        moved = damage_law.deform(sample.scene.damages, mesh.positions_mm)
         body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
         eye = sample.view.position_m
         held = sample.scene.spreader
@@ -233,7 +233,7 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
         for number, (x, y, flag) in enumerate(sample.objects[0].keypoints):
             corner = [(low, high)[number >> 2 & 1][0], (low, high)[number >> 1 & 1][1]]
             corner = np.array([*corner, (low, high)[number & 1][2]], np.float64)
-            corner = fields.deform(sample.scene.damages, corner)
+            corner = damage_law.deform(sample.scene.damages, corner)
             pixel, depth = sample.view.project(corner)
             inside = depth > 0 and (pixel >= 0).all() and (pixel < SIZE).all()
             assert (flag > 0) == inside

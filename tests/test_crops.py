@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import layout
 from fastgen.generator import Generator
-from fastgen.labelling.crops import text_crops
-from fastgen.labels import decal_of
-from fastgen.prints.artwork import glyph_tiles
-from fastgen.prints.lettering import layout
+from fastgen.labels.crops import text_crops
+from fastgen.labels.objects import decal_of
 
 
 def letters_of(decal):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.drawing import cuda
 from fastgen.errors import ConfigError, ContextError
+from fastgen.render import cuda
 
 SIZE = (101, 67)  # no row of any target is a multiple of 8 bytes
 CONFIG = Config.from_values({"damage": {"probability": 1}})

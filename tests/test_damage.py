@@ -9,13 +9,13 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import damage as fields
 from fastgen.classes import DAMAGE_CLASSES
-from fastgen.config import Config
-from fastgen.container import build_container
-from fastgen.drawing.sample_targets import SampleTargets
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import QUALITY, Generator, Quality
+from fastgen.geometry import damage_law
+from fastgen.geometry.container import build_container
+from fastgen.render.sample_targets import SampleTargets
 from fastgen.scene import Scene, Spreader
 from tests import oracle
 
@@ -88,7 +88,7 @@ def scene_with(generator, kind):
 def test_every_kind_is_seen_whole_from_close_by(generator, kind):
     scene = close_up(scene_with(generator, kind), kind)
     sample = generator.render(scene=scene, camera="close")
-    value = fields.mask_values(scene.damages)[0]
+    value = damage_law.mask_values(scene.damages)[0]
     assert (sample.damage == value).sum() > 200
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view, scene)
@@ -179,7 +179,7 @@ def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeyp
     def made(gl, *rest):
         return SampleTargets(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
 
-    monkeypatch.setattr("fastgen.drawing.targets.SampleTargets", made)
+    monkeypatch.setattr("fastgen.render.targets.SampleTargets", made)
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         short = other.render(scene=scene, camera="close")
     assert (usual.depth > 3.5).sum() > 50
@@ -233,15 +233,15 @@ def test_worked_steel_is_dulled_and_rusts(generator):
     dented, whole = (
         generator.render(scene=one, camera="close", layer="rust") for one in (scene, sound)
     )
-    marked = dented.damage == fields.mask_values(scene.damages)[0]
+    marked = dented.damage == damage_law.mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
     assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
     # along the fold no paint is as it was, be it rusty or not
     (damage,) = scene.damages
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, dented.view, scene)
-    along, across, _ = fields.local_coordinates(damage, hits.rest_mm)
-    fold = np.abs(across - fields.fold_path_mm(damage, along)) < 0.3 * damage.shape[0]
+    along, across, _ = damage_law.local_coordinates(damage, hits.rest_mm)
+    fold = np.abs(across - damage_law.fold_path_mm(damage, along)) < 0.3 * damage.shape[0]
     fold &= marked & (np.abs(along) < 0.6 * damage.size_mm[0] / 2)
     assert fold.sum() > 100
     blue = (one.image[fold][:, 2].astype(int) for one in (dented, whole))
@@ -261,7 +261,10 @@ def test_a_dented_leaf_stays_behind_its_locking_gear():
             names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
             is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
             met = []
-            for positions in (mesh.positions_mm, fields.deform(scene.damages, mesh.positions_mm)):
+            for positions in (
+                mesh.positions_mm,
+                damage_law.deform(scene.damages, mesh.positions_mm),
+            ):
                 body = trimesh.Trimesh(positions, mesh.triangles.astype(np.int64), process=False)
                 met.append(is_gear[RayMeshIntersector(body).intersects_first(eyes, rays)])
             gear += met[0].sum()
@@ -282,13 +285,13 @@ def test_undamaged_places_do_not_change(generator):
 
 def test_a_moved_point_lies_on_the_field():
     """A concave damage by hand: a paraboloid-like bump, at its centre, half way and rim."""
-    damage = fields.Damage(
+    damage = damage_law.Damage(
         "concave", "front", (0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (2000, 1000), 80.0
     )
     points = np.array([[0, 0, 0], [500, 0, 0], [0, 0, 250], [1000, 0, 0], [0, 300, 0]], float)
-    assert fields.amount_mm(damage, points)[:4] == pytest.approx([80, 45, 45, 0])
-    assert 0 < fields.amount_mm(damage, points)[4] < 80
-    moved = fields.deform((damage,), points)
+    assert damage_law.amount_mm(damage, points)[:4] == pytest.approx([80, 45, 45, 0])
+    assert 0 < damage_law.amount_mm(damage, points)[4] < 80
+    moved = damage_law.deform((damage,), points)
     np.testing.assert_allclose(moved[0], [0, 80, 0])
 
 
@@ -362,7 +365,9 @@ def test_moves_of_damages_add_up_however_wide_a_crease_is(many):
         wide = replace(dent, shape=(900.0, *dent.shape[1:]))
         points = np.array(dent.origin_mm) + rng.uniform(-1500, 1500, (3000, 3))
         moved = sum(
-            fields.amount_mm(d, points)[:, None] * np.array(d.inward) for d in (wide, *dents)
+            damage_law.amount_mm(d, points)[:, None] * np.array(d.inward) for d in (wide, *dents)
         )
         assert np.abs(moved).max() > 5
-        np.testing.assert_allclose(fields.deform((wide, *dents), points), points + moved, atol=1e-9)
+        np.testing.assert_allclose(
+            damage_law.deform((wide, *dents), points), points + moved, atol=1e-9
+        )

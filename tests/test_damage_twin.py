@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.damage import (
+from fastgen.geometry.damage_law import (
     FADE_END_MM,
     FADE_START_MM,
     amount_mm,
     deform,
     in_hole,
     local_coordinates,
-    mask_values,
     reach_mm,
 )
-from fastgen.drawing.programs import REACH_MARGIN_MM
-from fastgen.drawing.surface_values import damage_values
-from fastgen.gl import open_context
+from fastgen.render.gl import open_context
+from fastgen.render.programs import REACH_MARGIN_MM
+from fastgen.render.surface_values import damage_values
+from fastgen.scene.object_ids import mask_values
 from tests.glsl import blocks, run
 
 THRESHOLD_MM = 5.0

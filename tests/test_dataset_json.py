@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from fastgen.cli import main
+from fastgen.cli.main import main
 from tests.folders import content
 
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]

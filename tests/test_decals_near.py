@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from fastgen.drawing.decal_tables import MARGIN_MM
-from fastgen.drawing.decals_near import decals_near
-from fastgen.drawing.programs import DECAL_KINDS, NEAR_CELL_MM, SPREADER_ZONE
-from fastgen.drawing.textures import data_texture
-from fastgen.gl import open_context
+from fastgen.render.decal_tables import MARGIN_MM
+from fastgen.render.decals_near import decals_near
+from fastgen.render.gl import open_context
+from fastgen.render.programs import NEAR_CELL_MM, SPREADER_ZONE
+from fastgen.render.textures import data_texture
+from fastgen.scene.limits import DECAL_KINDS
 from tests.glsl import blocks, run
 
 SIZE_MM = (1500.0, 1200.0)

@@ -6,17 +6,17 @@ from datetime import datetime
 import numpy as np
 import pytest
 
-from fastgen.camera import view_of
-from fastgen.config import Config
+from fastgen.camera import weather as falling
+from fastgen.camera.electronics import stamped
+from fastgen.camera.projection import view_of
+from fastgen.camera.sensor import develop
+from fastgen.camera.tone_curve import light_of
+from fastgen.camera.weather import rained
+from fastgen.config.config import Config
+from fastgen.frame import Frame
 from fastgen.generator import Generator
-from fastgen.sample import Frame
 from fastgen.scene import Camera
-from fastgen.sensor import weather as falling
-from fastgen.sensor.develop import develop
-from fastgen.sensor.electronics import stamped
-from fastgen.sensor.light import light_of
-from fastgen.sensor.parts import Defocus, Noise, Rain, Sensor, Stamp, Weather
-from fastgen.sensor.weather import rained
+from fastgen.scene.optics import Defocus, Noise, Rain, Sensor, Stamp, Weather
 
 SIZE = (161, 121)
 CAMERA = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0)

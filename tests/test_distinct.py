@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fastgen import distinct
-from fastgen.distinct import distinct_rows
+from fastgen.geometry import distinct_rows as distinct
+from fastgen.geometry.distinct_rows import distinct_rows
 
 
 def rows_of(dtype, seed):

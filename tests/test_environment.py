@@ -13,17 +13,19 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from fastgen import Config, cache, environment
-from fastgen.environment import (
+from fastgen import Config
+from fastgen.errors import AssetError
+from fastgen.files import disk_cache
+from fastgen.light import environment
+from fastgen.light.environment import (
     EnvironmentLight,
     irradiance_at,
     load_environment,
     metered_luminance,
     prefilter_environment,
 )
-from fastgen.errors import AssetError
 from fastgen.light.hdri import bundled_hdris, bundled_weights, find_hdris, load_radiance
-from fastgen.sampling import sample_scene
+from fastgen.sampling.scene import sample_scene
 from tests.sky_samples import patchwork, texel_grid
 
 
@@ -188,13 +190,13 @@ def test_of_many_workers_one_prefilters_and_the_others_read(tmp_path):
 
 
 def test_what_was_not_read_for_longest_leaves_a_full_cache(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "LIMIT_BYTES", 3 * 9000)  # each takes 8000 bytes and a header
+    monkeypatch.setattr(disk_cache, "LIMIT_BYTES", 3 * 9000)  # each takes 8000 bytes and a header
     for age, name in enumerate("abcd"):
-        cache.write(tmp_path / f"{name}.npz", {"values": np.zeros(1000)})
+        disk_cache.write(tmp_path / f"{name}.npz", {"values": np.zeros(1000)})
         if name < "d":
             os.utime(tmp_path / f"{name}.npz", (1000 + age, 1000 + age))
         if name == "c":
-            assert "values" in cache.read(tmp_path / "a.npz")
+            assert "values" in disk_cache.read(tmp_path / "a.npz")
     assert {entry.stem for entry in tmp_path.iterdir()} == {"a", "c", "d"}
 
 
@@ -203,7 +205,7 @@ def test_what_killed_processes_left_in_the_cache_goes(tmp_path):
         (tmp_path / name).write_bytes(b"")
         if "dead" in name:
             os.utime(tmp_path / name, (1000, 1000))
-    cache.write(tmp_path / "a.npz", {"values": np.zeros(10)})
+    disk_cache.write(tmp_path / "a.npz", {"values": np.zeros(10)})
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.npz", ".busy.part", "busy.lock"}
 
 

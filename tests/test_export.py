@@ -9,17 +9,17 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.camera import view_of
+from fastgen.camera.projection import view_of
 from fastgen.classes import SPREADER_ID
-from fastgen.cli import main
-from fastgen.config import Config
-from fastgen.container import build_container
-from fastgen.damage import in_hole
+from fastgen.cli.main import main
+from fastgen.config.config import Config
 from fastgen.export import export_glb
 from fastgen.generator import Generator
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import in_hole
 from fastgen.geometry.damaged_mesh import damaged_mesh
 from fastgen.scene import Camera, Scene, Spreader
-from fastgen.sensor.parts import Lens
+from fastgen.scene.optics import Lens
 
 SIZE = (320, 240)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)

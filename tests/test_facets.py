@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fastgen import damage as fields
-from fastgen.config import Config
-from fastgen.container import build_container
+from fastgen.config.config import Config
 from fastgen.generator import Generator
-from fastgen.labelling.decal_facets import decal_outlines
-from fastgen.labelling.facets import Facets, clip, in_fours
-from fastgen.labelling.outlines import Outlines
-from fastgen.labels import _container_points
+from fastgen.geometry import damage_law
+from fastgen.geometry.container import build_container
+from fastgen.geometry.decal_facets import decal_outlines
+from fastgen.geometry.decal_outlines import Outlines
+from fastgen.geometry.facets import Facets, clip, in_fours
+from fastgen.labels.objects import _container_points
 from fastgen.scene import Decal
 from tests import oracle
 
@@ -90,7 +90,7 @@ def test_outlines_of_decals_lie_on_the_surface(scenes, turned_deg):
             assert oracle.inside(decal, decal.center_mm + away * 0.999).all()
             assert not oracle.inside(decal, decal.center_mm + away * 1.001).any()
             rest, _ = mesh.sheet_to_surface(decal.face, edge)
-            np.testing.assert_allclose(around, fields.deform(scene.damages, rest), atol=1e-6)
+            np.testing.assert_allclose(around, damage_law.deform(scene.damages, rest), atol=1e-6)
 
 
 def test_sides_and_reach_of_outlines_equal_brute_force():
@@ -114,7 +114,7 @@ def test_sides_and_reach_of_outlines_equal_brute_force():
 def test_from_every_side_the_outermost_points_are_among_those_of_the_container(scenes):
     directions = np.random.default_rng(7).normal(size=(200, 3))
     for scene, mesh in scenes:
-        everything = fields.deform(scene.damages, mesh.positions_mm)
+        everything = damage_law.deform(scene.damages, mesh.positions_mm)
         kept = _container_points(scene, mesh, bent=False)
         assert len(kept) < len(everything) / 4
         farthest = (everything @ directions.T).max(axis=0)

@@ -13,13 +13,13 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.cli import main
+from fastgen.cli.main import main
 from fastgen.formats import Item, assemble, formats_of
 from fastgen.formats.bop import OBJECT_IDS
 from fastgen.generator import Generator
-from fastgen.labels import CASTINGS
-from fastgen.records import from_plain
+from fastgen.labels.objects import CASTINGS
 from fastgen.scene import Scene
+from fastgen.validation import from_plain
 
 SPLITS = ("train", "val", "test")
 SIZE = (320, 240)

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 import yaml
 
-from fastgen.cli import main
-from fastgen.config import Config
+from fastgen.cli.main import main
+from fastgen.config.config import Config
 from fastgen.dataset import shards
+from fastgen.dataset.generate import generate
 from fastgen.dataset.shards import Job, Maker
 from fastgen.dataset.storage import storage_of
-from fastgen.generate import generate
 from fastgen.generator import Generator
-from fastgen.sampling import split_of
+from fastgen.sampling.scene import split_of
 from fastgen.scene import Scene
 from tests.backends import needs_osmesa
 from tests.folders import content

@@ -12,13 +12,13 @@ import numpy as np
 import psutil
 import pytest
 
-from fastgen.camera import view_of
-from fastgen.config import Config, LabelConfig
-from fastgen.container import build_container
+from fastgen.camera.projection import view_of
+from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
-from fastgen.geometry.mesh import SHEET_FACES
+from fastgen.geometry.container import build_container
 from fastgen.scene import Camera, Scene
+from fastgen.scene.faces import SHEET_FACES
 from tests.backends import BACKENDS
 
 SIZE = (96, 64)
@@ -202,10 +202,10 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
 
         for made in ("GpuMesh", "zone_table", "encoded"):
             monkeypatch.setattr(
-                f"fastgen.{'light.openness' if made == 'encoded' else 'drawing.shapes'}.{made}",
+                f"fastgen.{'light.sky_visibility' if made == 'encoded' else 'render.shapes'}.{made}",
                 never,
             )
-        monkeypatch.setattr("fastgen.renderer.GpuLight", never)
+        monkeypatch.setattr("fastgen.render.renderer.GpuLight", never)
         monkeypatch.setattr("fastgen.geometry.mesh._Locator.of", never)
         for index in range(30):
             sample = generator.render(index)

@@ -10,9 +10,9 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import pytest
 
-from fastgen import doctor, gl
-from fastgen.contexts.egl import EGL_PACKAGES, EglDevice
 from fastgen.errors import ConfigError, ContextError
+from fastgen.render import doctor, gl
+from fastgen.render.contexts.egl import EGL_PACKAGES, EglDevice
 from tests.backends import BACKENDS, needs_osmesa
 
 PAIRS = tuple(itertools.product(BACKENDS, repeat=2))

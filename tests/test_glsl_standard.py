@@ -10,9 +10,9 @@ from unittest.mock import MagicMock
 import pytest
 
 from fastgen import generator
-from fastgen.drawing.programs import DAMAGE_VARIANTS, LAYERS, link, listed_classes
-from fastgen.drawing.shading import Shading
-from fastgen.light.sun import MOST_SUNS
+from fastgen.light.directional_lights import MOST_SUNS
+from fastgen.render.programs import DAMAGE_VARIANTS, LAYERS, link, listed_classes
+from fastgen.render.shading import Shading
 
 COMPILER = "glslangValidator"
 SUNS = (0, 1, MOST_SUNS)

@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from fastgen.drawing.glyph_runs import GLYPH_RANGE, glyph_run
-from fastgen.prints.artwork import glyph_tiles
-from fastgen.prints.lettering import layout
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import layout
+from fastgen.render.glyph_runs import glyph_run
+from fastgen.scene.limits import GLYPH_RANGE
 
 
 def texts():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from fastgen.decals.iso6346 import check_digit, sample_identifier
 from fastgen.errors import ConfigError
-from fastgen.prints.identifier import check_digit, sample_identifier
 
 
 def slow_sum(text):

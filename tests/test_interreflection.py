@@ -9,17 +9,17 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
-from fastgen.container import build_container, container_outline
-from fastgen.environment import Ambient, prefilter_environment
+from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.mesh import MATERIALS
-from fastgen.gl import open_context
-from fastgen.light import interreflection
-from fastgen.light.interreflection import Cells, form_factors
+from fastgen.geometry.spreader import build_spreader
+from fastgen.light import indirect_light as interreflection
+from fastgen.light.directional_lights import Sun
+from fastgen.light.environment import Ambient, prefilter_environment
+from fastgen.light.indirect_light import Cells, form_factors
 from fastgen.light.occluders import without_cables
-from fastgen.light.openness import Sky, sky_directions
-from fastgen.light.sky_probe import Lit, SkyProbe, probe_points
-from fastgen.light.sun import Sun
-from fastgen.spreader import build_spreader
+from fastgen.light.sky_visibility import Sky, sky_directions
+from fastgen.render.gl import open_context
+from fastgen.render.sky_visibility_probe import Lit, SkyProbe, probe_points
 
 KIND = "20"
 ROOF, BEAM = np.array([0.8, 0.4, 0.2]), np.array([0.1, 0.2, 0.3])

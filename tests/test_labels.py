@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.generator import Generator
-from fastgen.labelling.visibility import mask_box, value_boxes
-from fastgen.labels import decal_of
+from fastgen.labels.objects import decal_of
+from fastgen.labels.visibility import mask_box, value_boxes
 from tests import oracle
 
 

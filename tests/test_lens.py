@@ -9,21 +9,22 @@ import numpy as np
 import pytest
 import trimesh
 
-from fastgen import damage as fields
-from fastgen.camera import View, view_of
-from fastgen.config import Config
-from fastgen.container import KINDS, build_container
-from fastgen.drawing.regions import region_of
+from fastgen.camera.lens import Distortion
+from fastgen.camera.projection import View, view_of
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats import view_values
 from fastgen.generator import Generator
+from fastgen.geometry import damage_law
+from fastgen.geometry.container import build_container
 from fastgen.geometry.divided_mesh import divided
-from fastgen.gl import open_context
-from fastgen.labels import decal_of
-from fastgen.lens import Distortion
+from fastgen.geometry.spreader import build_spreader
+from fastgen.labels.objects import decal_of
+from fastgen.render.gl import open_context
+from fastgen.render.regions import region_of
 from fastgen.scene import Camera, Scene
-from fastgen.sensor.parts import Lens
-from fastgen.spreader import build_spreader
+from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.optics import Lens
 from tests import oracle
 from tests.glsl import blocks, run
 from tests.mesh_probe import caster
@@ -150,7 +151,7 @@ def test_amodal_boxes_bound_dense_points_to_a_tenth_of_a_pixel(seen):
                 share = np.linspace(0, 1, 5)[:, None, None]
                 a, b = np.moveaxis(mesh.positions_mm[edges].astype(np.float64), 1, 0)
                 # a triangle's corners are moved by damage, its edges stay straight
-                a, b = (fields.deform(damages, end) for end in (a, b))
+                a, b = (damage_law.deform(damages, end) for end in (a, b))
                 points = (a + share * (b - a)).reshape(-1, 3)
             elif item.text or item.class_name[1:2].isdigit():
                 points = dense(decal_of(sample.scene, item.id), mesh, damages)

@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.drawing.glyph_runs import glyph_run
-from fastgen.gl import open_context
-from fastgen.prints.artwork import glyph_coverage, glyph_tiles
-from fastgen.prints.lettering import layout
+from fastgen.decals.artwork import glyph_coverage, glyph_tiles
+from fastgen.decals.lettering import layout
+from fastgen.render.gl import open_context
+from fastgen.render.glyph_runs import glyph_run
 from tests.test_shading import blocks, run
 
 CAP_MM = 100.0

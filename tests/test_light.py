@@ -7,8 +7,8 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.light.openness import encoded, open_sky, sky_directions
-from fastgen.light.sky_probe import Lit, SkyProbe
+from fastgen.light.sky_visibility import encoded, open_sky, sky_directions
+from fastgen.render.sky_visibility_probe import Lit, SkyProbe
 from tests.sky_samples import texel_grid
 from tests.test_environment import write_exr
 

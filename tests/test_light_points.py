@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fastgen.renderer
+import fastgen.render.renderer
 from fastgen import Config, Generator
-from fastgen.drawing import light_points
+from fastgen.camera.tone_curve import light_of
 from fastgen.errors import ConfigError
-from fastgen.sensor.light import light_of
+from fastgen.render import light_points
 
 FISHEYE = {"cameras": {"A": {"focal_mm": 24, "lens": {"model": "fisheye", "k1": [-0.02, 0.0]}}}}
 DAMAGED = {"damage": {"probability": 1, "count": [3, 5]}}

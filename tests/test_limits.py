@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES, SPREADER_ID
-from fastgen.config import Config
-from fastgen.container import build_container
+from fastgen.config.config import Config
 from fastgen.generator import Generator
+from fastgen.geometry.container import build_container
 from fastgen.scene import Camera, Container, Damage, Decal, Spreader
 from tests import oracle
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.config import Config
-from fastgen.container import build_container
+from fastgen.config.config import Config
+from fastgen.decals.artwork import brands, glyph_tiles
+from fastgen.decals.lettering import layout
+from fastgen.decals.weights import weight_lines
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
-from fastgen.light.srgb import DECODED
-from fastgen.markings import rhombus_offsets
-from fastgen.prints.artwork import brands, glyph_tiles
-from fastgen.prints.lettering import layout
-from fastgen.prints.weights import weight_lines
-from fastgen.sampling import sheet_sizes
+from fastgen.geometry.container import build_container
+from fastgen.sampling.markings import rhombus_offsets
+from fastgen.sampling.scene import sheet_sizes
+from fastgen.srgb import DECODED
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pycocotools.coco import COCO
 
 import fastgen
 from fastgen.classes import SEGMENTATION_CLASSES
-from fastgen.cli import main
+from fastgen.cli.main import main
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.errors import OutputError
 from fastgen.light.hdri import bundled_hdris

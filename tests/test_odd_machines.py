@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from fastgen import cache
-from fastgen.contexts.shader_cache import spare_full_disk
 from fastgen.dataset.dataset_json import shard_numbers
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.storage import Folder
 from fastgen.dataset.workers import in_words
+from fastgen.decals import artwork
 from fastgen.errors import AssetError
-from fastgen.prints import artwork
+from fastgen.files import disk_cache
+from fastgen.render.contexts.shader_cache import spare_full_disk
 from fastgen.resources import asset_path
 
 Disk = namedtuple("Disk", "f_bavail f_frsize")
@@ -49,8 +49,8 @@ def test_a_user_without_a_home_caches_among_temporary_files(monkeypatch, tmp_pat
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", no_home)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert cache.default_folder().parent == tmp_path
-    assert str(os.getuid()) in cache.default_folder().name
+    assert disk_cache.default_folder().parent == tmp_path
+    assert str(os.getuid()) in disk_cache.default_folder().name
 
 
 def test_art_is_read_from_a_folder_whose_name_is_not_utf8(tmp_path):

@@ -9,11 +9,11 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
-from fastgen.container import build_container
-from fastgen.drawing.shapes import spreader_mesh
-from fastgen.environment import Ambient, prefilter_environment, sky_irradiance
-from fastgen.gl import open_context
-from fastgen.light.openness import (
+from fastgen.geometry.container import build_container
+from fastgen.geometry.spreader import build_spreader
+from fastgen.light.directional_lights import Sun
+from fastgen.light.environment import Ambient, prefilter_environment, sky_irradiance
+from fastgen.light.sky_visibility import (
     Openness,
     Sky,
     encoded,
@@ -21,9 +21,9 @@ from fastgen.light.openness import (
     open_sky,
     sky_directions,
 )
-from fastgen.light.sky_probe import SkyProbe, probe_points
-from fastgen.light.sun import Sun
-from fastgen.spreader import build_spreader
+from fastgen.render.gl import open_context
+from fastgen.render.shapes import spreader_mesh
+from fastgen.render.sky_visibility_probe import SkyProbe, probe_points
 from tests.backends import needs_osmesa
 from tests.mesh_probe import behind_the_middle
 

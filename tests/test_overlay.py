@@ -5,8 +5,8 @@ import numpy as np
 
 from fastgen import Config, Generator
 from fastgen.classes import DAMAGE_CLASSES
-from fastgen.cli import main
-from fastgen.labelling.overlay import class_color, overlay
+from fastgen.cli.main import main
+from fastgen.labels.overlay import class_color, overlay
 
 
 def test_boxes_have_the_colours_of_their_classes():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.drawing import pixel_lists
-from fastgen.drawing.sample_targets import SampleTargets
+from fastgen.render import pixel_lists
+from fastgen.render.sample_targets import SampleTargets
 
 SIZE = (201, 150)
 KINDS = {

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.environment import (
+from fastgen.light.environment import (
     ROUGHNESS_LEVELS,
     EnvironmentLight,
     irradiance_at,

@@ -14,12 +14,12 @@ import pytest
 import ray
 from ray.cluster_utils import Cluster
 
-from fastgen.cli import main
-from fastgen.config import Config
+from fastgen.cli.main import main
+from fastgen.config.config import Config
+from fastgen.dataset.generate import generate, run_here
 from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.shards import Job
 from fastgen.errors import OutputError
-from fastgen.generate import generate, run_here
 from tests.crash_run import FAULTY_SCENE, QuickMaker
 from tests.folders import content
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from fastgen.errors import ConfigError
-from fastgen.records import Range, bounds, from_plain, to_plain
+from fastgen.validation import Range, bounds, from_plain, to_plain
 
 
 @dataclass(frozen=True)

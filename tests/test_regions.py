@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.drawing.regions import bands, merged, outside, within
+from fastgen.render.regions import bands, merged, outside, within
 
 
 def painted(regions, size=(40, 30)):

@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.camera import view_of
-from fastgen.config import Config
-from fastgen.container import build_container
-from fastgen.drawing.gpu_mesh import facing_groups
+from fastgen.camera.projection import view_of
+from fastgen.camera.tone_curve import displayed, light_of
+from fastgen.config.config import Config
 from fastgen.generator import QUALITY, Generator, Quality
-from fastgen.light.srgb import DECODED
+from fastgen.geometry.container import build_container
+from fastgen.render.gpu_mesh import facing_groups
 from fastgen.scene import Spreader
-from fastgen.sensor.light import displayed, light_of
+from fastgen.srgb import DECODED
 from tests import oracle
 from tests.backends import needs_osmesa
 

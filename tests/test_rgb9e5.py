@@ -4,8 +4,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from fastgen.gl import open_context
 from fastgen.light.rgb9e5 import LARGEST, packed, unpacked
+from fastgen.render.gl import open_context
 from tests.backends import BACKENDS
 
 _RGB9_E5 = 0x8C3D

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.generator import Generator
 
 ROOF = Config.from_values(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.light.srgb import DECODED
+from fastgen.srgb import DECODED
 from tests.plain import EVEN_PAINT
 
 TEXEL_MM = 20.0

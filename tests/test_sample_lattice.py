@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.config import Config
-from fastgen.drawing.sample_lattice import SampleLattice, fitting
+from fastgen.config.config import Config
 from fastgen.generator import Generator
+from fastgen.render.sample_lattice import SampleLattice, fitting
 
 
 def texels_of(lattice, places, size):

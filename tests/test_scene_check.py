@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.camera import view_of
-from fastgen.drawing.decal_tables import SceneError
+from fastgen.camera.projection import view_of
 from fastgen.errors import ConfigError
+from fastgen.render.decal_tables import SceneError
 from fastgen.scene import Camera, Scene
-from fastgen.scene_check import check_camera, check_scene
-from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.check import check_camera, check_scene
+from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 
 SIZE = (64, 64)
 

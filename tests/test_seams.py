@@ -5,10 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fastgen.container import KINDS, WallProfiles, build_container
 from fastgen.generator import Generator
+from fastgen.geometry.container import build_container
 from fastgen.geometry.seams import stitched
-from fastgen.spreader import build_spreader
+from fastgen.geometry.spreader import build_spreader
+from fastgen.scene.container_kinds import KINDS, WallProfiles
 from tests import oracle
 
 

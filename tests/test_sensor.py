@@ -6,16 +6,16 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.camera import view_of
-from fastgen.config import Config
+from fastgen.camera.blur import blur_radius_px, defocused, moved
+from fastgen.camera.electronics import falloff, noisy, stamped, through_jpeg
+from fastgen.camera.projection import view_of
+from fastgen.camera.tone_curve import displayed, light_of
+from fastgen.camera.weather import _streaks, foggy, rained
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.scene import Camera, Scene
-from fastgen.sensor.blur import blur_radius_px, defocused, moved
-from fastgen.sensor.electronics import falloff, noisy, stamped, through_jpeg
-from fastgen.sensor.light import displayed, light_of
-from fastgen.sensor.parts import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
-from fastgen.sensor.weather import _streaks, foggy, rained
+from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from tests.test_environment import write_exr
 
 SIZE = (160, 120)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fastgen.drawing.noise import noise_tiles
-from fastgen.drawing.textures import noise_texture
-from fastgen.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
-from fastgen.gl import open_context
+from fastgen.light.environment import IRRADIANCE_SIZE, ROUGHNESS_LEVELS, SPECULAR_SIZE
 from fastgen.light.reflectance import dfg_table, fresnel_climb
+from fastgen.render.gl import open_context
+from fastgen.render.noise import noise_tiles
+from fastgen.render.textures import noise_texture
 from tests.glsl import blocks, run
 
 

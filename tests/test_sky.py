@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fastgen import Generator
-from fastgen.camera import view_of
-from fastgen.environment import load_environment
+from fastgen.camera.projection import view_of
+from fastgen.light.environment import load_environment
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.prefilter import levelled, sample_octahedral
 from fastgen.light.rgb9e5 import unpacked

@@ -10,15 +10,15 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from fastgen.camera import view_of
-from fastgen.config import Config
-from fastgen.container import build_container
-from fastgen.drawing.shapes import spreader_mesh
+from fastgen.camera.projection import view_of
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
-from fastgen.light.srgb import DECODED
+from fastgen.geometry.container import build_container
+from fastgen.geometry.spreader import build_spreader, tier_bounds_mm
+from fastgen.render.shapes import spreader_mesh
 from fastgen.scene import Decal, Scene, Spreader
-from fastgen.spreader import build_spreader, tier_bounds_mm
+from fastgen.srgb import DECODED
 from tests import oracle
 from tests.mesh_probe import ISO_668, first_hits, winding_normals
 

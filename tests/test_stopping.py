@@ -10,7 +10,7 @@ import time
 import psutil
 import pytest
 
-from fastgen.cli import main
+from fastgen.cli.main import main
 from fastgen.dataset.workers import undisturbed
 
 ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", "2"]

@@ -14,7 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.dataset import storage
 from fastgen.dataset.shards import Job, Task
 from fastgen.dataset.storage import Folder, storage_of

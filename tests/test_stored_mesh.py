@@ -5,15 +5,15 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from fastgen import cache
-from fastgen.container import build_container
+from fastgen.files import disk_cache
+from fastgen.geometry.container import build_container
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.stored_mesh import stored
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(disk_cache, "default_folder", lambda: tmp_path / "cache")
     return tmp_path / "cache"
 
 
@@ -50,7 +50,7 @@ def test_what_differs_is_built_anew(folder, built, monkeypatch):
     moved = replace(built, positions_mm=built.positions_mm + np.float32(1))
     stored("box", ("20", 1.5), lambda: built)
     assert_equal(stored("box", ("20", 2.5), lambda: moved), moved)
-    monkeypatch.setattr(cache, "_CODE", "other code")
+    monkeypatch.setattr(disk_cache, "_CODE", "other code")
     assert_equal(stored("box", ("20", 1.5), lambda: moved), moved)
 
 
@@ -65,7 +65,7 @@ def test_a_damaged_entry_is_made_again(folder, built):
 
 def test_nothing_is_needed_of_the_disk(tmp_path, monkeypatch, built):
     (tmp_path / "file").write_text("in the way")
-    monkeypatch.setattr(cache, "default_folder", lambda: tmp_path / "file" / "cache")
+    monkeypatch.setattr(disk_cache, "default_folder", lambda: tmp_path / "file" / "cache")
     assert_equal(stored("box", 1, lambda: built), built)
 
 
@@ -73,10 +73,10 @@ def test_any_change_of_code_is_other_code(tmp_path, monkeypatch):
     modules = {name: tmp_path / f"{name}.py" for name in ("cache", "mesh")}
     for path in modules.values():
         path.write_text("a = 1")
-    before = cache._code_digest(tmp_path)
-    assert cache._code_digest(tmp_path) == before
+    before = disk_cache._code_digest(tmp_path)
+    assert disk_cache._code_digest(tmp_path) == before
     modules["mesh"].write_text("a = 2")
-    assert cache._code_digest(tmp_path) != before
+    assert disk_cache._code_digest(tmp_path) != before
     modules["mesh"].write_text("a = 1")
-    monkeypatch.setattr(cache.cv2, "__version__", "99")
-    assert cache._code_digest(tmp_path) != before
+    monkeypatch.setattr(disk_cache.cv2, "__version__", "99")
+    assert disk_cache._code_digest(tmp_path) != before

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fastgen.environment import irradiance_at, load_environment, prefilter_environment
-from fastgen.light.sun import MIN_SHARE, MOST_SUNS, split_suns
+from fastgen.light.directional_lights import MIN_SHARE, MOST_SUNS, split_suns
+from fastgen.light.environment import irradiance_at, load_environment, prefilter_environment
 from tests.sky_samples import even_directions, lamps_at_night, texel_grid
 from tests.test_environment import write_exr
 

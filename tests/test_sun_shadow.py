@@ -7,15 +7,16 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.container import KINDS, build_container, container_outline
-from fastgen.damage import deform
-from fastgen.drawing.programs import link
-from fastgen.gl import open_context
+from fastgen.geometry.container import build_container, container_outline
+from fastgen.geometry.damage_law import deform
+from fastgen.geometry.spreader import CABLE_TIER, build_spreader, tier_of_vertices
 from fastgen.light.occluders import without_cables
-from fastgen.light.sky_probe import probe_points
-from fastgen.light.sun_shadow import ShadowMap
+from fastgen.render.gl import open_context
+from fastgen.render.programs import link
+from fastgen.render.shadow_map import ShadowMap
+from fastgen.render.sky_visibility_probe import probe_points
 from fastgen.scene import Damage
-from fastgen.spreader import CABLE_TIER, build_spreader, tier_of_vertices
+from fastgen.scene.container_kinds import KINDS
 from tests.mesh_probe import behind_the_middle
 
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.camera.tone_curve import light_of
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.container import KINDS
-from fastgen.environment import load_environment
 from fastgen.generator import QUALITY, Quality
+from fastgen.light.environment import load_environment
 from fastgen.scene import Camera, Damage, EnvironmentView, Spreader
-from fastgen.sensor.light import light_of
+from fastgen.scene.container_kinds import KINDS
 from tests.plain import EVEN_PAINT
 from tests.sky_samples import lamps_at_night, one_light
 from tests.test_environment import write_exr

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.drawing.rust import rusted
-from fastgen.drawing.shapes import spreader_mesh
-from fastgen.drawing.surface_values import reflectances, scene_values
 from fastgen.geometry.mesh import MATERIALS
-from fastgen.light.srgb import DECODED
+from fastgen.render.rust import rusted
+from fastgen.render.shapes import spreader_mesh
+from fastgen.render.surface_values import reflectances, scene_values
+from fastgen.srgb import DECODED
 
 
 @pytest.mark.parametrize("rust", [0.0, 0.12, 0.2])

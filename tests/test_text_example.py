@@ -9,8 +9,8 @@ import text
 import torch
 from common.strips import letter_places, letters, row_count, straightened, strip
 
-from fastgen.prints.artwork import glyph_tiles
-from fastgen.prints.lettering import layout
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import layout
 
 
 def test_edit_distance_is_the_shortest_of_all_ways():

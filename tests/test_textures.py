@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from fastgen.drawing.textures import data_texture
-from fastgen.gl import open_context
+from fastgen.render.gl import open_context
+from fastgen.render.textures import data_texture
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.uint32])

@@ -14,14 +14,8 @@ import torch
 from torch.utils.data import DataLoader
 
 from fastgen import Config, Generator
-from fastgen.sampling import split_of
-from fastgen.torch import (
-    ContainerDataset,
-    ContainerStream,
-    Loader,
-    ShardSampler,
-    collate_lists,
-)
+from fastgen.sampling.scene import split_of
+from fastgen.torch import ContainerDataset, ContainerStream, Loader, ShardSampler, collate_lists
 from fastgen.torch.plan import EPOCH_SCENES, positions
 
 ROOT = Path(__file__).parent.parent

@@ -7,7 +7,7 @@ from PIL import Image
 
 from fastgen import Config, Generator
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.config import LabelConfig
+from fastgen.config.config import LabelConfig
 from fastgen.dataset.storage import Folder
 from fastgen.formats import SEAFRONT, Item, assemble, formats_of
 from fastgen.torch import (

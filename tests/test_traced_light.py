@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fastgen.light.traced_light
-from fastgen.environment import load_environment, to_map_frame
+from fastgen.light.environment import load_environment, to_map_frame
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.prefilter import octahedral_decode
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies

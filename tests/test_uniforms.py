@@ -4,8 +4,8 @@ import moderngl
 import numpy as np
 import pytest
 
-from fastgen.drawing.uniforms import Block
-from fastgen.gl import open_context
+from fastgen.render.gl import open_context
+from fastgen.render.uniforms import Block
 
 BLOCK = Block(
     "Probe",

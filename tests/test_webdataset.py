@@ -14,7 +14,7 @@ from moto.server import ThreadedMotoServer
 from PIL import Image
 from s3fs import S3FileSystem
 
-from fastgen.cli import main
+from fastgen.cli.main import main
 from fastgen.dataset.storage import storage_of
 
 ARGUMENTS = ["--images", "12", "--size", "96x80", "--seed", "3", "--format", "webdataset"]

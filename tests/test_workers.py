@@ -9,10 +9,10 @@ from functools import partial
 
 import pytest
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.dataset import workers
+from fastgen.dataset.generate import generate, run_here
 from fastgen.dataset.shards import Job
-from fastgen.generate import generate, run_here
 from tests.crash_run import QuickMaker
 
 
@@ -170,7 +170,7 @@ def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_aske
 def test_workers_that_find_nothing_to_do_are_told_of(
     tmp_path, monkeypatch, capsys, scenes, count, words
 ):
-    monkeypatch.setattr("fastgen.generate.run_here", partial(run_here, maker=QuickMaker))
+    monkeypatch.setattr("fastgen.dataset.generate.run_here", partial(run_here, maker=QuickMaker))
     size, out = (64, 64), str(tmp_path / "out")
     job = Job(out, scenes, Config.preset(), 1, size, ("A",), None, "auto", shard_scenes=2)
     generate(job, count)

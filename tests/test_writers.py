@@ -10,11 +10,11 @@ from PIL import Image
 from pycocotools import mask as coco_mask
 
 from fastgen.classes import DETECTION_CLASSES
-from fastgen.config import LabelConfig
-from fastgen.files import encode
+from fastgen.config.config import LabelConfig
+from fastgen.files import images as encode
 from fastgen.formats import Item, assemble, coco, damage, known_formats, yolo
 from fastgen.generator import Generator
-from fastgen.labelling.visibility import mask_box, window
+from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Object
 from fastgen.scene import Camera
 

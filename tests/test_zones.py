@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.container import WallProfiles, Wave, build_container
+from fastgen.geometry.container import build_container
 from fastgen.geometry.damaged_mesh import damaged_mesh
 from fastgen.geometry.mesh import MATERIALS
-from fastgen.gl import open_context
-from fastgen.light.srgb import DECODED
+from fastgen.geometry.spreader import build_spreader
+from fastgen.render.gl import open_context
 from fastgen.scene import Camera, Damage
-from fastgen.spreader import build_spreader
+from fastgen.scene.container_kinds import WallProfiles, Wave
+from fastgen.srgb import DECODED
 from tests import oracle
 from tests.glsl import run
 from tests.mesh_probe import ISO_668, triangles_of, winding_normals

@@ -1,8 +1,9 @@
-"""What every renderer script shares: the job it is given, its clocks, and the result it leaves.
+"""Parts shared by the renderer scripts: the job, the timers and the result file.
 
-Runs inside each peer's own environment, so it needs nothing but numpy. A job folder holds job.json,
-and for each scene a GLB in metres, y up, whose nodes are 'container' and 'marker_2', 'marker_3',
-... (the number is the marker's id), and a Radiance HDR picture that lights it.
+This module runs in each peer's own environment, so it needs only numpy. A job folder contains
+job.json and, for each scene, a GLB file and a Radiance HDR image that lights it. The GLB is in
+metres, y up. Its nodes are 'container', 'marker_2', 'marker_3' and so on, where the number is the
+marker's id.
 """
 
 import json
@@ -19,16 +20,20 @@ import numpy as np
 CONTAINER, CONTAINER_ID = "container", 1
 
 Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-"""glTF 2.0, section 3.4: y is up."""
+"""Rotation into glTF's frame, where y is up (glTF 2.0, section 3.4)."""
 
 
 @dataclass(frozen=True)
 class Shot:
     """One view of a scene.
 
-    pose: float64 [4, 4], camera to world, metres, z up; the camera looks along its -z and its y is
-    up, as OpenGL's and Blender's. focal_px: focal length in pixels. exposure: factor on radiance.
-    markers: ids of the markers of which something is visible.
+    Attributes:
+        camera: Camera name.
+        pose: Camera to world, float64 [4, 4], metres, z up. The camera looks along its -z axis with
+            y up, as in OpenGL and Blender.
+        focal_px: Focal length in pixels.
+        exposure: Factor on radiance.
+        markers: Ids of the markers that are at least partly visible.
     """
 
     camera: str
@@ -45,7 +50,7 @@ class Shot:
 
 @dataclass(frozen=True)
 class SceneJob:
-    """One scene: its number, its files, its turn of the light about the vertical, its views."""
+    """One scene: index, files, rotation of the light about the vertical, and views."""
 
     index: int
     glb: Path
@@ -56,7 +61,15 @@ class SceneJob:
 
 @dataclass(frozen=True)
 class Job:
-    """All that one renderer script has to do. size: (width, height). repeats: of each view."""
+    """The work for one renderer script.
+
+    Attributes:
+        seed: fastgen's seed.
+        size: (width, height) in pixels.
+        repeats: Draws per view.
+        samples: Samples per pixel.
+        scenes: The scenes to draw.
+    """
 
     seed: int
     size: tuple[int, int]
@@ -66,7 +79,7 @@ class Job:
 
 
 def read_job(folder: Path) -> Job:
-    """The job in `folder`."""
+    """Read the job in `folder`."""
     plain = json.loads((folder / "job.json").read_text(encoding="utf-8"))
     scenes = [
         SceneJob(
@@ -83,14 +96,14 @@ def read_job(folder: Path) -> Job:
 
 
 def object_id(node: str) -> int:
-    """The id of a GLB node: 1 for the container, and what stands in a marker's name."""
+    """Return the id of a GLB node: 1 for the container, the number in its name for a marker."""
     return CONTAINER_ID if node.startswith(CONTAINER) else int(node.split("_")[1].split(".")[0])
 
 
 class Recorder:
-    """Wall and core milliseconds by stage, and the last picture and ids of every view.
+    """Wall and CPU milliseconds by stage, and the last image and ids of each view.
 
-    A stage is 'set-up' (once a scene), 'colour' or 'labels' (each repeat of each view).
+    Stages are 'set-up' (once per scene), 'colour' and 'labels' (each repeat of each view).
     """
 
     def __init__(self, out: Path, version: str) -> None:
@@ -100,25 +113,25 @@ class Recorder:
 
     @contextmanager
     def lap(self, stage: str) -> Iterator[None]:
-        """Time what happens within; core time counts all threads of this process."""
+        """Time the body of the context; CPU time includes all threads of this process."""
         wall, cores = time.perf_counter(), time.process_time()
         yield
         took = time.perf_counter() - wall, time.process_time() - cores
         self._laps[stage].append((took[0] * 1e3, took[1] * 1e3))
 
     def keep(self, scene: SceneJob, shot: Shot, image: np.ndarray, ids: np.ndarray) -> None:
-        """Save a view: image uint8 [H, W, 3] sRGB and ids [H, W], row 0 at the top."""
+        """Save the image uint8 [H, W, 3] sRGB and the ids [H, W] of a view, row 0 at the top."""
         stem = f"{scene.index:06d}_{shot.camera}"
         np.savez_compressed(self._out / f"{stem}.npz", image=image, ids=ids.astype(np.uint16))
 
     def save(self) -> None:
-        """Write result.json: every lap, in the order in which it was made."""
+        """Write result.json with all times in the order in which they were measured."""
         result: dict[str, Any] = {"version": self._version, "laps": self._laps}
         (self._out / "result.json").write_text(json.dumps(result), encoding="utf-8")
 
 
 def nearest_id(pixels: np.ndarray, colors: dict[int, tuple[int, int, int]]) -> np.ndarray:
-    """Ids [H, W] of pixels [H, W, 3] that were painted with `colors`, 0 being the background."""
+    """Return the ids [H, W] of pixels [H, W, 3] painted with `colors`; 0 is the background."""
     keys = np.array([0, *colors])
     palette = np.array([(0, 0, 0), *colors.values()], np.int32)
     gaps = np.abs(pixels[:, :, None].astype(np.int32) - palette).sum(axis=-1)
@@ -126,7 +139,10 @@ def nearest_id(pixels: np.ndarray, colors: dict[int, tuple[int, int, int]]) -> n
 
 
 def id_colors(ids: list[int]) -> dict[int, tuple[int, int, int]]:
-    """A colour for each id, at least 42 of 255 from any other in some channel and from black."""
+    """Return a colour for each id.
+
+    Any two colours, and each colour and black, differ by at least 51 of 255 in some channel.
+    """
     levels = (0, 51, 102, 153, 204, 255)
     cells = [(r, g, b) for r in levels for g in levels for b in levels][1:]
     return {number: cells[(i * 37) % len(cells)] for i, number in enumerate(sorted(ids))}

@@ -1,8 +1,9 @@
 """Cycles through bpy: python with_cycles.py JOB OUT denoise|masks.
 
-'masks' labels as the paper does, by one binary render for each marker that is seen; 'denoise' adds
-Open Image Denoise to the colour and draws all ids in one flat render, the quickest labels that
-Cycles gives.
+The way 'masks' makes labels like the paper, with one binary render per visible marker.
+
+The way 'denoise' adds Open Image Denoise to the colour image and draws all ids in one flat render,
+which is the fastest way to get labels from Cycles.
 """
 
 import sys
@@ -15,18 +16,18 @@ from mathutils import Matrix
 from measure import Job, Recorder, SceneJob, Shot, object_id, read_job
 
 ID_STEP = 4
-"""Ids are painted this many of 255 levels apart."""
+"""Distance of two ids in grey levels of 255."""
 
 
 def open_scene(job: Job, scene: SceneJob, denoise: bool) -> dict[int, bpy.types.Object]:
-    """The GLB under the HDR's light, ready for Cycles on all cores; its objects by id."""
+    """Load the GLB and its HDR light for Cycles on all cores; return the objects by id."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=str(scene.glb))
     objects = {object_id(o.name): o for o in bpy.data.objects if o.type == "MESH"}
     settings = bpy.context.scene
     settings.render.engine = "CYCLES"
     settings.render.resolution_x, settings.render.resolution_y = job.size
-    settings.render.use_persistent_data = True  # keeps the ray tree between views
+    settings.render.use_persistent_data = True  # keeps the ray-tracing tree between views
     settings.cycles.device = "CPU"
     settings.cycles.use_adaptive_sampling = False
     settings.cycles.denoiser = "OPENIMAGEDENOISE"
@@ -48,7 +49,7 @@ def open_scene(job: Job, scene: SceneJob, denoise: bool) -> dict[int, bpy.types.
 
 
 def flat_material() -> bpy.types.Material:
-    """Emits each object's own colour and nothing else."""
+    """Return a material that emits the object's own colour and nothing else."""
     material = bpy.data.materials.new("flat")
     material.use_nodes = True
     nodes, links = material.node_tree.nodes, material.node_tree.links
@@ -59,7 +60,7 @@ def flat_material() -> bpy.types.Material:
 
 
 def aim(shot: Shot, width: int) -> None:
-    """Put the camera where the shot has it."""
+    """Place the camera at the shot's pose."""
     camera = bpy.context.scene.camera
     camera.matrix_world = Matrix(shot.pose.tolist())
     camera.data.sensor_fit = "HORIZONTAL"
@@ -83,7 +84,7 @@ def shade(job: Job, shot: Shot, denoise: bool) -> None:
 
 
 def paint(flat: bpy.types.Material) -> None:
-    """Set Cycles up for labels: one ray through each pixel centre, colours as they are."""
+    """Set Cycles up for labels: one ray through each pixel centre, colours unchanged."""
     settings = bpy.context.scene
     settings.view_layers[0].material_override = flat
     settings.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
@@ -97,7 +98,10 @@ def paint(flat: bpy.types.Material) -> None:
 
 
 def draw(folder: Path) -> np.ndarray:
-    """Render and read back, uint8 [H, W, 3], row 0 at the top, by a file as bpy gives no pixels."""
+    """Render and return uint8 [H, W, 3], row 0 at the top.
+
+    The image goes through a file, because bpy does not expose the rendered pixels.
+    """
     bpy.context.scene.render.filepath = str(folder / "frame.png")
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(bpy.context.scene.render.filepath)
@@ -111,7 +115,7 @@ def draw(folder: Path) -> np.ndarray:
 
 
 def masks(shot: Shot, objects: dict[int, bpy.types.Object], folder: Path) -> np.ndarray:
-    """Ids [H, W] of the markers, from a binary render of each one that is seen."""
+    """Return marker ids [H, W], from one binary render per visible marker."""
     ids = np.zeros(0)
     for number in shot.markers:
         for other, item in objects.items():
@@ -123,14 +127,14 @@ def masks(shot: Shot, objects: dict[int, bpy.types.Object], folder: Path) -> np.
 
 
 def all_ids(objects: dict[int, bpy.types.Object], folder: Path) -> np.ndarray:
-    """Ids [H, W] from one render of flat grey levels."""
+    """Return ids [H, W] from one render of flat grey levels."""
     for number, item in objects.items():
         item.color = [number * ID_STEP / 255] * 3 + [1.0]
     return np.rint(draw(folder)[..., 0] / ID_STEP)
 
 
 def main(folder: Path, out: Path, way: str) -> None:
-    """Every view."""
+    """Render every view."""
     job = read_job(folder)
     recorder = Recorder(out, f"Blender {bpy.app.version_string}")
     denoise = way == "denoise"
@@ -139,7 +143,7 @@ def main(folder: Path, out: Path, way: str) -> None:
             with recorder.lap("set-up"):
                 objects = open_scene(job, scene, denoise)
                 flat = flat_material()
-            # all colours, then all labels: switching makes Cycles prepare the scene again
+            # all colours, then all labels, because switching makes Cycles prepare the scene again
             images = {}
             for shot in scene.shots * job.repeats:
                 with recorder.lap("colour"):

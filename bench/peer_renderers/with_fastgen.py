@@ -1,10 +1,10 @@
-"""fastgen itself, measured as its peers are: python with_fastgen.py JOB OUT QUALITY."""
+"""fastgen measured in the same way as its peers: python with_fastgen.py JOB OUT QUALITY."""
 
 import os
 import sys
 from pathlib import Path
 
-# one process a core, as `fastgen generate` runs; llvmpipe reads it at the first context
+# one thread per process, like in `fastgen generate`; llvmpipe reads it at the first context
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
 from measure import Recorder, read_job
@@ -15,7 +15,7 @@ from fastgen.scene import Scene
 
 
 def main(folder: Path, out: Path, quality: str) -> None:
-    """Every view, image and all labels from one draw."""
+    """Render every view; one draw gives the image and all labels."""
     job = read_job(folder)
     config = Config.preset()
     with Generator(config, seed=job.seed, size=job.size, quality=quality) as generator:
@@ -31,7 +31,7 @@ def main(folder: Path, out: Path, quality: str) -> None:
                     with recorder.lap("colour"):
                         sample = generator.render(scene=plain, camera=shot.camera)
                     with recorder.lap("labels"):
-                        pass  # came with the image
+                        pass  # the labels came with the image
                 recorder.keep(scene, shot, sample.image, sample.ids)
         recorder.save()
 

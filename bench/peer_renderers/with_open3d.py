@@ -11,7 +11,7 @@ from open3d.visualization import rendering
 
 
 def mesh_of(part: trimesh.Trimesh) -> o3d.geometry.TriangleMesh:
-    """A node of the GLB with its texture coordinates, which Open3D keeps by triangle corner."""
+    """Return a GLB node as a mesh with Open3D's texture coordinates, one per triangle corner."""
     mesh = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector(np.asarray(part.vertices)),
         o3d.utility.Vector3iVector(np.asarray(part.faces)),
@@ -25,9 +25,12 @@ def mesh_of(part: trimesh.Trimesh) -> o3d.geometry.TriangleMesh:
 def fill(
     scene: rendering.Open3DScene, glb: Path
 ) -> tuple[list[tuple[str, str]], dict[int, tuple[int, int, int]]]:
-    """Put every node of a GLB in the scene twice, shaded and painted; their names, and the colours.
+    """Add every node of a GLB to the scene twice: once shaded, once painted with its id's colour.
 
-    The light is Open3D's own image: it takes no HDR file, only maps that Filament has prepared.
+    The light is Open3D's own, because it reads no HDR files, only maps prepared by Filament.
+
+    Returns:
+        The names of both copies of each node, and the colour of each id.
     """
     parts = trimesh.load(glb, process=False).geometry
     colors = id_colors([object_id(name) for name in parts])
@@ -38,7 +41,7 @@ def fill(
         material.shader = "defaultLit"
         texture = np.ascontiguousarray(source.baseColorTexture.convert("RGB"))
         material.albedo_img = o3d.geometry.Image(texture)
-        # glTF leaves out a factor of 1
+        # glTF omits a factor of 1
         roughness = 1.0 if source.roughnessFactor is None else source.roughnessFactor
         material.base_roughness, material.base_metallic = roughness, 0.0
         scene.add_geometry(name, mesh, material)
@@ -51,7 +54,7 @@ def fill(
 
 
 def show(scene: rendering.Open3DScene, names: list[tuple[str, str]], painted: bool) -> None:
-    """Switch between the shaded scene and the ids, which no effect may touch."""
+    """Show the shaded scene or the painted ids, the latter without any post-processing."""
     for shaded_name, painted_name in names:
         scene.show_geometry(shaded_name, not painted)
         scene.show_geometry(painted_name, painted)
@@ -61,7 +64,10 @@ def show(scene: rendering.Open3DScene, names: list[tuple[str, str]], painted: bo
 
 
 def as_painted(colors: dict[int, tuple[int, int, int]]) -> dict[int, tuple[int, int, int]]:
-    """What `colors` come back as: without post-processing, half of the linear value."""
+    """Return the colours as they are read back.
+
+    Without post-processing, Filament writes half of the linear value.
+    """
     found = {}
     for number, color in colors.items():
         linear = ((np.array(color) / 255 + 0.055) / 1.055) ** 2.4 * (np.array(color) > 0)
@@ -71,7 +77,7 @@ def as_painted(colors: dict[int, tuple[int, int, int]]) -> dict[int, tuple[int, 
 
 
 def main(folder: Path, out: Path) -> None:
-    """Every view."""
+    """Render every view."""
     job = read_job(folder)
     width, height = job.size
     recorder = Recorder(out, f"{o3d.__version__}, Filament")

@@ -1,4 +1,4 @@
-"""pyrender on EGL, a colour and a segmentation pass: python with_pyrender.py JOB OUT."""
+"""pyrender on EGL, with a colour and a segmentation pass: python with_pyrender.py JOB OUT."""
 
 import os
 import sys
@@ -14,9 +14,9 @@ from OpenGL.GL import GL_RENDERER, glGetString
 
 
 def load(glb: Path) -> tuple[pyrender.Scene, dict[pyrender.Node, int]]:
-    """The scene of a GLB, lit by an even ambient light, and the id of each of its nodes.
+    """Return the scene of a GLB under an even ambient light, and the id of each node.
 
-    pyrender has no image-based light; a directional light stands in for the sky's brighter side.
+    pyrender has no image-based light. A directional light replaces the brighter side of the sky.
     """
     scene = pyrender.Scene(ambient_light=[0.5, 0.5, 0.5], bg_color=[0.5, 0.5, 0.5, 1.0])
     ids = {}
@@ -26,7 +26,7 @@ def load(glb: Path) -> tuple[pyrender.Scene, dict[pyrender.Node, int]]:
 
 
 def main(folder: Path, out: Path) -> None:
-    """Every view."""
+    """Render every view."""
     job = read_job(folder)
     width, height = job.size
     renderer = pyrender.OffscreenRenderer(width, height)

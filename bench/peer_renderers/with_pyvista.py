@@ -1,6 +1,6 @@
 """PyVista with physically based shading and image-based light: python with_pyvista.py JOB OUT.
 
-The light keeps VTK's own turn about the vertical, which costs the same as the scene's.
+The light keeps VTK's own rotation about the vertical; rotating it would not change the cost.
 """
 
 import sys
@@ -25,10 +25,10 @@ from measure import (
 def open_scene(
     job: Job, scene: SceneJob
 ) -> tuple[pv.Plotter, pv.Plotter, dict[int, tuple[int, int, int]]]:
-    """A plotter that shades the scene and one that paints its ids, and the ids' colours."""
+    """Return a plotter that shades the scene, one that paints the ids, and the ids' colours."""
     shaded = pv.Plotter(off_screen=True, window_size=job.size, lighting="none")
     painted = pv.Plotter(off_screen=True, window_size=job.size, lighting="none")
-    painted.render_window.SetMultiSamples(0)  # a blend of two ids would be a third
+    painted.render_window.SetMultiSamples(0)  # blending two ids would give a third
     painted.background_color = "black"
     parts = trimesh.load(scene.glb, process=False).geometry
     colors = id_colors([object_id(name) for name in parts])
@@ -57,7 +57,7 @@ def open_scene(
 
 
 def aim(plotter: pv.Plotter, shot: Shot, height: int) -> None:
-    """Put the camera where the shot has it, in the frame of the GLB."""
+    """Place the camera at the shot's pose, in the frame of the GLB."""
     pose = shot.pose_y_up
     camera = plotter.camera
     camera.position = pose[:3, 3]
@@ -68,13 +68,13 @@ def aim(plotter: pv.Plotter, shot: Shot, height: int) -> None:
 
 
 def draw(plotter: pv.Plotter) -> np.ndarray:
-    """A frame, uint8 [H, W, 3]."""
+    """Return a frame, uint8 [H, W, 3]."""
     plotter.render()
     return np.asarray(plotter.screenshot(return_img=True))[..., :3]
 
 
 def main(folder: Path, out: Path) -> None:
-    """Every view."""
+    """Render every view."""
     job = read_job(folder)
     recorder = Recorder(out, f"{pv.__version__}, VTK {pv.vtk_version_info}")
     for scene in job.scenes:

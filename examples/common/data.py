@@ -13,7 +13,7 @@ import torch
 from torch.utils.data import DataLoader, Dataset
 
 import fastgen
-from fastgen.files.encode import jpeg
+from fastgen.files.images import jpeg
 from fastgen.torch import ContainerDataset, Loader, collate_lists
 
 Batch = tuple[list[torch.Tensor], list[Any]]

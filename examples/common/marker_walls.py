@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from fastgen import Config
 from fastgen.classes import MARKER_CLASSES
-from fastgen.container import build_container
+from fastgen.geometry.container import build_container
 from fastgen.geometry.mesh import Mesh
-from fastgen.light.openness import open_sky
-from fastgen.light.sky_probe import Lit, SkyProbe
+from fastgen.light.sky_visibility import open_sky
+from fastgen.render.sky_visibility_probe import Lit, SkyProbe
 from fastgen.sample import Object, Sample
-from fastgen.sampling import sheet_sizes, stream
+from fastgen.sampling.scene import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
 
 CAMERAS = ("Cl", "Cr")

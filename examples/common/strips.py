@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from fastgen.prints.lettering import GLYPH_PITCH_CAPS
+from fastgen.decals.lettering import GLYPH_PITCH_CAPS
 
 Grey = NDArray[Any]
 """A grey image [h, w], uint8 or float32."""

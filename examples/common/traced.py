@@ -11,10 +11,10 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen import Generator
+from fastgen.camera.tone_curve import displayed
 from fastgen.export import export_glb
 from fastgen.light.hdri import bundled_hdris
 from fastgen.scene import Scene
-from fastgen.sensor.light import displayed
 
 TEXEL_MM = 6.0
 """Of the exported textures: a pixel of the images shows 13 to 20 mm."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
 from fastgen.formats.yolo import pixel_box, rows
-from fastgen.labelling.overlay import draw_box, draw_outline
+from fastgen.labels.overlay import draw_box, draw_outline
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 

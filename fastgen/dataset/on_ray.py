@@ -17,12 +17,12 @@ from typing import Any
 
 import fastgen
 from fastgen.dataset.dataset_json import MANIFEST
+from fastgen.dataset.generate import Runner
 from fastgen.dataset.seal import digest
 from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.workers import HANG_S, Waiting, in_words
 from fastgen.errors import OutputError
-from fastgen.generate import Runner
 
 Reports = list[tuple[str, Any]]
 """What a maker reports, in order: see shards.Report."""

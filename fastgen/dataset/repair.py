@@ -4,13 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.dataset.dataset_json import MANIFEST
+from fastgen.dataset.generate import check_count, check_goes_on, generate
 from fastgen.dataset.shards import Job
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
-from fastgen.generate import check_count, check_goes_on, generate
 
 
 def repair(

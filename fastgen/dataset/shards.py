@@ -18,14 +18,14 @@ from typing import Any
 import cv2
 import orjson
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.dataset.freed_memory import return_freed_memory
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
 from fastgen.generator import Generator
-from fastgen.sampling import SPLITS, split_of
+from fastgen.sampling.scene import SPLITS, split_of
 
 SHARD_SCENES = {"seafront": 4, "webdataset": 64}
 """Scenes that are committed together, by format of the whole."""

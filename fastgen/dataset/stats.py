@@ -17,7 +17,7 @@ from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
 from fastgen.formats import Record
 from fastgen.formats.coco import trained_on
-from fastgen.sampling import SPLITS
+from fastgen.sampling.scene import SPLITS
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _FIRST_MARKER = DETECTION_CLASSES.index("text") + 1

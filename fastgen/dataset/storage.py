@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
-from fastgen.files.whole_file import ASIDE_FILES, whole_file
+from fastgen.files.atomic_file import ASIDE_FILES, whole_file
 from fastgen.formats import Files, Same
 
 ASIDE = ".aside"

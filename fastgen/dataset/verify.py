@@ -18,9 +18,9 @@ from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats import Record, coco
 from fastgen.formats.yolo import pixel_box, rows
-from fastgen.records import from_plain
-from fastgen.sampling import SPLITS
+from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
+from fastgen.validation import from_plain
 
 Place = Folder | Remote
 

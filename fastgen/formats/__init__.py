@@ -15,15 +15,15 @@ from typing import Any
 
 import orjson
 
-from fastgen.camera import View
+from fastgen.camera.projection import View
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
-from fastgen.config import LabelConfig
-from fastgen.files.encode import jpeg
+from fastgen.config.config import LabelConfig
+from fastgen.files.images import jpeg
 from fastgen.formats import coco
-from fastgen.labelling.visibility import window
-from fastgen.records import check_known
+from fastgen.labels.visibility import window
 from fastgen.sample import Box, Object, Sample
 from fastgen.scene import Scene
+from fastgen.validation import check_known
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
 """The formats that `--format seafront` always writes: the paper's tasks, and the container."""

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.container import KINDS, WallProfiles, build_container
-from fastgen.files.encode import png
+from fastgen.files.images import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
-from fastgen.sampling import SPLITS
+from fastgen.geometry.container import build_container
+from fastgen.sampling.scene import SPLITS
+from fastgen.scene.container_kinds import KINDS, WallProfiles
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
 """obj_id of each kind of container."""

@@ -3,7 +3,7 @@
 from typing import Any
 
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, coco, view_values
-from fastgen.labels import CASTINGS
+from fastgen.labels.objects import CASTINGS
 
 _EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]
 

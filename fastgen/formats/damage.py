@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES, SEGMENTATION_CLASSES
-from fastgen.files.encode import png
+from fastgen.files.images import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, coco
 from fastgen.formats.yolo import line, outline
-from fastgen.labelling.visibility import mask_box, window
+from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Sample
 
 CATEGORIES = [

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.files.encode import png
+from fastgen.files.images import png
 from fastgen.formats import Files, Format, Item
 
 

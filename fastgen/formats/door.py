@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.distributions.camera_config import CameraConfig
+from fastgen.config.cameras import CameraConfig
 from fastgen.errors import ConfigError
 from fastgen.formats import Files, Format, Item, Same
 from fastgen.scene import Camera

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from fastgen.files.encode import png
+from fastgen.files.images import png
 from fastgen.formats import Files, Format, Item
 
 

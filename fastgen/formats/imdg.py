@@ -6,8 +6,8 @@ from typing import Any
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, coco
 from fastgen.formats.yolo import detection_lines
-from fastgen.labelling.visibility import window
-from fastgen.sampling import SPLITS
+from fastgen.labels.visibility import window
+from fastgen.sampling.scene import SPLITS
 
 CATEGORIES = [{"id": i + 1, "name": name} for i, name in enumerate(DETECTION_CLASSES)]
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from fastgen.files.encode import png
+from fastgen.files.images import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records
-from fastgen.labelling.crops import text_crops
+from fastgen.labels.crops import text_crops
 
 
 class _Text(Format):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fastgen import formats
 from fastgen.classes import DETECTION_CLASSES
-from fastgen.labelling.visibility import mask_box, window
+from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Object
 
 

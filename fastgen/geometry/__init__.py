@@ -1,1 +1,1 @@
-"""What container.py and spreader.py are made of: triangle meshes, their unfolding, and parts."""
+"""Container and spreader meshes, their unfolding, and the damage displacement law."""

@@ -7,8 +7,8 @@ An aperture is a recessed pocket with a twelve-point outline: at 10 m through a 
 import numpy as np
 
 from fastgen.geometry.container_layout import CASTING_MM, Array, Layout
-from fastgen.geometry.mesh import FACE_AXES, FACES
 from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon, sweep
+from fastgen.scene.faces import FACE_AXES, FACES
 
 APERTURE_CENTER_MM = (101.5, 89.0, 59.0)
 """Aperture centres from the end (x), the side (y) and the bottom or top (z)."""

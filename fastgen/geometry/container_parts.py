@@ -17,8 +17,8 @@ from fastgen.geometry.container_layout import (
     Layout,
 )
 from fastgen.geometry.container_walls import Panel
-from fastgen.geometry.mesh import FACE_AXES
 from fastgen.geometry.unfold import Patch, Sheet, breaks, coarsened, prism, sweep
+from fastgen.scene.faces import FACE_AXES
 
 FORK_CENTERS_MM = (-1025.0, 1025.0)
 """Fork pockets of a 20' container; ISO 1496-1 annex C: 2050 between centres, at least 355 wide and

@@ -12,10 +12,10 @@ from fastgen.geometry.container_layout import (
     OVERLAP_MM,
     Array,
     Layout,
-    Wave,
 )
-from fastgen.geometry.mesh import FACE_AXES
 from fastgen.geometry.unfold import Sheet, breaks, sweep
+from fastgen.scene.container_kinds import Wave
+from fastgen.scene.faces import FACE_AXES
 
 Flats = tuple[tuple[float, float], ...]
 

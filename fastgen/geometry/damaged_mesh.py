@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.damage import (
+from fastgen.geometry.damage_law import (
     FADE_START_MM,
     deform,
     hole_radius_mm,

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fastgen.geometry.container_layout import OVERLAP_MM, Array, Layout, Wave
+from fastgen.geometry.container_layout import OVERLAP_MM, Array, Layout
 from fastgen.geometry.container_parts import DOOR_HEADER_MM, DOOR_SILL_MM
 from fastgen.geometry.container_walls import Flats, wave_knots
-from fastgen.geometry.mesh import FACE_AXES
 from fastgen.geometry.unfold import Patch, Sheet, beside, breaks, flat, joined, sweep
+from fastgen.scene.container_kinds import Wave
+from fastgen.scene.faces import FACE_AXES
 
 LEAF_MM = 58.0
 """Inset of the leaves' face."""

@@ -8,20 +8,14 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen import cache
-from fastgen.distinct import distinct_rows
 from fastgen.errors import ConfigError
-
-FACES = ("front", "back", "door", "no_door", "roof", "underside")
-"""front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
-
-SHEET_FACES = ("front", "back", "door", "no_door", "roof")
-"""Those that can bear decals and damage."""
+from fastgen.files import disk_cache
+from fastgen.geometry.distinct_rows import distinct_rows
+from fastgen.scene.faces import FACES, SHEET_FACES
 
 MATERIALS = (
     *("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside"),
@@ -43,28 +37,6 @@ MAX_ZONES = 500
 
 GROUP_SLACK_MM = 12.0
 """A face's frame stands back from the castings' plane by at most this much, see Mesh.groups."""
-
-
-@dataclass(frozen=True)
-class Axes:
-    """How a face is looked at from outside: right, up and toward the viewer, unit 3-vectors."""
-
-    right: tuple[float, float, float]
-    up: tuple[float, float, float]
-    out: tuple[float, float, float]
-
-
-FACE_AXES: Mapping[str, Axes] = MappingProxyType(
-    {
-        "front": Axes((1, 0, 0), (0, 0, 1), (0, -1, 0)),
-        "back": Axes((-1, 0, 0), (0, 0, 1), (0, 1, 0)),
-        "door": Axes((0, 1, 0), (0, 0, 1), (1, 0, 0)),
-        "no_door": Axes((0, -1, 0), (0, 0, 1), (-1, 0, 0)),
-        "roof": Axes((1, 0, 0), (0, 1, 0), (0, 0, 1)),
-        "underside": Axes((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-    }
-)
-"""right x up = out for every face, so nothing printed on a sheet is mirrored."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +180,7 @@ class Mesh:
 
             return {"hull": np.asarray(ConvexHull(self.points_mm).vertices, np.int64)}
 
-        return cache.computed("hull", self.shape_digest, found)["hull"]
+        return disk_cache.computed("hull", self.shape_digest, found)["hull"]
 
     @cached_property
     def shape_digest(self) -> str:

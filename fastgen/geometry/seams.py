@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.distinct import distinct_rows
+from fastgen.geometry.distinct_rows import distinct_rows
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastgen.geometry.container_castings import APERTURE_CENTER_MM
-from fastgen.geometry.container_layout import ContainerKind
 from fastgen.geometry.container_parts import ring
 from fastgen.geometry.unfold import Patch, Sheet, beside, box, prism, regular
+from fastgen.scene.container_kinds import ContainerKind
 
 TIERS = ("frame", "headblock", "cables")
 """What a spreader is made of from below, ever narrower: charts are named spreader.TIER.PART."""

@@ -6,15 +6,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen import cache
+from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Chart, Mesh, Zone
 
 _ARRAYS = ("positions_mm", "normals", "atlas_mm", "zone", "triangles")
 
 
 def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
-    """What `build` gives for `inputs`, its arrays read-only; see cache.computed."""
-    arrays = cache.computed(name, inputs, lambda: _packed(build()))
+    """What `build` gives for `inputs`, its arrays read-only; see disk_cache.computed."""
+    arrays = disk_cache.computed(name, inputs, lambda: _packed(build()))
     about = json.loads(arrays["about"].tobytes())
     return Mesh(
         **{key: arrays[key] for key in _ARRAYS},

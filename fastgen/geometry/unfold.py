@@ -12,18 +12,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fastgen.geometry.mesh import (
-    FACE_AXES,
-    FACES,
-    GROUP_SLACK_MM,
-    MATERIALS,
-    MAX_ZONES,
-    Chart,
-    Mesh,
-    Zone,
-)
+from fastgen.geometry.mesh import GROUP_SLACK_MM, MATERIALS, MAX_ZONES, Chart, Mesh, Zone
 from fastgen.geometry.seams import stitched
 from fastgen.geometry.zones import zones_of
+from fastgen.scene.faces import FACE_AXES, FACES
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""Light beside environment.py, and what is in its way: suns, sky, shadows, reflections, tones."""
+"""Light computed on the CPU: HDRIs, prefiltering, sky visibility and indirect light."""

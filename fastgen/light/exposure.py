@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from fastgen.camera import View
-from fastgen.environment import Ambient, irradiance_at, metered_luminance
+from fastgen.camera.projection import View
+from fastgen.light.environment import Ambient, irradiance_at, metered_luminance
 from fastgen.scene import REC_709, Camera, Color
 
 MIDDLE_GREY = 0.18

@@ -5,11 +5,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen import cache
-
-MIN_ROUGHNESS = 0.045
-"""Least perceptual roughness that is shaded: Filament's where it computes in single precision (Guy
-and Agopian 2018, Physically Based Rendering in Filament)."""
+from fastgen.files import disk_cache
 
 DIELECTRIC_INDEX = 1.5
 """Refractive index of what is no metal, usual for paints and plastics."""
@@ -46,7 +42,7 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
     Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
     mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
     """
-    return cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
+    return disk_cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
 
 
 def mean_specular_albedo(f0: float, roughness: float) -> float:

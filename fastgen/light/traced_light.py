@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.environment import to_map_frame
+from fastgen.light.environment import to_map_frame
 from fastgen.light.ray_bodies import LIFT_MM, RayBodies
-from fastgen.light.reflectance import DIELECTRIC_F0, MIN_ROUGHNESS, fresnel_climb
+from fastgen.light.reflectance import DIELECTRIC_F0, fresnel_climb
 from fastgen.light.sky_rays import SkyRays, spread_points
+from fastgen.scene.limits import MIN_ROUGHNESS
 
 Floats = NDArray[np.float32]
 

@@ -8,19 +8,19 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from fastgen.camera import View, view_of
+from fastgen.camera.projection import View, view_of
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.config import Config
-from fastgen.container import build_container
-from fastgen.damage import may_be_seen
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
 from fastgen.generator import Generator
-from fastgen.labels import outlines_mm
-from fastgen.records import whole
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import may_be_seen
+from fastgen.labels.objects import outlines_mm
 from fastgen.scene import Camera, Scene
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import class_names
+from fastgen.validation import whole
 
 
 def class_counts(

@@ -11,11 +11,10 @@ from typing import Any
 import torch
 from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
-from fastgen.records import whole
 from fastgen.sample import Sample
-from fastgen.sampling import sample_scene
+from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Scene
 from fastgen.torch.plan import (
     EPOCH_SCENES,
@@ -28,6 +27,7 @@ from fastgen.torch.plan import (
 )
 from fastgen.torch.rendering import LocalGenerator
 from fastgen.torch.targets import Collate, Item, check_form, collate_of, item_of
+from fastgen.validation import whole
 
 Curriculum = Callable[[int], Config | Mapping[str, Any]]
 Transforms = Callable[[Any, Any], Item]

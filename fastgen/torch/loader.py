@@ -6,11 +6,11 @@ from typing import Any
 from torch.utils.data import DataLoader, Sampler
 
 from fastgen.errors import ConfigError
-from fastgen.records import whole
-from fastgen.sampling import stream
+from fastgen.sampling.scene import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
 from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.torch.targets import Collate
+from fastgen.validation import whole
 
 
 class ShardSampler(Sampler[int]):

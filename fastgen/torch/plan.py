@@ -6,12 +6,12 @@ from typing import Any
 
 import torch
 
-from fastgen.config import Config
+from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import always_at_an_end
-from fastgen.records import check_known, nearest, whole
-from fastgen.sampling import SPLITS, split_of
+from fastgen.sampling.scene import SPLITS, split_of
 from fastgen.torch.targets import class_names
+from fastgen.validation import check_known, nearest, whole
 
 EPOCH_SCENES = 10**9
 """Scenes of epoch e count up from e times this, so that no two epochs share one."""

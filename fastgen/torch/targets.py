@@ -12,14 +12,14 @@ import torch
 from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.config import LabelConfig
+from fastgen.config.config import LabelConfig
 from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_number
-from fastgen.labelling.crops import text_crops
-from fastgen.records import check_known
+from fastgen.labels.crops import text_crops
 from fastgen.sample import Box, Sample
+from fastgen.validation import check_known
 
 Item = tuple[Any, Any]
 """(image, target) of one sample; what each holds depends on task and form, see `item_of`."""

@@ -1,0 +1,1 @@
+"""Cameras: projection, lens distortion, sensor, weather and tone curve."""

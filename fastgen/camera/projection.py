@@ -1,0 +1,166 @@
+"""Projection: a Camera and an image size to matrices, and points to pixels.
+
+Pixel coordinates: x to the right, y down, (0, 0) at the top left corner of the image, so pixel
+(column i, row j) has its centre at (i + 0.5, j + 0.5). View space: x right, y down, z forward
+along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1; a
+lens's distortion comes between the division by depth and the camera matrix, see lens.py.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fastgen.camera.lens import PINHOLE, Distortion
+from fastgen.errors import ConfigError
+from fastgen.scene import Camera
+from fastgen.scene.limits import FAR_M, MM, NEAR_M
+from fastgen.scene.optics import Lens
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera bound to an image size.
+
+    rotation: float64 [3, 3], world to view. position_m: float64 [3], world metres.
+    focal_px: focal length in pixels, the same on both axes. size: (width, height). distortion: the
+    lens's, None for a pinhole.
+    """
+
+    rotation: NDArray[np.float64]
+    position_m: NDArray[np.float64]
+    focal_px: float
+    size: tuple[int, int]
+    distortion: Distortion | None = None
+
+    @property
+    def center_px(self) -> tuple[float, float]:
+        """Principal point (x, y) in pixels: the middle of the image."""
+        return self.size[0] / 2, self.size[1] / 2
+
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """Camera matrix float64 [3, 3] from view space to pixels; Hartley and Zisserman, 6.1."""
+        x, y = self.center_px
+        return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1]])
+
+    @property
+    def translation_mm(self) -> NDArray[np.float64]:
+        """The world's origin in view space, float64 [3]; with `rotation` the container's pose."""
+        return -self.rotation @ self.position_m / MM
+
+    def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
+        """World points [..., 3] in mm to view space [..., 3] in metres."""
+        points = np.asarray(points_mm, np.float64)
+        # in one product: of a stack of small matrices NumPy takes one after the other
+        turned = points.reshape(-1, 3) @ (MM * self.rotation.T)
+        for axis, offset in enumerate(self.rotation @ self.position_m):
+            turned[:, axis] -= offset  # NumPy is slow along an axis of three
+        return turned.reshape(points.shape)
+
+    def project(
+        self, points_mm: NDArray[np.floating]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """World points [..., 3] in mm to pixels [..., 2] and depth [...] in metres.
+
+        Depth is along the optical axis; pixels of points at or behind the camera mean nothing.
+        """
+        view = self.to_view(points_mm)
+        depth = view[..., 2].copy()
+        inverse = 1 / np.where(depth > 1e-9, depth, np.nan)
+        plane = np.empty((*depth.shape, 2))
+        for axis in (0, 1):
+            np.multiply(view[..., axis], inverse, out=plane[..., axis])
+        if self.distortion:
+            plane = self.distortion.apply(plane)
+        plane *= self.focal_px
+        for axis, center in enumerate(self.center_px):
+            plane[..., axis] += center
+        return plane, depth
+
+    def rays(
+        self, pixels: NDArray[np.floating] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origin [3] in mm and unit directions [..., 3] of the rays through `pixels` [..., 2].
+
+        By default those are all pixel centres, [H, W, 2].
+        """
+        width, height = self.size
+        if pixels is None:
+            x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
+            pixels = np.stack(np.meshgrid(x, y), axis=-1)
+        across = (np.asarray(pixels, np.float64) - self.center_px) / self.focal_px
+        if self.distortion:
+            across = self.distortion.remove(across)
+        rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1) @ self.rotation
+        return self.position_m / MM, rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+    @property
+    def half_angle_deg(self) -> float:
+        """Angle between the optical axis and what the middle of the left border sees."""
+        edge = 0.5 * self.size[0] / self.focal_px
+        if self.distortion:
+            edge = float(np.linalg.norm(self.distortion.remove([-edge, 0.0])))
+        return float(np.degrees(np.arctan(edge)))
+
+    def lens_values(self, to_samples: NDArray[np.floating]) -> dict[str, ArrayLike]:
+        """The uniforms of shaders/lens.glsl; to_samples [2, 2]: see SampleLattice.to_clip."""
+        return {
+            **(self.distortion.shader_values if self.distortion else PINHOLE),
+            "lens_to_clip": (to_samples * 2 * self.focal_px / self.size).T.ravel(),
+            "lens_center": self.center_px,
+            "lens_focal": self.focal_px,
+        }
+
+    def clip_matrix(self) -> NDArray[np.float64]:
+        """World metres to OpenGL clip space without the lens's distortion, float64 [4, 4].
+
+        Clip y points down the image, so that row 0 of the framebuffer is the image's top row and
+        no read-back needs flipping; front faces are then clockwise. Depth maps [NEAR_M, FAR_M]
+        to [-1, 1]. OpenGL 4.5 core specification, section 13.6.
+        """
+        width, height = self.size
+        world_to_view = np.eye(4)
+        world_to_view[:3, :3] = self.rotation
+        world_to_view[:3, 3] = -self.rotation @ self.position_m
+        projection = np.zeros((4, 4))
+        projection[0, 0] = 2 * self.focal_px / width
+        projection[1, 1] = 2 * self.focal_px / height
+        projection[2, 2] = (FAR_M + NEAR_M) / (FAR_M - NEAR_M)
+        projection[2, 3] = -2 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
+        projection[3, 2] = 1.0
+        return projection @ world_to_view
+
+
+def view_of(camera: Camera, size: tuple[int, int]) -> View:
+    """The view of `camera` for an image of `size` (width, height) in pixels.
+
+    The image's up direction is the world's z, turned clockwise by the camera's roll. Raises
+    ConfigError for a lens that cannot be drawn, see lens.Distortion.
+    """
+    position = np.array(camera.position_mm, np.float64) * MM
+    forward = np.array(camera.target_mm, np.float64) * MM - position
+    forward /= np.linalg.norm(forward)
+    up_hint = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, up_hint)
+    right /= np.linalg.norm(right)
+    down = np.cross(forward, right)
+    roll = np.deg2rad(camera.roll_deg)
+    # turning the camera counter-clockwise turns what it sees clockwise
+    rolled_right = np.cos(roll) * right - np.sin(roll) * down
+    rolled_down = np.sin(roll) * right + np.cos(roll) * down
+    focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
+    distortion = None
+    if camera.lens is not None:
+        try:
+            distortion = _distortion(camera.lens, (size[0] / 2 / focal_px, size[1] / 2 / focal_px))
+        except ConfigError as error:
+            raise ConfigError(f"cameras.{camera.name}.{error}") from None
+    rotation = np.stack([rolled_right, rolled_down, forward])
+    return View(rotation, position, focal_px, size, distortion)
+
+
+@lru_cache(maxsize=64)
+def _distortion(lens: Lens, half_size: tuple[float, float]) -> Distortion:
+    return Distortion(lens, half_size)

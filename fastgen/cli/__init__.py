@@ -1,0 +1,1 @@
+"""The `fastgen` command: argument parsing and printing."""

@@ -1,1 +1,0 @@
-"""What gl.py is made of: OpenGL contexts of EGL and OSMesa."""

@@ -1,0 +1,1 @@
+"""Decal artwork, lettering and container identifiers, independent of any scene."""

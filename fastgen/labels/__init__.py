@@ -1,0 +1,1 @@
+"""Labels: Frame + Scene -> Objects, text crops and overlays."""

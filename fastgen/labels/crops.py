@@ -1,0 +1,82 @@
+"""Text crops: which identifiers of an image can be read, and their pixels."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
+from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_law import deform
+from fastgen.labels.objects import decal_of
+from fastgen.sample import Object, Sample
+from fastgen.scene import Decal
+
+_CROP_MARGIN_PX = 3
+_LEGIBLE_FRACTION = 0.85
+_LEGIBLE_LETTER = 0.5
+"""Of each letter's box, so that no crop reads what nobody can see."""
+
+_LETTER_POINTS = 7
+"""Along each side of a letter's box."""
+
+
+def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDArray[np.uint8]]]:
+    """Each legible text of an image, and its pixels [h, w, 3] with a small margin, as a view.
+
+    min_text_px: least height of its capitals in the image, see config.LabelConfig.
+    """
+    width, height = sample.view.size
+    for item in sample.objects:
+        if item.class_name != "text" or not _legible(sample, item, min_text_px):
+            continue
+        assert item.bbox is not None
+        x0, y0, x1, y1 = item.bbox
+        margin = _CROP_MARGIN_PX
+        yield (
+            item,
+            sample.image[
+                max(y0 - margin, 0) : min(y1 + margin, height),
+                max(x0 - margin, 0) : min(x1 + margin, width),
+            ],
+        )
+
+
+def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
+    """Large enough along both of its sides, hardly occluded, by half at most in any letter, and not
+    cut by the border."""
+    if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
+        return False
+    decal = decal_of(sample.scene, item.id)
+    upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)
+    across = np.linalg.norm(lower_right - lower_left) / decal.size_mm[0]
+    up = np.linalg.norm(upper_left - lower_left) / decal.size_mm[1]
+    large = min(across, up) * decal.cap_mm >= min_text_px
+    return bool(
+        large and (not item.occluded or _least_letter(sample, item, decal) >= _LEGIBLE_LETTER)
+    )
+
+
+def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
+    """The share seen of that letter of a text of which least is seen: locking bars hide an I."""
+    font = glyph_tiles()[1][decal.font]
+    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical)
+    middle = np.array(lettering.size_mm) / 2
+    steps = (np.arange(_LETTER_POINTS) + 0.5) / _LETTER_POINTS - 0.5
+    grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    letters = []
+    for glyph in lettering.glyphs:
+        ink = font.glyphs[glyph.char]
+        base = glyph.y0 + TILE_BASELINE_CAPS * decal.cap_mm
+        center = np.array([(glyph.x0 + glyph.x1) / 2, base + decal.cap_mm / 2]) - middle
+        letters.append(center + grid * decal.cap_mm * (ink.ink_right - ink.ink_left, 1.0))
+    sheet = np.concatenate(letters) @ decal.turn.T + np.array(decal.center_mm)
+    container = sample.scene.container
+    rest, _ = build_container(container.kind, container.profiles).sheet_to_surface(
+        decal.face, sheet
+    )
+    pixels, _ = sample.view.project(deform(sample.scene.damages, rest))
+    columns, rows = np.clip(np.floor(pixels).astype(int), 0, np.array(sample.view.size) - 1).T
+    seen = sample.ids[rows, columns] == item.id
+    return float(seen.reshape(len(letters), -1).mean(axis=1).min())

@@ -1,0 +1,111 @@
+"""What single pixel centres see of facets, in the image and around it.
+
+What is linear on a facet is linear in the image when divided by depth; Blinn 1992, "Hyperbolic
+Interpolation".
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.labels.coverage import Projected, Runs, spans
+
+Array = NDArray[np.float64]
+
+_MOST_POINTS = 1_000_000
+"""Of things that cover more, what lies outside the image is looked at on a coarser grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """What single pixel centres see. column, row: int [P]; within: bool [P], whether that is in the
+    image; depth_m: float64 [P]. Outside the image a point is the centre of `step` by `step` pixels,
+    of which (column, row) is the first.
+
+    facet: int [P], index into `plane`, float64 [F, 3, 4]: what each facet's rest position over
+    depth, in mm / m, and inverse depth are at its origin, and by how much they grow a pixel to the
+    right and down. away: float64 [2, P], right and down from that origin.
+    """
+
+    column: NDArray[np.int64]
+    row: NDArray[np.int64]
+    within: NDArray[np.bool_]
+    depth_m: Array
+    step: int
+    facet: NDArray[np.int64]
+    plane: Array
+    away: Array
+
+    def rest_mm(self, which: NDArray[np.int64]) -> Array:
+        """Rest positions [W, 3] of the points numbered `which` [W]."""
+        plane = self.plane.take(self.facet.take(which), axis=0)
+        right, down = self.away.take(which, axis=1)[..., None]
+        over_depth = plane[:, 0] + right * plane[:, 1] + down * plane[:, 2]
+        return np.asarray(over_depth[:, :3] * self.depth_m.take(which)[:, None])
+
+
+def surface_points(seen: Projected, size: tuple[int, int]) -> list[Points]:
+    """Every pixel centre in every facet, also outside an image of `size`: there on a grid that is
+    coarser the larger the facets are together, as Points of its own."""
+    if not len(seen.pixels):
+        return []
+    polygons, area = seen.polygons, np.prod(np.ptp(seen.pixels, axis=0))
+    if area <= _MOST_POINTS:
+        return [_points(seen, spans(polygons), 1, size)]
+    polygon, row, left, right = spans(polygons, size[1])
+    left, right = np.clip(left, 0, size[0]), np.clip(right, 0, size[0])
+    fine = _points(seen, (polygon, row, left, right), 1, size)
+    step = int(np.ceil(2 * np.sqrt(area / _MOST_POINTS)))
+    coarse = _points(seen, spans(polygons / step), step, size)
+    off = ~coarse.within
+    outside = replace(
+        coarse,
+        **{name: getattr(coarse, name)[off] for name in ("column", "row", "within", "depth_m")},
+        facet=coarse.facet[off],
+        away=coarse.away[:, off],
+    )
+    return [fine, outside]
+
+
+def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Points:
+    """The centres of squares of `step` pixels along `runs`, which count such squares."""
+    polygon, row, left, right = runs
+    length = right - left
+    ends = length.cumsum()
+    column = (left - ends + length).repeat(length)
+    column += np.arange(len(column))
+    met = np.zeros(len(seen.facets.corners), bool)
+    met[polygon] = True
+    origin, plane = _planes(seen, np.flatnonzero(met))
+    facet = (met.cumsum() - 1)[polygon].repeat(length)
+    column, row = column * step, row.repeat(length) * step
+    x, y = column + 0.5 * step, row + 0.5 * step
+    within = (x >= 0) & (x < size[0]) & (y >= 0) & (y < size[1])
+    from_x, from_y = origin.T.copy()
+    away = np.stack([x - from_x.take(facet), y - from_y.take(facet)])
+    inverse, right_of, down_of = plane[..., 3].T.copy()
+    depth = 1 / (
+        inverse.take(facet) + away[0] * right_of.take(facet) + away[1] * down_of.take(facet)
+    )
+    return Points(column, row, within, depth, step, facet, plane, away)
+
+
+def _planes(seen: Projected, which: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Origins [F, 2] in pixels and planes [F, 3, 4], as of Points, of the facets `which` [F]."""
+    assert seen.facets.rest_mm is not None
+    over_depth = np.column_stack([seen.facets.rest_mm, np.ones(len(seen.depth_m))])
+    over_depth /= seen.depth_m[:, None]
+    points = seen.facets.corners.take(which, axis=0)
+    # three corners fix a plane: of more, as clipping leaves, those of the largest triangle of a fan
+    corners = seen.pixels.take(points, axis=0)
+    sides = corners[:, 1:] - corners[:, :1]
+    doubled = sides[:, :-1, 0] * sides[:, 1:, 1] - sides[:, :-1, 1] * sides[:, 1:, 0]
+    second = np.abs(doubled).argmax(axis=1) + 1 + np.arange(len(which)) * points.shape[1]
+    a, b, c = points[:, 0], points.ravel().take(second), points.ravel().take(second + 1)
+    origin, value = seen.pixels.take(a, axis=0), over_depth.take(a, axis=0)
+    (bx, by), (cx, cy) = ((seen.pixels.take(to, axis=0) - origin).T[..., None] for to in (b, c))
+    grows, other = (over_depth.take(to, axis=0) - value for to in (b, c))
+    area = bx * cy - by * cx
+    right, down = (grows * cy - other * by) / area, (other * bx - grows * cx) / area
+    return origin, np.stack([value, right, down], axis=1)

@@ -1,1 +1,0 @@
-"""What prints are made of, below markings.py: identifiers, figures, lettering, artwork."""

@@ -1,0 +1,1 @@
+"""Everything that uses OpenGL: contexts, passes, shader programs, targets and CUDA."""

@@ -1,0 +1,1 @@
+"""OpenGL contexts without a screen: EGL and OSMesa."""

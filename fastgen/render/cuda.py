@@ -1,0 +1,235 @@
+"""Frames as CUDA memory: what GL drew, for PyTorch or CuPy, without a way through the host.
+
+The drawn textures are copied on the GPU into GL buffers that are registered with CUDA's driver
+(libcuda.so.1, nothing else is needed). Tests have a stand-in for that; on a GPU bench/gpu.py
+compares frames with those that are read back.
+"""
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from fastgen.camera.projection import View
+from fastgen.errors import ContextError
+from fastgen.render.gl import GLContext
+from fastgen.render.targets import Targets
+from fastgen.scene import Camera, Scene
+
+_LIBRARY = "libcuda.so.1"
+_VENDOR = "NVIDIA Corporation"
+
+# names as cuda.h and cudaGL.h define them: _v2 is the version with 64-bit addresses
+_CALLS = (
+    "cuInit",
+    "cuGetErrorName",
+    "cuGLGetDevices_v2",
+    "cuDevicePrimaryCtxRetain",
+    "cuDevicePrimaryCtxRelease_v2",
+    "cuCtxPushCurrent_v2",
+    "cuCtxPopCurrent_v2",
+    "cuGraphicsGLRegisterBuffer",
+    "cuGraphicsUnregisterResource",
+    "cuGraphicsMapResources",
+    "cuGraphicsUnmapResources",
+    "cuGraphicsResourceGetMappedPointer_v2",
+)
+_ALL_DEVICES = 1  # CU_GL_DEVICE_LIST_ALL
+_READ_AND_WRITE = 0  # CU_GRAPHICS_REGISTER_FLAGS_NONE: consumers may work in place
+_LEGACY_STREAM = 1  # of the CUDA array interface; the driver calls it NULL
+
+
+class CudaArray:
+    """An array in GPU memory, for `torch.as_tensor` or `cupy.asarray`, which do not copy it.
+
+    shape: rows first, no padding. typestr: NumPy's, such as '<f4'. Ready on CUDA's default stream,
+    the one that PyTorch uses unless told otherwise; work on another stream has to wait for that.
+    """
+
+    def __init__(self, pointer: int, shape: tuple[int, ...], typestr: str) -> None:
+        self._pointer = pointer
+        self.shape = shape
+        self.typestr = typestr
+
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]:
+        """Version 3 of the interface. Raises ContextError once GL has the memory back."""
+        if not self._pointer:
+            raise ContextError("this frame's memory went back to GL; clone a frame to keep it")
+        return {
+            "data": (self._pointer, False),
+            "shape": self.shape,
+            "typestr": self.typestr,
+            "strides": None,
+            "version": 3,
+            "stream": _LEGACY_STREAM,
+        }
+
+    def expire(self) -> None:
+        """Give no address from now on."""
+        self._pointer = 0
+
+
+@dataclass(frozen=True, eq=False)
+class CudaFrame:
+    """One draw in GPU memory, row 0 at the top; good until the next `Generator.render_cuda`.
+
+    image: uint8 [H, W, 4], sRGB and Frame.cover. labels: uint32 [H, W], id | damage << 16, see
+    Frame. depth: float32 [H, W], metres along the optical axis, inf where void. Objects are worked
+    out from ids on the host, so there are none here: `Generator.render` gives them.
+    """
+
+    image: CudaArray
+    labels: CudaArray
+    depth: CudaArray
+    scene: Scene
+    camera: Camera
+    view: View
+
+
+def cuda_reason(gl: GLContext) -> str:
+    """Why CUDA cannot reach what `gl`, which is current, draws; '' where it can."""
+    if gl.vendor != _VENDOR:
+        return f"OpenGL runs on {gl.renderer} ({gl.vendor}), not on an NVIDIA GPU"
+    try:
+        _Driver().device()
+    except ContextError as error:
+        return str(error)
+    return ""
+
+
+class CudaFrames:
+    """GPU memory for one frame of (width, height) = size, shared by GL and CUDA.
+
+    gl: a current context; it stays the caller's. Raises ContextError where `cuda_reason` gives one.
+    """
+
+    def __init__(self, gl: GLContext, size: tuple[int, int]) -> None:
+        reason = cuda_reason(gl)
+        if reason:
+            raise ContextError(f"cuda: {reason}; take Generator.render, or see fastgen doctor")
+        width, height = size
+        self._gl = gl
+        self._layouts = (
+            ((height, width, 4), "|u1"),
+            ((height, width), "<u4"),
+            ((height, width), "<f4"),
+        )
+        self._driver = _Driver()
+        self._device = self._driver.device()
+        self._context = ctypes.c_void_p()
+        # the primary context is the one that PyTorch and CuPy work in
+        self._driver("cuDevicePrimaryCtxRetain", ctypes.byref(self._context), self._device)
+        self._buffers = [gl.ctx.buffer(reserve=4 * width * height) for _ in self._layouts]
+        self._resources: list[ctypes.c_void_p] = []
+        self._mapped = False
+        self._arrays: list[CudaArray] = []
+        try:
+            with self._current():
+                for buffer in self._buffers:
+                    self._resources.append(self._register(buffer.glo))
+        except ContextError:
+            self.release()
+            raise
+
+    def take(self, targets: Targets) -> tuple[CudaArray, CudaArray, CudaArray]:
+        """Image, labels and depth of what was drawn into `targets`, see CudaFrame.
+
+        Ends the life of those that the last call gave, once CUDA's default stream is through
+        with them.
+        """
+        self._unmap()
+        targets.copy_to(*self._buffers)
+        with self._current():
+            self._driver("cuGraphicsMapResources", *self._all())
+            self._mapped = True
+            pointers = [self._pointer(resource) for resource in self._resources]
+        image, labels, depth = self._arrays = [
+            CudaArray(pointer, *layout)
+            for pointer, layout in zip(pointers, self._layouts, strict=True)
+        ]
+        return image, labels, depth
+
+    def release(self) -> None:
+        """Free the memory on both sides."""
+        self._gl.make_current()
+        self._unmap()
+        with self._current():
+            while self._resources:
+                self._driver("cuGraphicsUnregisterResource", self._resources.pop())
+        for buffer in self._buffers:
+            buffer.release()
+        self._driver("cuDevicePrimaryCtxRelease_v2", self._device)
+
+    def _unmap(self) -> None:
+        for array in self._arrays:
+            array.expire()
+        if self._mapped:
+            self._mapped = False
+            with self._current():
+                self._driver("cuGraphicsUnmapResources", *self._all())
+
+    def _all(self) -> tuple[Any, ...]:
+        """Count, resources and stream, as map and unmap take them."""
+        count = len(self._resources)
+        handles = (ctypes.c_void_p * count)(*[resource.value for resource in self._resources])
+        return ctypes.c_uint(count), handles, None
+
+    def _register(self, buffer: int) -> ctypes.c_void_p:
+        resource = ctypes.c_void_p()
+        arguments = ctypes.c_uint(buffer), ctypes.c_uint(_READ_AND_WRITE)
+        self._driver("cuGraphicsGLRegisterBuffer", ctypes.byref(resource), *arguments)
+        return resource
+
+    def _pointer(self, resource: ctypes.c_void_p) -> int:
+        pointer, size = ctypes.c_uint64(), ctypes.c_size_t()
+        found = ctypes.byref(pointer), ctypes.byref(size)
+        self._driver("cuGraphicsResourceGetMappedPointer_v2", *found, resource)
+        return pointer.value
+
+    @contextmanager
+    def _current(self) -> Iterator[None]:
+        """The primary context is the thread's within; afterwards that which was before."""
+        self._driver("cuCtxPushCurrent_v2", self._context)
+        try:
+            yield
+        finally:
+            self._driver("cuCtxPopCurrent_v2", ctypes.byref(ctypes.c_void_p()))
+
+
+class _Driver:
+    """CUDA's driver: call it with a function's name and arguments, all of them ctypes objects.
+
+    Failures become ContextErrors that name the function.
+    """
+
+    def __init__(self) -> None:
+        self._library = _load_library()
+        missing = [name for name in _CALLS if not hasattr(self._library, name)]
+        if missing:
+            raise ContextError(f"{_LIBRARY} has no {missing[0]}; update the NVIDIA driver")
+        self("cuInit", ctypes.c_uint(0))
+
+    def __call__(self, name: str, *arguments: Any) -> None:
+        code = getattr(self._library, name)(*arguments)
+        if code:
+            text = ctypes.c_char_p()
+            self._library.cuGetErrorName(ctypes.c_int(code), ctypes.byref(text))
+            raise ContextError(f"{name} failed: {(text.value or b'error').decode()} ({code})")
+
+    def device(self) -> ctypes.c_int:
+        """The CUDA device on which the current GL context draws: CUDA's order, not EGL's."""
+        count, device = ctypes.c_uint(), ctypes.c_int()
+        found = ctypes.byref(count), ctypes.byref(device)
+        self("cuGLGetDevices_v2", *found, ctypes.c_uint(1), ctypes.c_int(_ALL_DEVICES))
+        if not count.value:
+            raise ContextError("the GPU that OpenGL runs on is hidden from CUDA")
+        return device
+
+
+def _load_library() -> Any:
+    try:
+        return ctypes.CDLL(_LIBRARY)
+    except OSError as error:
+        raise ContextError(str(error)) from None

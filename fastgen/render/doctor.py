@@ -1,0 +1,95 @@
+"""Which OpenGL backends work on this machine, and what to install if none does."""
+
+import multiprocessing
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from fastgen.errors import FastgenError
+from fastgen.render.gl import egl_devices, open_context
+
+_START_S = 60.0
+"""For a new process to import what it needs; then its driver's time begins."""
+
+_TIMEOUT_S = 30.0
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One backend or device: whether it works, and its renderer string or why it failed."""
+
+    name: str
+    works: bool
+    words: str
+
+
+def diagnose() -> list[Finding]:
+    """Try every EGL device and OSMesa, each in a process of its own: drivers crash and hang."""
+    listed, answer = _isolated(_egl_device_names)
+    if not listed:
+        findings = [Finding("egl", False, answer)]
+    elif not answer:  # then there is Mesa's surfaceless platform at most
+        findings = [Finding("egl", *_isolated(_renderer, "egl", None))]
+    else:
+        findings = [
+            Finding(name, *_isolated(_renderer, "egl", index)) for index, name in enumerate(answer)
+        ]
+    return [*findings, Finding("osmesa", *_isolated(_renderer, "osmesa", None))]
+
+
+def report() -> tuple[str, bool]:
+    """What `fastgen doctor` prints, and whether anything works."""
+    findings = diagnose()
+    width = max(len(finding.name) for finding in findings)
+    lines = [f"{'ok  ' if f.works else 'FAIL'}  {f.name:{width}}  {f.words}" for f in findings]
+    works = any(finding.works for finding in findings)
+    if not works:
+        lines.append("Nothing renders here yet: follow one of the hints above.")
+    return "\n".join(lines), works
+
+
+def _egl_device_names() -> list[str]:
+    return [
+        f"egl device {index} ({'software' if device.software else 'hardware'})"
+        for index, device in enumerate(egl_devices())
+    ]
+
+
+def _renderer(backend: str, index: int | None) -> str:
+    with open_context(backend, index) as gl:
+        return f"{gl.renderer}, OpenGL {gl.version}"
+
+
+def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
+    """True and what `attempt` returns in a new process, or False and why it returned nothing."""
+    context = multiprocessing.get_context("spawn")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_answer, args=(sender, attempt, arguments), daemon=True)
+    process.start()
+    sender.close()
+    try:
+        if receiver.poll(_START_S):
+            receiver.recv()
+        if receiver.poll(_TIMEOUT_S):
+            answer: tuple[bool, Any] = receiver.recv()
+            return answer
+        return False, f"no answer within {_TIMEOUT_S:g} s: the driver hangs"
+    except EOFError:
+        process.join()
+        code = process.exitcode or 0
+        ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        return False, f"the driver crashed ({ended})"
+    finally:
+        process.kill()
+        process.join()
+        receiver.close()
+
+
+def _answer(sender: Any, attempt: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    sender.send("started")
+    try:
+        answer = True, attempt(*arguments)
+    except FastgenError as error:
+        answer = False, str(error)
+    sender.send(answer)

@@ -1,0 +1,263 @@
+"""(config, seed, index) -> Scene: pure, the same on every machine and in every process.
+
+Every property draws from a stream of its own, named after it, so that adding a property or
+drawing one value more does not change the others in any scene.
+"""
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from datetime import datetime
+from itertools import product
+
+import numpy as np
+
+from fastgen.camera.projection import view_of
+from fastgen.config.cameras import CameraConfig, direction_from, face_frame
+from fastgen.config.config import Config, ContainerConfig, SpreaderConfig, linear_color
+from fastgen.errors import ConfigError
+from fastgen.geometry.container import build_container
+from fastgen.geometry.mesh import Mesh
+from fastgen.light.hdri import hours_of
+from fastgen.sampling.damage import sample_damages
+from fastgen.sampling.markings import sample_decals
+from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
+from fastgen.scene import (
+    Ageing,
+    Camera,
+    Container,
+    Dirt,
+    EnvironmentView,
+    Paint,
+    Rust,
+    Scene,
+    Scratches,
+    Spreader,
+    Surface,
+    Vec3,
+    Wear,
+)
+from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.faces import SHEET_FACES
+from fastgen.validation import Range, nearest
+
+Streams = Callable[[str], np.random.Generator]
+
+SPLITS = ("train", "val", "test")
+
+
+def stream(seed: int, index: int, name: str) -> np.random.Generator:
+    """The random generator of one property of one scene; depends on nothing but its arguments."""
+    key = hashlib.blake2b(f"{seed}/{index}/{name}".encode(), digest_size=16).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
+
+
+def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
+    """The scene number `index` of the dataset that `config` and `seed` describe.
+
+    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
+    among them, all alike. Raises ConfigError when it names one that is not there.
+    """
+
+    def streams(name: str) -> np.random.Generator:
+        return stream(seed, index, name)
+
+    kinds = config.container.kinds
+    weights = np.array(list(kinds.values()))
+    kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
+    scale = float(streams("corrugation").choice(config.container.depth_scale))
+    container = Container(kind, config.container.profiles.deepened(scale))
+    mesh = build_container(container.kind, container.profiles)
+    surface = _surface(config, streams)
+    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
+    environment = _environment(config, streams, environments)
+    hours = hours_of(environment.name)
+    moment = sample_moment(config.sensor.stamp.years, hours, streams("moment"))
+    return Scene(
+        seed=seed,
+        index=index,
+        container=container,
+        surface=surface,
+        environment=environment,
+        cameras=tuple(
+            _with_sensor(_camera(name, rig, kind, streams), config, moment, streams)
+            for name, rig in config.cameras.items()
+        ),
+        decals=sample_decals(
+            config.markings,
+            kind,
+            sheet_sizes(mesh),
+            surface.paint.albedo,
+            streams,
+            flats=mesh.flats,
+        ),
+        damages=damages,
+        spreader=_spreader(config.spreader, streams),
+        weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
+    )
+
+
+def split_of(config: Config, seed: int, index: int) -> str:
+    """'train', 'val' or 'test': all views of a scene fall in the same split, whatever the count."""
+    shares = np.array([config.split.train, config.split.val, config.split.test])
+    edges = np.cumsum(shares / shares.sum())
+    return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
+
+
+def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
+    """Width and height in mm of the unfolded sheet of each face that carries decals."""
+    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
+    return {face: (rect[2], rect[3]) for face, rect in rects.items()}
+
+
+def _surface(config: Config, streams: Streams) -> Surface:
+    c = config.surface
+    name = str(streams("paint.color").choice(list(c.colors)))
+    rust = streams("rust")
+    rust_color = str(streams("rust.color").choice(c.rust_colors))
+    # squaring keeps most containers presentable and a few bad
+    low, high = c.rust_coverage
+    coverage = low + (high - low) * float(rust.random()) ** 2
+    return Surface(
+        paint=Paint(
+            name,
+            linear_color(c.colors[name]),
+            c.roughness.draw(streams("paint.roughness")),
+            c.tone_variation.draw(streams("paint.tone")),
+        ),
+        ageing=Ageing(
+            c.ageing_strength.draw(streams("ageing.strength")),
+            c.ageing_reach_mm.draw(streams("ageing.reach")),
+        ),
+        dirt=Dirt(
+            c.dirt_strength.draw(streams("dirt.strength")),
+            c.dirt_reach_mm.draw(streams("dirt.reach")),
+            linear_color(c.dirt_color),
+        ),
+        rust=Rust(
+            coverage,
+            c.rust_scale_mm.draw(streams("rust.scale")),
+            linear_color(rust_color),
+            c.rust_roughness.draw(streams("rust.roughness")),
+        ),
+        scratches=Scratches(c.scratch_coverage.draw(streams("scratches"))),
+        wear=Wear(
+            c.wear_strength.draw(streams("wear")),
+            c.wear_scale_mm.draw(streams("wear.scale")),
+        ),
+        noise_offset_mm=(
+            Range(0, 50000).draw(streams("noise.x")),
+            Range(0, 50000).draw(streams("noise.y")),
+        ),
+    )
+
+
+def _environment(
+    config: Config, streams: Streams, environments: Mapping[str, float]
+) -> EnvironmentView:
+    wanted = config.environment.names
+    for name in wanted:
+        if name not in environments:
+            raise ConfigError(
+                f"environment.names: no HDRI {name!r} here{nearest(name, environments)}"
+            )
+    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
+    share = np.array(list(weights.values())) / sum(weights.values())
+    name = str(streams("environment").choice(list(weights), p=share))
+    return EnvironmentView(name, config.environment.yaw_deg.draw(streams("environment.yaw")))
+
+
+def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
+    """Every container with every spreader that scenes of `config` may hold it by, up to colours."""
+    c = config.spreader
+    lowered = [v for v, p in ((True, c.flippers_down), (False, 1 - c.flippers_down)) if p > 0]
+    low, high = c.gap_mm
+    gaps = {_whole_gap(c, gap) for gap in (*np.arange(low, high, 5).tolist(), high)}
+    spreaders = [
+        Spreader(True, linear_color(c.colors[0]), (front, back), gap)
+        for front, back in product(lowered, repeat=2)
+        for gap in sorted(gaps)
+    ]
+    bare = replace(spreaders[0], present=False)
+    held = spreaders * (c.probability > 0) + [bare] * (c.probability < 1)
+    for one in one_container_each(config.container):
+        (kind,), (scale,) = one.kinds, one.depth_scale
+        container = Container(kind, config.container.profiles.deepened(scale))
+        yield from ((container, spreader) for spreader in held)
+
+
+def one_container_each(c: ContainerConfig) -> Iterator[ContainerConfig]:
+    """For every container of a distribution one that has only that."""
+    for kind, weight in c.kinds.items():
+        for scale in c.depth_scale * (weight > 0):
+            yield replace(c, kinds={kind: 1.0}, depth_scale=(scale,))
+
+
+def one_damage_each(config: Config) -> Iterator[Config]:
+    """`config` without damage, with bent steel for certain, and with a hole, as far as it has
+    them: a renderer draws the three in different ways."""
+    damage = config.damage
+    yield replace(config, damage=replace(damage, probability=0.0))
+    holes = ("perforation",)
+    for kinds in (tuple(k for k in damage.kinds if k not in holes), holes):
+        if damage.probability > 0 and set(kinds) & set(damage.kinds):
+            yield replace(config, damage=replace(damage, probability=1.0, kinds=kinds))
+
+
+def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
+    lowered = streams("spreader.flippers").random(2) < c.flippers_down
+    gap = _whole_gap(c, c.gap_mm.draw(streams("spreader.gap")))
+    return Spreader(
+        present=bool(streams("spreader").random() < c.probability),
+        albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
+        flippers_down=(bool(lowered[0]), bool(lowered[1])),
+        gap_mm=gap,
+    )
+
+
+def _whole_gap(c: SpreaderConfig, gap_mm: float) -> float:
+    """Few different gaps, so that few shapes are built."""
+    low, high = c.gap_mm
+    return min(max(10.0 * round(gap_mm / 10), low), high)
+
+
+def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
+    """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    rng = streams(f"camera.{name}")
+    frame = face_frame(rig.face, kind)
+    azimuth_deg, elevation_deg = rig.azimuth_deg.draw(rng), rig.elevation_deg.draw(rng)
+    direction = direction_from(frame, azimuth_deg, elevation_deg)
+    shift = rig.target_shift_mm.draw(rng) * frame.right + rig.target_shift_mm.draw(rng) * frame.up
+    target = frame.middle_mm + shift
+    position = _rounded(target + direction * rig.distance_mm.draw(rng))
+    roll = rig.roll_deg.draw(rng)
+    camera = Camera(
+        name=name,
+        position_mm=position,
+        target_mm=_rounded(target),
+        focal_mm=rig.focal_mm,
+        roll_deg=round(roll, 3),
+        sensor_width_mm=rig.sensor_width_mm,
+        exposure_ev=round(rig.exposure_ev.draw(rng), 3),
+        lens=sample_lens(rig.lens, streams(f"lens.{name}")) if rig.lens else None,
+    )
+    if frame.outward[2] == 0:
+        return camera
+    # near the vertical "up" means nothing: there the face's own right stays the image's
+    rows = view_of(replace(camera, roll_deg=0.0, lens=None), (1, 1)).rotation
+    level = math.degrees(math.atan2(-rows[1] @ frame.right, rows[0] @ frame.right))
+    return replace(camera, roll_deg=round((roll + level + 180) % 360 - 180, 3))
+
+
+def _with_sensor(camera: Camera, config: Config, moment: datetime, streams: Streams) -> Camera:
+    distance_mm = float(np.linalg.norm(np.subtract(camera.position_mm, camera.target_mm)))
+    sensor = sample_sensor(
+        config.sensor, distance_mm, moment, lambda part: streams(f"sensor.{camera.name}.{part}")
+    )
+    return replace(camera, sensor=sensor)
+
+
+def _rounded(point: np.ndarray) -> Vec3:
+    x, y, z = (round(float(v), 1) for v in point)
+    return x, y, z

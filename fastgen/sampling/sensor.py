@@ -1,0 +1,129 @@
+"""Draws what a camera and its weather do to an image; each part from a stream of its own."""
+
+import itertools
+from collections.abc import Callable, Iterator
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from fastgen.config.sensor import LensConfig, SensorConfig, WeatherConfig
+from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.validation import Range
+
+
+def sample_lens(config: LensConfig, rng: np.random.Generator) -> Lens:
+    """One lens of the kind that `config` describes; coefficients to a millionth."""
+    drawn = {name: getattr(config, name).draw(rng) for name in sorted(config.names)}
+    return Lens(config.model, tuple(round(drawn[name], 6) for name in config.names))
+
+
+def extreme_lenses(config: LensConfig) -> Iterator[Lens]:
+    """The lenses at the ends of all ranges."""
+    ends = [sorted({*getattr(config, name)}) for name in config.names]
+    return (Lens(config.model, values) for values in itertools.product(*ends))
+
+
+def sample_sensor(
+    config: SensorConfig,
+    distance_mm: float,
+    moment: datetime,
+    streams: Callable[[str], np.random.Generator],
+) -> Sensor | None:
+    """What a camera `distance_mm` before its target does to an image, None where it is nothing.
+
+    moment: when it takes it. streams: gives the random stream of each part by its name.
+    """
+    if config == SensorConfig():  # all is off: seeding streams takes longer than all they draw
+        return None
+    sensor = Sensor(
+        defocus=_defocus(config, distance_mm, streams("defocus")),
+        motion=_motion(config, streams("motion")),
+        vignetting=_drawn(streams("vignetting"), config.vignetting),
+        exposure_error_ev=_drawn(streams("exposure"), config.exposure_error_ev),
+        gains=_gains(config.white_balance_ev, streams("white balance")),
+        noise=_noise(config, streams("noise")),
+        stamp=_stamp(config, moment, streams("stamp")),
+        jpeg_quality=int(streams("jpeg").integers(*config.jpeg_quality, endpoint=True)),
+    )
+    return None if sensor == Sensor() else sensor
+
+
+def sample_moment(
+    years: tuple[int, int], hours: tuple[int, int], rng: np.random.Generator
+) -> datetime:
+    """When a scene is, to the second: in one of `years`, within `hours` of the day, past 24 after
+    midnight."""
+    first, last = years
+    day = datetime(int(rng.integers(first, last, endpoint=True)), 1, 1)
+    seconds = int(rng.integers(3600 * hours[0], 3600 * hours[1]))
+    return day + timedelta(days=int(rng.integers(364)), seconds=seconds)
+
+
+def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
+    """The weather of a scene; streams: as for `sample_sensor`."""
+    if config == WeatherConfig():
+        return Weather()
+    fog, rain, wet = streams("fog"), streams("rain"), streams("wet")
+    foggy, rains = (
+        rng.random() < probability
+        for rng, probability in ((fog, config.fog_probability), (rain, config.rain_probability))
+    )
+    wets = wet.random() < config.wet_probability or rains
+    return Weather(
+        visibility_mm=round(config.visibility_mm.draw(fog)) if foggy else 0.0,
+        rain=Rain(
+            rate_mm_h=_drawn(rain, config.rate_mm_h),
+            # to four digits, as four decimals would make 0 of the shortest
+            shutter_s=float(f"{config.shutter_s.draw(rain):.4g}"),
+            wind=_drawn(rain, config.wind),
+            seed=_seed(rain),
+        )
+        if rains
+        else None,
+        wetness=_drawn(wet, config.wetness) if wets else 0.0,
+    )
+
+
+def _defocus(config: SensorConfig, distance_mm: float, rng: np.random.Generator) -> Defocus | None:
+    if rng.random() >= config.defocus.probability:
+        return None
+    focus = config.defocus.focus.draw(rng) * distance_mm
+    return Defocus(round(focus), _drawn(rng, config.defocus.f_number))
+
+
+def _motion(config: SensorConfig, rng: np.random.Generator) -> tuple[float, float]:
+    if rng.random() >= config.motion.probability:
+        return 0.0, 0.0
+    extent, angle = config.motion.extent.draw(rng), rng.uniform(0, 2 * np.pi)
+    return round(float(extent * np.cos(angle)), 6), round(float(extent * np.sin(angle)), 6)
+
+
+def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
+    red, blue = (round(2.0 ** ev.draw(rng), 4) for _ in range(2))
+    return red, 1.0, blue
+
+
+def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
+    if rng.random() >= config.noise.probability:
+        return None
+    # so that halving the light is as likely at any level
+    low, high = np.log(config.noise.full_well_e)
+    full_well = round(float(np.exp(rng.uniform(low, high))))
+    return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))
+
+
+def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> Stamp | None:
+    if rng.random() >= config.stamp.probability:
+        return None
+    shape = str(rng.choice(["%Y-%m-%d", "%d/%m/%Y", "%d.%m.%Y", "%Y/%m/%d"]))
+    corner = str(rng.choice(config.stamp.corners))
+    text = moment.strftime(f"{shape} %H:%M:%S")
+    return Stamp(text, corner, _drawn(rng, config.stamp.height))
+
+
+def _drawn(rng: np.random.Generator, values: Range) -> float:
+    return round(values.draw(rng), 4)
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**31))

@@ -1,0 +1,33 @@
+"""Faces of a container and the axes of each face as seen from outside."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+FACES = ("front", "back", "door", "no_door", "roof", "underside")
+"""front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
+
+SHEET_FACES = ("front", "back", "door", "no_door", "roof")
+"""Those that can bear decals and damage."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """How a face is looked at from outside: right, up and toward the viewer, unit 3-vectors."""
+
+    right: tuple[float, float, float]
+    up: tuple[float, float, float]
+    out: tuple[float, float, float]
+
+
+FACE_AXES: Mapping[str, Axes] = MappingProxyType(
+    {
+        "front": Axes((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+        "back": Axes((-1, 0, 0), (0, 0, 1), (0, 1, 0)),
+        "door": Axes((0, 1, 0), (0, 0, 1), (1, 0, 0)),
+        "no_door": Axes((0, -1, 0), (0, 0, 1), (-1, 0, 0)),
+        "roof": Axes((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+        "underside": Axes((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+    }
+)
+"""right x up = out for every face, so nothing printed on a sheet is mirrored."""

@@ -1,0 +1,29 @@
+"""Numbers that stand for decals in the id target and for damages in the damage target."""
+
+from fastgen.classes import (
+    CONTAINER_ID,
+    DAMAGE_CLASSES,
+    DAMAGE_VALUES,
+    SEGMENTATION_CLASSES,
+    SPREADER_ID,
+)
+from fastgen.scene.data import Damage, Scene
+
+
+def object_ids(scene: Scene) -> list[int]:
+    """Id of each decal in the id target, 0 for those without a label: 2, 3, ... in scene order,
+    those of damages left out."""
+    numbers = range(CONTAINER_ID + 1, SPREADER_ID)
+    free = (number for number in numbers if number not in DAMAGE_VALUES)
+    return [next(free) if decal.class_name else 0 for decal in scene.decals]
+
+
+def mask_values(damages: tuple[Damage, ...]) -> list[int]:
+    """Value of each damage in the damage target: category * 100 + instance (3.3.4 of the paper)."""
+    counts = dict.fromkeys(DAMAGE_CLASSES, 0)
+    values = []
+    for damage in damages:
+        counts[damage.kind] += 1
+        category = SEGMENTATION_CLASSES.index(damage.kind) + 1
+        values.append(category * 100 + counts[damage.kind])
+    return values
