@@ -1,4 +1,7 @@
-// float ageing(...): darkening toward the corners of a panel that is narrow_mm wide, 0..1.
+// float ageing(float corner_mm, float narrow_mm, float tone): darkening near a panel's corners, 0..1.
+// corner_mm: Distance to the nearest corner. narrow_mm: The panel's shorter side: the darkening
+// reaches at most half that far. tone: Paint-tone noise, 0..1, which breaks up the pattern.
+// SeaFront paper, section 3.2. The two weights are artistic choices.
 
 float ageing(float corner_mm, float narrow_mm, float tone) {
     float near_corner = 1.0 - smoothstep(0.0, min(ageing_reach_mm, 0.5 * narrow_mm), corner_mm);

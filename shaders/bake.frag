@@ -1,4 +1,6 @@
-// The material at a texel of the atlas, unlit: the layers that shade.glsl lights, for export.
+// Fragment stage of texture export: evaluates the unlit material layers at one atlas texel.
+// Reads the atlas position and zone, and the rest position if there is damage. Writes base colour,
+// roughness and metallic.
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
@@ -26,8 +28,8 @@ flat in uint zone;
 
 uniform float texel_mm;
 
-layout(location = 0) out vec4 out_albedo;    // sRGB-encoded; alpha 1 where a part lies
-layout(location = 1) out vec4 out_surface;   // -, roughness, metallic, as glTF orders them
+layout(location = 0) out vec4 out_albedo;    // sRGB-encoded; alpha is 1 inside a part.
+layout(location = 1) out vec4 out_surface;   // Unused, roughness, metallic: glTF 2.0, section 3.9.2.
 
 void main() {
     float scar = 0.0;

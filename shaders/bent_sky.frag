@@ -1,4 +1,5 @@
-// Shades the sky where a lens bends it, and what layers other than all of them show in its place.
+// Fragment stage of the background, seen through a distorting lens or in a single-layer image.
+// Reads the environment map along the pixel's view ray. Writes display colour and coverage 0.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"

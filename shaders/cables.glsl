@@ -1,7 +1,9 @@
-// float cables_cover(vec2 pixel): the share of a pixel that cables cover, from where they run: samples
-// hit what is thinner than their distance now and then, and a straight cable would come out in dashes.
+// float cables_cover(vec2 pixel): share of a pixel that the hoisting cables cover, 0..1.
+// pixel: Position of its centre. The share is computed analytically, because point samples would draw
+// a cable thinner than their spacing as dashes.
 
-// the pixel filter's integral up to x pixels beside its centre
+// Integral of the pixel filter up to x pixels from its centre: a tent for 2 samples per axis, else
+// a box, as in SampleLattice.filter.
 float filtered_below(float x) {
 #if SAMPLES_PER_AXIS == 2
     float t = clamp(x, -1.0, 1.0);
@@ -11,16 +13,18 @@ float filtered_below(float x) {
 #endif
 }
 
+// Z component of the cross product.
 float turned(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 
-// cables are upright; pixel: its centre
+// All cables are vertical.
 float cables_cover(vec2 pixel) {
     vec3 ray = view_ray(pixel);
-    // of four sides along the axes; this and what lies aside are times the ray's level length
+    // Half the width at which an axis-aligned square bar is seen. Like `aside`, it is multiplied by
+    // the horizontal length of the ray.
     float half_width = CABLE_HALF_SIDE_M * (abs(ray.x) + abs(ray.y));
-    vec2 rise = ray.xy * (ray.z / max(dot(ray.xy, ray.xy), 1e-9));   // for a metre of what is level
+    vec2 rise = ray.xy * (ray.z / max(dot(ray.xy, ray.xy), 1e-9));   // Climb per horizontal metre.
     float cover = 0.0;
-    vec2 last = vec2(1.0, 0.0);   // from where to where the cable before covers; nothing yet
+    vec2 last = vec2(1.0, 0.0);   // Strip of the previous cable; empty at first.
     int i = 0;
     do {
         vec3 foot = cable_foot[i].xyz;
@@ -31,7 +35,7 @@ float cables_cover(vec2 pixel) {
         vec2 strip = vec2(filtered_below((aside - half_width) * pixels),
                           filtered_below((aside + half_width) * pixels));
         bool met = there && strip.y > strip.x;
-        // side by side in the image two cover more than one behind the other
+        // Count the overlap with the previous cable once.
         float both = max(min(strip.y, last.y) - max(strip.x, last.x), 0.0);
         cover += met ? strip.y - strip.x - both : 0.0;
         last = met ? strip : last;

@@ -1,6 +1,7 @@
-// Lists the pixels that see more than sky by what is to be done there, and writes what is known of their
-// labels already: decals, damages and holes are found where they are shaded.
-// llvmpipe runs both sides of every branch in a shader; a list for each side is the branch it takes.
+// Compute stage that sorts every pixel that sees more than sky into the list of its pixel class.
+// Reads the visibility buffer, decal cells and damages. Writes the lists, and label and depth of each
+// pixel whose centre sees a surface. shade_listed.comp overwrites labels near decals and damages.
+// The lists replace branches: Mesa's CPU driver llvmpipe executes both sides of every branch.
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
@@ -21,12 +22,12 @@
 
 layout(local_size_x = LIST_GROUP) in;
 
-uniform ivec4 region;   // x, y, width and height in pixels
+uniform ivec4 region;   // Corner x, y, width and height in pixels.
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
 
 #if DAMAGED
-// 1 near a damage, 2 near a hole, else 0
+// 2 near a hole, 1 near another damage, else 0.
 int damage_near(vec3 rest_mm) {
     int near = 0;
     for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
@@ -36,12 +37,12 @@ int damage_near(vec3 rest_mm) {
 }
 #endif
 
-// column and row of this invocation among size.x by size.y, counted row by row; a row of size.y or more where
-// none is left
+// Column and row of this invocation in a grid of size.x by size.y, counted row by row. Surplus
+// invocations get a row of size.y or more.
 ivec2 in_turn(ivec2 size) {
     int number = int(gl_GlobalInvocationID.x);
     int row = int(float(number) / float(size.x));
-    // a rounding may put what begins or ends a row into the one beside it
+    // Rounding may move the first or last cell of a row into the neighbouring row.
     int column = number - row * size.x;
     if (column < 0) --row;
     if (column >= size.x) ++row;
@@ -57,13 +58,15 @@ void write_labels(ivec2 pixel, uint key, float depth) {
 #if CABLES_NEAR
 bool sky_or_cable(uint key) { return key == 0u || float(key_zone(key)) == cable_zone; }
 
-// whether cables cover a part of a pixel; bare: nothing but sky is seen beside them
+// Whether cables cover a part of the pixel, more than about a step of 255. bare: the pixel shows
+// nothing but sky and cables.
 bool covered_in_part(ivec2 pixel, bool bare) {
     return bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496;
 }
 
-// of single samples: whether a pixel sees sky, or a cable with nothing but sky to its sides, left, right, over
-// and under it, for a cable may hang before other things; beyond the image is nothing
+// Whether a pixel of a single sample shows sky, or a cable surrounded by sky and cables. A cable in
+// front of another surface must not be mixed with sky. key: surface id of the pixel. sides: those of
+// its left, right, upper and lower neighbours; neighbours outside the image count as sky.
 bool seen_bare(ivec2 pixel, uint key, uvec4 sides) {
     ivec2 last = imageSize(label_image) - 1;
     bvec4 beyond = bvec4(pixel.x <= 0, pixel.x >= last.x, pixel.y <= 0, pixel.y >= last.y);
@@ -74,7 +77,7 @@ bool seen_bare(ivec2 pixel, uint key, uvec4 sides) {
 #endif
 
 #if COARSE
-// lists those of a block of two by two pixels whose bits are set, each by itself
+// Adds each pixel of a 2x2 block whose bit is set to a list, one entry per pixel.
 void list_each(uint list, ivec2 block, uint bits) {
     if (bits == 0u) return;
     uint at = listed(list, bitCount(bits));
@@ -82,13 +85,14 @@ void list_each(uint list, ivec2 block, uint bits) {
         if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_group(i), 1u);
 }
 
-// those of two by two pixels that see one facet, without prints or damage near, are shaded at once
+// 2x2 coarse shading (Vaidyanathan et al. 2014, Coarse Pixel Shading): pixels of a 2x2 block that see
+// the same facet are shaded once, unless a decal or damage is near.
 void main() {
     ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
     if (in_region.y >= region.w) return;
     ivec2 block = region.xy + in_region;
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_keys, 0));
-    // wzxy: from the order of textureGather to that of in_group
+    // The swizzle .wzxy reorders the texels of textureGather as in_group counts them.
     uvec4 key = textureGather(surface_keys, middle).wzxy;
     vec4 sheet_x = textureGather(sheet_points, middle, 0).wzxy;
     vec4 sheet_y = textureGather(sheet_points, middle, 1).wzxy;
@@ -97,7 +101,7 @@ void main() {
     vec4 rest_mm[3] = vec4[3](textureGather(rest_x, middle).wzxy, textureGather(rest_y, middle).wzxy,
                               textureGather(rest_z, middle).wzxy);
 #endif
-    uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // a bit for each pixel of these classes
+    uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // One bit per pixel and class.
 #if CABLES_NEAR
     uint cables = 0u;
     uvec4 left = textureGatherOffset(surface_keys, middle, ivec2(-1, 0)).wzxy;
@@ -140,7 +144,8 @@ void main() {
     uint groups[4];
     uint count = 0u;
     for (int i = 0; i < 4; ++i) {
-        // facets that face one way share a key: a step over the sheet tells of what lies hidden between
+        // Parallel facets share a surface id. A large step in atlas position shows that a hidden
+        // surface lies between two pixels.
         float most_mm = COARSE_STEP_PX * 1000.0 * pixel_angle * depth[i];
         uint group = 0u;
         for (int j = i; j < 4; ++j) {
@@ -165,7 +170,8 @@ void main() {
     uint keys[FILTER_NEAR] = keys_near(middle);
     uint key = keys[0];
     bool mixed = false;
-    // the first and the last of other parts stand for all: few pixels see a fourth
+    // Test three zones for decals: that of the centre, and the first and the last other one. Few
+    // pixels see a fourth.
     uint first = key, last = key;
     ivec2 first_at = middle, last_at = middle;
     for (int i = 1; i < FILTER_NEAR; ++i) {
@@ -195,7 +201,7 @@ void main() {
     if (near > 1) list = LIST_HOLED;
 #endif
 #if CABLES_NEAR
-    // in which nothing but sky is seen beside them, though perhaps all samples see sky, or the cable
+    // All samples of a pixel may miss a cable, or all may hit it; its exact coverage decides.
 #if SAMPLES_PER_AXIS == 1
     bool bare = seen_bare(pixel, key, uvec4(key_at(middle - ivec2(1, 0)), key_at(middle + ivec2(1, 0)),
                                             key_at(middle - ivec2(0, 1)), key_at(middle + ivec2(0, 1))));

@@ -1,17 +1,23 @@
-// vec3 deformed(vec3 p): where all damages move rest point p (mm, container frame); bool in_hole(i, p);
-// Damaged damage_at(p): what the shading needs there. The twin of fastgen/damage.py.
+// vec3 deformed(vec3 p): position of rest point p after all damages; mm in the container frame.
+// int hole_at(vec3 p): index of the perforation that removed p, -1 for none.
+// Damaged damage_at(vec3 p): derivative of the deformation, wear of the steel and mask value at p.
+// vec3 bent_normal(mat3 bend, vec3 n): normal n of the rest surface after the deformation.
+// Damage i displaces p along its inward axis. damage_law.py is the reference implementation in numpy;
+// section 3.3.2 of the SeaFront paper describes the four kinds.
 
+// A smooth hill, (1 - t^2)^2 up to |t| = 1 and 0 beyond, and its derivative.
 float bump(float t) { float s = max(1.0 - t * t, 0.0); return s * s; }
 float bump_slope(float t) { return -4.0 * t * max(1.0 - t * t, 0.0); }
 
+// Coordinates of p along, across and inward from the origin of damage i, in mm.
 vec3 damage_local(int i, vec3 p) {
     vec3 q = p - damage_origin[i].xyz;
     return vec3(dot(q, damage_along[i].xyz), dot(q, damage_across[i].xyz), dot(q, damage_inward[i].xyz));
 }
 
-// The first damage from i on, before `end`, that may move or mark the surface at p or a pixel beside
-// it; `end` for none. A driver that runs all sides of a branch skips nothing but a loop's turns: what
-// is far away is passed over here.
+// Index of the first damage from i on, before `end`, whose bounding sphere contains p; `end` if there
+// is none. The sphere includes the margin of within_reach. Loops skip distant damages by this
+// function, because llvmpipe executes both sides of a branch in a loop's body.
 int next_near(int i, int end, vec3 p) {
     for (; i < end; ++i) {
         vec3 q = p - damage_origin[i].xyz;
@@ -20,11 +26,14 @@ int next_near(int i, int end, vec3 p) {
     return i;
 }
 
+// Sideways offset of a dent's fold in mm at u mm along it: by turns straight and sinusoidal. a, b: the
+// first two vectors of its damage_shape.
 float fold_path(vec4 a, vec4 b, float u) {
     float turn = smoothstep(-0.25, 0.25, sin(PI * u / b.y + b.x));
     return a.z * turn * sin(2.0 * PI * u / a.w);
 }
 
+// Radius of a hole's outline in mm: its mean radius, modulated by the harmonics 2 to 6 of `angle`.
 float hole_radius(int i, float angle) {
     vec4 a = damage_shape[3 * i];
     vec4 b = damage_shape[3 * i + 1];
@@ -35,13 +44,12 @@ float hole_radius(int i, float angle) {
     return damage_along[i].w * ratio;
 }
 
-// holes are the first `hole_count` damages
+// Whether perforation i removed p. Perforations are the first hole_count damages.
 bool in_hole(int i, vec3 p) {
     vec3 q = damage_local(i, p);
     return length(q.xy) < hole_radius(i, atan(q.y, q.x)) && abs(q.z) < DAMAGE_FADE_START_MM;
 }
 
-// which perforation has torn away rest point p, -1 for none
 int hole_at(vec3 p) {
     int found = -1;
     int i = next_near(0, hole_count, p);
@@ -52,27 +60,30 @@ int hole_at(vec3 p) {
     return found;
 }
 
-// whether damage i may move or mark the surface at p, or a pixel beside it
+// Whether damage i may change a pixel that shows p. REACH_MARGIN_MM covers the neighbours that the
+// pixel filter reads.
 bool within_reach(int i, vec3 p) {
     vec3 q = abs(damage_local(i, p));
     vec3 reach = vec3(damage_along[i].w, damage_across[i].w, DAMAGE_FADE_END_MM);
     if (i < hole_count) reach.xy = reach.xy * HOLE_REACH + damage_shape[3 * i].x;
     else if (i < dent_end) {
         vec4 shape = damage_shape[3 * i];
-        reach.y = max(reach.y, shape.x) + shape.z;   // its path swings
+        reach.y = max(reach.y, shape.x) + shape.z;   // The fold swings to both sides.
     }
     else if (i >= bowl_end) reach.z = reach.y;
     return all(lessThan(q, reach + REACH_MARGIN_MM));
 }
 
 struct Field {
-    float amount;   // mm along `inward`
-    // its gradient in local coordinates; along a fold or an outline only nearly so, and without what
-    // fading inward adds, which turns neither the damaged sheet nor those across it
+    float amount;   // Displacement along the inward axis, mm.
+    // Gradient of `amount` in local coordinates. It is approximate along folds and hole outlines. It
+    // leaves out the inward fade, which tilts neither the damaged sheet nor sheets perpendicular to it.
     vec3 slope;
-    float scar;     // how much the steel is worked: aged in a fold, rusty along a torn rim; 0..1
+    float scar;     // Wear of the bent steel, 0..1: aged in a fold, rusty along a torn rim.
 };
 
+// Displacement field of damage i at p. Its kind follows from its index: perforations, dents, concave
+// damages, bent edges. The weights of `scar` are artistic choices.
 Field damage_field(int i, vec3 p) {
     vec3 q = damage_local(i, p);
     float half_length = damage_along[i].w;
@@ -121,12 +132,13 @@ Field damage_field(int i, vec3 p) {
                  scar * scar * step(0.5, fade));
 }
 
+// Weight of a field at w mm behind its face: a damage must not move the opposite wall.
 float sheet_fade(float w) {
     return 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(w));
 }
 
-// The damages come sorted by kind, and each kind has a loop of its own: a driver that runs all
-// sides of a branch would otherwise do four kinds' work for every damage.
+// Damages are sorted by kind, and each kind has its own loop. One loop with branches would cost
+// the work of four kinds per damage on llvmpipe, which executes both sides of every branch.
 vec3 deformed(vec3 p) {
     vec3 moved = p;
     for (int i = next_near(0, hole_count, p); i < hole_count; i = next_near(i + 1, hole_count, p)) {
@@ -157,15 +169,15 @@ vec3 deformed(vec3 p) {
 }
 
 struct Damaged {
-    mat3 bend;      // derivative of the deformed by the rest position
+    mat3 bend;      // Derivative of the deformed position by the rest position.
     float scar;
-    uint value;     // mask value of what moved this point most, above the threshold; 0 for none
+    uint value;     // Mask value of the damage with the largest displacement; 0 below the threshold.
 };
 
 Damaged damage_at(vec3 p) {
     Damaged d = Damaged(mat3(1.0), 0.0, 0u);
     float most = damage_threshold_mm;
-    // there is one at least, and nothing comes of one that is far away
+    // There is at least one damage, and a distant one adds nothing.
     int i = min(next_near(0, damage_count, p), damage_count - 1);
     do {
         Field f = damage_field(i, p);
@@ -182,7 +194,7 @@ Damaged damage_at(vec3 p) {
     return d;
 }
 
-// normals turn with the cofactors of the deformation
+// Normals transform by the cofactor matrix of the derivative.
 vec3 bent_normal(mat3 bend, vec3 n) {
     return normalize(n.x * cross(bend[1], bend[2]) + n.y * cross(bend[2], bend[0]) +
                      n.z * cross(bend[0], bend[1]));

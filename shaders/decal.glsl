@@ -1,34 +1,38 @@
-// DecalHit decals_at(...): what is printed or stuck at a point of the sheet, and whose id it bears.
+// DecalHit decals_at(uint zone, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise):
+// decals over the albedo `paint` at a point of the atlas: albedo, coverage and object id.
+// footprint_mm: width of the lookup on the surface.
 
-uniform sampler2D decal_table;      // DECAL_TEXELS texels a row, a row a decal; see decal_tables.py
-uniform sampler2D glyph_table;      // as of glyph_runs.py
-uniform sampler2DArray art;         // markers, stickers, emblems: sRGB, straight alpha
-uniform sampler2DArray glyph_tiles; // signed distance, 0.5 on the outline; share of ink
+uniform sampler2D decal_table;      // One row per decal; see DecalTables in decal_tables.py.
+uniform sampler2D glyph_table;      // One texel per letter; see GlyphRun in glyph_runs.py.
+uniform sampler2DArray art;         // Markers, stickers, emblems: sRGB, straight alpha.
+uniform sampler2DArray glyph_tiles; // R: signed distance, 0.5 on the outline. G: ink coverage.
 
 struct DecalHit {
     vec3 albedo;
-    float alpha;   // coverage of the footprint, 0..1
-    uint id;       // object at the exact point, 0 where none
+    float alpha;   // Covered share of the footprint, 0..1.
+    uint id;       // Object at the exact point, 0 for none.
 };
 
 vec4 decal_texel(uint decal, int column) {
     return texelFetch(decal_table, ivec2(column, int(decal) - 1), 0);
 }
 
-// a box's signed distance in mm, positive inside
+// Distance in mm to the nearest side of a box, positive inside.
 float inside_box(vec2 p, vec2 half_size) {
     vec2 d = half_size - abs(p);
     return min(d.x, d.y);
 }
 
-// ink of one glyph around a point `d` mm from its centre. Distances are sharp from near; once the
-// footprint nears the stroke's width, only averages of coverage keep the ink.
+// Ink coverage of one glyph at d mm from its centre. The distance field gives sharp outlines nearby
+// (Green 2007, Improved Alpha-Tested Magnification for Vector Textures and Special Effects). Averaged
+// distances lose or gain ink once the footprint nears the width of a stroke, so mip-mapped coverage
+// takes over there.
 float glyph_ink(vec2 d, float layer, float cap_mm, float footprint_mm) {
     float tile_mm = GLYPH_TILE_CAPS * cap_mm;
     vec2 uv = d / tile_mm + 0.5;
     if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 0.0;
     float lod = log2(footprint_mm * GLYPH_TILE_SIZE / tile_mm);
-    // bilinear lookups widen a texel by about half
+    // Half a level finer, because bilinear filtering widens a texel by about half.
     vec2 texel = textureLod(glyph_tiles, vec3(uv.x, 1.0 - uv.y, layer), max(lod - 0.5, 0.0)).rg;
     float distance_mm = (texel.r - 0.5) * GLYPH_RANGE_CAPS * cap_mm;
     float sharp = clamp(0.5 + distance_mm / footprint_mm, 0.0, 1.0);
@@ -37,6 +41,7 @@ float glyph_ink(vec2 d, float layer, float cap_mm, float footprint_mm) {
 
 vec4 glyph_texel(uint glyph) { return texelFetch(glyph_table, ivec2(glyph & 255u, glyph >> 8), 0); }
 
+// Ink coverage of a text at p mm from its middle. run: the fifth texel of the decal's row.
 float text_coverage(vec2 p, vec4 run, float footprint_mm) {
     float cap_mm = run.x;
     uint start = uint(run.y);
@@ -44,7 +49,7 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
     float part = clamp(fma(along, abs(run.w), 0.5 * run.z), 0.0, run.z - 1.0);
     uint reach = uint(glyph_texel(start + uint(part)).w);
     uint g = start + reach / GLYPH_RANGE, end = start + reach % GLYPH_RANGE;
-    // centre and layer of the two nearest glyphs: from afar, two share a footprint
+    // Offset, layer and distance of the two nearest glyphs: a wide footprint may touch both.
     vec4 first = vec4(1e9, 1e9, 0.0, 1e9);
     vec4 second = first;
     do {
@@ -58,7 +63,7 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
                glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
 }
 
-// worn: share of the ink that is gone where all of it wears
+// Adds one decal on top of `hit`. worn: share of the ink lost by a decal of wear 1.
 void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float worn) {
     vec4 place = decal_texel(decal, 1);
     vec4 turn = decal_texel(decal, 0);
@@ -80,7 +85,7 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
         float wave = abs(fract((p.x + p.y) / period_mm) - 0.5) * period_mm - 0.25 * period_mm;
         albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / footprint_mm, 0.0, 1.0));
     } else {
-        // half a level finer: trilinear lookups widen the footprint by as much
+        // Half a level finer, because trilinear filtering widens the footprint by about as much.
         float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
         vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
         albedo = kind.x == DECAL_EMBLEM ? ink.rgb : srgb_decode(texel.rgb);

@@ -1,4 +1,4 @@
-// One triangle that covers the image, as far away as the sky.
+// Vertex stage: one triangle that covers the viewport at the depth of the sky. Reads no buffers.
 #version 430 core
 #include "blocks.glsl"
 

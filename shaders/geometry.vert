@@ -1,4 +1,7 @@
-// Vertex stage of the geometry draws: rest mesh, deformed by its damages, to clip space.
+// Vertex stage of the geometry pass: deforms the rest mesh by its damages and projects it.
+// Reads rest position, normal, atlas position, zone and sky visibility of each vertex. Writes the
+// surface id and what geometry.frag stores in the visibility buffer.
+// programs.py generates blocks.glsl: the constants and the uniform blocks.
 #version 430 core
 #include "blocks.glsl"
 #include "octahedral.glsl"
@@ -13,27 +16,29 @@ layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_zone;
 layout(location = 5) in vec3 in_cone;
 layout(location = 6) in vec4 in_light;
-layout(location = 7) in uvec3 in_open_to;   // a bit for each of openness.py's directions
+layout(location = 7) in uvec3 in_open_to;   // One bit per direction of sky_visibility.py.
 
 out vec2 atlas_mm;
-out vec4 openness;   // cone, share of open sky about the mirrored ray
+out vec4 openness;   // Cone; share of open sky about the mirror direction.
 out vec4 sky_light;
 flat out uint surface_key;
 #if DAMAGED
 out vec3 rest_mm;
 #endif
 
-// what damages touch and what they do not is drawn by different programs, and meets without a gap
+// Different programs draw damaged and undamaged triangles. Positions must be equal to the bit, or
+// gaps would open between them.
 invariant gl_Position;
 
-uniform usampler2D lobe_masks;   // as openness.py makes them
+uniform usampler2D lobe_masks;   // See lobe_masks in sky_visibility.py.
 
+// Bit mask of the directions about `direction`, or of the hemisphere about it if below = LOBE_CELLS.
 uvec3 lobe_mask(vec3 direction, int below) {
     ivec2 cell = min(ivec2(octahedral(direction) * float(LOBE_CELLS)), ivec2(LOBE_CELLS - 1));
     return texelFetch(lobe_masks, cell + ivec2(0, below), 0).xyz;
 }
 
-// share of open sky about where a mirror there would show the eye
+// Share of open sky about the mirror direction of the view ray.
 float open_about_mirror(vec3 position_m, vec3 normal) {
     vec3 mirror = reflect(position_m - eye_m, normal);
     uvec3 lobe = lobe_mask(mirror, 0) & lobe_mask(normal, LOBE_CELLS);
@@ -53,7 +58,8 @@ void main() {
     openness = vec4(in_cone, open_about_mirror(position_mm * MM, in_normal));
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
-    // what holes show; in a mirror the sheets' backs pass for fronts: face culling keeps the insides
+    // Viewport 1 holds the inner view, which holes reveal. It is mirrored: that swaps front and back
+    // faces, so face culling keeps the inner sides.
     gl_ViewportIndex = 1;
     gl_Position.x = -gl_Position.x;
 #endif

@@ -1,14 +1,18 @@
 // vec3 lit(Reflector r, Openness sky): radiance of the environment reflected toward the eye.
+// vec3 diffuse_radiance(vec3 normal): irradiance / pi of the whole environment on a surface.
+// vec3 background(vec3 direction): radiance of the environment from a direction of any length.
+// Directions are in the world frame. prefilter.py makes the maps.
 
-uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, a layer a roughness, 1-texel border
-uniform sampler2D irradiance_light;      // irradiance / pi, 1-texel border
-uniform sampler2D background_light;      // radiance, x in its middle, 1-texel border
+uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, one layer per roughness.
+uniform sampler2D irradiance_light;      // Irradiance / pi by surface normal.
+uniform sampler2D background_light;      // Radiance; +x is the middle of the map.
 
+// World to environment frame; yaw: cosine and sine of the environment's rotation about +z.
 vec3 to_environment(vec3 d) {
     return vec3(fma(yaw.x, d.x, yaw.y * d.y), fma(yaw.x, d.y, -yaw.y * d.x), d.z);
 }
 
-// inside the border of a map that is `size` texels wide
+// Texture coordinates inside the border of one texel of a map `size` texels wide.
 vec2 bordered(vec2 uv, float size) {
     float texel = 1.0 / size;
     return fma(uv, vec2(1.0 - 2.0 * texel), vec2(texel));
@@ -28,50 +32,46 @@ vec3 diffuse_radiance(vec3 normal) {
     return textureLod(irradiance_light, uv, 0.0).rgb;
 }
 
-// the direction may have any length
 vec3 background(vec3 direction) {
     vec2 uv = bordered(octahedral(to_environment(direction).yzx), background_size);
     return textureLod(background_light, uv, 0.0).rgb;
 }
 
-// What rays have found to reach a point: of what an unhidden sky gives, its share of the irradiance and
-// of what the mirror shows; irradiance / pi and radiance in the mirror that surfaces add.
+// Light at a point, found by rays.
 struct Traced {
-    vec3 open;
-    vec3 thrown;
-    vec3 mirrored_open;
-    vec3 mirrored_thrown;
-    float known;   // 0 where no rays were cast
+    vec3 open;              // Share of the whole sky's irradiance that arrives.
+    vec3 thrown;            // Irradiance / pi of indirect light.
+    vec3 mirrored_open;     // Share of the sky's mirrored radiance that arrives.
+    vec3 mirrored_thrown;   // Mirrored radiance of other surfaces.
+    float known;            // Weight of the rays found; 0 without rays.
 };
 
 const Traced NO_RAYS = Traced(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 0.0);
 
-// what of the sky a point sees: a cone about its mean direction, the cosine of the cone's half-angle,
-// its irradiance from there, relative to that of a whole sky about that direction, the share that is
-// open about where it mirrors the eye's ray, whether `light` lacks what comes from what hides the sky,
-// 1 or 0, how much of that hangs above as a spreader does, 0 to 1, irradiance / pi that the suns throw on what
-// hides the sky and faces here, times its share, and the albedo of what hides it; where there are rays, they
-// stand for all of this
+// Sky visibility of a point, and its occluders: the surfaces that hide a share of its hemisphere.
+// lit() uses the rays instead if rays.known > 0.
 struct Openness {
-    vec3 direction;
-    float rim;
-    vec3 light;
-    float mirrored;
-    float bounces;
-    float hung;
-    vec3 sun;
-    vec3 beside;
+    vec3 direction;   // Bent normal: mean direction of the visible sky.
+    float rim;        // Cosine of the half-angle of the cone of visible sky.
+    vec3 light;       // Irradiance of the visible sky, relative to a whole sky about the bent normal.
+    float mirrored;   // Share of open sky about the mirror direction.
+    float bounces;    // 1 if `light` lacks light reflected by the occluders, else 0.
+    float hung;       // Share of the occluders that is a spreader overhead, 0..1.
+    vec3 sun;         // Irradiance / pi of directional lights on the occluders, times their share.
+    vec3 beside;      // Albedo of the occluders.
     Traced rays;
 };
 
-// along the surface, away from what hides the sky most; 0 where it is hidden all round alike
+// Component of the bent normal along the surface. It points away from the strongest occlusion, and is
+// 0 if occlusion is even all around.
 vec3 leaning(Openness sky, vec3 normal) {
     return sky.direction - normal * dot(normal, sky.direction);
 }
 
-// Light that gets here by way of what hides the sky: Jimenez et al. 2016, Practical Realtime
-// Strategies for Accurate Indirect Occlusion, section 4. Path-traced containers have three quarters of
-// their fit in corners, and more where little is hidden: that stands in the open itself.
+// Light reflected by the occluders, as a share of a whole sky: the fit of Jimenez et al. 2016,
+// Practical Realtime Strategies for Accurate Indirect Occlusion, section 4, less its direct part.
+// Corners of path-traced containers have three quarters of the fitted light. Small occluders reflect
+// more, because they are in the open themselves.
 vec3 bounced(Openness sky) {
     float share = 1.0 - sky.rim * sky.rim;
     vec3 a = 2.0404 * sky.beside - 0.3324;
@@ -81,32 +81,35 @@ vec3 bounced(Openness sky) {
     return min(fit * (0.75 + max(0.75 - 1.5 * sky.rim, 0.0)), 1.0 - share);
 }
 
-// Share of a lobe about `mirror` that meets open sky, by the cone and by what is open just where the
-// mirror points. Fitted, as are the bend, the width and the lean of lobes below, to GGX lobes of 96
-// rays from the pixels of 32 scenes; of much hidden by the distance to path-traced images.
+// Share of a GGX lobe about `mirror` that reaches the sky. It mixes two estimates: the cone of visible
+// sky, and the visibility about the mirror direction. The constants here, and the bend, width and lean
+// of lobes in lit(), are fitted to GGX lobes of 96 rays from the pixels of 32 scenes. The terms for
+// strong occlusion are fitted to path-traced images.
 float open_lobe(Openness sky, vec3 mirror, float roughness) {
     float within = smoothstep(0.58 * sky.rim - 0.55, 0.58 * sky.rim + 0.69 + 0.76 * roughness,
                               dot(mirror, sky.direction));
-    within = mix(1.0, within, min(sky.rim / 0.3, 1.0));   // no rim, nothing that hides
-    // a lobe at a roof under a spreader goes by one gap or none
+    within = mix(1.0, within, min(sky.rim / 0.3, 1.0));   // A rim of 0 has no occluders.
+    // On a roof under a spreader, a lobe passes through one gap or none.
     float pointed = 0.22 + 0.32 * sky.rim + 0.4 * smoothstep(0.6, 0.9, sky.rim);
     return mix(within, sky.mirrored, pointed);
 }
 
 vec3 lit(Reflector r, Openness sky) {
     Material m = r.material;
+    // Karis 2013 (split sum), Turquin 2019 (multiple scattering).
     vec3 metal = (m.albedo * r.dfg.x + r.dfg.y) * (1.0 + m.albedo * r.gain);
     vec3 specular = mix(vec3(r.dielectric), metal, m.metallic);
 
-    // rough lobes bend to the normal (Lagarde and de Rousiers 2014, section 4.9.3) and are narrower
-    // from aslant
+    // Rough lobes bend toward the normal (Lagarde and de Rousiers 2014, Moving Frostbite to PBR,
+    // section 4.9.3) and are narrower at grazing angles.
     float aslant = 1.0 - r.n_dot_v;
     float bend = min(m.roughness * m.roughness * (1.47 * m.roughness - 0.54 + 0.39 * aslant), 1.0);
     vec3 mirror = normalize(mix(reflect(-r.view, r.normal), r.normal, bend));
     float width = m.roughness * (1.025 - (0.79 - 0.415 * m.roughness) * aslant);
     vec3 around = diffuse_radiance(sky.direction) * (sky.light + sky.bounces * bounced(sky));
+    // Occluders reflect with the mean of their assumed albedo and the sheet's paint.
     around += sky.sun * mix(sky.beside, material_base[SHEET_MATERIAL].rgb, 0.5);
-    // where the sky is hidden the mirror shows what hides it; the rest of a lobe leans away from there
+    // The hidden part of a lobe mirrors the occluders. The rest leans away from them.
     float open = open_lobe(sky, mirror, m.roughness);
     vec3 aside = leaning(sky, r.normal);
     float most = length(aside);

@@ -1,8 +1,9 @@
-// vec3 inside_albedo(vec3 normal, vec3 rest_mm), vec3 inside(...): radiance of the container's inside,
-// seen through a hole.
-// Little light gets in: a share of the average around, unlike by where a side faces, so that the sides
-// can be told apart.
+// vec3 inside(vec3 normal, vec3 rest_mm): radiance of the container's interior, seen through a hole.
+// vec3 inside_albedo(vec3 normal, vec3 rest_mm): its albedo, of a wooden floor and primed walls.
+// Little light enters, so the radiance is a small share of the mean irradiance outside. Its variation
+// by normal is an artistic choice that makes the sides distinguishable.
 
+// The floor is made of boards 140 mm wide, with dark joints.
 vec3 inside_albedo(vec3 normal, vec3 rest_mm) {
     if (normal.z > 0.7) return INSIDE_WOOD * (0.85 + 0.15 * step(0.04, fract(rest_mm.y / 140.0)));
     return INSIDE_PRIMER;

@@ -1,12 +1,15 @@
-// uint key_at(ivec2 middle), uint[] keys_near(ivec2 middle), uint[] keys_around(ivec2 middle): the
-// surfaces that a pixel's samples see, in the order of FILTER_OFFSET; near are the first of them.
+// uint key_at(ivec2 middle): surface id of one sample in the visibility buffer; 0 is sky.
+// uint[] keys_near(ivec2 middle): ids of the first FILTER_NEAR samples of the pixel filter.
+// uint[] keys_around(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
+// middle: Texel of the sample at the pixel's centre.
 
 uniform usampler2D surface_keys;
 
 uint key_at(ivec2 middle) { return texelFetch(surface_keys, middle, 0).r; }
 
 #if SAMPLES_PER_AXIS == 2 || SAMPLES_PER_AXIS == 3
-// none is more than a texel away; two gathers bring most at half the cost of fetches
+// Near samples are at most a texel from the centre. Two gathers return most ids at half the cost
+// of single fetches.
 uint[FILTER_NEAR] keys_near(ivec2 middle) {
     vec2 corner = 1.0 / vec2(textureSize(surface_keys, 0));
     uvec4 low = textureGather(surface_keys, vec2(middle) * corner);

@@ -1,24 +1,29 @@
-// float covered(...), normal_covered(...): how much of a footprint lies above a noise threshold;
-// normal_threshold(share); NoiseSample read_noise(...), read_without_period(...).
+// NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm): filtered noise.
+// NoiseSample read_without_period(...): the same, without visible repetition.
+// float covered(float value, float threshold, float lost, float softness): share of a footprint where
+// uniform noise exceeds a threshold, 0..1. normal_covered(...) does it for normally distributed noise.
+// float normal_threshold(float share): threshold that `share` of a normal channel exceeds.
+// See noise.py for the channels. Both kinds of noise follow the idea of LEAN mapping (Olano and Baker
+// 2010): variance that filtering removes returns as softness of the threshold.
 
 uniform sampler2DArray noise_tiles;
 
 struct NoiseSample {
     vec4 value;
-    vec4 lost;   // standard deviation that filtering removed
+    vec4 lost;   // Standard deviation that filtering removed.
 };
 
-// tile_mm: length of a tile on the sheet; footprint_mm: width of the pixel on the sheet
-// The level of texels no wider than the footprint, for bilinear lookups widen them.
+// tile_mm: Side of a noise tile on the surface. footprint_mm: Width of the lookup on the surface.
+// The mip level's texels are at most as wide as the footprint, because bilinear filtering widens them.
 NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
     float lod = clamp(floor(log2(footprint_mm * NOISE_SIZE / tile_mm)), 0.0, NOISE_LEVELS - 1.0);
     vec4 value = textureLod(noise_tiles, vec3(sheet_mm / tile_mm, layer), lod);
     return NoiseSample(value, noise_lost[layer * int(NOISE_LEVELS) + int(lod)]);
 }
 
-// The sum of two lookups whose tiles are to each other as the golden ratio, one of them mirrored, so
-// that it repeats nowhere; the grain of the last channel is of one. Weights whose squares add up to 1
-// keep mean and deviation, and of normal channels the distribution: Heitz and Neyret 2018,
+// Sums two lookups. One is mirrored, and their tiles differ in size by the golden ratio, so the sum
+// repeats nowhere. The last channel, grain, has one lookup. The squares of the weights add up to 1,
+// which keeps mean and deviation, and the distribution of normal channels: Heitz and Neyret 2018,
 // High-Performance By-Example Noise using a Histogram-Preserving Blending Operator, section 3.
 NoiseSample read_without_period(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
     NoiseSample a = read_noise(layer, sheet_mm, 0.7862 * tile_mm, footprint_mm);
@@ -28,15 +33,14 @@ NoiseSample read_without_period(int layer, vec2 sheet_mm, float tile_mm, float f
     return a;
 }
 
-// A linear ramp, softer by the spread of what was filtered away: an even spread over a half-width h has
-// a variance of h * h / 3, and variances add.
+// A linear ramp about the threshold, widened by the deviation lost. A uniform distribution of
+// half-width h has the variance h * h / 3, and variances add.
 float covered(float value, float threshold, float lost, float softness) {
     float half_width = sqrt(softness * softness + 3.0 * lost * lost);
     return clamp(0.5 + 0.5 * (value - threshold) / half_width, 0.0, 1.0);
 }
 
-// Above what a normal channel (fastgen/drawing/noise.py) lies for `share` of the sheet, in deviations: the
-// quantile of Abramowitz and Stegun 1964, 26.2.22.
+// The normal quantile of Abramowitz and Stegun 1964, 26.2.22, in standard deviations.
 float normal_threshold(float share) {
     float rare = min(share, 1.0 - share);
     float t = sqrt(-2.0 * log(max(rare, 1e-6)));
@@ -44,12 +48,13 @@ float normal_threshold(float share) {
     return share < 0.5 ? quantile : -quantile;
 }
 
-// As covered, of a normal channel; thresholds and softness in its deviations.
+// Thresholds and softness are in standard deviations of the channel.
 vec3 normal_covered(float value, vec3 threshold, float lost, vec3 softness) {
     float spread = 2.0 * NORMAL_REACH * lost;
     vec3 x = (2.0 * NORMAL_REACH * (value - 0.5) - threshold) *
              inversesqrt(spread * spread + softness * softness);
-    // Phi: Page 1977, Approximations to the cumulative normal function and its inverse
+    // Normal distribution function: Page 1977, Approximations to the Cumulative Normal Function and its
+    // Inverse.
     return 1.0 / (1.0 + exp(-x * (1.5976 + 0.070566 * x * x)));
 }
 

@@ -1,5 +1,9 @@
-// vec4 bent(vec4 clip), vec2 straightened(vec2 pixel): a lens's distortion and the way back, see lens.py.
+// vec4 bent(vec4 clip): clip position after the lens distortion.
+// vec2 straightened(vec2 pixel): undistorted position of a pixel of the image; the inverse of bent().
+// Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
+// the radial polynomial continues as a straight line; see lens.py.
 
+// Tangential distortion of the Brown-Conrady model.
 vec2 tangential(vec2 p) {
     float q = dot(p, p);
     vec2 twice = 2.0 * lens_tangential * p.x * p.y;
@@ -20,7 +24,8 @@ vec4 bent(vec4 clip) {
     return vec4(to_clip * moved * clip.w, clip.zw);
 }
 
-// ideal over seen radius is the fit's reciprocal
+// Ratio of the undistorted to the distorted radius: the reciprocal of a polynomial in the squared
+// radius, which lens.py fits.
 float stretched(vec2 seen) {
     float q = dot(seen, seen);
     vec4 high = lens_back[1], low = lens_back[0];
@@ -28,9 +33,9 @@ float stretched(vec2 seen) {
     return 1.0 / ((((ratio * q + low.w) * q + low.z) * q + low.y) * q + low.x);
 }
 
-const int TANGENTIAL_STEPS = 6;   // each leaves a third of the error or less
+const int TANGENTIAL_STEPS = 6;   // Each leaves a third of the error or less.
 
-// the tangential part is that about the point sought, so it is found step by step
+// The tangential term depends on the undistorted point, which fixed-point iteration finds.
 vec2 straightened(vec2 pixel) {
     if (lens_model == 0.0) return pixel;
     vec2 seen = (pixel - lens_center) / lens_focal;

@@ -1,15 +1,17 @@
-// Points of surfaces that rays are cast from, two a cell of a grid over the image. Upper half: what the
-// middle pixel of the cell sees, if that is a surface. Lower half: another surface among the samples of
-// that pixel and those of the cell beside it, if any, by turns the first and the last.
+// Fragment stage that picks the points from which rays are cast: up to two per cell of a grid over
+// the image. Reads the visibility buffer; writes surface id, position and normal of each point.
+// The first point_rows rows hold the surface at the cell's middle pixel. The other rows hold another
+// surface, if samples there or at adjacent pixels see one. Cells alternate between the first and the
+// last such surface.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
 
-uniform int point_rows;     // of cells
-uniform ivec2 last_pixel;   // of the image
+uniform int point_rows;     // Rows of cells over the image.
+uniform ivec2 last_pixel;   // Column and row of the image's last pixel.
 
-layout(location = 0) out uint out_key;    // 0 for none
-layout(location = 1) out vec4 out_place;  // from the eye in m; perceptual roughness
+layout(location = 0) out uint out_key;    // 0 for no point.
+layout(location = 1) out vec4 out_place;  // Position relative to the eye in m; perceptual roughness.
 layout(location = 2) out vec4 out_normal;
 
 void main() {
@@ -23,7 +25,8 @@ void main() {
         uint first = key;
         bool last = ((cell.x + cell.y) & 1) == 1;
         key = 0u;
-        // no pixel beyond the next, nor outside the image: there the targets hold what was drawn before
+        // Neighbours are at most one pixel away and inside the image. Outside it the visibility buffer
+        // holds earlier content.
         ivec2 before = -ivec2(min(point_step / 2, 1));
         ivec2 after = min(ivec2(min((point_step - 1) / 2, 1)), last_pixel - pixel);
         for (int y = before.y; y <= after.y; ++y) {

@@ -1,20 +1,22 @@
-// SurfacePoint surface_at(zone, sheet_mm, footprint_mm, scar): all layers at a point of the sheet.
+// SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar): material of a
+// point after all layers. footprint_mm: Width of the lookup on the surface. scar: Wear of the steel by
+// damage, 0..1. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
+// artistic choices.
 
 struct SurfacePoint {
     Material material;
     uint decal_id;
-    vec3 outward;   // as in the table of zones
-    float printed;   // share that shows a decal
+    vec3 outward;   // Outward axis of a panel's face, or 0; see zone.glsl.
+    float printed;   // Share of the footprint that shows a decal.
 };
 
-// footprint_mm: width of the lookup on the sheet; scar: how much damage has worked the steel, 0..1
 SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar) {
     vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
     vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
     int code = int(part.x);
     int kind = code & ZONE_MATERIAL;
-    vec4 base = material_base[kind];   // albedo, roughness
-    vec4 trait = material_trait[kind]; // metallic, proneness to rust, share of the paint layers, -
+    vec4 base = material_base[kind];   // Albedo, roughness.
+    vec4 trait = material_trait[kind]; // Metallic, rust proneness, share of the paint layers, unused.
 
     vec2 from_low = sheet_mm - rect.xy;
     vec2 to_border = min(from_low, rect.zw - from_low);
@@ -72,8 +74,8 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
-    // worked steel shows, which rubber is not, and what stands before the sheet is not worked: dulled
-    // paint, then rust where the noise is rustiest
+    // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and
+    // door gear in front of the sheet is not scarred.
     scar *= (code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0;
     albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(scar), coarse.lost.y, 0.3) *
@@ -81,7 +83,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
 #endif
     float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
     vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x) *
-                 mix(1.22, 0.6, old);   // RUST_OLD of it is old: 1 on the mean
+                 mix(1.22, 0.6, old);   // 1 on average: RUST_OLD of the rust is old.
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif

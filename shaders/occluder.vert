@@ -1,4 +1,5 @@
-// What may hide the sky, seen in parallel from one direction: fastgen/light/sky_probe.py.
+// Vertex stage of the occluders' depth maps, for sky visibility and shadows of directional lights.
+// Reads positions in mm and projects them in parallel; map_matrix in occluders.py makes to_map.
 #version 430 core
 
 layout(location = 0) in vec3 in_position_mm;

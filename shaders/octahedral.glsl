@@ -1,5 +1,8 @@
-// Unit vectors to [0, 1]^2 and back, and the surface keys that hold a normal so.
-// Cigolle et al. 2014, A Survey of Efficient Representations for Independent Unit Vectors.
+// vec2 octahedral(vec3 n): octahedral coordinates in [0, 1]^2 of a direction of any length.
+// vec3 octahedral_direction(vec2 uv): unit vector of octahedral coordinates.
+// uint pack_surface_key(uint zone, vec3 normal): surface id; key_zone and key_normal unpack it.
+// Cigolle et al. 2014, A Survey of Efficient Representations for Independent Unit Vectors, JCGT 3(2),
+// section 3.2.
 
 vec2 octahedral(vec3 n) {
     n /= abs(n.x) + abs(n.y) + abs(n.z);
@@ -15,9 +18,9 @@ vec3 octahedral_direction(vec2 uv) {
     return normalize(n);
 }
 
-// zone + 1 in the low bits, so that 0 is the void; the normal in 2 x 11 bits
+// Zone + 1 is in the low 10 bits, so that 0 means no surface. The normal takes 2 x 11 bits.
 uint pack_surface_key(uint zone, vec3 normal) {
-    // 2046 steps, so that the axes are met exactly
+    // An even number of steps represents the axes exactly.
     uvec2 n = uvec2(octahedral(normal) * 2046.0 + 0.5);
     return (zone + 1u) | (n.x << 10) | (n.y << 21);
 }

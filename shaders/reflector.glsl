@@ -1,7 +1,8 @@
-// Reflector reflector(Material m, vec3 normal, vec3 view): what light of any kind meets at a point.
-// Split sum of Karis 2013 (Real Shading in Unreal Engine 4); directions are in the world frame.
+// Reflector reflector(Material m, vec3 normal, vec3 view): terms of the BRDF shared by all lights.
+// float fresnel_climb(float cosine): Fresnel reflectance, rescaled from F0..1 to 0..1.
+// Split sum of Karis 2013, Real Shading in Unreal Engine 4. Directions are in the world frame.
 
-uniform sampler2D dfg_table;   // x: n_dot_v, y: roughness -> scale and bias
+uniform sampler2D dfg_table;   // By n_dot_v and roughness: scale and bias of F0.
 
 struct Material {
     vec3 albedo;
@@ -12,17 +13,17 @@ struct Material {
 struct Reflector {
     Material material;
     vec3 normal;
-    vec3 view;         // unit, toward the eye
+    vec3 view;         // Unit, toward the eye.
     float n_dot_v;
     vec2 dfg;
-    // energy that single scattering loses, a unit of reflectance head-on: Turquin 2019, Practical
-    // multiple scattering compensation for microfacet models, eq. 16
+    // Energy that single scattering loses, per unit of F0: Turquin 2019, Practical multiple scattering
+    // compensation for microfacet models, eq. 16.
     float gain;
-    float dielectric;  // share of all light that a clear coat mirrors
-    vec3 diffuse;      // of what it lets through, the share that comes back
+    float dielectric;  // Share of all light that a clear coat mirrors.
+    vec3 diffuse;      // Share of all light that the base below the coat returns.
 };
 
-// as in fastgen/light/reflectance.py
+// Cook and Torrance 1982, A Reflectance Model for Computer Graphics; see reflectance.py.
 float fresnel_climb(float cosine) {
     float g = sqrt(fma(cosine, cosine, DIELECTRIC_INDEX * DIELECTRIC_INDEX - 1.0));
     float away = (g - cosine) / (g + cosine);

@@ -1,4 +1,4 @@
-// vec3 rest_at(ivec2): where a sample's point lies while nothing is damaged, in mm.
+// vec3 rest_at(ivec2 sample_at): position of a sample's surface point before any damage, in mm.
 
 uniform sampler2D rest_x;
 uniform sampler2D rest_y;

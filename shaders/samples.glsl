@@ -1,15 +1,15 @@
-// Where the samples of a pixel lie in the sample targets, and on the image: sample_lattice.py.
+// ivec2 middle_of(ivec2 pixel): texel of the sample at a pixel's centre, in the visibility buffer.
+// vec2 from_center(vec2 offset): offset in pixels of the sample `offset` texels from that sample.
+// vec2 place_of(ivec2 sample_at): position of a sample in the image, in pixels.
+// Twin of sample_lattice.py, which explains the slanted lattice of samples.
 
-// texel of the sample at a pixel's centre
 ivec2 middle_of(ivec2 pixel) {
     return pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2 + ivec2(SAMPLE_SLANT * pixel.y + SAMPLE_PAD, 0);
 }
 
-// pixels from a pixel's centre to the sample that many texels from it
 vec2 from_center(vec2 offset) {
     float down = offset.y / float(SAMPLES_PER_AXIS);
     return vec2((offset.x - float(SAMPLE_SLANT) * down) / float(SAMPLES_PER_AXIS), down);
 }
 
-// the place of a sample in the image
 vec2 place_of(ivec2 sample_at) { return 0.5 + from_center(vec2(sample_at - middle_of(ivec2(0)))); }

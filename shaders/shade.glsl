@@ -1,4 +1,9 @@
-// Shaded sky(ray), Part part_at(...), vec3 part_color(...): what shading a pixel of any class is made of.
+// Shading of pixels of all classes:
+// Shaded sky(vec3 ray): the background. Shaded single_surface(ivec2 pixel): a pixel of one surface.
+// Part part_at(ivec2 sample_at, uint key, vec3 view): the material that a part of a pixel shares.
+// vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view): its light toward the eye.
+// Shaded through_hole(ivec2 sample_at, uint key, vec3 ray): the view through a hole.
+// vec3 developed(vec3 color): tone-mapped and encoded colour.
 
 #include "octahedral.glsl"
 #include "samples.glsl"
@@ -33,19 +38,19 @@
 
 uniform sampler2D sheet_points;
 uniform sampler2D sheet_depths;
-uniform usampler2D openness_points;   // four bytes each
+uniform usampler2D openness_points;   // Four bytes per texel.
 uniform usampler2D light_points;
 
 struct Shaded {
-    vec3 color;   // exposed radiance; of a single layer, what is displayed
+    vec3 color;   // Exposed radiance; in a single-layer image the value to show.
     uint id;
     uint damage;
     float depth;
-    float cover;   // share of the pixel that is no sky
+    float cover;   // Share of the pixel that is not sky.
 };
 
-// pixels that are shaded at once are so in the middle between the first and the last of them: how far that
-// is from the first, and how many there are
+// 2x2 coarse shading evaluates several pixels once, midway between the first and the last pixel.
+// to_last: Offset of the last pixel from the first. shaded_at_once: Number of pixels.
 #if WITH_COARSE
 ivec2 to_last;
 float shaded_at_once;
@@ -54,7 +59,7 @@ const ivec2 to_last = ivec2(0);
 const float shaded_at_once = 1.0;
 #endif
 
-// what samplers hold in that middle, the first sample being at sample_at
+// Value of a visibility-buffer texture at that midpoint; sample_at belongs to the first pixel.
 vec4 mean_of(sampler2D values, ivec2 sample_at) {
     vec4 first = texelFetch(values, sample_at, 0);
 #if WITH_COARSE
@@ -73,7 +78,8 @@ vec4 mean_of_bytes(usampler2D values, ivec2 sample_at) {
 #endif
 }
 
-// as openness.py encodes it; interreflection.py has found what surfaces throw on the spreader
+// Decodes what sky_visibility.py encodes. On the spreader the light includes indirect light already;
+// see indirect_light.py.
 Openness openness_at(ivec2 sample_at, uint zone) {
     vec4 stored = mean_of_bytes(openness_points, sample_at);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
@@ -86,7 +92,7 @@ Openness openness_at(ivec2 sample_at, uint zone) {
                     NO_RAYS);
 }
 
-// to what is displayed, sRGB-encoded: last of all, for a pixel gathers light and not tones
+// Must run after the pixel filter, because a pixel averages light, not encoded values.
 vec3 developed(vec3 color) {
 #if LAYER == LAYER_NORMALS
     return color;
@@ -96,7 +102,7 @@ vec3 developed(vec3 color) {
     return srgb_encode(color);
 }
 
-// sun_seen: share of each sun that gets there
+// sun_seen: Unshadowed share of each directional light.
 vec3 layer_color(Material m, vec3 normal, vec3 view, Openness sky, vec4 sun_seen) {
 #if LAYER == LAYER_ALL
     Reflector r = reflector(m, normal, view);
@@ -119,20 +125,20 @@ Shaded sky(vec3 ray) {
 #if LAYER == LAYER_ALL
     vec3 color = exposure * background(ray);
 #elif LAYER == LAYER_NORMALS
-    vec3 color = vec3(0.5);   // no direction
+    vec3 color = vec3(0.5);   // The sky has no normal.
 #else
     vec3 color = vec3(1.0);
 #endif
     return Shaded(color, 0u, 0u, VOID_DEPTH, 0.0);
 }
 
-// all that the samples of one part within a pixel share: its layers, the point they are taken at
+// A part is one zone within a pixel. All its samples share these values, taken at one point.
 struct Part {
     SurfacePoint surface;
     uint id;
     uint damage;
     float depth;
-    float footprint_mm;   // on the sheet, of a lookup of the layers
+    float footprint_mm;   // Width of a material lookup on the surface.
     float scar;
 #if WITH_DAMAGE
     mat3 bend;
@@ -154,7 +160,7 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
-    // the geometric mean of the footprint's two axes on the sheet
+    // Geometric mean of the footprint's two axes on the surface.
     p.footprint_mm = sqrt(shaded_at_once) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
                      inversesqrt(max(facing, 0.05));
     p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
@@ -167,14 +173,14 @@ Part part_at(ivec2 sample_at, uint key, vec3 view) {
 }
 
 #if LOOKUPS > 1
-// what all lookups of a pixel have in common, the layers at none
+// A sum of lookups before the first one: zero, except for values that are the same for all lookups.
 SurfacePoint no_layers(SurfacePoint first) {
     first.material = Material(vec3(0.0), 0.0, 0.0);
     first.printed = 0.0;
     return first;
 }
 
-// the layers of `p` at another point of its sheet go into `sum`, the mean of `count` of them
+// Adds the material of `p` at another atlas position to `sum`, the mean of `count` lookups.
 void add_layers(inout SurfacePoint sum, Part p, uint zone, vec2 sheet_mm, float count) {
     SurfacePoint s = surface_at(zone, sheet_mm, p.footprint_mm, p.scar);
     sum.material.albedo += s.material.albedo / count;
@@ -191,9 +197,10 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     normal = bent_normal(p.bend, normal);
     sky.direction = bent_normal(p.bend, sky.direction);
 #endif
-    // the paint of the place, for much rust seldom stands alone, but never a print's
+    // Occluders are assumed to have the local albedo, because heavy rust is rarely isolated. A decal
+    // says nothing about them, so the sheet's paint replaces it.
     sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
-    // over a roof, prints too, it is the spreader's
+    // Above a roof the occluder is the spreader.
     sky.hung = above.a * sky.bounces * max(p.surface.outward.z, 0.0);
     sky.beside = mix(sky.beside, above.rgb, sky.hung);
     vec4 sun_seen = vec4(0.0);
@@ -204,7 +211,8 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     sky.rays = traced_at(place, key, from_eye, normal);
 #endif
 #if SUNS && LAYER == LAYER_ALL
-    // before a sun behind the wall stands the whole container, too close to a groove for the map
+    // The whole container blocks a light behind the panel, but it is too close to a groove for the
+    // shadow map to show that.
     if (dot(p.surface.outward, sun_toward[0].xyz) >= 0.0) {
         sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);
         sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky, 0);
@@ -219,14 +227,15 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     return layer_color(p.surface.material, normal, view, sky, sun_seen);
 }
 
-// a pixel whose near samples all see the same surface
+// A pixel whose near samples all see the same surface.
 Shaded single_surface(ivec2 pixel) {
     ivec2 middle = middle_of(pixel);
     uint key = key_at(middle);
     vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 + 0.5 * vec2(to_last)));
     Part p = part_at(middle, key, view);
 #if LOOKUPS > 1
-    // the sheet is all but flat between the middle and two others of its near samples
+    // The surface is nearly flat between the centre sample and two other near samples, so the atlas
+    // position is linear in the pixel.
     const ivec2 one = ivec2(FILTER_STEP), other = ivec2(FILTER_STEP, -FILTER_STEP);
     const mat2 pixels = mat2(from_center(vec2(one)), from_center(vec2(other)));
     vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
@@ -242,7 +251,7 @@ Shaded single_surface(ivec2 pixel) {
 }
 
 #if WITH_HOLES
-// what a hole shows: the inside of the container, or the sky through another hole
+// Shows the interior of the container, or the sky through another hole.
 Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
     uint inner_key = key_at(inner_at);
@@ -250,13 +259,13 @@ Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
     float depth = texelFetch(sheet_depths, inner_at, 0).r;
     Shaded s = sky(ray);
     if (inner_key != 0u) {
-        vec3 normal = -key_normal(inner_key);   // sheets are seen from behind
+        vec3 normal = -key_normal(inner_key);   // The inner view sees surfaces from behind.
 #if LAYER == LAYER_NORMALS
         vec3 seen = bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5;
 #elif LAYER == LAYER_ALL
         vec3 seen = exposure * inside(normal, rest_mm);
 #elif LAYER == LAYER_REFLECTION
-        vec3 seen = vec3(1.0);   // as rough as can be
+        vec3 seen = vec3(1.0);   // Maximum roughness.
 #else
         vec3 seen = inside_albedo(normal, rest_mm);
 #endif

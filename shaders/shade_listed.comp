@@ -1,4 +1,6 @@
-// Shades the listed pixels of one class: all but those that see sky alone.
+// Compute stage that shades the listed pixels of one pixel class.
+// Reads the list, the visibility buffer, material tables and lights. Writes display colour and
+// coverage, labels near decals and damages, and depth near holes.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
@@ -11,8 +13,8 @@
 layout(local_size_x = LIST_GROUP) in;
 
 #if OF_CABLES
-// steel, rusty on the mean, as much of it as covers the pixel; of its four sides along the axes the eye
-// sees two, each as wide as it faces the eye
+// A pixel that cables cover in part: steel with its mean rust, mixed with the sky by coverage. The eye
+// sees two of a cable's four axis-aligned sides, each in proportion to how it faces the eye.
 Shaded cable(vec2 center) {
     vec3 ray = view_ray(center);
     vec3 view = -normalize(ray);
@@ -23,7 +25,7 @@ Shaded cable(vec2 center) {
     steel.roughness = mix(steel.roughness, rust_roughness, cable_rusted.a);
     steel.metallic *= 1.0 - cable_rusted.a;
 #endif
-    wet(steel.albedo, steel.roughness, steel.metallic, 0.8 * wetness);   // material.glsl's mean
+    wet(steel.albedo, steel.roughness, steel.metallic, 0.8 * wetness);   // The mean in material.glsl.
     vec3 color = vec3(0.0);
     for (int axis = 0; axis < 2; ++axis) {
         vec3 normal = vec3(0.0);
@@ -55,10 +57,10 @@ void main() {
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
     ivec2 middle = middle_of(pixel);
-    // the filter's samples, on and about the pixel's centre: the layers once for each part of the
-    // container seen, the light once for each of its orientations
+    // Among the samples of the pixel filter, the material is evaluated once per zone, and lighting
+    // once per surface id, which is an orientation within a zone.
     uint keys[FILTER_SAMPLES] = keys_around(middle);
-    uint left = 0u;   // a bit for each sample that is still to be shaded
+    uint left = 0u;   // One bit per sample that is still to be shaded.
     float sky_weight = 0.0;
     for (int i = 0; i < FILTER_SAMPLES; ++i) {
         if (keys[i] == 0u) sky_weight += FILTER_WEIGHT[i];
@@ -73,8 +75,8 @@ void main() {
     Shaded s = sky(view_ray(center));
     vec3 color = sky_weight * s.color;
     float done = sky_weight;
-    // a driver that runs all lanes until the last is done runs a loop's body once more to find that
-    // its condition fails ahead of it: conditions come last. Of several surfaces one is no sky.
+    // Conditions are at the end of loops, because llvmpipe executes a body once more for a condition
+    // at the start. At least one sample of a mixed pixel sees a surface.
     int part = 0;
     do {
         uint first_key = 0u;
@@ -90,8 +92,8 @@ void main() {
         vec3 view = -normalize(ray);
         Part p = part_at(middle + offset, first_key, view);
 #if LOOKUPS > 1
-        // at the first of its samples; of two lookups neither is at the first of three samples or
-        // more, the middle one where it has that, so that they lie on either side
+        // Lookups are at the first samples of the zone. Two lookups skip the first of three or more
+        // samples, the centre if the zone covers it, so that they lie on either side.
         int found = bitCount(of_part);
         uint others = LOOKUPS == 2 && found > 2 ? of_part & (of_part - 1u) : of_part;
         SurfacePoint mean = no_layers(p.surface);
@@ -100,7 +102,7 @@ void main() {
             ivec2 at = offset;
             for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
                 if ((others & 1u << i) != 0u) at = FILTER_OFFSET[i];
-            others &= others - 1u;   // less the lowest bit
+            others &= others - 1u;   // Clears the lowest bit.
             add_layers(mean, p, zone, texelFetch(sheet_points, middle + at, 0).xy, float(lookups));
         } while (++lookup < lookups);
         p.surface = mean;
@@ -132,7 +134,7 @@ void main() {
             done += weight;
         } while (++side < MAX_SIDES && of_part != 0u);
     } while (++part < MAX_PARTS && left != 0u);
-    color /= done;   // of a busy pixel, what was not come to counts like the rest
+    color /= done;   // Surfaces beyond MAX_PARTS and MAX_SIDES look like the rest.
     s.cover = 1.0 - sky_weight / done;
 #elif OF_CABLES
     Shaded s = cable(vec2(pixel) + 0.5);
@@ -148,7 +150,7 @@ void main() {
 #else
     imageStore(color_image, pixel, shown);
 #endif
-    // of other pixels classify.comp knew it
+    // For other classes classify.comp has written labels and depth.
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
 #endif

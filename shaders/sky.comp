@@ -1,11 +1,12 @@
-// Shades every pixel as if it saw sky alone, and stores the sky's labels and depth: what else is seen is
-// written over it.
+// Compute stage of the background: shades every pixel as sky. Later passes overwrite pixels
+// that see a surface. Reads the environment map. Writes display colour, coverage 0, and the sky's label
+// and depth.
 #version 430 core
 #include "blocks.glsl"
 #include "shade.glsl"
 #include "images.glsl"
 
-layout(local_size_x = LIST_GROUP) in;   // of a row
+layout(local_size_x = LIST_GROUP) in;   // Pixels of one row.
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

@@ -1,9 +1,10 @@
-// Shades the pixels that see only the sky.
+// Fragment stage of the background without lens distortion.
+// Reads the environment map at the interpolated coordinates. Writes display colour and coverage 0.
 #version 430 core
 #include "blocks.glsl"
 #include "tone.glsl"
 
-uniform sampler2D background_light;   // as in ibl.glsl
+uniform sampler2D background_light;   // As in ibl.glsl.
 
 in vec2 map_uv;
 

@@ -1,24 +1,26 @@
-// Exposed linear radiance to what a screen shows, and sRGB encoding.
+// vec3 neutral_tone(vec3 c): exposed linear radiance to linear display colour.
+// vec3 srgb_encode(vec3 c), vec3 srgb_decode(vec3 c): sRGB transfer function and its inverse.
 
-// Khronos PBR Neutral (fastgen/light/tone.py): the identity less the Fresnel offset, then a shoulder that
-// leans to white.
+// Khronos PBR Neutral (Khronos Group 2024, specification section 2; constants in tone.py): subtracts
+// the Fresnel offset, then compresses highlights toward white.
 vec3 neutral_tone(vec3 c) {
     const float start = TONE_SHOULDER - TONE_FRESNEL;
     float low = min(c.r, min(c.g, c.b));
     c -= low < 2.0 * TONE_FRESNEL ? low - 0.25 / TONE_FRESNEL * low * low : TONE_FRESNEL;
     float peak = max(c.r, max(c.g, c.b));
-    // where the peak is below the start, the shoulder's own formula leaves c as it is
+    // A peak clamped to `start` makes the formula below the identity, so no branch is needed.
     const float d = 1.0 - start;
-    float shoulder = clamp(peak, start, 1e6);   // white anyway, and a fourth power below
-    // of what comes out, the peak is (over - d * d) / over and the share of white 1 - over / whitened: both
-    // over one divisor, for divisions are dear
+    float shoulder = clamp(peak, start, 1e6);   // Keeps the fourth power below finite.
+    // The compressed peak is (over - d * d) / over, and the share of white is 1 - over / whitened. One
+    // common divisor saves a division.
     float over = shoulder + d - start;
     float whitened = TONE_DESATURATION * (shoulder * over - over + d * d) + over;
     float kept = (over - d * d) / (over * shoulder * whitened);
     return c * (over * kept) + (whitened - over) * shoulder * kept;
 }
 
-// IEC 61966-2-1, within a twentieth of a step of 255: the power 1/2.4 as a polynomial of the square root
+// IEC 61966-2-1. A polynomial in the square root replaces the power 1/2.4; its error is at most 0.05
+// of a step of 255.
 vec3 srgb_encode(vec3 c) {
     vec3 x = sqrt(c);
     vec3 curve = fma(vec3(-0.94768983), x, vec3(3.41874960));

@@ -1,4 +1,5 @@
-// vec3 view_ray(vec2 pixel): from the eye through a place in the image; a metre of depth long.
+// vec3 view_ray(vec2 pixel): ray from the eye through a position in the image, in the world frame.
+// Its length is 1 m of depth along the optical axis.
 
 vec3 view_ray(vec2 pixel) {
     pixel = straightened(pixel);

@@ -1,7 +1,8 @@
-// void wet(albedo, roughness, metallic, wetness): what rain does to a surface; 0 dry to 1 soaked.
+// void wet(inout vec3 albedo, inout float roughness, float metallic, float wetness): effect of rain on
+// a surface. wetness: 0 for dry to 1 for soaked.
 
-// Lagarde 2013, "Water drop 3b: physically based wet surfaces": what is porous, which is rough,
-// soaks water and darkens to a fifth. That a film of water smooths all is his too, by how much is ours.
+// Lagarde 2013, "Water drop 3b: Physically based wet surfaces": rough non-metals are porous, soak up
+// water and darken to a fifth. A film of water smooths every surface; the factor 0.7 is our choice.
 void wet(inout vec3 albedo, inout float roughness, float metallic, float wetness) {
     float porosity = clamp((roughness - 0.5) / 0.4, 0.0, 1.0) * (1.0 - metallic);
     albedo *= 1.0 - 0.8 * porosity * wetness;

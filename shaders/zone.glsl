@@ -1,10 +1,12 @@
-// What is known of each zone of the atlas (fastgen/drawing/gpu_mesh.py). bool before_sheet(zone): whether it is
-// of the door's bars; vec2 upright(sheet_mm, code): turned so that +y is up in the world; float
-// to_upper_side(from_low, size, code): distance to the side of a zone that is up.
+// bool before_sheet(uint zone): whether a zone belongs to door gear, which is in front of the sheet.
+// vec2 upright(vec2 sheet_mm, int code): atlas position, turned so that +y is up in the world.
+// float to_upper_side(vec2 from_low, vec2 size, int code): distance in mm to a zone's upper side.
+// A zone is a part of the atlas that weathers on its own, such as one side of a beam.
 
-uniform sampler2D zone_table;   // row 0: x0, y0, width, height in mm; row 1: code, and of panels and
-                                // door gear their face's outward axis, else 0
-// code: material, quarter turns clockwise from +y to up, bits of gear, small pieces, what is level
+// One column per zone, made by gpu_mesh.py. Row 0: x0, y0, width, height in mm. Row 1: code, and the
+// outward axis of the face for panels and door gear, else 0. The code holds the material, the quarter
+// turns clockwise from +y to up, and bits for door gear, small pieces and level zones.
+uniform sampler2D zone_table;
 
 bool before_sheet(uint zone) {
     return (int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x) & ZONE_GEAR) != 0;
