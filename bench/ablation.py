@@ -177,7 +177,9 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=16)
     parser.add_argument("--size", default="640x640")
     parser.add_argument("--repeats", type=int, default=6)
-    parser.add_argument("--only", default="", help="measure only elements whose group or name contains this")
+    parser.add_argument(
+        "--only", default="", help="measure only elements whose group or name contains this"
+    )
     options = parser.parse_args()
     size = parse_size(options.size)
     chosen = traced(options.cases)

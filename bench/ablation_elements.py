@@ -27,7 +27,7 @@ class Element:
     Sky visibility is still computed with the unedited meshes.
 
     Attributes:
-        group: Group in the table.
+        group: Group that --only of ablation.py can select.
         name: Name in the table.
         scene: Function that returns the scene without the element.
         text: Pairs of old and new shader text. Every old text must occur in some shader.
@@ -74,14 +74,19 @@ class Absence:
         """
         for old, _ in self.element.text:
             if old not in self._found:
-                raise SystemExit(f"{self.element.name}: no shader contains {old!r}; update ablation_elements.py")
+                raise SystemExit(
+                    f"{self.element.name}: no shader contains {old!r}; update ablation_elements.py"
+                )
 
     def _replacements(self) -> Iterator[tuple[Any, str, Any]]:
         element = self.element
         if element.text:
             yield programs, "expand", self._edited(programs.expand)
         if element.container:
-            for name in ("build_container", "container_outline"):  # the visible mesh, and the one for sun shadows
+            for name in (
+                "build_container",
+                "container_outline",
+            ):  # the visible mesh, and the one for sun shadows
                 yield shapes, name, _built(getattr(shapes, name), element.container)
         if element.spreader:
             yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)

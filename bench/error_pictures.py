@@ -44,8 +44,9 @@ def contact_picture(rows: Sequence[tuple[Case, Panels]]) -> Picture:
     """Return two cases per row, each with our image, the reference and FLIP under captions."""
     tiles = []
     for case, (test, reference, error) in rows:
-        damage = "damaged" if case.damaged else "undamaged"
-        state = f"{damage}, {'rusty' if case.rusty else 'clean'}"
+        state = (
+            f"{'damaged' if case.damaged else 'undamaged'}, {'rusty' if case.rusty else 'clean'}"
+        )
         names = (f"fastgen: {case.light}, {case.camera}, {state}", "Cycles, 1024 samples", "FLIP")
         panels = (bgr(test), bgr(reference), heat(error))
         tiles.append(np.hstack([_titled(p, n) for p, n in zip(panels, names, strict=True)]))

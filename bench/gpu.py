@@ -13,7 +13,7 @@ tensors of image, labels and depth.
 Images per second through the Loader of fastgen.torch with N workers, copied to the GPU, boxes
 included.
 
-Images per second of `fastgen generate` with N workers, after its start-up.
+Images per second of `fastgen generate` with N workers, over the last two thirds of the run.
 
 N defaults to the number of cores. Some frames in CUDA memory are compared with `Generator.render`.
 Without an NVIDIA GPU, prints the reason and measures only the rate to disk. Needs PyTorch. On a
@@ -36,7 +36,7 @@ from throughput import whole_run
 import fastgen
 from fastgen import Config, Generator
 from fastgen.errors import FastgenError
-from fastgen.generator import QUALITY
+from fastgen.render.settings import QUALITY
 from fastgen.torch import ContainerDataset, Loader
 from fastgen.validation import check_known
 

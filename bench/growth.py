@@ -217,7 +217,7 @@ def drift(table: Table) -> str:
     words = (
         f"rate: first tenth {rates[:tenth].mean():.2f}/s, last tenth {rates[-tenth:].mean():.2f}/s"
     )
-    # HDRIs and meshes are loaded during about the first 1000 images and then stay in memory
+    # without preloading, HDRIs and meshes are loaded on first use, so memory grows early on
     for start in (100, 1000, 5000):
         if start < counts[-1]:
             at = int(np.searchsorted(counts, start))
@@ -299,7 +299,9 @@ def main() -> None:
     parser.add_argument("--parts", default="pixels,markers,damages,hdri,workers,length")
     parser.add_argument("--images", type=int, default=400, help="images of the long run")
     parser.add_argument("--size", default="640x640", help="image size of the long run")
-    parser.add_argument("--run-images", type=int, default=200, help="images per run of the part `workers`")
+    parser.add_argument(
+        "--run-images", type=int, default=200, help="images per run of the part `workers`"
+    )
     parser.add_argument("--rounds", type=int, default=5, help="draws per view")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "growth.png")
     options = parser.parse_args()

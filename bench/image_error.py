@@ -103,7 +103,9 @@ def _imported(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise SystemExit("FLIP and SSIM need more packages: run pip install '.[accuracy]'") from None
+        raise SystemExit(
+            "FLIP and SSIM need more packages: run pip install '.[accuracy]'"
+        ) from None
 
 
 def borders(ids: NDArray[np.integer], depth_m: Array) -> NDArray[np.bool_]:

@@ -28,10 +28,10 @@ import moderngl
 from results import parse_size
 
 from fastgen import Config, Generator
-from fastgen.generator import QUALITY
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.sample_targets import SampleTargets
+from fastgen.render.settings import QUALITY
 from fastgen.render.shading import Shading
 
 

@@ -169,7 +169,9 @@ def main() -> None:
     parser.add_argument("--samples", default="256")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--scale", type=int, default=1, help="factor on the file's resolution per side")
+    parser.add_argument(
+        "--scale", type=int, default=1, help="factor on the file's resolution per side"
+    )
     parser.add_argument("--denoise", action="store_true")
     parser.add_argument("--background", type=int)
     parser.add_argument("--whole", type=Path)

@@ -245,8 +245,12 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=2)
     parser.add_argument("--cameras", default="A,B,Cl,Cr")
     parser.add_argument("--size", default="640x640")
-    parser.add_argument("--repeats", type=int, default=5, help="draws per view; Cycles draws each once")
-    parser.add_argument("--samples", type=int, help="samples per pixel of Cycles, instead of 16 and 128")
+    parser.add_argument(
+        "--repeats", type=int, default=5, help="draws per view; Cycles draws each once"
+    )
+    parser.add_argument(
+        "--samples", type=int, help="samples per pixel of Cycles, instead of 16 and 128"
+    )
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "peers.png")
     options = parser.parse_args()
     peers = [peer for peer in PEERS if options.only.lower() in peer.name.lower()]

@@ -5,8 +5,9 @@
 
 Runs every size on EGL and OSMesa, and every quality at 640x640. Stages are timed in one process
 with warm caches, so every HDRI and mesh was used before. The rate of `fastgen generate` is given
-from start to finish and after start-up. In these short runs the workers still prepare some meshes
-for the first time. Long runs of `draft` follow, where all meshes are prepared early.
+for the whole run and for its last two thirds. In these short runs the workers still prepare some
+meshes for the first time. For the long runs of `draft` that follow, they prepare everything in
+advance.
 
 Writes bench/results/throughput.json, docs/throughput.png and a table in README.md. `bench/peers.py`
 measures other tools.
@@ -207,7 +208,7 @@ def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, 
     shown = [row for row in rows if row["backend"] == "egl"]
     lines = [
         "CPU time in ms of a labelled image by stage, and images per second of `fastgen generate`",
-        f"with two workers: over a run of {images} images including start-up, and after start-up",
+        f"with two workers: over a whole run of {images} images, and over its last two thirds",
         f"(`python bench/throughput.py`, {about}, version {fastgen.__version__}):",
         "",
         "| quality | size | scene | draw | labels | files | CPU ms | images/s, run | steady |",
@@ -226,7 +227,7 @@ def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, 
         "",
         f"Runs of {count:,} images with `draft` at {USUAL}, median of {LONG_RUNS}: "
         f"{rate.whole:.1f} images/s,",
-        f"{rate.steady:.1f} after start-up.",
+        f"{rate.steady:.1f} over the last two thirds.",
     ]
     return lines
 
@@ -260,7 +261,9 @@ def main() -> None:
     """Print the table and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--images", type=int, default=200)
-    parser.add_argument("--scenes", type=int, default=12, help="scenes for the stages, 4 images each")
+    parser.add_argument(
+        "--scenes", type=int, default=12, help="scenes for the stages, 4 images each"
+    )
     parser.add_argument("--sizes", default=SIZES)
     parser.add_argument("--long", type=int, default=2000, help="images of the long runs")
     parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "throughput.png")
@@ -281,7 +284,7 @@ def main() -> None:
     ]
     driver = ", ".join(sorted({row["driver"] for row in rows}))
     caption = f"{about}; {driver}; {options.images} images per run"
-    print(f"\n{driver}; N work.: images per second with N workers; steady: after start-up")
+    print(f"\n{driver}; N work.: images per second with N workers; steady: last two thirds")
     long = options.long, long_runs(options.long)
     told = {"images": long[0], "images_per_s": long[1].whole, "steady_images_per_s": long[1].steady}
     save("throughput", {**origin(), "images": options.images, "rows": rows, "long_runs": told})

@@ -1,12 +1,12 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain, product
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,13 @@ from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
 from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
-from fastgen.light.ray_bodies import check_rays
 from fastgen.render.bake import Atlas
 from fastgen.render.cuda import CudaFrame, cuda_reason
-from fastgen.render.gl import BACKENDS, check_device, open_context
+from fastgen.render.gl import open_context
 from fastgen.render.programs import LAYERS
 from fastgen.render.renderer import Renderer
 from fastgen.render.session import Opened
+from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.shadow_map import shader_suns
 from fastgen.render.shapes import shadow_casters, spreader_outline
 from fastgen.sample import Sample
@@ -42,27 +42,6 @@ from fastgen.sampling.sensor import extreme_lenses
 from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
-
-MIN_SIZE, MAX_SIZE = 64, 4096
-
-
-class Quality(NamedTuple):
-    """As of Renderer."""
-
-    samples_per_axis: int
-    lookups: int
-    traced: bool = False
-    shadow_detail: float = 1.0
-    coarse: bool = False
-
-
-QUALITY = {
-    "draft": Quality(1, 1, shadow_detail=0.4, coarse=True),
-    "balanced": Quality(3, 2),
-    "fine": Quality(5, 25),
-    "high": Quality(5, 25, traced=True),
-}
-
 
 _BRIGHTEST_AIR = 0.65
 """Light of fog that an exposure meter lets through: short of the tone curve's shoulder."""
@@ -113,45 +92,19 @@ class Generator:
         quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
-        self._arguments = {
-            "config": config,
-            "seed": seed,
-            "size": size,
-            "backend": backend,
-            "hdri_dir": hdri_dir,
-            "quality": quality,
-            "device_index": device_index,
-        }
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
-        self.size = _whole_size(size)
-        check_known("quality", quality, tuple(QUALITY))
-        if QUALITY[quality].traced:
-            check_rays()
-        check_known("backend", backend, BACKENDS)
-        self.backend = backend
-        for name, rig in self.config.cameras.items():
-            for lens in extreme_lenses(rig.lens) if rig.lens else ():  # before the first is drawn
-                view_of(
-                    Camera(
-                        name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
-                    ),
-                    self.size,
-                )
-        if device_index is not None:
-            device_index = whole("device_index", device_index)
-        check_device(backend, device_index)
-        if not isinstance(hdri_dir, str | Path | None):
-            raise ConfigError(f"hdri_dir: {hdri_dir!r} is no path; give that of a folder")
+        self.settings = RenderSettings(size, quality, backend, device_index, hdri_dir)
+        _check_lenses(self.config, self.settings.size)
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
         # a scene's cameras are mostly rendered one after the other
         self._latest: tuple[tuple[Config, int, int], Scene] | None = None
-        self._sound: Scene | None = None
+        self._checked: Scene | None = None
         self._gpu = Opened(
-            partial(open_context, backend, device_index),
+            partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
                 Renderer,
                 light=partial(_load_light, self._hdris),
@@ -159,6 +112,16 @@ class Generator:
                 mask_threshold_mm=self.config.damage.mask_threshold_mm,
             ),
         )
+
+    @classmethod
+    def of(cls, config: Config | None, seed: int, settings: RenderSettings) -> Self:
+        """Return a Generator with these settings."""
+        return cls(config, seed, **vars(settings))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the images in pixels."""
+        return self.settings.size
 
     @property
     def environments(self) -> dict[str, float]:
@@ -351,7 +314,7 @@ class Generator:
         self.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        return self._arguments
+        return {"config": self.config, "seed": self.seed, **vars(self.settings)}
 
     def __setstate__(self, arguments: dict[str, Any]) -> None:
         self.__init__(**arguments)  # type: ignore[misc]
@@ -374,8 +337,8 @@ class Generator:
     def _check(self, scene: Scene) -> Scene:
         """`check_scene`, once for all cameras of a scene, and never for what was made here."""
         ours = self._latest is not None and scene is self._latest[1]
-        if not ours and scene is not self._sound:
-            self._sound = check_scene(scene)
+        if not ours and scene is not self._checked:
+            self._checked = check_scene(scene)
         return scene
 
 
@@ -385,15 +348,11 @@ def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     return load_environment(hdris[name])
 
 
-def _whole_size(size: Any) -> tuple[int, int]:
-    pair = list(size) if isinstance(size, Iterable) and not isinstance(size, str) else []
-    if len(pair) != 2:
-        raise ConfigError(f"size: {size!r} is no pair; give (width, height), as in (640, 640)")
-    try:
-        width, height = (whole("size", side, MIN_SIZE, MAX_SIZE) for side in pair)
-    except ConfigError:
-        raise ConfigError(
-            f"size: {pair[0]}x{pair[1]} cannot be; "
-            f"each side takes {MIN_SIZE} to {MAX_SIZE} whole pixels"
-        ) from None
-    return width, height
+def _check_lenses(config: Config, size: tuple[int, int]) -> None:
+    """Refuse lenses that cannot be drawn at this size before the first image is drawn."""
+    for name, rig in config.cameras.items():
+        for lens in extreme_lenses(rig.lens) if rig.lens else ():
+            camera = Camera(
+                name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
+            )
+            view_of(camera, size)

@@ -1,5 +1,8 @@
-"""Tests. llvmpipe gets no threads of its own: pytest runs a process a core, and a fork may then use
-what its parent opened."""
+"""Tests of fastgen.
+
+llvmpipe gets no threads of its own here: pytest-xdist already runs one process per core, and
+without threads a forked process can use the contexts that its parent opened.
+"""
 
 import os
 

@@ -1,4 +1,4 @@
-"""The backends that tests draw with: those that there can be on this system."""
+"""GL backends that the tests can use on this system."""
 
 import re
 import subprocess
@@ -9,8 +9,10 @@ import pytest
 
 
 def _possible() -> tuple[str, ...]:
-    """Both, where OSMesa is missing but could be installed too: tests fail there, as they should.
-    Mesa gave it up with 25.1."""
+    """Return both backends unless Mesa is 25.1 or later, which has no OSMesa.
+
+    On an older Mesa a missing OSMesa could be installed, so its tests run and fail.
+    """
     if find_library("OSMesa") is None:
         command = [sys.executable, "-m", "fastgen", "doctor"]
         words = subprocess.run(command, capture_output=True, text=True, check=False).stdout

@@ -1,4 +1,4 @@
-"""Fixtures that test files share."""
+"""Fixtures shared by several test files."""
 
 import shutil
 
@@ -7,6 +7,6 @@ import pytest
 
 @pytest.fixture
 def copy(dataset, tmp_path):
-    """A copy, to be spoilt, of the dataset that a test file's own fixture `dataset` made."""
+    """A copy of the dataset from the test file's `dataset` fixture, which the test may damage."""
     shutil.copytree(dataset, tmp_path / "out")
     return tmp_path / "out"

@@ -1,8 +1,9 @@
-"""A run whose workers write made-up bytes at once, to be killed; see test_storage.py.
+"""Dataset run whose workers quickly write made-up bytes; test_storage.py kills it.
 
-    python tests/crash_run.py OUT SCENES WORKERS [FAULT]
+    python tests/crash_run.py OUT SCENES WORKERS
 
-FAULT: 'crash' or 'hang': what scene 5 does to its worker each time it is rendered.
+The environment variable FAULT makes scene 5 fail each time it is rendered: 'crash' aborts its
+worker, 'hang' makes the worker sleep.
 """
 
 import os
@@ -26,7 +27,7 @@ FAULTY_SCENE = 5
 
 
 class QuickMaker(Maker):
-    """Makes shards as Maker does, of bytes that depend on the index alone."""
+    """Shard maker that renders nothing: its bytes depend only on the scene index."""
 
     fault = ""
 
@@ -55,7 +56,7 @@ class QuickMaker(Maker):
 
 
 def make(out, scenes, workers, hang_s=60.0, then=lambda: None):
-    """Run the job; what dataset.json says. then: called between the last shard and the end."""
+    """Run the job and return the content of dataset.json. `then` is called after the last shard."""
     config = Config.preset()
     job = Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
     run = run_here(workers, hang_s, QuickMaker)

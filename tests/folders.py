@@ -1,11 +1,11 @@
-"""What lies in a folder, to compare one run's output with another's."""
+"""Content of folders, to compare the output of two runs."""
 
 import hashlib
 from pathlib import Path
 
 
 def content(folder: Path) -> dict[str, str]:
-    """Hash of every file by its relative name."""
+    """Return the SHA-256 hash of every file in `folder` by its relative path."""
     return {
         str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
         for p in sorted(folder.rglob("*"))

@@ -1,4 +1,4 @@
-"""Runs single functions of the shaders, for tests."""
+"""Single shader functions run on the GPU, for tests."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'
 
 
 def run(gl, body, inputs, textures=None, damage="sound"):
-    """Evaluate `vec4 f(vec4 x)` of GLSL `body` at each row of inputs [N, 4]. Returns [N, 4]."""
+    """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4]."""
     ctx = gl.ctx
     main = (
         "\nuniform sampler2D inputs; layout(location = 0) out vec4 answer;\n"
@@ -37,7 +37,10 @@ def run(gl, body, inputs, textures=None, damage="sound"):
 
 
 def blocks(gl, **changed):
-    """Uniform blocks of zeros but for `changed`, bound."""
+    """Bind uniform blocks that are zero except for the members in `changed`.
+
+    They stay valid as long as the caller keeps the returned buffers.
+    """
     kept = []
     for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):
         values = {}

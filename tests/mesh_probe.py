@@ -1,4 +1,4 @@
-"""Rays and measures with which tests look at a Mesh from outside."""
+"""Ray casts and measurements with which tests examine a Mesh from outside."""
 
 from functools import lru_cache
 
@@ -32,7 +32,7 @@ def caster(mesh: Mesh) -> RayMeshIntersector:
 
 
 def first_hits(mesh: Mesh, origins, directions):
-    """Triangle (-1 for none) and distance of each ray's first hit."""
+    """Return the triangle (-1 for none) and the distance in mm of each ray's first hit."""
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     triangle = caster(mesh).intersects_first(origins, directions)
     corner = mesh.positions_mm[mesh.triangles[triangle, 0]].astype(np.float64)
@@ -59,7 +59,10 @@ def triangles_of(mesh: Mesh, name: str):
 
 
 def depths(mesh: Mesh, face: str, points):
-    """How far behind the outer plane of `face` straight rays through `points` [N, 3] hit."""
+    """Cast rays straight into `face` through `points` [N, 3].
+
+    Returns the triangles hit and their depth in mm behind the outer plane of the face.
+    """
     out = np.array(OUT[face], float)
     plane = (mesh.positions_mm @ out).max()
     origins = points - (points @ out - plane - 100)[:, None] * out
@@ -69,7 +72,7 @@ def depths(mesh: Mesh, face: str, points):
 
 
 def around(rng, mesh: Mesh, count: int):
-    """Points outside the outer box, from a millimetre to tens of metres away."""
+    """Return random points outside the bounding box, at distances from 1 mm to tens of metres."""
     low, high = mesh.positions_mm.min(axis=0), mesh.positions_mm.max(axis=0)
     reach = 10 ** rng.uniform(0, 4.3, (count, 1))
     points = rng.uniform(low - reach, high + reach)
@@ -78,7 +81,10 @@ def around(rng, mesh: Mesh, count: int):
 
 
 def behind_the_middle(container, points, toward):
-    """Whether rays [3] from points [K, 3] in mm cross the box 350 mm within a container: slabs."""
+    """Return whether rays from points [K, 3] in mm along `toward` [3] cross the container's core.
+
+    The core is the bounding box shrunk by 350 mm on each side. This is a slab test.
+    """
     low, high = np.array(container.bounds_mm) + [[350.0], [-350.0]]
     with np.errstate(divide="ignore"):
         ways = np.sort([(low - points) / toward, (high - points) / toward], axis=0)

@@ -1,4 +1,4 @@
-"""Slow, obvious answers by another route: Embree rays through pixel centres and plain numpy."""
+"""Reference results from a slow, simple method: Embree rays through pixel centres, and numpy."""
 
 from dataclasses import dataclass
 
@@ -21,11 +21,15 @@ SPREADER = 60000
 
 @dataclass
 class Hits:
-    """What the ray through each pixel centre sees, [H, W, ...].
+    """Surface seen by the ray through each pixel centre.
 
-    triangle: int, -1 where nothing. hole: number of the perforation that the ray passed through
-    first, -1 for none. rest_mm [3]: rest position. atlas_mm [2]. depth_m: inf where nothing.
-    spreader: where the scene's spreader is before all that; triangle and hole are -1 there.
+    Attributes:
+        triangle: int [H, W], -1 where the ray hits nothing.
+        hole: int [H, W], index of the first perforation that the ray passes through, or -1.
+        rest_mm: [H, W, 3], position before damage.
+        atlas_mm: [H, W, 2], atlas coordinates.
+        depth_m: [H, W], depth along the view axis, inf where the ray hits nothing.
+        spreader: bool [H, W], where the spreader is nearest; triangle and hole are -1 there.
     """
 
     triangle: np.ndarray
@@ -43,16 +47,17 @@ class Hits:
 def cast(
     mesh: Mesh, view: View, scene: Scene | None = None, pixels: np.ndarray | None = None
 ) -> Hits:
-    """First outside that each pixel centre sees; through a hole of `scene`, the first inside.
+    """Return what each pixel centre sees: the first outer face or, through a hole, inner face.
 
-    pixels [..., 2]: other places in the image to look through. mesh: the
-    container's; a scene adds its damages and its spreader.
+    Args:
+        mesh: The container's mesh. `scene` adds its damages and its spreader.
+        pixels: Image positions [..., 2] to look through instead of the pixel centres.
     """
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
     tears = ~np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
     moved = damage_law.deform(damages, rest)
-    # Embree sees metres around the origin, where its float32 is finest
+    # Embree computes in float32, so it gets metres around the origin
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
     start, rays = view.rays(pixels)
     shape = rays.shape[:-1]
@@ -80,7 +85,7 @@ def cast(
         for i, damage in enumerate(damages):
             torn[damage_law.in_hole(damage, point) & tears[triangle]] = i
         inside = hole[active] >= 0
-        # outsides end a ray from outside, insides one that came in through a hole
+        # outer faces stop a ray from outside, inner faces one that entered through a hole
         wall = facing != inside
         opened = wall & ~inside & (torn >= 0)
         hole[active[opened]] = torn[opened]
@@ -108,7 +113,7 @@ def cast(
 
 
 def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarray) -> np.ndarray:
-    """Depth in metres of the spreader alone along each of rays [N, 3], inf where it is not."""
+    """Return the depth in metres of the spreader along rays [N, 3], inf where they miss it."""
     held = scene.spreader
     mesh = build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
     positions = mesh.positions_mm.astype(np.float64)
@@ -122,7 +127,7 @@ def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarra
 
 
 def _meet(corners: np.ndarray, start: np.ndarray, ray: np.ndarray):
-    """Distance, weights of corners 1 and 2, and whether the ray meets the front; in float64."""
+    """Return distance, weights of corners 1 and 2, and whether the front is hit, in float64."""
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(e1, e2)
     along = (ray * normal).sum(1)
@@ -140,7 +145,7 @@ def _between(corners: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 
 def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
-    """Which sheet points [..., 2] lie on the decal: in its diamond or its rectangle. bool [...]."""
+    """Return whether sheet points [..., 2] lie in the decal's diamond or rectangle, bool [...]."""
     angle = np.deg2rad(decal.rotation_deg)
     offset = sheet_mm - np.array(decal.center_mm)
     x = offset @ np.array([np.cos(angle), np.sin(angle)])
@@ -152,7 +157,7 @@ def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
 
 
 def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
-    """The id target that the rays say is right, uint16 [H, W]."""
+    """Return the id target expected from the rays, uint16 [H, W]."""
     ids = np.where(hits.hit, 1, 0).astype(np.uint16)
     ids[hits.spreader] = SPREADER
     chart = mesh.chart[mesh.triangles[hits.triangle, 0]]
@@ -164,12 +169,12 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
         number = mesh.chart_index(decal.face)
         x0, y0 = mesh.charts[number].rect_mm[:2]
         ids[outside & (chart == number) & inside(decal, hits.atlas_mm - (x0, y0))] = following
-        following = 600 if following == 199 else following + 1  # damages have 200 to 599
+        following = 600 if following == 199 else following + 1  # 200 to 599 are damages
     return ids
 
 
 def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
-    """The damage target that the rays say is right, uint16 [H, W]."""
+    """Return the damage target expected from the rays, uint16 [H, W]."""
     order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5}
     values, counts = [], dict.fromkeys(order, 0)
     for damage in scene.damages:
@@ -187,7 +192,7 @@ def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
 
 
 def box_of(mask: np.ndarray) -> tuple[int, int, int, int] | None:
-    """Tight box of a mask by looking at every pixel's coordinates."""
+    """Return the tight box of a mask (x0, y0, x1, y1), end exclusive, or None if it is empty."""
     rows, columns = np.nonzero(mask)
     if not rows.size:
         return None
@@ -195,7 +200,7 @@ def box_of(mask: np.ndarray) -> tuple[int, int, int, int] | None:
 
 
 def near_edge(values: np.ndarray) -> np.ndarray:
-    """Pixels [H, W] within one pixel of a place where `values` [H, W] changes."""
+    """Return which pixels [H, W] lie within one pixel of a change in `values` [H, W]."""
     padded = np.pad(values, 1, mode="edge")
     height, width = values.shape
     around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]

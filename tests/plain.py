@@ -1,4 +1,4 @@
-"""Values of a configuration that leave things out."""
+"""Configuration values that switch effects off."""
 
 EVEN_PAINT = {
     "rust_coverage": 0,
@@ -8,4 +8,4 @@ EVEN_PAINT = {
     "scratch_coverage": 0,
     "wear_strength": 0,
 }
-"""Of `surface`: bare paint of one colour and roughness."""
+"""Values of `surface` for clean paint of one colour and roughness."""

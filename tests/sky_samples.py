@@ -1,11 +1,11 @@
-"""Environments and directions made by formulas that know nothing of fastgen."""
+"""Environments and directions from formulas that do not use fastgen."""
 
 import cv2
 import numpy as np
 
 
 def texel_grid(height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Directions [H, 2H, 3] and solid angles [H, 2H] of equirectangular texels, written out."""
+    """Return directions [H, 2H, 3] and solid angles [H, 2H] of equirectangular texels."""
     v, u = np.mgrid[0:height, 0 : 2 * height] + 0.5
     polar, turn = np.pi * v / height, 2 * np.pi * (0.5 - u / (2 * height))
     direction = np.stack(
@@ -15,7 +15,7 @@ def texel_grid(height: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def even_directions(count: int) -> np.ndarray:
-    """Fibonacci sphere [count, 3]: each stands for the same solid angle."""
+    """Return directions [count, 3] of a Fibonacci sphere; each covers the same solid angle."""
     k = np.arange(count) + 0.5
     z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
     r = np.sqrt(1 - z**2)
@@ -23,7 +23,7 @@ def even_directions(count: int) -> np.ndarray:
 
 
 def patchwork(seed: int, height: int = 128) -> np.ndarray:
-    """A random environment of soft colours with a few strong lamps, float32 [H, 2H, 3]."""
+    """Return a random environment of soft colours and a few strong lamps, float32 [H, 2H, 3]."""
     rng = np.random.default_rng(seed)
     soft = cv2.resize(rng.random((8, 16, 3), dtype=np.float32), (2 * height, height))
     direction, _ = texel_grid(height)
@@ -34,7 +34,7 @@ def patchwork(seed: int, height: int = 128) -> np.ndarray:
 
 
 def one_light(direction: np.ndarray, radiance: float, height: int = 128) -> np.ndarray:
-    """Black but for the texel nearest to a direction."""
+    """Return a black environment with one lit texel, the nearest to `direction`."""
     grid, _ = texel_grid(height)
     image = np.zeros((height, 2 * height, 3), np.float32)
     image[np.unravel_index((grid @ direction).argmax(), grid.shape[:2])] = radiance
@@ -44,8 +44,12 @@ def one_light(direction: np.ndarray, radiance: float, height: int = 128) -> np.n
 def lamps_at_night(
     toward: np.ndarray, lights: np.ndarray, height: int = 512, radius_deg: float = 0.9
 ) -> np.ndarray:
-    """A dim sky of 0.02 with even discs about directions [K, 3] that give lights [K, 3], irradiance
-    / pi, float32 [H, 2H, 3]."""
+    """Return a sky of radiance 0.02 with a uniform disc around each direction, float32 [H, 2H, 3].
+
+    Args:
+        toward: Directions of the discs [K, 3].
+        lights: Irradiance / pi that each disc gives [K, 3].
+    """
     direction, solid_angle = texel_grid(height)
     sky = np.full((height, 2 * height, 3), 0.02)
     for way, light in zip(toward, lights, strict=True):

@@ -15,7 +15,7 @@ RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125,
 YELLOW, WHITE, BLACK = (246, 201, 0), (255, 255, 255), (16, 16, 16)
 
 FIELDS = {
-    # class: colour at a free spot of the upper half, and of the lower half
+    # class: colour at a blank spot of the upper half and of the lower half
     "C1.1": (ORANGE, ORANGE),
     "C2.1": (RED, RED),
     "C2.3": (GREEN, GREEN),
@@ -59,7 +59,7 @@ def test_fields_have_their_regulation_colours(name):
     assert np.abs(lower[:3] - FIELDS[name][1]).max() <= 12
 
 
-def test_markers_differ_at_48_px_where_a_person_sees_it():
+def test_markers_are_visibly_different_at_48_px():
     images, _ = art_images()
     small = np.stack(
         [cv2.resize(i[..., :3], (48, 48), interpolation=cv2.INTER_AREA) for i in images[:26]]
@@ -67,7 +67,7 @@ def test_markers_differ_at_48_px_where_a_person_sees_it():
     for i in range(26):
         for j in range(i):
             most = np.abs(small[i] - small[j]).max(axis=-1)
-            # II and III yellow differ in one bar alone, and so they do here
+            # yellow II and yellow III differ only in one bar
             pair = {MARKER_CLASSES[i], MARKER_CLASSES[j]}
             least = 5 if pair == {"C7.2", "C7.4"} else 12
             assert (most > 40).sum() >= least, pair
@@ -110,7 +110,7 @@ def test_stickers_and_emblems_have_art():
 
 
 def mean_light(block):
-    """sRGB [3] and alpha of the mean light of texels [..., 4], by Python's floats."""
+    """Return sRGB and alpha, 0 to 255, of texels [..., 4] averaged as linear light."""
     texels = block.reshape(-1, 4) / 255.0
     light = [
         [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in t[:3]] for t in texels
@@ -121,7 +121,7 @@ def mean_light(block):
     return np.append(255 * code, 255 * alpha.mean())
 
 
-def test_smaller_artwork_is_the_mean_of_its_light_and_not_of_its_codes():
+def test_mip_levels_average_linear_light_and_not_srgb_codes():
     rng = np.random.default_rng(3)
     image = rng.integers(0, 256, (16, 16, 4), np.uint8)
     image[:4, :4, :3], image[:4, :2, 3], image[:4, 2:4, 3] = 200, 255, 0
@@ -135,7 +135,7 @@ def test_smaller_artwork_is_the_mean_of_its_light_and_not_of_its_codes():
     assert (levels[1][0, 0, :3] == 200).all()
 
 
-def test_the_gpu_samples_these_levels():
+def test_the_gpu_samples_the_computed_mip_levels():
     rng = np.random.default_rng(4)
     images = rng.integers(0, 256, (3, 8, 8, 4), np.uint8)
     code = """

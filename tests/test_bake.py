@@ -1,4 +1,4 @@
-"""Textures baked for export: how fine they are, and where damage shows in them."""
+"""Textures baked for export: their resolution, and the place of damage in them."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ def generator():
         yield made
 
 
-def test_the_texel_that_an_error_proposes_fits(generator, tmp_path):
+def test_the_texel_size_proposed_by_an_error_fits(generator, tmp_path):
     scene = generator.scene(0)
     with pytest.raises(ConfigError, match="give ") as caught:
         export_glb(generator, scene, tmp_path / "box.glb", texel_mm=0.01)
@@ -30,7 +30,7 @@ def test_the_texel_that_an_error_proposes_fits(generator, tmp_path):
     assert max(mesh.atlas_size_mm) / proposed <= 8192
 
 
-def test_a_spreaders_texels_are_the_containers_but_where_its_atlas_would_be_too_large(
+def test_a_spreader_has_the_container_texel_size_unless_its_atlas_would_be_too_large(
     generator, tmp_path, monkeypatch
 ):
     scene = replace(
@@ -51,7 +51,7 @@ def test_a_spreaders_texels_are_the_containers_but_where_its_atlas_would_be_too_
     assert asked[1] > 16.1
 
 
-def test_a_dent_marks_the_wall_that_it_is_in_and_not_the_opposite_one(generator):
+def test_a_dent_marks_its_own_wall_and_not_the_opposite_one(generator):
     sound = replace(generator.scene(0), damages=())
     mesh = build_container(sound.container.kind, sound.container.profiles)
     (_, low, _), (_, _, high) = mesh.bounds_mm
@@ -66,7 +66,7 @@ def test_a_dent_marks_the_wall_that_it_is_in_and_not_the_opposite_one(generator)
     )
     without, dented = (generator.bake(replace(sound, damages=d), 16.0) for d in ((), (dent,)))
     levels = [atlas.base_color.astype(int) for atlas in (without, dented)]
-    changed = np.abs(levels[0] - levels[1]).max(axis=2) > 1  # two programs round as they like
+    changed = np.abs(levels[0] - levels[1]).max(axis=2) > 1  # shader variants may round differently
     found = {}
     for face in ("front", "back"):
         x, y, width, height = mesh.charts[mesh.chart_index(face)].rect_mm

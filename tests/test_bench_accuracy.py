@@ -1,4 +1,4 @@
-"""The references, and what is concluded from them: cases, filters, files, equal samples, fronts."""
+"""Reference images of the benchmarks, and the figures and charts computed from them."""
 
 import itertools
 import subprocess
@@ -24,18 +24,18 @@ from fastgen.scene.faces import FACE_AXES
 
 
 @pytest.mark.parametrize("count", [8, 16, 24, 32])
-def test_prefix_of_the_cases_holds_every_light_camera_and_state_equally_often(count):
+def test_each_prefix_of_the_cases_is_balanced_over_light_camera_and_state(count):
     chosen = reference_set.cases()[:count]
     for trait, kinds in (("light", 8), ("camera", 4), ("damaged", 2), ("rusty", 2)):
         assert set(Counter(getattr(case, trait) for case in chosen).values()) == {count // kinds}
 
 
-def test_no_two_cases_join_the_same_light_and_camera():
+def test_no_two_cases_share_light_and_camera():
     pairs = {(case.light, case.camera) for case in reference_set.cases()}
     assert len(pairs) == len(reference_set.cases()) == 32
 
 
-def test_case_draws_what_it_is_called():
+def test_the_scene_of_a_case_has_its_light_damage_and_rust():
     for case in reference_set.cases()[:8]:
         scene = case.drawn()
         assert scene.environment.name == case.light
@@ -44,14 +44,14 @@ def test_case_draws_what_it_is_called():
 
 
 def test_filters_are_the_integrals_of_a_box_and_a_tent():
-    """Against sums over samples: 20 a half pixel, weighted by each filter's own formula."""
+    """Compare with sums of 20 samples per half pixel, weighted by each filter's formula."""
     rng = np.random.default_rng(2)
     halves = rng.random((16, 12, 3))
     kernels = {
         "box": lambda x: (abs(x) < 0.5) * 1.0,
         "tent": lambda x: np.maximum(1 - abs(x), 0.0),
     }
-    fine = 20  # samples a half pixel
+    fine = 20  # samples per half pixel
     rows, columns = (np.repeat(np.arange(n), fine) for n in (16, 12))
     y, x = ((np.arange(n * fine) + 0.5) / fine / 2 for n in (16, 12))
     found = reference_set.filtered(halves)
@@ -63,7 +63,7 @@ def test_filters_are_the_integrals_of_a_box_and_a_tent():
             assert np.allclose(found[name][i, j], expected, atol=1e-6)
 
 
-def test_reference_comes_back_from_its_files(tmp_path):
+def test_a_reference_can_be_saved_and_loaded(tmp_path):
     case = reference_set.cases()[0]
     y, x = np.mgrid[:320, :320] / 320
     smooth = np.stack([0.02 + x, 0.1 + y, 0.3 + 0.2 * x * y], axis=-1)
@@ -84,13 +84,13 @@ def test_reference_comes_back_from_its_files(tmp_path):
     assert np.allclose(read.depth_m, depth_m, rtol=1e-6)
     assert np.allclose(read.openness, written.openness, atol=0.02)
     for name, radiance in written.radiance.items():
-        # compression is judged as it is seen, after exposure and encoding
+        # compression error is measured as displayed, after exposure and encoding
         shown, kept = ((0.25 * r).clip(0, 1) ** (1 / 2.2) for r in (radiance, read.radiance[name]))
         assert np.abs(shown - kept).max() < 0.02
 
 
 @pytest.mark.parametrize("path", sorted(reference_set.FOLDER.glob("*.npz")), ids=lambda p: p.stem)
-def test_reference_that_is_kept_loads_and_shows_its_case(path):
+def test_a_stored_reference_loads_and_matches_its_case(path):
     case = reference_set.cases()[int(path.stem)]
     reference = reference_set.load(case.number)
     assert reference.scene.environment.name == case.light
@@ -100,7 +100,7 @@ def test_reference_that_is_kept_loads_and_shows_its_case(path):
         assert image.shape == (*reference.inside.shape, 3)
 
 
-def test_equal_samples_of_noise_that_falls_with_the_root():
+def test_equal_samples_for_noise_that_falls_with_the_square_root():
     curve = [(n, 0.4 / n**0.5, 0.5 + 0.1 * n) for n in (1, 2, 4, 8, 16, 32, 64)]
     found = cycles_figures.equal_samples(curve, 0.4 / 24**0.5)
     assert found.samples == pytest.approx(24, rel=1e-3)
@@ -108,12 +108,12 @@ def test_equal_samples_of_noise_that_falls_with_the_root():
 
 
 @pytest.mark.parametrize(("error", "words"), [(0.5, "fewer than 1"), (0.01, "more than 64")])
-def test_error_beyond_the_series_is_said_to_be_beyond_it(error, words):
+def test_an_error_outside_the_measured_series_is_reported_as_a_bound(error, words):
     curve = [(1, 0.4, 1.0), (64, 0.05, 7.0)]
     assert cycles_figures.equal_samples(curve, error).words == words
 
 
-def test_front_holds_exactly_the_points_that_none_beats():
+def test_the_front_is_exactly_the_points_that_no_other_dominates():
     rng = np.random.default_rng(5)
     points = [pareto_chart.Point("fastgen", str(i), *rng.random(2)) for i in range(60)]
     unbeaten = {
@@ -125,7 +125,7 @@ def test_front_holds_exactly_the_points_that_none_beats():
     assert {p.setting for p in pareto_chart.front(points)} == unbeaten
 
 
-def test_every_text_that_an_ablation_changes_stands_in_a_shader():
+def test_every_shader_text_that_an_ablation_replaces_exists():
     shaders = ("bent_sky.frag", "shade_listed.comp")
     text = "".join(
         programs.expand(
@@ -139,13 +139,13 @@ def test_every_text_that_an_ablation_changes_stands_in_a_shader():
             assert old in text, element.name
 
 
-def test_everything_that_an_ablation_replaces_is_there():
+def test_every_python_name_that_an_ablation_replaces_exists():
     for element in ablation_elements.ELEMENTS:
         for owner, name, _ in ablation_elements.Absence(element)._replacements():
             assert hasattr(owner, name), (element.name, name)
 
 
-def test_mesh_without_charts_lacks_their_triangles_alone_and_keeps_its_groups():
+def test_removing_charts_removes_only_their_triangles_and_keeps_the_groups():
     mesh = build_container("20")
     less = ablation_elements.without_charts("door.bar.")(mesh)
     names = np.array([chart.name for chart in mesh.charts])
@@ -166,7 +166,7 @@ def test_filled_pockets_lie_in_the_plane_of_their_casting():
             assert np.allclose(heights[0], heights[1].max(), atol=1e-3)
 
 
-def test_spreader_parts_that_an_ablation_names_exist():
+def test_mesh_edits_of_ablations_change_the_mesh():
     spreader, container = build_spreader("40HC"), build_container("20")
     for element in ablation_elements.ELEMENTS:
         for edit, mesh in ((element.spreader, spreader), (element.container, container)):
@@ -177,8 +177,8 @@ def test_spreader_parts_that_an_ablation_names_exist():
 
 
 @pytest.mark.parametrize("name", ["accuracy", "pareto", "ablation"])
-def test_help_needs_no_error_measure(name):
-    """An import that is None fails as one of a package that is not installed."""
+def test_help_works_without_the_error_metrics(name):
+    """A module set to None in `sys.modules` fails to import, like one that is not installed."""
     path = Path(ablation_elements.__file__).with_name(f"{name}.py")
     code = (
         "import runpy, sys; sys.modules['flip_evaluator'] = sys.modules['skimage'] = None;"
@@ -189,7 +189,7 @@ def test_help_needs_no_error_measure(name):
     assert "usage:" in done.stdout
 
 
-def test_without_an_error_measure_one_line_says_what_to_install():
+def test_a_missing_error_metric_is_one_line_that_says_what_to_install():
     folder = Path(ablation_elements.__file__).parent
     code = (
         f"import sys; sys.modules['flip_evaluator'] = None; sys.path.insert(0, '{folder}');"
@@ -210,9 +210,12 @@ def renderer():
 
 
 @pytest.mark.parametrize(("number", "apart"), [(3, 3.5), (5, 5.0), (8, 3.0), (11, 2.5), (14, 5.5)])
-def test_an_image_is_what_a_path_tracer_makes_of_its_scene(renderer, number, apart):
-    """Light, layers, damage and metering together, in steps of 255: clean in the sun, rusty in the
-    sun, clean and overcast, clean in the sun, rusty at dusk."""
+def test_an_image_matches_its_path_traced_reference(renderer, number, apart):
+    """Test light, layers, damage and exposure together; `apart` limits the mean error in 8-bit steps.
+
+    The cases are: clean in the sun, rusty in the sun, clean and overcast, clean in the sun, rusty
+    at dusk.
+    """
     case, reference = reference_set.cases()[number], reference_set.load(number)
     scene = reference.scene
     ours = renderer.render(scene=scene, camera=case.camera).image

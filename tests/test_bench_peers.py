@@ -1,4 +1,4 @@
-"""The comparison with peers: they get fastgen's scene, and what they cannot do is said."""
+"""The comparison with other renderers: they get fastgen's scene, and failures are reported."""
 
 import sys
 from pathlib import Path
@@ -19,7 +19,7 @@ from fastgen import Config, Generator
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory):
-    """The job of one scene, and fastgen's ids of its two views."""
+    """A job of one scene, and fastgen's id images of its two views."""
     folder = tmp_path_factory.mktemp("job")
     with Generator(Config.preset(), seed=7, size=(320, 240)) as generator:
         truths = peer_jobs.write_jobs(generator, [0], ["A", "Cr"], 1, folder)
@@ -43,11 +43,11 @@ def test_markers_of_the_glb_project_onto_their_pixels(job):
             for drawn, seen in ((x, columns + 0.5), (y, rows + 0.5)):
                 gaps += [seen.min() - drawn.min(), drawn.max() - seen.max()]
     assert len(gaps) >= 16
-    assert min(gaps) > -0.5  # nothing of a marker is seen beyond its mesh
-    assert np.median(gaps) < 1  # and but for a rod before some of them, all of it is
+    assert min(gaps) > -0.5  # no marker pixel lies outside the marker's mesh
+    assert np.median(gaps) < 1  # most markers are seen whole; a rod covers some
 
 
-def test_every_labelled_object_has_a_node_of_its_own(job):
+def test_every_labelled_object_has_its_own_node(job):
     found, _ = job
     (scene,) = found.scenes
     names = trimesh.load_scene(scene.glb, process=False).geometry.keys()
@@ -65,19 +65,19 @@ def test_painted_ids_are_read_back_from_rounded_colors():
     assert (measure.nearest_id(noisy, colors) == ids).all()
 
 
-def test_peer_that_is_not_installed_is_listed_with_the_command(tmp_path, capsys):
+def test_a_peer_that_is_not_installed_is_listed_with_the_install_command(tmp_path, capsys):
     absent = peers.Peer("absent", "with_pyrender.py", environment="no such environment")
     result = peers.run(absent, tmp_path, tmp_path / "out")
     peers.show({"absent": result})
     assert "not measured: not installed: python bench/peers.py --install" in capsys.readouterr().out
 
 
-def test_script_that_fails_is_listed_with_its_last_words(tmp_path):
+def test_a_failing_script_is_listed_with_its_error(tmp_path):
     broken = peers.Peer("broken", "with_fastgen.py", ("draft",))
     assert "job.json" in peers.run(broken, tmp_path, tmp_path / "out")["failed"]
 
 
-def test_drift_of_a_steady_run_is_none():
+def test_a_steady_run_shows_no_drift():
     counts = [float(n) for n in range(100, 2100, 100)]
     table = {"images": counts, "seconds": [n / 20 for n in counts], "resident_mb": [500.0] * 20}
     words = growth.drift(table)

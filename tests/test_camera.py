@@ -1,4 +1,4 @@
-"""Projection against algebra done another way."""
+"""Camera projection compared with independent algebra."""
 
 import numpy as np
 import pytest
@@ -71,15 +71,15 @@ def test_near_and_far_planes_bound_the_depth_range():
     np.testing.assert_allclose(clip[:, 2] / clip[:, 3], [-1, 1], atol=1e-9)
 
 
-def test_straight_down_has_a_view_too():
+def test_a_camera_that_looks_straight_down_has_a_valid_rotation():
     view = view_of(camera(position_mm=(0, 0, 9000), target_mm=(0, 0, 0)), SIZE)
     np.testing.assert_allclose(view.rotation @ view.rotation.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(view.rotation) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("face", ["front", "back", "door", "no_door"])
-def test_a_rig_turns_to_the_right_and_lifts(face):
-    """Seen from the camera that looks straight at the face, from where it would stand."""
+def test_positive_azimuth_moves_right_and_positive_elevation_moves_up(face):
+    """Measure the moves along the axes of the camera that looks straight at the face."""
     still = {"target_shift_mm": 0, "roll_deg": 0, "distance_mm": 9000, "focal_mm": 20}
 
     def placed(**angles):

@@ -1,4 +1,4 @@
-"""Rigs are refused where a camera may come too near, before anything is drawn."""
+"""Camera rigs that could place a camera too close to a container are refused."""
 
 import re
 
@@ -33,8 +33,8 @@ def refused(kind="20", **camera):
 
 @pytest.mark.parametrize("distance_mm", [300, 500, 1100])
 @pytest.mark.parametrize("angle", ["azimuth_deg", "elevation_deg"])
-def test_before_a_face_a_camera_keeps_100_mm_by_its_angle(distance_mm, angle):
-    # the foot of the perpendicular lies on the face, so its length is the distance: d cos a
+def test_the_steepest_angle_in_front_of_a_face_leaves_100_mm(distance_mm, angle):
+    # the perpendicular meets the face, so the distance to the face is its length d cos(a)
     steepest = np.degrees(np.arccos(100 / distance_mm))
     other = {"azimuth_deg": 0, "elevation_deg": 0} | {"distance_mm": distance_mm}
     for sign in (1, -1):
@@ -44,25 +44,25 @@ def test_before_a_face_a_camera_keeps_100_mm_by_its_angle(distance_mm, angle):
 
 def test_beyond_the_edge_of_a_face_a_camera_keeps_100_mm_from_the_edge():
     for away_mm, near in ((99.0, True), (101.0, False)):
-        # 60 mm before the plane of the face, the rest of the way aside from its edge
+        # 60 mm in front of the plane of the face, the rest of the distance beyond its edge
         before, aside = 60.0, HALF_WIDTH_MM + np.sqrt(away_mm**2 - 60.0**2)
         azimuth = np.degrees(np.arctan2(aside, before))
         assert refused(distance_mm=np.hypot(before, aside), azimuth_deg=azimuth) is near
 
 
-def test_ranges_count_as_a_whole():
-    # where the camera stands farthest it is clear of the face, beyond its edge
+def test_one_bad_value_within_a_range_refuses_the_rig():
+    # at its largest distance the camera is clear of the face, beyond the edge
     azimuth = 88.0
     far = (HALF_WIDTH_MM + 500) / np.sin(np.radians(azimuth))
     rig = {"azimuth_deg": azimuth, "target_shift_mm": [0, 0]}
     assert not refused(distance_mm=far, **rig)
     assert refused(distance_mm=[far - 450, far], **rig)
-    # a shift of what it looks at brings it back over the face
+    # shifting its target moves the camera back in front of the face
     assert refused(distance_mm=far, **rig | {"target_shift_mm": [-450, 0]})
     assert not refused(distance_mm=far, **rig | {"target_shift_mm": [0, 450]})
 
 
-def test_only_kinds_that_come_are_asked():
+def test_only_container_kinds_with_a_weight_are_checked():
     beside = {"face": "front", "focal_mm": 20, "distance_mm": 4000, "azimuth_deg": 89}
     beside |= {"elevation_deg": 0, "target_shift_mm": 0}
     assert np.sin(np.radians(89)) * 4000 > HALF_LENGTH_MM + 100
@@ -74,7 +74,7 @@ def test_only_kinds_that_come_are_asked():
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_draw_of_an_accepted_rig_comes_too_near(seed):
+def test_no_camera_sampled_from_an_accepted_rig_is_too_close(seed):
     # half-sizes along right, up and out of each face; ISO 668
     faces = {"front": "lhw", "back": "lhw", "door": "whl", "no_door": "whl", "roof": "lwh"}
     kinds = {"20": (6058, 2438, 2591), "45HC": (13716, 2438, 2896)}
@@ -111,14 +111,14 @@ def test_no_draw_of_an_accepted_rig_comes_too_near(seed):
         ("45HC", "underside", 88.0407, [-89, 89], [-6745.4, -6743.3]),
     ],
 )
-def test_a_narrow_way_past_the_container_is_found_in_a_wide_rig(
+def test_a_small_forbidden_region_of_a_wide_rig_is_found(
     kind, face, azimuth_deg, elevation_deg, shift_mm
 ):
     rig = {"face": face, "azimuth_deg": azimuth_deg, "elevation_deg": elevation_deg}
     assert refused(kind, distance_mm=[300, 150000], target_shift_mm=shift_mm, **rig)
 
 
-def test_a_sheet_may_bulge_as_far_as_its_damages_reach():
+def test_the_required_distance_includes_outward_damage():
     def config(distance_mm, damage):
         values = {"cameras": {"N": RIG | {"distance_mm": distance_mm}}, "damage": damage}
         return Config.from_values(values)
@@ -134,12 +134,12 @@ def test_a_sheet_may_bulge_as_far_as_its_damages_reach():
     for distance_mm in (300, 499):
         with pytest.raises(ConfigError, match="may bulge by 400 mm") as caught:
             config(distance_mm, {"concave": deep})
-        # which both stand in another part of the configuration
+        # both settings are in another section, so the error has to name them
         assert "damage.concave.depth_mm" in str(caught.value)
         assert "damage.concave.outward: 0" in str(caught.value)
 
 
-def test_a_python_rig_of_plain_values_is_read_as_a_file_is():
+def test_a_rig_made_in_python_is_checked_like_one_from_a_file():
     rig = {"A": CameraConfig("front", 14.5, (5600, 7400), azimuth_deg=3)}
     found = Config.checked(Config(cameras=rig)).cameras["A"]
     assert found.distance_mm == (5600, 7400)

@@ -1,4 +1,4 @@
-"""Runs of triangles around parts of an image against all triangles projected one by one."""
+"""Triangle runs chosen for an image region, compared with projecting every triangle."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def scene():
 
 
 def within(mesh, view, region, moved_mm):
-    """Which triangles have a corner box in view space whose projection meets the region."""
+    """Return which triangles may project onto `region` if corners move up to `moved_mm`."""
     shifts = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * moved_mm
     corners = mesh.positions_mm[mesh.triangles].astype(float)[:, :, None] + shifts
     eye = (corners.reshape(len(corners), -1, 3) / 1000 - view.position_m) @ view.rotation.T
@@ -35,7 +35,7 @@ def within(mesh, view, region, moved_mm):
 @pytest.mark.parametrize("region", REGIONS)
 @pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
 @pytest.mark.parametrize("moved_mm", [0.0, 150.0])
-def test_runs_hold_every_triangle_that_a_region_shows(scene, camera, region, moved_mm):
+def test_runs_contain_every_triangle_that_a_region_shows(scene, camera, region, moved_mm):
     mesh = build_container(scene.container.kind, scene.container.profiles)
     view = view_of(scene.camera(camera), SIZE)
     chosen = np.zeros(len(mesh.triangles), bool)
@@ -50,7 +50,7 @@ def test_runs_hold_every_triangle_that_a_region_shows(scene, camera, region, mov
         assert chosen.mean() < 0.7
 
 
-def test_the_whole_image_and_what_a_lens_bends_take_all(scene):
+def test_the_whole_image_and_distorted_views_use_all_triangles(scene):
     mesh = build_container(scene.container.kind, scene.container.profiles)
     whole = [slice(0, len(mesh.triangles))]
     camera = scene.camera("A")
@@ -59,8 +59,8 @@ def test_the_whole_image_and_what_a_lens_bends_take_all(scene):
     assert Clusters(mesh).seen_in(view_of(bent, SIZE), REGIONS[0], 0.0) == whole
 
 
-def test_near_the_eye_nothing_is_left_out(scene):
-    """A box that reaches behind the camera has no outline in the image."""
+def test_triangles_that_cross_the_near_plane_are_kept(scene):
+    """A bounding box that reaches behind the camera has no valid projection."""
     mesh = build_container(scene.container.kind, scene.container.profiles)
     camera = scene.camera("A")
     inside = view_of(replace(camera, position_mm=(0.0, 0.0, 1200.0)), SIZE)
@@ -73,7 +73,7 @@ def test_near_the_eye_nothing_is_left_out(scene):
     assert chosen[crosses].all()
 
 
-def test_triangles_are_parted_by_whether_a_box_may_reach_them():
+def test_triangles_are_split_by_whether_a_box_may_reach_them():
     mesh = build_container("20")
     clusters = Clusters(mesh)
     rng = np.random.default_rng(8)
@@ -99,4 +99,4 @@ def test_triangles_are_parted_by_whether_a_box_may_reach_them():
         for part in far:
             is_far[part] = True
         assert not (is_far & meets).any()
-        assert is_far.sum() > 0.5 * wanted.sum()  # most of a container is
+        assert is_far.sum() > 0.5 * wanted.sum()  # most of a container is far from the boxes

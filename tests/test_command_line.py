@@ -1,4 +1,4 @@
-"""The command line: what it refuses, and that `show` writes every layer."""
+"""The command line: errors for bad input, and every layer of `show`."""
 
 import cv2
 import numpy as np
@@ -66,7 +66,7 @@ def test_bad_input_gets_one_clear_line_and_code_2(arguments, message, tmp_path, 
     assert not list(tmp_path.glob("out*"))
 
 
-def test_workers_draw_on_the_device_that_is_named_or_not_at_all(tmp_path, capsys):
+def test_workers_render_only_on_the_named_device(tmp_path, capsys):
     command = ["generate", str(tmp_path / "out"), "--images", "2", "--size", "64x64"]
     assert main([*command, "--device-index", "99"]) == 2
     assert "there is no device 99 among" in capsys.readouterr().err
@@ -82,7 +82,7 @@ def test_workers_draw_on_the_device_that_is_named_or_not_at_all(tmp_path, capsys
         ["paint"],
     ],
 )
-def test_a_bad_command_line_gets_one_line_too(arguments, capsys):
+def test_a_malformed_command_line_gets_one_clear_line_and_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
@@ -109,10 +109,10 @@ def test_show_writes_every_layer(tmp_path):
     [
         ([*range(70), SPREADER_ID], ID_GREYS),
         ([0, 101, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 10))], DAMAGE_GREYS),
-        ([CONTAINER_ID, SOUND_CONTAINER], ID_GREYS),  # among ids 101 is a decal
+        ([CONTAINER_ID, SOUND_CONTAINER], ID_GREYS),  # as an id, 101 is a decal
     ],
 )
-def test_shown_labels_can_be_told_from_one_another(labels, greys):
+def test_shown_labels_have_clearly_different_colours(labels, greys):
     shown = label_colors(np.array([labels], np.uint16), greys)[0].astype(float)
     apart = np.linalg.norm(shown[:, None] - shown, axis=-1)
     assert apart[~np.eye(len(labels), dtype=bool)].min() > 20

@@ -1,5 +1,7 @@
-"""The sky as a compute shader stores it where a GPU draws, on the driver at hand, against the sky
-that is rasterized."""
+"""The sky from the compute shader that GPUs use, compared with the rasterized sky.
+
+Both run on the driver of this machine.
+"""
 
 import dataclasses
 
@@ -13,7 +15,7 @@ from fastgen.render.gl import is_software, open_context
 from fastgen.render.renderer import Renderer
 from fastgen.scene import Lens
 
-SIZE = (203, 131)  # no row of an image fills work groups
+SIZE = (203, 131)  # no row of an image fills its work groups
 DAMAGE = {"damage": {"probability": 1, "count": [2, 4]}}
 HOLES = {"damage": {"probability": 1, "count": [2, 3], "kinds": ["perforation"]}}
 
@@ -23,7 +25,10 @@ def light(name):
 
 
 def drawn(scenes, camera, layer="all", **options):
-    """Frames of some scenes, one drawn over the other: as on a processor, and as on a GPU."""
+    """Return pairs of frames of each scene: rendered as on a CPU, and as on a GPU.
+
+    The scenes are drawn one after another into the same targets.
+    """
     found = []
     for software in (True, False):
         with open_context() as gl:
@@ -34,13 +39,15 @@ def drawn(scenes, camera, layer="all", **options):
 
 
 def one_of_each(*values):
-    """A scene of each distribution, so that each is drawn over what another left."""
+    """Return one scene of each configuration."""
     return [Generator(Config.from_values(value), seed=9).scene(1) for value in values]
 
 
 def check(pairs, most_steps):
-    """Labels and depths are the same to the bit, and colours but for the sky's: one way
-    interpolates where in the map they are."""
+    """Assert that labels and depths are bit-identical and that only sky colours differ slightly.
+
+    Sky colours may differ because one method interpolates environment map coordinates.
+    """
     for usual, other in pairs:
         for name in ("ids", "damage", "depth", "cover"):
             np.testing.assert_array_equal(getattr(usual, name), getattr(other, name), name)
@@ -53,12 +60,12 @@ def check(pairs, most_steps):
 
 
 @pytest.mark.parametrize("options", [{"samples_per_axis": 1, "coarse": True}, {}])
-def test_frames_are_the_same_but_for_steps_of_the_sky(options):
+def test_frames_differ_only_by_small_steps_in_the_sky(options):
     order = one_of_each({}, HOLES, DAMAGE, {})
     check(drawn(order, lambda scene: scene.camera("Cl"), **options), 2)
 
 
-def test_so_are_bent_frames_and_single_layers():
+def test_distorted_frames_and_single_layers_differ_only_in_the_sky():
     (scene,) = one_of_each(DAMAGE)
     bent = dataclasses.replace(
         scene.camera("B"), lens=Lens("brown_conrady", (-0.01, 0.0, 0.0, 0.0, 0.0))
@@ -79,5 +86,5 @@ def test_so_are_bent_frames_and_single_layers():
         ("AMD Radeon RX 6600 (radeonsi, navi23, LLVM 17.0.6, DRM 3.57, 6.8.0)", False),
     ],
 )
-def test_drivers_on_the_processor_are_told_from_gpus(renderer, software):
+def test_software_drivers_are_told_from_gpus(renderer, software):
     assert is_software(renderer) is software

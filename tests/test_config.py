@@ -1,4 +1,4 @@
-"""Whatever a configuration holds: scenes that can be drawn, or one error that names the key."""
+"""Any configuration gives either scenes that can be rendered or one error that names the key."""
 
 import dataclasses
 import json
@@ -25,11 +25,11 @@ MUCH = {
     "damage": {"probability": 1, "count": [4, 4]},
     "markings": {"markers_per_face": [1, 3], "stickers_per_face": [0, 2]},
 }
-"""Values over the preset with which every scene draws from nearly every field."""
+"""Changes to the preset that make every scene use nearly every field."""
 
 
 def keys(value, path=()):
-    """Every key of nested mappings, those of inner nodes included."""
+    """Yield the path of every key of nested mappings, including inner nodes."""
     for key, item in value.items():
         yield (*path, key)
         if isinstance(item, dict):
@@ -43,7 +43,7 @@ def nested(path, value):
 
 
 def sampled(config, count=2):
-    """Scenes of `config`, seen to hold finite numbers alone, before and after their damage."""
+    """Sample scenes and check that all their numbers are finite, before and after damage."""
     for index in range(count):
         scene = sample_scene(config, 1, index, {"x": 1.0})
         json.dumps(dataclasses.asdict(scene), allow_nan=False)
@@ -52,7 +52,7 @@ def sampled(config, count=2):
 
 
 @pytest.mark.parametrize("path", list(keys(Config.preset().to_plain())), ids=".".join)
-def test_any_value_is_drawn_from_or_refused_by_its_key(path):
+def test_any_value_is_either_sampled_or_refused_by_its_key(path):
     base = Config.from_values(MUCH)
     for value in NASTY:
         try:
@@ -63,15 +63,15 @@ def test_any_value_is_drawn_from_or_refused_by_its_key(path):
             assert named.split("[")[0].startswith(path[0]), message
             assert len(message) < 300
             assert "\n" not in message
-            # a value may be at odds with another of its own group, which then is named
+            # a value may conflict with another field of its group; the error then names that one
             assert named.startswith((".".join(path), ".".join(path[:-1]))), message
             continue
-        if path != ("environment", "names"):  # which there are is known at sampling alone
+        if path != ("environment", "names"):  # the available names are known only at sampling
             sampled(config)
 
 
 def limits(cls, path=()):
-    """Path, type and metadata of every bounded field under a dataclass."""
+    """Yield path, type and metadata of every bounded field of a dataclass and its parts."""
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         hint, here = hints[field.name], (*path, field.name)
@@ -90,7 +90,7 @@ BOUNDED = [
 @pytest.mark.parametrize(
     ("path", "hint", "meta"), BOUNDED, ids=[".".join(path) for path, _, _ in BOUNDED]
 )
-def test_the_limits_of_every_field_give_scenes(path, hint, meta):
+def test_the_limits_of_every_field_can_be_sampled(path, hint, meta):
     base = Config.from_values(MUCH)
     low, high = meta["lo"], meta["hi"]
     for value in (low, high) if math.isfinite(high - low) else ():
@@ -99,17 +99,17 @@ def test_the_limits_of_every_field_give_scenes(path, hint, meta):
         elif typing.get_origin(hint) is tuple:
             given = [value, value]
         else:
-            continue  # weights and probabilities by name
+            continue  # mappings from names to weights or probabilities
         if path == ("container", "depth_scale"):
-            given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave
-        if path[-1] in ("depth_mm", "distance_mm"):  # what bulges takes a camera's room
+            given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave allowed
+        if path[-1] in ("depth_mm", "distance_mm"):  # bulges could come too close to a camera
             base = Config.from_values({"damage": {"concave": {"outward": 0}}}, base)
-        if path[-1] in ("azimuth_deg", "elevation_deg"):  # so far aside even they leave room
+        if path[-1] in ("azimuth_deg", "elevation_deg"):  # far enough for any angle
             base = Config.from_values({"cameras": {"A": {"distance_mm": 9000}}}, base)
         sampled(Config.from_values(nested(path, given), base), 1)
 
 
-def test_errors_about_names_name_the_file(tmp_path):
+def test_errors_in_a_file_name_the_file(tmp_path):
     for text, words in (
         (
             "damage: {kinds: [dent]}",
@@ -158,7 +158,7 @@ def test_errors_about_names_name_the_file(tmp_path):
 
 
 @pytest.mark.parametrize("base", ["crane", {}])
-def test_a_base_that_is_no_configuration_is_refused(base, tmp_path):
+def test_a_base_that_is_not_a_config_is_refused(base, tmp_path):
     path = tmp_path / "port.yaml"
     path.write_text("damage: {probability: 0.5}")
     with pytest.raises(ConfigError, match=r"base: .* is no Config; take what Config.preset"):
@@ -167,7 +167,7 @@ def test_a_base_that_is_no_configuration_is_refused(base, tmp_path):
         Config.load(path, base)
 
 
-def test_cameras_may_share_values_by_an_anchor(tmp_path):
+def test_cameras_may_share_values_through_a_yaml_anchor(tmp_path):
     path = tmp_path / "port.yaml"
     shared = "{face: front, focal_mm: 12, distance_mm: 5000}"
     path.write_text(f"cameras:\n  gantry: &shared {shared}\n  gate: {{<<: *shared, focal_mm: 35}}")
@@ -176,7 +176,7 @@ def test_cameras_may_share_values_by_an_anchor(tmp_path):
     assert rig["gate"].distance_mm == rig["gantry"].distance_mm
 
 
-def test_possible_shapes_are_just_what_scenes_draw():
+def test_possible_shapes_are_exactly_those_of_sampled_scenes():
     config = Config.from_values(
         {"spreader": {"gap_mm": [12, 34], "probability": 0.8}, "container": {"kinds": {"20": 1}}}
     )
@@ -192,26 +192,26 @@ def test_possible_shapes_are_just_what_scenes_draw():
 
 
 @pytest.mark.parametrize("number", ["1e-05", "1E-3", "2.5e-4", "1.0e-05", ".5e-3", "+1e-4"])
-def test_numbers_are_read_as_json_and_yaml_write_them(tmp_path, number):
+def test_numbers_with_exponents_are_read_as_numbers(tmp_path, number):
     path = tmp_path / "weather.yaml"
     path.write_text(f"weather: {{shutter_s: [{number}, 1e-1]}}")
     assert Config.load(path).weather.shutter_s == (float(number), 0.1)
 
 
-def test_other_ways_of_writing_a_whole_number_mean_what_they_say(tmp_path):
+def test_other_notations_of_whole_numbers_are_read_correctly(tmp_path):
     path = tmp_path / "port.yaml"
     for text in ("12", "+12", "1_2", "0xC", "0b1100", "0xc"):
         path.write_text(f"damage: {{count: [0, {text}]}}")
         assert Config.load(path).damage.count == (0, 12)
 
 
-def test_one_number_stands_for_both_of_a_pair():
+def test_one_number_sets_both_ends_of_a_range():
     assert Config.from_values({"damage": {"count": 3}}).damage.count == (3, 3)
 
 
 @pytest.mark.parametrize("escaped", [True, False])
-def test_names_may_be_of_any_script(escaped, tmp_path):
-    """JSON escapes what lies beyond the first plane of Unicode as two halves (RFC 8259, 7)."""
+def test_names_may_use_any_script(escaped, tmp_path):
+    """JSON escapes characters beyond U+FFFF as surrogate pairs (RFC 8259, section 7)."""
     colors = {"Gr\u00f6\u00dfe \U0001f6a2": "#ff0000"}
     path = tmp_path / "port.json"
     text = json.dumps({"surface": {"colors": colors}}, ensure_ascii=escaped)
@@ -219,21 +219,21 @@ def test_names_may_be_of_any_script(escaped, tmp_path):
     assert Config.load(path).surface.colors == colors
 
 
-def test_half_a_letter_is_refused(tmp_path):
+def test_a_lone_surrogate_is_refused(tmp_path):
     path = tmp_path / "port.json"
     path.write_text('{"surface": {"colors": {"\\ud83d": "#ff0000"}}}')
     with pytest.raises(ConfigError, match=r"not a YAML file .*half of a letter"):
         Config.load(path)
 
 
-def test_a_configuration_comes_back_from_json(tmp_path):
+def test_a_config_can_be_written_to_json_and_read_back(tmp_path):
     config = Config.from_values({"weather": {"shutter_s": [1e-5, 1e-3]}}, Config.preset("crane"))
     path = tmp_path / "config.json"
     path.write_text(json.dumps(config.to_plain()))
     assert Config.load(path) == config
 
 
-def test_numbers_of_numpy_are_numbers():
+def test_numpy_numbers_and_arrays_are_accepted():
     values = {"damage": {"probability": np.float32(0.5), "count": np.int64(2)}}
     config = Config.from_values(values)
     assert config.damage.probability == 0.5
@@ -247,7 +247,7 @@ def test_numbers_of_numpy_are_numbers():
     assert config.damage.kinds == ("dented",)
 
 
-def test_a_color_that_yaml_took_for_a_comment_is_told(tmp_path):
+def test_a_color_that_yaml_read_as_a_comment_is_explained(tmp_path):
     file = tmp_path / "rig.yaml"
     file.write_text("surface:\n  dirt_color: #332211\n")
     with pytest.raises(ConfigError, match=r"surface\.dirt_color: .* began with #, quote it"):
@@ -260,6 +260,6 @@ def test_a_color_that_yaml_took_for_a_comment_is_told(tmp_path):
         Config.load(file)
 
 
-def test_a_turn_past_360_degrees_is_told_how_to_write_it():
+def test_a_yaw_range_through_360_degrees_is_explained():
     with pytest.raises(ConfigError, match=r"yaw_deg: .* swap them, or write \[-10, 10\]"):
         Config.from_values({"environment": {"yaw_deg": [350, 10]}})

@@ -1,4 +1,4 @@
-"""The whole configuration as commented YAML, read by PyYAML and by hand."""
+"""The complete configuration printed as commented YAML."""
 
 import dataclasses
 import shutil
@@ -20,20 +20,20 @@ OWN = {
     "environment": {"names": ["1e3", "park"]},
     "weather": {"shutter_s": 1e-5},
 }
-"""Values that YAML is known to misread where they are written carelessly."""
+"""Values that YAML misreads unless they are written carefully."""
 
 CONFIGS = {**{name: Config.preset(name) for name in PRESETS}, "own": Config.from_values(OWN)}
 
 
 @pytest.mark.parametrize("name", CONFIGS)
-def test_what_is_printed_reads_back(name, tmp_path):
+def test_printed_yaml_reads_back_as_the_same_config(name, tmp_path):
     text = as_yaml(CONFIGS[name])
     (tmp_path / "all.yaml").write_text(text, encoding="utf-8")
     assert Config.load(tmp_path / "all.yaml", Config.preset("crane")) == CONFIGS[name]
-    assert yaml.safe_load(text) == CONFIGS[name].to_plain()  # as any other reader does
+    assert yaml.safe_load(text) == CONFIGS[name].to_plain()  # as any other YAML reader would
 
 
-def test_the_command_prints_a_file_over_a_preset(tmp_path, capsys):
+def test_the_command_prints_a_preset_changed_by_a_file(tmp_path, capsys):
     (tmp_path / "mine.yaml").write_text("damage: {probability: 0.75}")
     assert main(["config", "--preset", "crane", "--config", str(tmp_path / "mine.yaml")]) == 0
     printed = yaml.safe_load(capsys.readouterr().out)
@@ -56,7 +56,7 @@ def test_the_command_prints_a_file_over_a_preset(tmp_path, capsys):
         ("environment: {names: [quay]}", "environment.names: no HDRI 'quay' here"),
     ],
 )
-def test_what_a_run_would_refuse_is_refused_by_the_file(tmp_path, capsys, text, words):
+def test_the_command_refuses_a_file_that_a_run_would_refuse(tmp_path, capsys, text, words):
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     assert main(["config", "--config", str(path)]) == 2
@@ -65,7 +65,7 @@ def test_what_a_run_would_refuse_is_refused_by_the_file(tmp_path, capsys, text, 
     assert said.out == ""
 
 
-def test_names_may_be_those_of_a_folder(tmp_path, capsys):
+def test_environment_names_may_be_those_of_an_hdri_folder(tmp_path, capsys):
     shutil.copy(bundled_hdris()["sky"], tmp_path / "quay.exr")
     (tmp_path / "mine.yaml").write_text("environment: {names: [quay]}")
     shown = ["config", "--config", str(tmp_path / "mine.yaml"), "--hdri", str(tmp_path)]
@@ -74,7 +74,7 @@ def test_names_may_be_those_of_a_folder(tmp_path, capsys):
 
 
 def records(cls):
-    """A dataclass and all that its fields hold, whatever way."""
+    """Yield a dataclass and all dataclasses in its fields, at any depth."""
     yield cls
     for hint in typing.get_type_hints(cls).values():
         for part in (hint, *typing.get_args(hint)):
@@ -92,8 +92,7 @@ def test_every_key_is_explained(cls):
     assert "Raises" not in " ".join([about, *words.values()])
 
 
-def test_limits_are_told_beside_values():
-    """Those that are refused beyond."""
+def test_printed_limits_are_the_enforced_limits():
     (line,) = (line for line in as_yaml(Config.preset()).splitlines() if "rust_scale_mm" in line)
     assert "range, 50 to 100000 mm" in line
     for value, good in ((50, True), (49.9, False), (1e5, True), (100001, False)):
@@ -105,6 +104,6 @@ def test_limits_are_told_beside_values():
         assert taken == good
 
 
-def test_the_page_shows_what_the_command_prints():
+def test_the_docs_page_shows_the_printed_config():
     page = Path("docs/configuration.md").read_text(encoding="utf-8")
     assert f"```yaml\n{as_yaml(Config.preset())}```\n" in page

@@ -1,4 +1,4 @@
-"""The container's shape, measured by rays rather than by its builder."""
+"""Shape of the container, measured with rays and not with the builder's own numbers."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ DEEP = WallProfiles(
 
 
 @pytest.mark.parametrize("kind", ISO_668)
-def test_outer_size_is_that_of_iso_668_to_the_millimetre(kind):
+def test_outer_size_is_exactly_that_of_iso_668(kind):
     mesh = build_container(kind)
     length, width, height, code = ISO_668[kind]
     assert np.array_equal(mesh.positions_mm.min(axis=0), [-length / 2, -width / 2, 0])
@@ -78,7 +78,7 @@ def test_every_casting_has_a_deep_aperture_in_each_outer_face():
 
 @pytest.mark.parametrize("profiles", [WallProfiles(), DEEP], ids=["usual", "deep"])
 @pytest.mark.parametrize("face", WALLS)
-def test_rays_measure_the_pitch_and_depth_that_was_asked_for(face, profiles):
+def test_corrugation_has_the_pitch_and_depth_of_its_profile(face, profiles):
     mesh = build_container("20", profiles)
     wave = {"no_door": profiles.end, "roof": profiles.roof}.get(face, profiles.side)
     axis, half = (1, 1219) if face == "no_door" else (0, 3029)
@@ -107,11 +107,11 @@ def test_rays_measure_the_pitch_and_depth_that_was_asked_for(face, profiles):
     ("kind", "profiles"),
     [("20", WallProfiles()), ("40", WallProfiles()), ("45HC", WallProfiles()), ("20", DEEP)],
 )
-def test_no_ray_from_outside_meets_a_back_face_or_the_sky_behind(kind, profiles):
+def test_no_ray_from_outside_hits_a_back_face_or_passes_through(kind, profiles):
     mesh = build_container(kind, profiles)
     rng = np.random.default_rng(5)
     origins = around(rng, mesh, 150_000)
-    # the core leaves out the fork pockets, through which one may look
+    # the core excludes the fork pockets, which are open from side to side
     low = mesh.positions_mm.min(axis=0) + np.array([60, 60, 180])
     high = mesh.positions_mm.max(axis=0) - (60, 60, 60)
     core = np.clip(rng.uniform(low - 300, high + 300, origins.shape), low, high)
@@ -127,7 +127,7 @@ def test_no_ray_from_outside_meets_a_back_face_or_the_sky_behind(kind, profiles)
 
 
 @pytest.mark.parametrize("kind", ["20", "40HC"])
-def test_a_group_is_only_seen_from_in_front_of_its_face(kind):
+def test_a_group_is_visible_only_from_in_front_of_its_face(kind):
     mesh = build_container(kind)
     rng = np.random.default_rng(6)
     group = np.full(len(mesh.triangles), "frame", "U10")
@@ -135,7 +135,7 @@ def test_a_group_is_only_seen_from_in_front_of_its_face(kind):
         group[where] = name
     low, high = mesh.positions_mm.min(axis=0), mesh.positions_mm.max(axis=0)
     origins = around(rng, mesh, 150_000)
-    # half of them right behind the plane of some face, where a promise breaks first
+    # half of the origins lie just behind the plane of a face, where an error shows first
     near = np.arange(0, len(origins), 2)
     axis, upper = rng.integers(0, 3, near.size), rng.integers(0, 2, near.size)
     inward = GROUP_SLACK_MM + 10 ** rng.uniform(-2, 3, near.size)
@@ -154,7 +154,7 @@ def test_a_group_is_only_seen_from_in_front_of_its_face(kind):
 
 
 @pytest.mark.parametrize("kind", ISO_668)
-def test_groups_split_all_triangles_and_the_frame_is_the_small_rest(kind):
+def test_each_triangle_is_in_one_group_and_the_frame_group_is_small(kind):
     mesh = build_container(kind)
     assert set(mesh.groups) == {*FACES, "frame"}
     covered = np.concatenate([np.arange(s.start, s.stop) for s in mesh.groups.values()])
@@ -164,7 +164,7 @@ def test_groups_split_all_triangles_and_the_frame_is_the_small_rest(kind):
 
 
 @pytest.mark.parametrize("kind", ISO_668)
-def test_triangles_are_sound_and_wound_as_their_normals_say(kind):
+def test_triangles_are_not_degenerate_and_are_wound_like_their_normals(kind):
     mesh = build_container(kind)
     a, b, c = mesh.positions_mm[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
     assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() > 1.0
@@ -177,7 +177,7 @@ def test_triangles_are_sound_and_wound_as_their_normals_say(kind):
     assert (charts == charts[:, :1]).all()
 
 
-def test_fork_pockets_open_a_20_from_side_to_side_and_no_other():
+def test_fork_pockets_pass_through_a_20_and_not_a_40():
     ray = np.array([[-1025.0, -3000, 80], [1025.0, -3000, 80]])
     ahead = np.tile([0.0, 1, 0], (2, 1))
     assert (first_hits(build_container("20"), ray, ahead)[0] == -1).all()
@@ -187,7 +187,7 @@ def test_fork_pockets_open_a_20_from_side_to_side_and_no_other():
 
 
 @pytest.mark.parametrize("kind", ISO_668)
-def test_four_round_bars_stand_before_two_leaves(kind):
+def test_four_round_bars_lie_in_front_of_the_door_leaves(kind):
     mesh = build_container(kind)
     y = np.arange(-1000, 1000, 1.0)
     points = np.column_stack([np.zeros(len(y)), y, np.full(len(y), 700.0)])
@@ -197,12 +197,12 @@ def test_four_round_bars_stand_before_two_leaves(kind):
     starts = np.flatnonzero(np.diff(bar.astype(int)) == 1)
     assert len(starts) == 4
     assert bar.sum() / 4 == pytest.approx(32, abs=3)
-    # proud of the leaf, yet within the castings' plane
+    # in front of the leaf, but behind the castings' plane
     assert depth[bar].min() > 0
     assert depth[names == "door"].min() - depth[bar].max() > 10
 
 
-def test_a_dark_seal_lies_deeper_than_the_leaves_all_around_them():
+def test_a_recessed_rubber_seal_surrounds_the_door_leaves():
     mesh = build_container("40HC")
     gaps = [(0, 1300), (0, 2000), (-1100, 1400), (1100, 700), (-600, 126), (600, 2769)]
     points = np.array([[0, y, z] for y, z in gaps], float)
@@ -232,7 +232,7 @@ def test_triangle_count_stays_within_its_budget(kind, limit):
 
 
 @pytest.mark.parametrize("kind", ["20", "45HC"])
-def test_the_outline_is_the_same_surface_of_fewer_triangles(kind):
+def test_the_outline_is_the_same_surface_with_fewer_triangles(kind):
     fine, outline = build_container(kind), container_outline(kind)
     assert len(outline.triangles) < 0.4 * len(fine.triangles)
     rng = np.random.default_rng(2)
@@ -243,12 +243,12 @@ def test_the_outline_is_the_same_surface_of_fewer_triangles(kind):
     (hit, far), (as_well, as_far) = (first_hits(mesh, eyes, toward) for mesh in (fine, outline))
     both = (hit >= 0) & (as_well >= 0)
     assert both.mean() > 0.9
-    # a ray may slip past an edge on one of them
+    # at an edge a ray may miss one of the two meshes
     assert (both == ((hit >= 0) | (as_well >= 0))).mean() > 0.999
     assert np.isclose(far[both], as_far[both], rtol=0, atol=0.05).mean() > 0.999
 
 
-def test_equal_calls_share_one_mesh_that_cannot_be_written():
+def test_equal_calls_share_one_read_only_mesh():
     mesh = build_container("20")
     assert build_container("20", profiles=WallProfiles(), max_edge_mm=150) is mesh
     with pytest.raises(ValueError, match="read-only"):

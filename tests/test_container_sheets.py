@@ -1,4 +1,4 @@
-"""The container's panels as grids, their unfolding, and the way from a sheet to the surface."""
+"""Panel grids of the container, their unfolding, and the mapping from a sheet to the surface."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from tests.mesh_probe import (
 
 
 def sheet_jacobian(mesh: Mesh):
-    """d position / d sheet [T, 3, 2] and the sheet's signed area of each triangle."""
+    """Return d position / d sheet [T, 3, 2] and the signed sheet area [T] of each triangle."""
     p = mesh.positions_mm[mesh.triangles].astype(np.float64)
     s = mesh.atlas_mm[mesh.triangles].astype(np.float64)
     edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2)
@@ -36,7 +36,7 @@ def test_nothing_on_a_sheet_is_mirrored(kind):
 
 
 @pytest.mark.parametrize("face", RIGHT)
-def test_a_panels_sheet_runs_to_the_right_and_up_for_who_stands_before_it(face):
+def test_sheet_axes_point_right_and_up_for_a_viewer_in_front_of_the_panel(face):
     mesh = build_container("40")
     width, height = mesh.charts[mesh.chart_index(face)].rect_mm[2:]
     sheet = np.array([[0.1, 0.5], [0.9, 0.5], [0.4, 0.1], [0.4, 0.9]]) * (width, height)
@@ -101,7 +101,7 @@ def test_no_point_of_the_atlas_belongs_to_two_triangles():
 
 
 @pytest.mark.parametrize("max_edge", [150.0, 90.0])
-def test_no_edge_of_a_panel_is_too_long_to_bend(max_edge):
+def test_panel_edges_are_no_longer_than_max_edge_mm(max_edge):
     mesh = build_container("20", max_edge_mm=max_edge)
     for face in (*WALLS, "door"):
         p = mesh.positions_mm[mesh.triangles[triangles_of(mesh, face)]].astype(np.float64)
@@ -110,8 +110,8 @@ def test_no_edge_of_a_panel_is_too_long_to_bend(max_edge):
 
 
 @pytest.mark.parametrize(("face", "columns"), [("no_door", 2), ("front", 1)])
-def test_facets_of_a_wall_have_enough_columns_for_light_to_change_across(face, columns):
-    """Two on the end wall, whose waves are deep; flats are the widest facets."""
+def test_wall_facets_have_enough_columns_for_light_to_vary_across_them(face, columns):
+    """The end wall needs two because its waves are deep. Flats are the widest facets."""
     profiles = WallProfiles()
     mesh = build_container("20", profiles)
     p = mesh.positions_mm[np.unique(mesh.triangles[triangles_of(mesh, face)])].astype(np.float64)
@@ -127,7 +127,7 @@ def test_facets_of_a_wall_have_enough_columns_for_light_to_change_across(face, c
 
 
 def edges_of(mesh: Mesh, face: str):
-    """Welded points [N, 3], and the edges [E, 2] with how many triangles use each."""
+    """Return welded points [N, 3], edges [E, 2], triangles per edge [E] and the triangle count."""
     corners = mesh.triangles[triangles_of(mesh, face)]
     points, number = np.unique(
         mesh.positions_mm[corners].reshape(-1, 3), axis=0, return_inverse=True
@@ -147,7 +147,7 @@ def test_a_wall_is_one_disc_without_a_crack(face):
 
 
 @pytest.mark.parametrize("face", [*WALLS, "door"])
-def test_no_vertex_lies_within_an_edge_of_its_panel(face):
+def test_no_vertex_lies_inside_a_border_edge_of_its_panel(face):
     points, edges, count, _ = edges_of(build_container("40HC"), face)
     border = edges[count == 1]
     a, b = points[border[:, 0], None].astype(float), points[border[:, 1], None].astype(float)
@@ -159,7 +159,7 @@ def test_no_vertex_lies_within_an_edge_of_its_panel(face):
 
 
 @pytest.mark.parametrize("name", [*FACES, "post.door.front", "rail.top.back", "door.handle.2"])
-def test_a_sheet_point_comes_back_to_where_it_was_taken(name):
+def test_sheet_to_surface_inverts_the_unfolding(name):
     mesh = build_container("40HC")
     rng = np.random.default_rng(8)
     chosen = rng.choice(triangles_of(mesh, name), 400)
@@ -173,7 +173,7 @@ def test_a_sheet_point_comes_back_to_where_it_was_taken(name):
     assert np.abs(normals - winding_normals(mesh)[chosen]).max() < 1e-3
 
 
-def test_a_step_on_the_sheet_is_as_long_on_the_wall():
+def test_lengths_on_the_sheet_equal_lengths_on_the_wall():
     mesh = build_container("40")
     for face in WALLS:
         width, height = mesh.charts[mesh.chart_index(face)].rect_mm[2:]

@@ -1,4 +1,4 @@
-"""Amodal boxes and visible fractions against rays through the pixels of a much larger image."""
+"""Amodal boxes and visible fractions compared with rays through a larger image."""
 
 import dataclasses
 
@@ -23,14 +23,14 @@ PAD = 160
 
 
 def unbounded(view):
-    """The same camera with PAD pixels more on each side."""
+    """Return the same view with PAD more pixels on each side."""
     return View(
         view.rotation, view.position_m, view.focal_px, (SIZE[0] + 2 * PAD, SIZE[1] + 2 * PAD)
     )
 
 
 def all_hits(mesh, triangles, view, damages):
-    """Every meeting of every pixel's ray with some triangles: ray, rest point, atlas point."""
+    """Return ray index, rest point and atlas point of every hit of pixel rays with `triangles`."""
     rest = mesh.positions_mm.astype(np.float64)
     moved = damage_law.deform(damages, rest)
     part = mesh.triangles[triangles]
@@ -46,7 +46,7 @@ def all_hits(mesh, triangles, view, damages):
 
 
 def dense(decal, mesh, damages):
-    """Points all over a decal in the world after damage, most of them along its edge."""
+    """Return world points all over a decal after damage, mostly along its edge."""
     coarse, fine = np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 6001)
     points = [np.stack(np.meshgrid(coarse, coarse), axis=-1).reshape(-1, 2)]
     for side in (-0.5, 0.5):
@@ -61,7 +61,7 @@ def dense(decal, mesh, damages):
 
 
 def near(count, truth):
-    """Equal but for centres that lie on an edge to within rounding."""
+    """Return whether counts agree, except for pixel centres on an edge."""
     return abs(count - truth) <= max(2, 0.004 * truth)
 
 
@@ -73,7 +73,7 @@ def generator():
 
 
 def views(generator):
-    """Cameras of the rig, and two from which much leaves the image."""
+    """Yield samples from the rig's cameras and from close cameras whose images cut objects off."""
     for index in range(3):
         scene = generator.scene(index)
         if index == 1:
@@ -84,12 +84,12 @@ def views(generator):
         mesh = generator._gpu.renderer().mesh(scene.container)
         for decal in [d for d in scene.decals if d.class_name and d.face == "front"][:3]:
             (x, y, z), *_ = mesh.sheet_to_surface("front", decal.center_mm)[0]
-            # 4 m before it, the image is 3.6 m wide: its border goes through the decal
+            # at 4 m the image is 3.6 m wide, so its border crosses the decal
             cut = Camera("cut", (x + 1800, y - 4000, z), (x + 1800, y, z), 40.0)
             yield generator.render(scene=scene, camera=cut)
 
 
-def test_decals_cover_what_rays_say(generator):
+def test_decal_coverage_matches_rays(generator):
     seen = cut = 0
     for sample in views(generator):
         mesh = generator._gpu.renderer().mesh(sample.scene.container)
@@ -122,14 +122,14 @@ def test_decals_cover_what_rays_say(generator):
                 pixels, depth = sample.view.project(points)
                 if depth.min() > 0.2:
                     truth = np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
-                    # damage bends between the vertices too; what is drawn is straight there
+                    # triangles are drawn flat, but the damage field also bends between vertices
                     limit = 2.0 if sample.scene.damages else 0.05
                     assert np.abs(truth - [x0, y0, x1, y1]).max() < limit
     assert seen > 60
     assert cut > 3
 
 
-def test_damages_cover_what_rays_say(generator):
+def test_damage_coverage_matches_rays(generator):
     seen = 0
     threshold = generator.config.damage.mask_threshold_mm
     for sample in views(generator):
@@ -155,8 +155,8 @@ def test_damages_cover_what_rays_say(generator):
     assert seen > 8
 
 
-def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
-    """An image of a ninth of the pixels is labelled the way that rays have confirmed above."""
+def test_coarse_sampling_outside_a_large_image_keeps_damage_boxes_and_fractions(monkeypatch):
+    """The expected labels are from a small image, where all sampling is fine."""
     damage = {"probability": 1.0, "kinds": ["concave"], "faces": ["door"], "count": [2, 2]}
     config = Config.from_values({"damage": damage, "spreader": {"probability": 0.0}})
     with (
@@ -179,7 +179,7 @@ def test_large_damages_reach_as_far_beyond_the_image_as_small_ones(monkeypatch):
         assert np.abs(np.array(b.amodal_bbox) - 3 * np.array(a.amodal_bbox)).max() <= 12
 
 
-def test_the_container_covers_its_silhouette(generator):
+def test_container_coverage_matches_its_silhouette(generator):
     cut = 0
     for sample in views(generator):
         mesh = generator._gpu.renderer().mesh(sample.scene.container)
@@ -195,7 +195,7 @@ def test_the_container_covers_its_silhouette(generator):
     assert cut
 
 
-def test_the_spreader_covers_what_rays_say(generator):
+def test_spreader_coverage_matches_rays(generator):
     seen = hidden = 0
     for sample in views(generator):
         held = sample.scene.spreader
@@ -214,7 +214,7 @@ def test_the_spreader_covers_what_rays_say(generator):
     assert seen > 1
 
 
-def test_casting_corners_are_seen_as_rays_see_them(generator):
+def test_casting_keypoint_visibility_matches_rays(generator):
     flags = set()
     for sample in views(generator):
         mesh = generator._gpu.renderer().mesh(sample.scene.container)
@@ -240,7 +240,7 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
             if not inside:
                 continue
             assert np.abs(pixel - (x, y)).max() < 1.0
-            # a point just outside the corner is seen where nothing stands in the way
+            # a point just outside the corner is visible if nothing is in the way
             point = corner * 1e-3 + 2e-3 * np.sign(corner - (0, 0, high[2] / 2))
             ray = point - eye
             reach = np.linalg.norm(ray)
@@ -253,7 +253,7 @@ def test_casting_corners_are_seen_as_rays_see_them(generator):
     assert flags == {1, 2}
 
 
-def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
+def test_pixels_of_abutting_polygons_are_counted_exactly_once():
     rng = np.random.default_rng(3)
     corners = rng.uniform(-20, 60, (50, 3, 2))
     owner = np.repeat(np.arange(5), 10)
@@ -282,7 +282,7 @@ def test_pixels_of_abutting_polygons_are_counted_once_and_none_is_lost():
         assert (lower_pixel[lower_whose == number] == np.flatnonzero(within)).all()
 
 
-def test_enormous_objects_are_counted_to_a_thousandth():
+def test_huge_objects_are_counted_to_within_a_thousandth():
     square = np.array([[[-9e5, -8e5], [7e5, -8e5], [7e5, 9e5], [-9e5, 9e5]]])
     found = covered(square, np.zeros(1, np.int64), 1, (64, 48))
     assert (found.pixels()[0] == np.arange(64 * 48)).all()

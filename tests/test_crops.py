@@ -1,4 +1,4 @@
-"""Which identifiers become crops, against labels of the same letters as texts of their own."""
+"""Choice of text crops, compared with labels of each letter as a separate decal."""
 
 from dataclasses import replace
 
@@ -12,13 +12,13 @@ from fastgen.labels.objects import decal_of
 
 
 def letters_of(decal):
-    """The same ink as `decal`, one decal a letter."""
+    """Yield decals of one letter each with the same ink as `decal`."""
     font = glyph_tiles()[1][decal.font]
     whole = layout(decal.lines, font, decal.cap_mm, decal.vertical)
     assert decal.rotation_deg == 0
     for glyph in whole.glyphs:
         alone = layout((glyph.char,), font, decal.cap_mm)
-        # the tile stands to its ink in one way wherever the letter is
+        # the offset between tile and ink does not depend on the letter's place
         (tile,) = alone.glyphs
         low = np.subtract((glyph.x0, glyph.y0), (tile.x0, tile.y0))
         center = low + np.array(alone.size_mm) / 2 - np.array(whole.size_mm) / 2
@@ -55,7 +55,7 @@ def test_no_letter_of_a_crop_is_mostly_hidden():
     assert hidden >= 3
 
 
-def test_a_text_that_is_hidden_by_more_than_a_seventh_is_no_crop():
+def test_a_text_hidden_by_more_than_a_seventh_is_not_cropped():
     with Generator(seed=21, size=(640, 640), quality="draft") as generator:
         sample = generator.render(index=3, camera="Cl")
     whole = {item.id for item, _ in text_crops(sample, 10.0)}

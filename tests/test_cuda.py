@@ -1,4 +1,4 @@
-"""Frames for CUDA: the GL half on the driver at hand, the CUDA half on a stand-in for libcuda."""
+"""Frames for CUDA: GL runs on the driver of this machine, CUDA on a fake libcuda."""
 
 import ctypes
 from types import SimpleNamespace
@@ -20,17 +20,21 @@ NAMES = {
     211: b"CUDA_ERROR_NOT_MAPPED",
     304: b"CUDA_ERROR_OPERATING_SYSTEM",
 }
-"""Some of cuda.h's CUresult."""
+"""Some CUresult values of cuda.h."""
 
 CONTEXT, DEVICE, FIRST_RESOURCE = 0x5EED_0000_1234, 5, 0x7F00_0000_0000
 
 
 class FakeDriver:
-    """libcuda.so.1 as far as fastgen calls it, with its rules: a call that breaks one returns the
-    error that the reference names.
+    """Fake libcuda.so.1 with the functions that fastgen calls, and their rules.
 
-    Mapping a GL buffer copies it to the host; that address stands for the one on the GPU. calls:
-    names in order. fails: names of calls that return error 304. devices: CUDA's, of the context.
+    A call that breaks a rule returns the error code in the CUDA driver reference. Mapping a GL
+    buffer copies it to the host, and the host address replaces the GPU address.
+
+    Attributes:
+        calls: Names of the functions called, in order.
+        fails: Names of functions that return error 304.
+        devices: CUDA devices of the GL context.
     """
 
     def __init__(self, gl):
@@ -137,7 +141,7 @@ class FakeDriver:
 
 
 def on_host(array):
-    """A copy, made by NumPy from what the array says of itself."""
+    """Return a copy that NumPy makes from the array's `__cuda_array_interface__`."""
     said = array.__cuda_array_interface__
     assert said["version"] == 3
     assert said["stream"] == 1
@@ -153,7 +157,7 @@ def generator():
 
 @pytest.fixture
 def driver(generator, monkeypatch):
-    """The stand-in, with `generator` said to draw on an NVIDIA GPU."""
+    """Fake driver, with `generator` treated as if it ran on an NVIDIA GPU."""
     assert generator.renderer_name  # opens its context
     fake = FakeDriver(generator._gpu.context())
     monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
@@ -162,7 +166,7 @@ def driver(generator, monkeypatch):
 
 
 @pytest.mark.parametrize(("index", "camera"), [(0, "A"), (1, "Cr"), (2, "B"), (3, "Cl")])
-def test_a_frame_is_that_of_render_bit_for_bit(generator, driver, index, camera):
+def test_a_frame_is_bit_identical_to_that_of_render(generator, driver, index, camera):
     sample = generator.render(index=index, camera=camera)
     generator.render_cuda(index=index + 1, camera=camera)
     frame = generator.render_cuda(index=index, camera=camera)
@@ -177,7 +181,7 @@ def test_a_frame_is_that_of_render_bit_for_bit(generator, driver, index, camera)
     np.testing.assert_array_equal(frame.view.clip_matrix(), sample.view.clip_matrix())
 
 
-def test_buffers_are_registered_once_and_mapped_anew_for_each_frame(generator, driver):
+def test_buffers_are_registered_once_and_mapped_for_each_frame(generator, driver):
     scene = generator.scene(0)
     for name in ("A", "B"):
         generator.render_cuda(scene=scene, camera=name)
@@ -191,7 +195,7 @@ def test_buffers_are_registered_once_and_mapped_anew_for_each_frame(generator, d
     assert (driver.retained, driver.pushed, driver.buffers, driver.mapped) == (0, 0, {}, {})
 
 
-def test_a_frame_outlives_a_render_but_no_render_cuda(generator, driver):
+def test_a_frame_is_valid_until_the_next_render_cuda(generator, driver):
     first = generator.render_cuda(index=0)
     before = on_host(first.image)
     generator.render(index=1)
@@ -205,7 +209,7 @@ def test_a_frame_outlives_a_render_but_no_render_cuda(generator, driver):
         on_host(second.depth)
 
 
-def test_a_closed_generator_renders_for_cuda_again(generator, driver):
+def test_a_closed_generator_can_render_for_cuda_again(generator, driver):
     before = on_host(generator.render_cuda(index=0).depth)
     generator.close()
     np.testing.assert_array_equal(on_host(generator.render_cuda(index=0).depth), before)
@@ -229,12 +233,12 @@ def test_a_failing_call_is_named_and_leaves_nothing_behind(generator, driver, na
     assert (driver.retained, driver.pushed, driver.buffers, driver.mapped) == (0, 0, {}, {})
 
 
-def test_a_driver_that_works_leaves_no_reason(generator, driver):
+def test_a_working_driver_gives_no_reason(generator, driver):
     assert generator.cuda_reason() == ""
     assert driver.retained == 0
 
 
-def test_what_the_driver_lacks_is_the_reason(generator, driver, monkeypatch):
+def test_the_reason_names_what_the_driver_lacks(generator, driver, monkeypatch):
     driver.fails.add("cuInit")
     assert generator.cuda_reason().startswith("cuInit failed: CUDA_ERROR_OPERATING_SYSTEM")
     driver.fails.clear()
@@ -246,14 +250,14 @@ def test_what_the_driver_lacks_is_the_reason(generator, driver, monkeypatch):
     )
 
 
-def test_a_missing_library_is_the_reason(generator, monkeypatch):
+def test_the_reason_names_a_missing_library(generator, monkeypatch):
     assert generator.renderer_name
     monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
     monkeypatch.setattr(cuda, "_LIBRARY", "libcuda-of-no-machine.so.1")
     assert "libcuda-of-no-machine.so.1: cannot open" in generator.cuda_reason()
 
 
-def test_another_vendors_driver_is_the_reason_and_render_is_named_instead(generator):
+def test_the_reason_names_another_vendors_driver_and_suggests_render(generator):
     reason = generator.cuda_reason()
     assert "OpenGL runs on llvmpipe" in reason
     assert "\n" not in reason
@@ -261,7 +265,7 @@ def test_another_vendors_driver_is_the_reason_and_render_is_named_instead(genera
         generator.render_cuda(index=0)
 
 
-def test_arguments_are_checked_as_those_of_render(generator):
+def test_arguments_are_checked_like_those_of_render(generator):
     with pytest.raises(ConfigError, match="give either index or scene"):
         generator.render_cuda()
     with pytest.raises(ConfigError, match="camera: 'D' is unknown"):

@@ -1,4 +1,4 @@
-"""Damage: the shader against its numpy twin seen through Embree, and the sampled proportions."""
+"""Damage: the shader compared with Embree rays on its numpy twin, and sampled proportions."""
 
 import math
 from dataclasses import replace
@@ -12,10 +12,11 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
-from fastgen.generator import QUALITY, Generator, Quality
+from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
 from fastgen.render.sample_targets import SampleTargets
+from fastgen.render.settings import QUALITY, Quality
 from fastgen.scene import Scene, Spreader
 from tests import oracle
 
@@ -40,19 +41,19 @@ def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, ind
         expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
         wrong = sample.damage != expected
         assert wrong.mean() < 1e-3
-        # away from edges, only a centre right on a seam between two parts may fall between them
+        # away from edges, only a pixel centre exactly on a seam between two parts may differ
         assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
         ids = oracle.object_ids(scene, mesh, hits)
         assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
         both = np.isfinite(sample.depth) & hits.hit & ~oracle.near_edge(expected)
         error_m = np.abs(sample.depth[both] - hits.depth_m[both])
         allowed_m = np.maximum(1e-3, 1e-3 * hits.depth_m[both])
-        # centres on a crease between facets may fall on either
+        # pixel centres on a crease may be on either facet
         assert (error_m <= allowed_m).mean() > 0.999
 
 
-def test_what_one_damage_pushes_out_of_its_plane_shows_the_others():
-    """A camera behind the plane of a sheet sees what stands on a bulge of it."""
+def test_ids_on_a_bulge_are_right_from_behind_the_plane_of_its_sheet():
+    """A camera behind the plane of a sheet sees decals on a part that bulges outward."""
     bulging = {"probability": 1, "kinds": ["concave", "dented"], "count": [4, 4]}
     with Generator(Config.from_values({"damage": bulging}), seed=0, size=(256, 192)) as generator:
         for index, camera in ((1463, "Cr"), (1103, "Cr"), (373, "Cl")):
@@ -65,7 +66,7 @@ def test_what_one_damage_pushes_out_of_its_plane_shows_the_others():
 
 
 def close_up(scene: Scene, kind: str) -> Scene:
-    """The scene with only its first damage of `kind`, and a camera right before it."""
+    """Return the scene with only its first damage of `kind` and a camera in front of it."""
     damage = next(d for d in scene.damages if d.kind == kind)
     origin, inward = np.array(damage.origin_mm), np.array(damage.inward)
     place = origin - 2500 * inward + 150 * np.array(damage.along)
@@ -85,7 +86,7 @@ def scene_with(generator, kind):
 
 
 @pytest.mark.parametrize("kind", DAMAGE_CLASSES)
-def test_every_kind_is_seen_whole_from_close_by(generator, kind):
+def test_every_kind_matches_rays_from_close_by(generator, kind):
     scene = close_up(scene_with(generator, kind), kind)
     sample = generator.render(scene=scene, camera="close")
     value = damage_law.mask_values(scene.damages)[0]
@@ -105,8 +106,8 @@ def test_every_kind_is_seen_whole_from_close_by(generator, kind):
         ("dented", {"amplitude_mm": 200, "width_mm": 300, "sink_share": 0.9, "depth_mm": 90}),
     ],
 )
-def test_a_damage_is_marked_as_far_as_it_moves_the_steel(kind, ranges):
-    """Farther than sheets fade for a wide edge, farther than its width for a path that swings."""
+def test_a_mask_covers_all_steel_that_its_damage_moves(kind, ranges):
+    """A wide `axis` reaches beyond the fade of other kinds, a winding dent beyond its width."""
     values = {"probability": 1.0, "count": [1, 1], "kinds": [kind], kind: ranges}
     with Generator(Config.from_values({"damage": values}), 5, SIZE) as generator:
         for index in range(3):
@@ -130,7 +131,7 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert sample.image[through].mean() < 0.6 * around
 
 
-def test_a_hole_shows_brown_boards_below_and_grey_walls(generator):
+def test_a_hole_shows_brown_floor_boards_and_grey_walls(generator):
     scene = close_up(scene_with(generator, "perforation"), "perforation")
     above = replace(scene.cameras[0], position_mm=tuple(
         np.array(scene.cameras[0].position_mm) + (0.0, 0.0, 600.0)
@@ -154,15 +155,15 @@ def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
     behind = (hits.hole >= 0) & (hits.triangle >= 0) & (sample.depth > 3.5)
     corners = mesh.positions_mm[mesh.triangles[hits.triangle[behind]]].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= -np.linalg.norm(normal, axis=1, keepdims=True)  # they show their backs
+    normal /= -np.linalg.norm(normal, axis=1, keepdims=True)  # their back faces are seen
     cosine = (sample.normals[behind] * (normal @ sample.view.rotation.T)).sum(axis=1)
     assert behind.sum() > 50
     assert np.median(cosine) > 0.999
     assert (cosine > 0.99).mean() > 0.8  # other pixels blend two sides of a corrugation
 
 
-def test_two_views_that_share_rows_show_what_separate_ones_do(generator, monkeypatch):
-    """The inner view of a hole, where textures are two rows too short for both."""
+def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch):
+    """Textures are two rows too short for the outer view and the inner view of a hole."""
     scene = close_up(scene_with(generator, "perforation"), "perforation")
     monkeypatch.setitem(QUALITY, "balanced", Quality(2, 1))
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
@@ -222,8 +223,8 @@ def test_opposite_holes_let_the_sky_through(generator):
     assert sample.cover[128, 128] == 0
 
 
-def test_worked_steel_is_dulled_and_rusts(generator):
-    """Blue paint without rust of its own: as brown as rust, in part, where a dent is deep."""
+def test_deformed_steel_is_dulled_and_rusts(generator):
+    """Blue paint without other rust becomes partly brown where a dent is deep."""
     scene = close_up(scene_with(generator, "dented"), "dented")
     surface = scene.surface
     paint = replace(surface.paint, albedo=(0.02, 0.05, 0.4))
@@ -236,7 +237,7 @@ def test_worked_steel_is_dulled_and_rusts(generator):
     marked = dented.damage == damage_law.mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
     assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
-    # along the fold no paint is as it was, be it rusty or not
+    # along the fold all paint changes, rusty or not
     (damage,) = scene.damages
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, dented.view, scene)
@@ -249,7 +250,7 @@ def test_worked_steel_is_dulled_and_rusts(generator):
 
 
 def test_a_dented_leaf_stays_behind_its_locking_gear():
-    """From outside one meets a bar or lever first wherever one does at rest."""
+    """Rays that hit a bar or handle first on the undamaged door also do so on the damaged one."""
     doors = {"damage": {"probability": 1.0, "faces": ["door"], "kinds": ["dented"]}}
     across, up = np.meshgrid(np.arange(-870.0, 870.0, 8.0), np.arange(900.0, 1200.0, 8.0))
     eyes = np.column_stack([np.full(across.size, 9000.0), across.ravel(), up.ravel()])
@@ -268,7 +269,7 @@ def test_a_dented_leaf_stays_behind_its_locking_gear():
                 body = trimesh.Trimesh(positions, mesh.triangles.astype(np.int64), process=False)
                 met.append(is_gear[RayMeshIntersector(body).intersects_first(eyes, rays)])
             gear += met[0].sum()
-            assert (met[0] & ~met[1]).sum() <= 10  # of 8 mm each, where a leaf folds sharply
+            assert (met[0] & ~met[1]).sum() <= 10  # rays 8 mm apart, where a leaf folds sharply
     assert gear > 40 * 200
 
 
@@ -283,8 +284,8 @@ def test_undamaged_places_do_not_change(generator):
     assert same[far].mean() > 0.9
 
 
-def test_a_moved_point_lies_on_the_field():
-    """A concave damage by hand: a paraboloid-like bump, at its centre, half way and rim."""
+def test_a_concave_damage_moves_points_by_hand_computed_amounts():
+    """A concave damage is a bump, checked at its centre, half way out and at its rim."""
     damage = damage_law.Damage(
         "concave", "front", (0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (2000, 1000), 80.0
     )
@@ -302,7 +303,7 @@ def many():
 
 
 def within(count, n, p):
-    """Four standard deviations of a binomial: one run in 16,000 fails by chance."""
+    """Return whether `count` is within 4 binomial standard deviations; 1 in 16,000 runs is not."""
     return abs(count - n * p) < 4 * math.sqrt(n * p * (1 - p))
 
 
@@ -337,7 +338,7 @@ def test_scenes_with_damage_round_trip_through_json(many):
     assert Scene.from_json(scene.to_json()) == scene
 
 
-def test_a_hundred_of_a_kind_is_refused():
+def test_a_hundred_damages_of_one_kind_are_refused():
     with pytest.raises(ConfigError, match=r"damage.count\[1\]: 100 is out of range; give 0 to 99"):
         Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
 
@@ -349,7 +350,7 @@ def test_a_hundred_of_a_kind_is_refused():
         *("dented.width_mm", "dented.amplitude_mm", "perforation.depth_mm"),
     ],
 )
-def test_what_reaches_farther_than_a_container_is_wide_is_refused(name):
+def test_sizes_beyond_the_container_width_are_refused(name):
     kind, key = name.split(".")
     inward = {"concave": {"outward": 0}}
     Config.from_values({"damage": inward | {kind: inward.get(kind, {}) | {key: 2400}}})
@@ -357,7 +358,7 @@ def test_what_reaches_farther_than_a_container_is_wide_is_refused(name):
         Config.from_values({"damage": {kind: {key: 2438}}})
 
 
-def test_moves_of_damages_add_up_however_wide_a_crease_is(many):
+def test_displacements_of_damages_add_up_even_for_a_wide_crease(many):
     dents = [d for scene in many for d in scene.damages if d.kind == "dented"][:4]
     assert len(dents) == 4
     rng = np.random.default_rng(2)

@@ -1,4 +1,4 @@
-"""shaders/damage.glsl against fastgen/damage.py, which describe the same fields."""
+"""The damage shader compared with its numpy twin; both define the same displacement fields."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ from fastgen.scene.object_ids import mask_values
 from tests.glsl import blocks, run
 
 THRESHOLD_MM = 5.0
-EDGE_MM = 0.01  # nearer to a border than this, either answer is right
+EDGE_MM = 0.01  # nearer to a border than this, both results are accepted
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def gl():
 
 
 def scenes_with(*kinds):
-    """Three scenes; about each of their damages, points as far out as twice its reach."""
+    """Return three scenes, each with points around its damages out to twice their reach."""
     damage = {"probability": 1.0, "count": [2, 12], "kinds": list(kinds)}
     generator = Generator(Config.from_values({"damage": damage}), seed=3)
     rng = np.random.default_rng(0)
@@ -54,8 +54,7 @@ def damages():
 
 
 def asked(gl, scene, body, points):
-    """What GLSL `vec4 f(vec4 x)` returns at each of points [N, 3], [N, 4]; and the damages in the
-    order of the shader."""
+    """Return GLSL `vec4 f(vec4 x)` at points [N, 3] as [N, 4], and the damages in shader order."""
     values = damage_values(scene, scene.damages, THRESHOLD_MM, 0)
     kept = blocks(gl, **values)
     rows = np.column_stack([points, np.zeros(len(points))])
@@ -66,7 +65,7 @@ def asked(gl, scene, body, points):
     return out, ordered
 
 
-def test_points_move_as_far_as_numpy_moves_them(gl, damages):
+def test_points_move_as_in_numpy(gl, damages):
     for scene, points in damages:
         moved, _ = asked(gl, scene, "vec4 f(vec4 x) { return vec4(deformed(x.xyz), 0.0); }", points)
         wanted = deform(scene.damages, points)
@@ -74,7 +73,7 @@ def test_points_move_as_far_as_numpy_moves_them(gl, damages):
         np.testing.assert_allclose(moved[:, :3], wanted, atol=0.02)
 
 
-def test_reach_is_what_numpy_says(gl, damages):
+def test_reach_is_the_same_as_in_numpy(gl, damages):
     body = (
         "vec4 f(vec4 x) { vec4 n = vec4(0.0); for (int i = 0; i < damage_count; ++i)"
         " n.x += within_reach(i, x.xyz) ? exp2(float(i)) : 0.0; return n; }"
@@ -91,7 +90,7 @@ def test_reach_is_what_numpy_says(gl, damages):
             np.testing.assert_array_equal(seen[sure], (beyond < 0)[sure])
 
 
-def test_what_reaches_a_point_is_not_passed_over(gl, damages):
+def test_next_near_skips_no_damage_that_reaches_a_point(gl, damages):
     body = (
         "vec4 f(vec4 x) { vec4 n = vec4(0.0); for (int i = 0; i < damage_count; ++i)"
         " if (within_reach(i, x.xyz)) {"
@@ -103,7 +102,7 @@ def test_what_reaches_a_point_is_not_passed_over(gl, damages):
         assert out[:, 1].max() == 0
 
 
-def test_holes_are_where_numpy_has_them(gl, damages):
+def test_holes_are_the_same_as_in_numpy(gl, damages):
     holes = 0
     for scene, points in damages:
         if not any(d.kind == "perforation" for d in scene.damages):
@@ -114,7 +113,7 @@ def test_holes_are_where_numpy_has_them(gl, damages):
         for i, damage in enumerate(ordered):
             wanted[in_hole(damage, points)] = i
         holes += np.count_nonzero(wanted >= 0)
-        assert np.count_nonzero(out[:, 0] != wanted) <= 1  # a point on an outline
+        assert np.count_nonzero(out[:, 0] != wanted) <= 1  # one point may lie on an outline
     assert holes > 50
 
 
@@ -132,9 +131,12 @@ def test_a_point_is_marked_with_the_damage_that_moves_it_most(gl, damages):
 
 
 @pytest.mark.parametrize("column", range(3))
-def test_bend_is_the_derivative_of_what_moves(gl, column):
-    """Along folds and torn rims it is only nearly so, and where a field fades it lacks what turns
-    neither the damaged sheet nor those across it."""
+def test_bend_is_the_derivative_of_the_displacement(gl, column):
+    """Test `axis` and `concave`; along folds and torn rims the bend is approximate.
+
+    Points where a `concave` field fades inward are skipped. The bend omits the gradient of the
+    fade, which turns neither the damaged sheet nor those across it.
+    """
     body = f"vec4 f(vec4 x) {{ return vec4(damage_at(x.xyz).bend[{column}], 0.0); }}"
     step = 0.5 * np.eye(3)[column]
     for scene, points in scenes_with("axis", "concave"):

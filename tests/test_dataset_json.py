@@ -1,4 +1,4 @@
-"""dataset.json lost, damaged or edited, and shards that know whose they are without it."""
+"""Datasets with a lost, damaged or edited dataset.json; shard manifests identify their run."""
 
 import json
 import os
@@ -65,7 +65,7 @@ def unfinished_with_another_seed(path):
         *(with_another_seed, unfinished_with_another_seed, with_odd_shards),
     ],
 )
-def test_shards_know_whose_they_are_when_dataset_json_does_not(dataset, copy, capsys, spoil):
+def test_shard_manifests_identify_the_run_if_dataset_json_does_not(dataset, copy, capsys, spoil):
     spoil(copy / "dataset.json")
     written = {path: path.stat().st_mtime_ns for path in copy.glob("images/*/*.jpg")}
     before = content(copy)
@@ -80,7 +80,7 @@ def test_shards_know_whose_they_are_when_dataset_json_does_not(dataset, copy, ca
 
 
 @pytest.mark.parametrize("shard", ["1", "2", "4"])
-def test_fewer_images_are_refused_without_dataset_json_too(tmp_path, capsys, shard):
+def test_fewer_images_are_refused_without_dataset_json(tmp_path, capsys, shard):
     assert run(tmp_path, "--shard", shard) == 0
     (tmp_path / "dataset.json").unlink()
     before = content(tmp_path)
@@ -100,7 +100,7 @@ def test_a_folder_that_only_looks_like_a_dataset_is_left_alone(tmp_path, capsys,
     assert content(tmp_path / "shards") == before
 
 
-def test_another_order_of_what_is_drawn_from_is_another_setting(tmp_path, capsys):
+def test_another_order_of_weighted_names_is_another_setting(tmp_path, capsys):
     kinds = {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1}
     for name, order in (("one", kinds), ("other", dict(reversed(kinds.items())))):
         (tmp_path / f"{name}.yaml").write_text(json.dumps({"container": {"kinds": order}}))
@@ -116,7 +116,7 @@ def test_another_order_of_what_is_drawn_from_is_another_setting(tmp_path, capsys
     assert "container.kinds was ['20', '40', " in capsys.readouterr().err
 
 
-def test_a_manifest_that_was_changed_is_made_again(dataset, copy):
+def test_a_changed_manifest_is_made_again(dataset, copy):
     (copy / "dataset.json").unlink()
     shutil.copy(copy / "shards/000002.json", copy / "shards/000001.json")
     path = copy / "shards/000000.json"
@@ -126,7 +126,7 @@ def test_a_manifest_that_was_changed_is_made_again(dataset, copy):
 
 
 @pytest.mark.parametrize("also", [[], ["--also", "bop,kitti"], ["--format", "webdataset"]])
-def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
+def test_verify_reports_only_a_lost_manifest_and_stray_files(tmp_path, capsys, also):
     out = tmp_path / "out"
     assert run(out, *also) == 0
     whole = content(out)
@@ -140,11 +140,11 @@ def test_a_lost_manifest_is_all_that_verify_blames(tmp_path, capsys, also):
     assert [line.split(":")[0] for line in faults if "--repair" not in line] == [
         "shards/000001.json", *astray,
     ]  # fmt: skip
-    assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # strays are not ours
+    assert main(["verify", str(out), "--repair", "--workers", "1"]) == 1  # stray files stay
     assert whole.items() <= content(out).items()
 
 
-def test_a_repair_that_was_stopped_goes_on(dataset, copy, capsys):
+def test_an_interrupted_repair_can_be_continued(dataset, copy, capsys):
     shutil.rmtree(copy / "images")
 
     def stop(*_):
@@ -159,8 +159,8 @@ def test_a_repair_that_was_stopped_goes_on(dataset, copy, capsys):
 
 
 @pytest.mark.parametrize("command", [["verify"], ["verify", "--repair", "--workers", "1"]])
-def test_a_linked_folder_is_left_as_it_is(copy, tmp_path, capsys, command):
-    """Files are renamed into place, which cannot cross to the disk where it may lie."""
+def test_a_linked_folder_is_refused_and_left_as_it_is(copy, tmp_path, capsys, command):
+    """Files are renamed into place, which fails if the link leads to another disk."""
     shutil.move(copy / "images", tmp_path / "elsewhere")
     (copy / "images").symlink_to(tmp_path / "elsewhere")
     before = content(copy), content(tmp_path / "elsewhere")
@@ -170,7 +170,7 @@ def test_a_linked_folder_is_left_as_it_is(copy, tmp_path, capsys, command):
     assert (content(copy), content(tmp_path / "elsewhere")) == before
 
 
-def test_what_is_no_file_is_named_and_made_again(dataset, copy, capsys):
+def test_pipes_and_folders_in_place_of_files_are_reported_and_repaired(dataset, copy, capsys):
     empty = next(path for path in copy.rglob("*") if path.is_file() and not path.stat().st_size)
     image = next(copy.glob("images/*/*.jpg"))
     for path in (empty, image):
@@ -185,7 +185,7 @@ def test_what_is_no_file_is_named_and_made_again(dataset, copy, capsys):
     assert content(copy) == content(dataset)
 
 
-def test_a_difference_of_a_missing_key_is_told(copy, capsys):
+def test_a_missing_config_key_is_reported_as_a_difference(copy, capsys):
     said = json.loads((copy / "dataset.json").read_text())
     said["config"]["cameras"]["A"].pop("lens")
     (copy / "dataset.json").write_text(json.dumps(said))
@@ -195,7 +195,7 @@ def test_a_difference_of_a_missing_key_is_told(copy, capsys):
     assert "(config.cameras.A.lens was missing, is now None)" in capsys.readouterr().err
 
 
-def test_an_extension_that_was_killed_is_not_finished(dataset, copy, tmp_path, capsys):
+def test_an_interrupted_extension_is_reported_as_unfinished(dataset, copy, tmp_path, capsys):
     assert main(["generate", str(tmp_path / "more"), *ARGUMENTS[2:], "--images", "8"]) == 0
 
     def fall(*_):
@@ -215,20 +215,20 @@ def test_an_extension_that_was_killed_is_not_finished(dataset, copy, tmp_path, c
     assert {k: v for k, v in content(copy).items() if k.startswith("images")} == images
 
 
-def test_a_dangling_link_does_not_belong(copy, capsys):
+def test_verify_reports_a_dangling_link(copy, capsys):
     (copy / "images/link").symlink_to("nowhere")
     assert main(["verify", str(copy)]) == 1
     assert "images/link: does not belong here" in capsys.readouterr().out
     assert run(copy) == 0
 
 
-def test_stats_refuse_what_was_changed(copy, capsys):
+def test_stats_refuse_a_changed_manifest(copy, capsys):
     path = copy / "shards/000001.json"
     path.write_text(path.read_text().replace('"split":"', '"split":"te'))
     assert main(["stats", str(copy)]) == 2
     assert "is damaged; run fastgen verify" in capsys.readouterr().err
 
 
-def test_a_file_address_is_a_folder(dataset, tmp_path):
+def test_a_file_url_names_a_folder(dataset, tmp_path):
     assert run(f"file://{tmp_path}/out") == 0
     assert content(tmp_path / "out") == content(dataset)

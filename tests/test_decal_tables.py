@@ -1,4 +1,4 @@
-"""Tables of decals, against one cell and one decal after the other."""
+"""Decal tables compared with a loop over all decals and cells."""
 
 from dataclasses import replace
 
@@ -25,14 +25,14 @@ def with_decals(*decals):
 
 
 def listed(grid, row, column):
-    """Numbers of the decals that a cell names, from the bottom."""
+    """Return the indices of the decals that a cell lists, bottom first."""
     words = grid[row, column]
     halves = [half for word in words.tolist() for half in (word & 0xFFFF, word >> 16)]
     return [half - 1 for half in halves if half]
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
-def test_each_cell_names_the_decals_that_reach_it_in_the_order_of_painting(index):
+def test_each_cell_lists_the_decals_that_reach_it_in_painting_order(index):
     scene = sample_scene(Config.preset(), 5, index, {"port_quay_noon": 1.0})
     mesh, tables = packed(scene)
     assert len(scene.decals) > 10
@@ -62,7 +62,7 @@ def test_a_scene_without_decals_has_empty_tables():
     assert tables.table.shape[0] == 1
 
 
-def test_the_first_decal_that_finds_no_room_is_named():
+def test_the_first_decal_without_room_is_named():
     crowd = [marker(1000.0, 1000.0)] * CELL_SLOTS
     packed(with_decals(*crowd))
     with pytest.raises(SceneError, match=rf"decals\[{CELL_SLOTS + 1}\].*more than {CELL_SLOTS}"):

@@ -1,4 +1,4 @@
-"""Cells of the atlas that decals are near to, against points of the cells one by one."""
+"""Atlas cells marked as near a decal, compared with tests of single points in each cell."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SIZE_MM = (1500.0, 1200.0)
 
 
 def row(kind, center, half, turn_deg):
-    """A row of the table of decals."""
+    """Return one row of the decal table, float32 [5, 4]."""
     cos, sin = np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))
     values = np.zeros((5, 4), np.float32)
     values[0] = cos, sin, -sin, cos
@@ -24,7 +24,7 @@ def row(kind, center, half, turn_deg):
 
 
 def beyond_mm(kind, center, half, turn_deg, points):
-    """How far points [..., 2] lie outside an outline, along the normals of its sides."""
+    """Return how far points [..., 2] lie outside an outline, along the normals of its sides."""
     angle = np.deg2rad(turn_deg)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     x, y = np.moveaxis(np.abs((points - center) @ turn.T), -1, 0)
@@ -34,11 +34,11 @@ def beyond_mm(kind, center, half, turn_deg, points):
 
 
 def cells(numbers):
-    """The cells [rows, columns] in what the shader reads."""
+    """Unpack the cells [rows, columns] from the numbers that the shader reads."""
     return np.stack([numbers >> 8 * i & 255 for i in range(4)], axis=-1).reshape(len(numbers), -1)
 
 
-def test_cells_hold_all_points_near_decals_and_few_others():
+def test_cells_cover_all_points_near_decals_and_few_others():
     rng = np.random.default_rng(4)
     columns, rows = (int(np.ceil(side / NEAR_CELL_MM)) for side in SIZE_MM)
     steps = (np.arange(8) + 0.5) / 8 * NEAR_CELL_MM
@@ -47,7 +47,7 @@ def test_cells_hold_all_points_near_decals_and_few_others():
     points = np.stack(np.meshgrid(across.ravel(), down.ravel()), axis=-1)
     for turn_deg in (0.0, 90.0, 180.0, 3.0, -77.0, 45.0):
         for kind in ("marker", "text", "sticker"):
-            # also beyond the atlas' borders
+            # centres may lie outside the atlas
             center, half = rng.uniform((-50, -50), SIZE_MM), rng.uniform(20, 300, 2)
             if kind == "marker":
                 half[1] = half[0]
@@ -57,11 +57,11 @@ def test_cells_hold_all_points_near_decals_and_few_others():
             beyond = beyond_mm(*decal, points).reshape(rows, 8, columns, 8)
             nearest = beyond.min(axis=(1, 3))
             assert found[nearest <= MARGIN_MM].all()
-            # a cell's middle is no more than half its diagonal from any point of it
+            # the centre of a cell is at most half a diagonal from any of its points
             assert not found[nearest > MARGIN_MM + 1.5 * NEAR_CELL_MM].any()
 
 
-def test_no_decal_is_near_where_there_is_none_and_several_add_up():
+def test_no_decals_mark_no_cells_and_several_decals_add_up():
     assert not decals_near(np.zeros((0, 5, 4), np.float32), SIZE_MM).any()
     a = row("text", (300, 300), (100, 40), 0.0)
     b = row("marker", (900, 700), (150, 150), 0.0)
@@ -70,7 +70,7 @@ def test_no_decal_is_near_where_there_is_none_and_several_add_up():
     np.testing.assert_array_equal(both, alone)
 
 
-def test_the_shader_finds_each_cell():
+def test_the_shader_reads_each_cell():
     decals = [row("text", (300, 310), (90, 40), 3.0), row("marker", (1480, 1190), (100, 100), 0.0)]
     size_mm = (1501.0, 1203.0)
     near = decals_near(np.stack(decals), size_mm)

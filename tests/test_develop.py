@@ -1,4 +1,4 @@
-"""What each part of a sensor does to a whole image, one part at a time."""
+"""Effect of each part of the sensor model on an image, one part at a time."""
 
 from dataclasses import replace
 from datetime import datetime
@@ -24,7 +24,7 @@ AIR = (0.5, 0.5, 0.5)
 
 
 def recorded(image, sensor, depth_m=6.0):
-    """`image` [H, W, 3] as a camera with `sensor` gives it, of a plane depth_m away."""
+    """Return `image` [H, W, 3] as recorded by a camera with `sensor` from `depth_m` away."""
     height, width = image.shape[:2]
     frame = Frame(
         image=image,
@@ -43,7 +43,7 @@ def even(level=110):
 
 
 def point():
-    """A bright spot in the middle of the dark."""
+    """Return a dark image with one bright pixel near its centre."""
     image = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     image[60, 80] = 250
     return image
@@ -53,7 +53,7 @@ def ratio(after, before):
     return light_of(after).mean(axis=(0, 1)) / light_of(before).mean(axis=(0, 1))
 
 
-def test_an_error_of_exposure_is_in_stops_of_light():
+def test_exposure_error_is_in_stops():
     for stops in (-1.0, 0.5):
         found = ratio(recorded(even(), Sensor(exposure_error_ev=stops)), even())
         np.testing.assert_allclose(found, 2**stops, rtol=0.02)
@@ -64,7 +64,7 @@ def test_white_balance_multiplies_channels():
     np.testing.assert_allclose(found, (1.25, 1.0, 0.8), rtol=0.02)
 
 
-def test_white_balance_comes_after_counting_and_keeps_the_signal_to_noise():
+def test_white_balance_follows_photon_noise_and_keeps_the_signal_to_noise_ratio():
     sensor = Sensor(gains=(1.5, 1.0, 0.7), noise=Noise(2000, 0.0, 3))
     light = light_of(recorded(even(), sensor)).reshape(-1, 3)
     level = light_of(even())[0, 0, 0]
@@ -73,33 +73,33 @@ def test_white_balance_comes_after_counting_and_keeps_the_signal_to_noise():
     )
 
 
-def test_an_error_of_exposure_comes_before_counting():
+def test_exposure_error_precedes_photon_noise():
     light = light_of(recorded(even(), Sensor(exposure_error_ev=-2.0, noise=Noise(2000, 0.0, 3))))
     counted = light_of(even())[0, 0, 0] / 4 * 2000
     assert light.mean() / light.std() == pytest.approx(counted**0.5, rel=0.05)
 
 
-def test_corners_lose_what_vignetting_says():
+def test_corners_darken_by_the_vignetting():
     light = light_of(recorded(even(), Sensor(vignetting=0.5)))[..., 0]
     assert light[60, 80] == pytest.approx(light_of(even())[0, 0, 0], rel=0.02)
     assert light[0, 0] / light[60, 80] == pytest.approx(0.5, abs=0.02)
 
 
 @pytest.mark.parametrize(("motion", "rows", "columns"), [((0.1, 0.0), 1, 16), ((0.0, 0.1), 16, 1)])
-def test_motion_is_right_and_down_in_widths_of_the_image(motion, rows, columns):
+def test_motion_is_right_and_down_in_image_widths(motion, rows, columns):
     lit = light_of(recorded(point(), Sensor(motion=motion)))[..., 0] > 0.01
     assert np.ptp(np.nonzero(lit)[0]) + 1 == pytest.approx(rows, abs=2)
     assert np.ptp(np.nonzero(lit)[1]) + 1 == pytest.approx(columns, abs=2)
 
 
-def test_what_is_out_of_focus_spreads_and_what_is_in_focus_does_not():
+def test_only_points_out_of_focus_are_blurred():
     sensor = Sensor(defocus=Defocus(6000, 1.0))
     np.testing.assert_array_equal(recorded(point(), sensor, depth_m=6.0) > 30, point() > 30)
     near = light_of(recorded(point(), sensor, depth_m=0.5))[..., 0]
     assert np.count_nonzero(near > 0.1 * near.max()) >= 5
 
 
-def test_a_jpeg_keeps_its_colours():
+def test_jpeg_compression_keeps_colours():
     image = even()
     image[:] = (220, 30, 60)
     apart = recorded(image, Sensor(jpeg_quality=90)).astype(int) - image
@@ -116,7 +116,7 @@ def test_a_stamp_fits_into_the_image(size):
         assert columns.max() < size[0] - 1
 
 
-def test_drops_stand_for_those_that_are_too_many_to_draw(monkeypatch):
+def test_a_limit_on_the_number_of_drops_keeps_their_total_light(monkeypatch):
     view = view_of(CAMERA, SIZE)
     dark, far = np.zeros((121, 161, 3), np.float32), np.full((121, 161), np.inf, np.float32)
 
@@ -130,7 +130,7 @@ def test_drops_stand_for_those_that_are_too_many_to_draw(monkeypatch):
     assert light() == pytest.approx(every, rel=0.15)
 
 
-def test_what_is_drawn_of_a_sensor_is_what_its_ranges_say():
+def test_sampled_sensors_lie_within_their_ranges():
     values = {
         "sensor": {
             "white_balance_ev": [0.2, 0.3],
@@ -152,7 +152,7 @@ def test_what_is_drawn_of_a_sensor_is_what_its_ranges_say():
 @pytest.mark.parametrize(
     ("name", "hours"), [("port_noon", range(8, 17)), ("port_night", (21, 22, 23, 0, 1, 2, 3))]
 )
-def test_cameras_of_a_scene_are_stamped_with_one_moment_that_looks_so(name, hours):
+def test_cameras_of_a_scene_share_one_timestamp_that_fits_the_light(name, hours):
     values = {
         "environment": {"names": [name]},
         "sensor": {"stamp": {"probability": 1.0, "years": [2020, 2021]}},

@@ -1,4 +1,4 @@
-"""Distinct rows against sets of tuples."""
+"""`distinct_rows` compared with sets of tuples."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ def rows_of(dtype, seed):
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.int64])
 @pytest.mark.parametrize("odd", [None, 0])
-def test_each_row_is_found_once_and_every_row_finds_its_like(dtype, odd, monkeypatch):
-    """odd 0: all rows share a code, and the slow way must do."""
+def test_each_distinct_row_is_returned_once_and_every_row_is_mapped_to_it(dtype, odd, monkeypatch):
+    """All rows get the same hash if `odd` is 0, which forces the slow path."""
     if odd is not None:
         monkeypatch.setattr(distinct, "_ODD", np.full(3, odd, np.uint64))
     rows = rows_of(dtype, 5).astype(dtype)
@@ -26,7 +26,7 @@ def test_each_row_is_found_once_and_every_row_finds_its_like(dtype, odd, monkeyp
     assert (rows[first][which] == rows).all()
 
 
-def test_zeros_of_both_signs_are_one():
+def test_zeros_of_both_signs_are_equal():
     rows = np.array([[0.0, 1.0, 2.0], [-0.0, 1.0, 2.0]], np.float32)
     first, which = distinct_rows(rows)
     assert len(first) == 1

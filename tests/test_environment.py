@@ -1,4 +1,4 @@
-"""Environments: files, the cache, metering and what is bundled."""
+"""Environments: HDRI files, the disk cache, metering and the bundled HDRIs."""
 
 import json
 import os
@@ -40,7 +40,7 @@ def write_channels(path: Path, channels: dict[str, np.ndarray]) -> Path:
 
 
 def write_flat_hdr(path: Path, rgbe: np.ndarray) -> Path:
-    """Radiance picture [H, W, 4] uint8 without run lengths, byte by byte."""
+    """Write RGBE pixels [H, W, 4] as a Radiance file without run-length encoding."""
     height, width = rgbe.shape[:2]
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
     path.write_bytes(head.encode() + rgbe.astype(np.uint8).tobytes())
@@ -59,9 +59,9 @@ def test_unusable_values_are_replaced_on_reading(tmp_path):
     assert (read[10, 20] == 65504).all()
     assert (read[11, 30] == 0).all()
     assert (read[80, 80] == 0).all()
-    np.testing.assert_allclose(read[12, 0], 0.25)  # from its neighbours, across the seam too
+    np.testing.assert_allclose(read[12, 0], 0.25)  # from its neighbours, also across the seam
     np.testing.assert_allclose(read[60, 100], 0.25)
-    assert (read[61, 101] == 0).all()  # nothing known around it
+    assert (read[61, 101] == 0).all()  # no valid neighbours
     light = prefilter_environment("odd", read)
     assert np.isfinite(light.specular).all()
 
@@ -80,17 +80,17 @@ def test_meter_reads_the_side_it_points_at_and_follows_yaw():
     x, y = np.array([1.0, 0, 0]), np.array([0, 1.0, 0])
     assert metered_luminance(light, x, 20.0, 0.0) == pytest.approx(8, rel=0.01)
     assert metered_luminance(light, y, 20.0, 0.0) == pytest.approx(0.5, rel=0.01)
-    # turned a quarter counter-clockwise, what stood at +x stands at +y
+    # a quarter turn counter-clockwise moves the light from +x to +y
     assert metered_luminance(light, y, 20.0, 90.0) == pytest.approx(8, rel=0.01)
     assert metered_luminance(light, x, 20.0, 90.0) == pytest.approx(0.5, rel=0.01)
     # a cap of 60 degrees around the normal gives sin^2(60) of a full hemisphere's irradiance
     falling = irradiance_at(light, y[None], 90.0)[0, 0]
     assert falling == pytest.approx(0.5 + 7.5 * 0.75, rel=0.01)
-    # |x| > 0.5 is half of the hemisphere
-    assert metered_luminance(light, x, 90.0, 0.0) == pytest.approx(2, rel=0.15)  # cells average
+    # |x| > 0.5 is half of the hemisphere; the tolerance is for cells, which are averages
+    assert metered_luminance(light, x, 90.0, 0.0) == pytest.approx(2, rel=0.15)
 
 
-def test_whole_sphere_meter_equals_the_mean():
+def test_mean_luminance_equals_the_mean_over_the_sphere():
     radiance = patchwork(3)
     light = prefilter_environment("patches", radiance)
     _, solid_angle = texel_grid(radiance.shape[0])
@@ -161,7 +161,7 @@ def test_racing_writers_leave_one_whole_entry(tmp_path):
             np.testing.assert_array_equal(light.specular, stored["specular"])
 
 
-def test_of_many_workers_one_prefilters_and_the_others_read(tmp_path):
+def test_only_one_of_several_workers_prefilters_an_environment(tmp_path):
     path = write_exr(tmp_path / "a.exr", patchwork(1))
     code = """if True:
         import sys, time
@@ -189,7 +189,7 @@ def test_of_many_workers_one_prefilters_and_the_others_read(tmp_path):
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
-def test_what_was_not_read_for_longest_leaves_a_full_cache(tmp_path, monkeypatch):
+def test_a_full_cache_drops_the_least_recently_read_entry(tmp_path, monkeypatch):
     monkeypatch.setattr(disk_cache, "LIMIT_BYTES", 3 * 9000)  # each takes 8000 bytes and a header
     for age, name in enumerate("abcd"):
         disk_cache.write(tmp_path / f"{name}.npz", {"values": np.zeros(1000)})
@@ -200,7 +200,7 @@ def test_what_was_not_read_for_longest_leaves_a_full_cache(tmp_path, monkeypatch
     assert {entry.stem for entry in tmp_path.iterdir()} == {"a", "c", "d"}
 
 
-def test_what_killed_processes_left_in_the_cache_goes(tmp_path):
+def test_cache_files_of_killed_processes_are_removed(tmp_path):
     for name in (".dead.part", "dead.lock", ".busy.part", "busy.lock"):
         (tmp_path / name).write_bytes(b"")
         if "dead" in name:
@@ -209,7 +209,7 @@ def test_what_killed_processes_left_in_the_cache_goes(tmp_path):
     assert {entry.name for entry in tmp_path.iterdir()} == {"a.npz", ".busy.part", "busy.lock"}
 
 
-def test_unwritable_cache_folder_only_means_no_caching(tmp_path):
+def test_an_unwritable_cache_folder_only_disables_caching(tmp_path):
     path = write_exr(tmp_path / "a.exr", patchwork(1))
     (tmp_path / "file").write_text("in the way")
     light = load_environment(path, tmp_path / "file" / "cache")
@@ -222,11 +222,11 @@ def test_default_cache_follows_xdg(tmp_path, monkeypatch):
     assert len(list((tmp_path / "xdg" / "fastgen").iterdir())) == 1
 
 
-def test_hdr_bytes_decode_to_the_radiance_they_stand_for(tmp_path):
+def test_hdr_bytes_decode_to_the_correct_radiance(tmp_path):
     rgbe = np.random.default_rng(2).integers(3, 256, (128, 256, 4))
     rgbe[..., 3] = 120 + rgbe[..., 3] % 20
     read = load_radiance(write_flat_hdr(tmp_path / "flat.hdr", rgbe))
-    # mantissas of 8 bits below an exponent with a bias of 128 (Ward 1991, Real Pixels)
+    # 8-bit mantissas and an exponent with a bias of 128 (Ward 1991, Real Pixels)
     expected = rgbe[..., :3] * 2.0 ** (rgbe[..., 3:] - 136)
     np.testing.assert_allclose(read, expected, rtol=0.01, atol=2.0**-17)
 
@@ -250,7 +250,7 @@ def test_channel_layouts_are_read_as_rgb(tmp_path, kind):
         image = np.repeat(image[..., :1], 3, axis=2)
     elif kind == "alpha":
         write_exr(path, np.concatenate([image, np.zeros((128, 256, 1), np.float32)], 2), "RGBA")
-    elif kind == "more":  # of a renderer's other passes
+    elif kind == "more":  # with other render passes
         planes = {name: image[..., c].copy() for c, name in enumerate("RGB")}
         others = ("A", "roughness", "bump", "glow.")
         write_channels(path, planes | {name: image[..., 0] + 1 for name in others})
@@ -301,13 +301,13 @@ def test_an_hdri_without_light_is_refused_by_name_cached_or_not(tmp_path, value)
 
 
 @pytest.mark.parametrize("value", [3e4, 1e30])
-def test_an_hdri_beyond_half_floats_is_refused_by_name(tmp_path, value):
+def test_an_hdri_too_bright_for_half_floats_is_refused_by_name(tmp_path, value):
     path = write_exr(tmp_path / "lamp.exr", np.full((128, 256, 3), value, np.float32))
     with pytest.raises(AssetError, match=r"lamp\.exr: is too bright"):
         load_environment(path, tmp_path / "cache")
 
 
-def test_a_faint_light_is_light(tmp_path):
+def test_a_faint_light_is_accepted(tmp_path):
     image = np.zeros((128, 256, 3), np.float32)
     image[64] = 0.01  # a glow along the horizon
     assert load_environment(write_exr(tmp_path / "dusk.exr", image), tmp_path).mean_luminance > 0
@@ -338,7 +338,7 @@ def test_folder_listing_is_sorted_and_ignores_other_files(tmp_path):
     assert [p.name for p in find_hdris(tmp_path)] == ["a.exr", "b.HDR", "c.Exr"]
 
 
-def test_a_name_that_is_not_utf_8_is_refused(tmp_path):
+def test_a_file_name_that_is_not_utf_8_is_refused(tmp_path):
     (tmp_path / os.fsdecode(b"sk\xff.hdr")).write_bytes(b"")
     with pytest.raises(AssetError, match=r"hdr: is no name in UTF-8; rename it"):
         find_hdris(tmp_path)
@@ -350,7 +350,7 @@ def test_folder_without_hdris_is_refused_by_name(tmp_path):
             find_hdris(folder)
 
 
-def test_bundled_environments_are_whole_free_and_varied():
+def test_bundled_environments_are_complete_free_and_varied():
     bundled = bundled_hdris()
     folder = next(iter(bundled.values())).parent
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
@@ -368,7 +368,7 @@ def test_bundled_environments_are_whole_free_and_varied():
     assert {"day", "night", "dusk", "overcast", "urban", "industrial", "port"} <= kinds
 
 
-def test_ports_are_drawn_oftener_than_other_places_and_interiors_never():
+def test_ports_weigh_more_than_other_places_and_interiors_nothing():
     folder = next(iter(bundled_hdris().values())).parent
     index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
     weights = bundled_weights()
@@ -379,7 +379,7 @@ def test_ports_are_drawn_oftener_than_other_places_and_interiors_never():
         assert (weight > 1) == ("port" in kind)
 
 
-def test_scenes_draw_by_weight_and_what_is_named_alike():
+def test_scenes_follow_the_weights_unless_environments_are_named():
     def drawn(config, weights):
         scenes = [sample_scene(config, 5, i, weights) for i in range(12)]
         return Counter(scene.environment.name for scene in scenes)

@@ -1,4 +1,4 @@
-"""The examples: each runs end to end, and what they measure agrees with hand-made cases."""
+"""The examples: each runs end to end, and their metrics agree with cases made by hand."""
 
 import json
 import os
@@ -27,7 +27,7 @@ SIZE = (200, 100)
 
 
 @pytest.mark.parametrize("example", ["door", "imdg", "damage", "text", "imdg --full"])
-def test_example_runs_and_leaves_table_numbers_and_charts(example, tmp_path):
+def test_an_example_runs_and_writes_table_numbers_and_charts(example, tmp_path):
     name, *options = example.split()
     command = [sys.executable, f"examples/{name}.py", "--smoke", *options]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_WAIT_POLICY": "PASSIVE"}
@@ -41,7 +41,7 @@ def test_example_runs_and_leaves_table_numbers_and_charts(example, tmp_path):
 
 
 def labels(*things, masks=None):
-    """Target of (label, x0, y0, x1, y1) each, its area that of the box or of the mask."""
+    """Return a target from tuples (label, x0, y0, x1, y1), with areas of the masks or the boxes."""
     boxes = torch.tensor([t[1:] for t in things], dtype=torch.float32).reshape(-1, 4)
     target = {"boxes": boxes, "labels": torch.tensor([t[0] for t in things], dtype=torch.int64)}
     target["area"] = (boxes[:, 2:] - boxes[:, :2]).prod(1)
@@ -51,12 +51,12 @@ def labels(*things, masks=None):
 
 
 def detections(*things, masks=None):
-    """Detections of (score, label, x0, y0, x1, y1) each."""
+    """Return detections from tuples (score, label, x0, y0, x1, y1)."""
     found = labels(*(t[1:] for t in things), masks=masks)
     return found | {"scores": torch.tensor([t[0] for t in things], dtype=torch.float32)}
 
 
-def test_average_precision_of_right_wrong_right_is_that_of_the_interpolated_curve():
+def test_average_precision_is_that_of_the_interpolated_curve():
     target = labels((1, 0, 0, 20, 20), (1, 100, 0, 120, 20))
     found = detections((0.9, 1, 0, 0, 20, 20), (0.8, 1, 50, 50, 70, 70), (0.7, 1, 100, 0, 120, 20))
     scores = score([target], [found], NAMES, SIZE)
@@ -67,7 +67,7 @@ def test_average_precision_of_right_wrong_right_is_that_of_the_interpolated_curv
     assert scores.ap50 == pytest.approx(scores.class_ap50[0])
 
 
-def test_sizes_are_told_apart_by_the_area_of_the_label():
+def test_recall_by_size_uses_the_area_of_the_label():
     target = labels((1, 0, 0, 20, 20), (1, 60, 0, 110, 50), (1, 100, 0, 200, 100))
     found = detections((0.9, 1, 60, 0, 110, 50))
     summary = score([target], [found], NAMES, SIZE).summary
@@ -84,7 +84,7 @@ def test_a_mask_that_overlaps_by_three_fifths_counts_at_three_of_ten_thresholds(
     assert score([target], [found], NAMES, SIZE).class_ap[1] == pytest.approx(100)
 
 
-def test_nothing_found_is_no_error():
+def test_no_detections_is_not_an_error():
     scores = score([labels((1, 0, 0, 20, 20))], [detections()], NAMES, SIZE)
     point = operating_point(scores)
     assert scores.ap == 0
@@ -92,7 +92,7 @@ def test_nothing_found_is_no_error():
     assert np.isnan(point.mean_precision)
 
 
-def test_operating_point_leaves_out_what_costs_more_precision_than_it_brings_recall():
+def test_operating_point_drops_detections_that_cost_more_precision_than_they_add_recall():
     target = labels((1, 0, 0, 20, 20), (1, 100, 0, 120, 20))
     wrong = [(0.3, 1, 50, y, 60, y + 10) for y in (0, 20, 40, 60, 80)]
     right = [(0.8, 1, 0, 0, 20, 20), (0.7, 1, 100, 0, 120, 20)]
@@ -102,7 +102,7 @@ def test_operating_point_leaves_out_what_costs_more_precision_than_it_brings_rec
     assert (point.mean_precision, point.mean_recall) == (100, 100)
 
 
-def test_confusion_counts_the_class_found_at_each_label_and_what_is_missed():
+def test_confusion_counts_the_class_detected_at_each_label_and_missed_labels():
     target = labels((1, 0, 0, 200, 100), (2, 0, 0, 200, 98), (3, 10, 10, 30, 30), (3, 60, 0, 70, 9))
     ends = (0.9, 1, 0, 0, 200, 99), (0.8, 3, 0, 0, 198, 98)
     found = detections(*ends, (0.7, 3, 9, 9, 30, 30), (0.1, 3, 60, 0, 70, 9))
@@ -141,7 +141,7 @@ def _filled(box):
     return mask
 
 
-def test_overlaps_of_boxes_are_those_of_pycocotools():
+def test_iou_of_boxes_equals_that_of_pycocotools():
     rng = np.random.default_rng(4)
     a, b = (torch.tensor([_box(rng) for _ in range(n)], dtype=torch.float32) for n in (7, 9))
     theirs = coco_mask.iou(*(_sized(boxes) for boxes in (a, b)), [0] * len(b))
@@ -152,7 +152,7 @@ def _sized(boxes):
     return torch.cat([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]], dim=1).double().numpy()
 
 
-def test_generalized_overlap_falls_below_zero_with_the_gap():
+def test_generalized_iou_falls_below_zero_with_the_gap():
     unit = torch.tensor([0.0, 0, 1, 1])
     for gap in (0.0, 1.0, 5.0):
         apart = unit + torch.tensor([1 + gap, 0, 1 + gap, 0])
@@ -161,7 +161,7 @@ def test_generalized_overlap_falls_below_zero_with_the_gap():
 
 
 def perfect_maps(target, classes):
-    """Maps that a detector would give for a target of boxes whose centres are cell centres."""
+    """Return the maps of an ideal detector for boxes whose centres are cell centres."""
     height, width = SIZE[1] // STRIDE, SIZE[0] // STRIDE
     heat = torch.full((1, classes, height, width), -20.0)
     sides = torch.zeros(1, 2, 4, height, width)
@@ -174,7 +174,7 @@ def perfect_maps(target, classes):
     return heat, sides
 
 
-def test_detector_reads_boxes_and_classes_off_its_maps(monkeypatch):
+def test_detector_reads_boxes_and_classes_from_its_maps(monkeypatch):
     target = labels((1, 2, 4, 194, 96), (3, 90, 40, 114, 68), (2, 26, 14, 34, 22))
     model = Detector(3)
     monkeypatch.setattr(Detector, "forward", lambda self, pixels: perfect_maps(target, 3))
@@ -185,18 +185,18 @@ def test_detector_reads_boxes_and_classes_off_its_maps(monkeypatch):
     assert found["boxes"][order] == pytest.approx(target["boxes"][[0, 2, 1]], abs=1e-3)
 
 
-def test_of_boxes_of_a_class_on_one_another_the_best_stays():
+def test_only_the_best_of_overlapping_boxes_of_a_class_is_kept():
     boxes = torch.tensor([[0.0, 0, 10, 10], [1, 0, 11, 10], [0, 0, 10, 10], [5, 0, 15, 10]])
     assert distinct(boxes, torch.tensor([1, 1, 2, 1])).tolist() == [True, False, True, True]
 
 
-def test_heat_is_one_at_the_cell_of_the_centre_alone_and_longer_along_the_longer_side():
+def test_heat_is_one_only_at_the_centre_cell_and_extends_along_the_longer_side():
     bells = gaussians(torch.tensor([[16.0, 40, 176, 60]]), torch.Size((25, 50)))[0]
     assert (bells == 1).nonzero().tolist() == [[12, 24]]
     assert bells[12, 28] > bells[16, 24]
 
 
-def test_losses_of_a_detector_fall_on_one_image_until_it_finds_the_box():
+def test_a_detector_trained_on_one_image_finds_its_box():
     torch.manual_seed(0)
     image = torch.full((3, 64, 64), 60, dtype=torch.uint8)
     image[0, 20:44, 12:36] = 250
@@ -232,7 +232,7 @@ def test_slenderness_of_a_tilted_bar_is_its_length_over_its_width():
     assert damage.slenderness(square) == pytest.approx(1)
 
 
-def test_kept_items_are_those_of_the_dataset_and_come_back_from_the_file(tmp_path):
+def test_cached_items_equal_those_of_the_dataset_and_are_read_back(tmp_path):
     config = damage.Config.from_values(damage.MANY_DAMAGES)
     data = ContainerDataset("damage", config, seed=2, size=(96, 64), length=4)
     first, again = rendered(data, tmp_path), rendered(data, tmp_path)
@@ -243,12 +243,12 @@ def test_kept_items_are_those_of_the_dataset_and_come_back_from_the_file(tmp_pat
         assert (first[i][0] == kept_image).all()
         assert (target["masks"] == kept_target["masks"]).all()
         assert (target["boxes"] == kept_target["boxes"]).all()
-        # a JPEG
+        # cached images are JPEGs
         assert (image.float() - kept_image.float()).abs().mean() < 6
     data.close()
 
 
-def test_order_of_batches_is_decided_by_seed_and_pass():
+def test_order_of_batches_depends_on_seed_and_pass():
     items = list(zip(torch.arange(9), range(9), strict=True))
 
     def order(seed, number):
@@ -270,7 +270,7 @@ def test_workers_render_new_strips_for_every_pass():
     assert set(passes[0][0][1]).isdisjoint(passes[1][0][1])
 
 
-def test_table_shows_a_dash_for_what_is_not_measured():
+def test_table_shows_a_dash_for_missing_values():
     table = Table("T", ["a", "b", "c"], [["x", 3, float("nan")], ["y", 2, 1.25]])
     assert table.markdown().splitlines()[2:] == [
         "| a | b | c |",

@@ -1,4 +1,4 @@
-"""What `fastgen export` writes, read back by trimesh and hit with Embree rays."""
+"""Files from `fastgen export`, read back by trimesh and hit with Embree rays."""
 
 import json
 import struct
@@ -34,7 +34,7 @@ TORN = Config.from_values(
 
 
 def tree_of(path):
-    """The JSON part of a GLB, by the layout in section 4.4 of the glTF 2.0 specification."""
+    """Return the JSON part of a GLB, as laid out in section 4.4 of the glTF 2.0 specification."""
     data = path.read_bytes()
     magic, version, length = struct.unpack_from("<4sII", data)
     assert (magic, version, length) == (b"glTF", 2, len(data))
@@ -44,7 +44,7 @@ def tree_of(path):
 
 
 class Exported:
-    """An exported file as rays see it: z up, metres."""
+    """An exported file as geometry for rays: z up, in metres."""
 
     def __init__(self, path):
         self.tree = tree_of(path)
@@ -58,7 +58,7 @@ class Exported:
         self.visual = self.parts["container"].visual
 
     def rays(self, name):
-        """Origin and directions [H * W, 3] through all pixel centres, from the glTF camera."""
+        """Return the origin [3] and pixel ray directions [H * W, 3] of the glTF camera."""
         node = next(n for n in self.tree["nodes"] if n["name"] == name and "camera" in n)
         lens = self.tree["cameras"][node["camera"]]["perspective"]
         width, height = node["extras"]["size"]
@@ -70,7 +70,7 @@ class Exported:
         return TO_Z_UP @ pose[:3, 3], local @ pose[:3, :3].T @ TO_Z_UP.T
 
     def first_hits(self, name, body):
-        """Triangle of `body` (-1: none) and depth along the axis, [H * W] each."""
+        """Return triangle of `body` (-1 for none) and depth along the view axis, [H * W] each."""
         origin, rays = self.rays(name)
         origins = np.tile(origin, (len(rays), 1))
         lengths = np.linalg.norm(rays, axis=1, keepdims=True)
@@ -82,7 +82,7 @@ class Exported:
         return triangle, np.where(triangle >= 0, depth, np.inf)
 
     def texel(self, image, name):
-        """Bilinear texture values [H * W, C] that the rays of a camera meet, NaN where none."""
+        """Return bilinear texture values [H * W, C] at a camera's ray hits, NaN for misses."""
         triangle, depth = self.first_hits(name, self.outside)
         origin, rays = self.rays(name)
         points = origin + np.where(triangle >= 0, depth, 0)[:, None] * rays
@@ -90,7 +90,7 @@ class Exported:
         uv = np.einsum("rc,rck->rk", weights, self.visual.uv[self.outside.faces[triangle]])
         pixels = np.asarray(image, float)
         height, width = pixels.shape[:2]
-        # trimesh counts v upward, rows go down
+        # v points up in trimesh, image rows go down
         place = np.stack([uv[:, 0] * width, (1 - uv[:, 1]) * height], axis=1) - 0.5
         place = np.clip(np.nan_to_num(place), 0, (width - 1.001, height - 1.001))
         x, y = np.floor(place).astype(int).T
@@ -112,7 +112,7 @@ def holes(scene):
 
 @pytest.fixture(scope="module")
 def torn(generator, tmp_path_factory):
-    """A container with holes in the door and in a side, and its file."""
+    """A scene with holes in the door and in a side wall, and its exported file."""
     scenes = (generator.scene(index) for index in range(200))
     faces = ((scene, {damage.face for damage in holes(scene)}) for scene in scenes)
     scene = next(s for s, torn in faces if "door" in torn and torn & {"front", "back"})
@@ -122,7 +122,7 @@ def torn(generator, tmp_path_factory):
 
 
 def head_on(scene: Scene, face_y: float, x_mm: float, z_mm: float) -> Camera:
-    """A camera that sees the front 4 mm a pixel, straight on, at (x, z) on it."""
+    """Return a camera that looks straight at (x, z) on the front, at 4 mm per pixel."""
     distance_mm = 6000.0
     focal_mm = distance_mm / (4.0 * SIZE[0]) * 36.0
     position = (x_mm, face_y - distance_mm, z_mm)
@@ -130,7 +130,7 @@ def head_on(scene: Scene, face_y: float, x_mm: float, z_mm: float) -> Camera:
 
 
 def bare(scene: Scene) -> Scene:
-    """`scene` without any layer but its paint and decals, and without damage."""
+    """Return `scene` with only paint and decals: no other layers and no damage."""
     surface = scene.surface
     surface = replace(
         surface,
@@ -144,7 +144,7 @@ def bare(scene: Scene) -> Scene:
 
 
 @pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
-def test_rays_at_the_exported_geometry_see_the_renderers_silhouette(generator, torn, camera):
+def test_exported_geometry_has_the_rendered_silhouette(generator, torn, camera):
     scene, exported = torn
     sample = generator.render(scene=scene, camera=camera)
     triangle, _ = exported.first_hits(camera, exported.whole)
@@ -153,19 +153,19 @@ def test_rays_at_the_exported_geometry_see_the_renderers_silhouette(generator, t
 
 
 @pytest.mark.parametrize("camera", ["A", "B", "Cl", "Cr"])
-def test_rays_at_the_exported_geometry_meet_it_at_the_rendered_depth(generator, torn, camera):
+def test_exported_geometry_has_the_rendered_depth(generator, torn, camera):
     scene, exported = torn
     sample = generator.render(scene=scene, camera=camera)
     triangle, depth = exported.first_hits(camera, exported.whole)
     both = (triangle >= 0) & (sample.ids.ravel() > 0)
     error = np.abs(depth[both] - sample.depth.ravel()[both])
-    # insides lie the thickness of the steel deeper than what the renderer shows through a hole, and
-    # beside one locking bars bend in finer steps
+    # through a hole, exported inner faces lie deeper by the thickness of the steel; beside a hole,
+    # exported locking bars bend in finer steps
     assert np.quantile(error, 0.995) < 4e-3
 
 
 @pytest.mark.parametrize("camera", ["A", "Cr"])
-def test_the_exported_spreader_is_where_the_renderer_shows_it(generator, tmp_path, camera):
+def test_the_exported_spreader_has_the_rendered_silhouette_and_depth(generator, tmp_path, camera):
     scene = generator.scene(1)
     scene = replace(bare(scene), spreader=Spreader(present=True, gap_mm=20.0))
     export_glb(generator, scene, tmp_path / "held.glb", [scene.camera(camera)], 16.0)
@@ -177,11 +177,11 @@ def test_the_exported_spreader_is_where_the_renderer_shows_it(generator, tmp_pat
     assert wrong.mean() < 5e-4
     seen = (triangle >= first) & (sample.ids.ravel() == SPREADER_ID)
     assert seen.sum() > 100
-    # at outlines the two may meet different beams
+    # at outlines the two may hit different beams
     assert np.quantile(np.abs(depth[seen] - sample.depth.ravel()[seen]), 0.995) < 1e-3
 
 
-def test_the_exported_spreader_wears_the_renderers_paint(generator, tmp_path):
+def test_the_exported_spreader_has_the_rendered_paint(generator, tmp_path):
     scene = bare(generator.scene(0))
     scene = replace(scene, spreader=Spreader(present=True, albedo=(0.5, 0.1, 0.02)))
     export_glb(generator, scene, tmp_path / "held.glb", [], 16.0)
@@ -191,9 +191,9 @@ def test_the_exported_spreader_wears_the_renderers_paint(generator, tmp_path):
     np.testing.assert_allclose(linear, (0.5, 0.1, 0.02), rtol=0.03, atol=2e-3)
 
 
-def test_holes_are_open_to_a_millimetre(torn):
+def test_holes_are_cut_to_within_a_millimetre(torn):
     scene, _ = torn
-    hole = next(hole for hole in holes(scene) if hole.face != "door")  # gear would stand before it
+    hole = next(hole for hole in holes(scene) if hole.face != "door")  # gear would hide it
     rest = build_container(scene.container.kind, scene.container.profiles)
     flat = replace(hole, depth_mm=0.0)
     cut = damaged_mesh(rest, (flat,))
@@ -225,7 +225,7 @@ def test_holes_are_open_to_a_millimetre(torn):
     assert not open_here[hit & ~grown].any()
 
 
-def test_normals_of_a_dented_wall_are_those_of_its_triangles(generator):
+def test_normals_of_a_bent_wall_match_its_triangles(generator):
     scenes = (generator.scene(index) for index in range(50))
     damages = next(d for s in scenes for d in s.damages if d.kind == "concave")
     rest = build_container("20", generator.scene(0).container.profiles)
@@ -237,7 +237,7 @@ def test_normals_of_a_dented_wall_are_those_of_its_triangles(generator):
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1)) @ area / area.sum()) < 0.5
 
 
-def test_base_color_is_what_the_renderer_shows_unlit(generator, tmp_path):
+def test_base_color_matches_the_unlit_render(generator, tmp_path):
     scene = bare(generator.scene(0))
     names = [d for d in scene.decals if d.face == "front"]
     mesh = build_container(scene.container.kind, scene.container.profiles)
@@ -252,12 +252,12 @@ def test_base_color_is_what_the_renderer_shows_unlit(generator, tmp_path):
     seen = (sample.ids.ravel() > 0) & np.isfinite(baked[:, 0])
     assert np.ptp(shown[seen], axis=0).max() > 60
     error = np.abs(baked - shown)[seen].max(axis=1)
-    # of 255; footprints differ by the slant of the corrugation, which blurs edges differently
+    # in 8-bit steps; on slanted corrugation footprints differ, which blurs edges differently
     assert np.quantile(error, 0.95) <= 1.0
     assert error.mean() < 0.6
 
 
-def test_roughness_is_what_the_renderer_shows_unlit(generator, tmp_path):
+def test_roughness_matches_the_unlit_render(generator, tmp_path):
     scene = replace(generator.scene(0), damages=())
     mesh = build_container(scene.container.kind, scene.container.profiles)
     camera = head_on(scene, float(mesh.bounds_mm[0][1]), 0.0, 1300.0)
@@ -273,7 +273,7 @@ def test_roughness_is_what_the_renderer_shows_unlit(generator, tmp_path):
     assert error.mean() < 2.0
 
 
-def test_the_file_keeps_scene_light_and_exposure(generator, torn):
+def test_the_file_stores_scene_light_and_exposure(generator, torn):
     scene, exported = torn
     extras = exported.tree["scenes"][0]["extras"]
     assert Scene.from_json(json.dumps(extras["scene"])) == scene
@@ -286,7 +286,7 @@ def test_the_file_keeps_scene_light_and_exposure(generator, torn):
         assert nodes[camera.name]["extras"]["exposure"] == expected
 
 
-def test_what_a_lens_does_stands_in_its_cameras_extras(generator, tmp_path):
+def test_lens_distortion_is_stored_in_the_extras_of_its_camera(generator, tmp_path):
     scene = generator.scene(0)
     lens = Lens("brown_conrady", (-0.1, 0.02, 1e-3, 0.0, 0.0))
     bent = replace(scene.cameras[0], lens=lens)
@@ -297,7 +297,7 @@ def test_what_a_lens_does_stands_in_its_cameras_extras(generator, tmp_path):
     assert "distortion" not in nodes[scene.cameras[1].name]["extras"]
 
 
-def test_gltf_cameras_look_through_the_renderers_pixels(torn):
+def test_gltf_cameras_match_the_pixels_of_the_renderer(torn):
     scene, exported = torn
     for camera in scene.cameras:
         origin, rays = exported.rays(camera.name)
@@ -314,7 +314,7 @@ def test_the_same_scene_makes_the_same_file(generator, torn, tmp_path):
     assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
-def test_baking_leaves_the_next_frame_as_it_was(generator, torn):
+def test_baking_does_not_change_the_next_frame(generator, torn):
     scene, _ = torn
     before = generator.render(scene=scene, camera="B")
     generator.bake(scene, 32.0)

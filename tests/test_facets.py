@@ -1,4 +1,4 @@
-"""Pieces of surfaces and outlines of decals against brute force and the slow way to the surface."""
+"""Surface facets and decal outlines compared with brute force and `sheet_to_surface`."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ from tests import oracle
 
 @pytest.fixture(scope="module")
 def scenes():
-    """Damaged ones, each with its container's mesh."""
+    """Damaged scenes, each with the mesh of its container."""
     generator = Generator(Config.from_values({"damage": {"probability": 1.0}}), seed=31)
     found = [generator.scene(index) for index in range(4)]
     return [(s, build_container(s.container.kind, s.container.profiles)) for s in found]
@@ -36,14 +36,14 @@ def test_clipping_halves_a_square():
     assert not left.any()
 
 
-def test_triangles_that_make_a_flat_convex_polygon_become_one():
+def test_two_triangles_of_a_flat_convex_quad_become_one_polygon():
     square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
     bent = square + [5.0, 0, 0]
     bent[3, 2] = 1
     dart = np.array([[0.0, 9, 0], [4, 9, 0], [1, 10, 0], [0, 13, 0]])
     triangles = [
         *(square[[0, 1, 2]], square[[0, 2, 3]]),  # the fourth corner comes last
-        *(square[[0, 1, 2]] + 20, square[[3, 0, 2]] + 20),  # and first
+        *(square[[0, 1, 2]] + 20, square[[3, 0, 2]] + 20),  # here it comes first
         *(bent[[0, 1, 2]], bent[[0, 2, 3]]),
         *(dart[[0, 1, 2]], dart[[0, 2, 3]]),
         *(square[[0, 1, 2]] + 40, square[[0, 2, 3]] + 60),
@@ -61,7 +61,7 @@ def test_triangles_that_make_a_flat_convex_polygon_become_one():
     assert (polygons[2:, 3] == corners[4:, 2]).all()
 
 
-def test_facets_hold_each_corner_once_and_are_cut_with_their_rest_positions():
+def test_facets_store_each_corner_once_and_are_cut_with_their_rest_positions():
     square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
     triangle = square[[0, 1, 2, 2]]  # its last corner repeats
     polygons = np.array([square, triangle + 5, triangle + 9])
@@ -111,7 +111,7 @@ def test_sides_and_reach_of_outlines_equal_brute_force():
         np.testing.assert_allclose(reach, np.abs(edge - decal.center_mm).max(axis=0))
 
 
-def test_from_every_side_the_outermost_points_are_among_those_of_the_container(scenes):
+def test_container_points_include_the_outermost_in_every_direction(scenes):
     directions = np.random.default_rng(7).normal(size=(200, 3))
     for scene, mesh in scenes:
         everything = damage_law.deform(scene.damages, mesh.positions_mm)

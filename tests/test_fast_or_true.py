@@ -1,4 +1,4 @@
-"""fast_or_true: it runs on stand-ins for Cycles' images, and its parts keep to geometry."""
+"""The fast_or_true example: a run on fake Cycles images, and tests of its parts."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def run(folder):
     return subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
 
 
-def test_it_runs_on_stand_ins_and_without_them_says_what_is_missing(tmp_path, scenes):
+def test_it_runs_on_fake_images_and_reports_missing_ones(tmp_path, scenes):
     refused = run(tmp_path)
     assert refused.returncode != 0
     assert "--blender-python" in refused.stderr
@@ -60,7 +60,7 @@ def test_it_runs_on_stand_ins_and_without_them_says_what_is_missing(tmp_path, sc
         assert (tmp_path / f"fast_or_true{chart}.png").stat().st_size > 1000
 
 
-def test_crowded_ends_bear_many_markers_that_cover_nothing(scenes):
+def test_crowded_ends_have_many_markers_without_overlaps(scenes):
     for scene in scenes:
         for face in ("door", "no_door"):
             covered = np.zeros((3000, 3000), np.int32)
@@ -75,7 +75,7 @@ def test_crowded_ends_bear_many_markers_that_cover_nothing(scenes):
         assert sum(d.kind == "marker" and d.face in ("door", "no_door") for d in scene.decals) > 20
 
 
-def test_elements_leave_markers_and_cameras_where_they_are(scenes):
+def test_elements_do_not_move_markers_or_cameras(scenes):
     for change in ELEMENTS.values():
         for scene in scenes:
             changed = change(scene)
@@ -87,9 +87,9 @@ def test_elements_leave_markers_and_cameras_where_they_are(scenes):
             assert old == new
 
 
-def test_a_crop_holds_its_box_in_the_middle():
+def test_a_crop_has_its_box_in_the_middle():
     image = np.zeros((60, 80, 3), np.uint8)
-    image[20:40, 30:50] = 255  # a box of 20 pixels takes 20 of a crop's 24: 24 / 1.2
+    image[20:40, 30:50] = 255  # 20 pixels of the box fill 20 of the crop's 24: 24 / 1.2
     box = (30.0, 20.0, 50.0, 40.0)
     item = Object(2, "C1.1", 1, (30, 20, 50, 40), box, 400, 1.0, False)
     expected = np.zeros((CROP_PX, CROP_PX, 3), np.uint8)
@@ -104,7 +104,7 @@ def test_greys_below_the_shoulder_are_an_offset_and_the_srgb_curve():
     assert np.abs(shown - expected).max() <= 0.5
 
 
-def test_interval_is_the_binomial_one_where_every_item_is_its_own_scene():
+def test_interval_is_binomial_if_every_item_is_its_own_scene():
     rng = np.random.default_rng(2)
     right = np.repeat(rng.random((1, 400)) < 0.7, 3, axis=0).astype(float)
     found = interval(right, np.arange(400))
@@ -113,7 +113,7 @@ def test_interval_is_the_binomial_one_where_every_item_is_its_own_scene():
     assert (found.high - found.low) / 2 == pytest.approx(half, rel=0.1)
 
 
-def test_interval_grows_where_scenes_stand_or_fall_together():
+def test_interval_grows_if_all_items_of_a_scene_agree():
     scenes = np.repeat(np.arange(20), 20)
     right = (scenes % 2 == 0).astype(float)[None]
     together, apart = interval(right, scenes), interval(right, np.arange(400))

@@ -1,4 +1,4 @@
-"""Every format read back by a tool of those who use it, and set against pixels and algebra."""
+"""Every output format, read back by a common tool and compared with pixels and algebra."""
 
 import json
 from pathlib import Path
@@ -35,7 +35,7 @@ def out(tmp_path_factory):
 
 
 def scenes(out, split="*"):
-    """What the scene files hold, by stem."""
+    """Return the content of the scene files by stem."""
     paths = sorted(out.glob(f"scenes/{split}/*.json"))
     return {path.stem: json.loads(path.read_text()) for path in paths}
 
@@ -45,7 +45,7 @@ def ids(out, stem, split):
 
 
 def wanted_boxes(record):
-    """Class and box (x0, y0, x1, y1) of what the marker task labels."""
+    """Return class and box (x0, y0, x1, y1) of every object that the marker task labels."""
     return sorted(
         (thing["class_name"], *thing["bbox"])
         for thing in record["objects"]
@@ -55,7 +55,7 @@ def wanted_boxes(record):
 
 @pytest.mark.parametrize("task", ["damage", "imdg", "container"])
 @pytest.mark.parametrize("split", SPLITS)
-def test_coco_scores_full_marks_against_itself(out, task, split):
+def test_coco_labels_score_full_marks_against_themselves(out, task, split):
     truth = COCO(str(out / task / f"coco_{split}.json"))
     found = [dict(a, score=1.0) for a in truth.dataset["annotations"] if not a["iscrowd"]]
     assert found
@@ -121,7 +121,7 @@ def test_supervision_reads_yolo_outlines_of_damage(out, tmp_path):
         for path, _, found in data:
             mask = cv2.imread(f"{out}/damage/masks/{split}/{Path(path).stem}.png", -1) > 0
             container = found.mask[found.class_id == 0][0]
-            # this reader rounds half a pixel away, which is much of a container this far
+            # this reader rounds by half a pixel, which matters for a container this far away
             assert (container & mask).sum() / (container | mask).sum() > 0.93
 
 
@@ -144,7 +144,7 @@ def test_globox_reads_the_same_boxes(out, form):
             boxes = []
             for box in one.boxes:
                 name = box.label if form == "voc" else DETECTION_CLASSES[int(box.label)]
-                # VOC's first corner counts from 1
+                # the first corner in VOC is 1-based
                 shift = 1 if form == "voc" else 0
                 corners = (box.xmin - shift, box.ymin - shift, box.xmax, box.ymax)
                 boxes.append((name, *np.rint(corners).astype(int).tolist()))
@@ -177,7 +177,7 @@ def test_kitti_rows_have_fifteen_columns_and_ignored_regions(out):
     assert rows
 
 
-def test_bop_poses_take_the_model_to_its_pixels(out):
+def test_bop_poses_project_the_model_onto_its_pixels(out):
     seen = 0
     infos = json.loads((out / "bop/models/models_info.json").read_text())
     models = {
@@ -203,7 +203,7 @@ def test_bop_poses_take_the_model_to_its_pixels(out):
             pixels = points @ np.array(cameras[key]["cam_K"]).reshape(3, 3).T
             pixels = pixels[:, :2] / pixels[:, 2:]
             x, y, width, height = info["bbox_obj"]
-            # pixel centres are whole numbers here; profiles vary by some millimetres
+            # BOP has pixel centres at whole numbers; wall profiles vary by some millimetres
             np.testing.assert_allclose(pixels.min(axis=0) + 0.5, (x, y), atol=1.0)
             np.testing.assert_allclose(pixels.max(axis=0) + 0.5, (x + width, y + height), atol=1.0)
             name = f"{int(key):06d}"
@@ -218,7 +218,7 @@ def test_bop_poses_take_the_model_to_its_pixels(out):
     assert seen == 24
 
 
-def test_scene_files_project_the_castings_themselves(out):
+def test_the_view_in_a_scene_file_projects_the_castings_to_their_keypoints(out):
     for record in scenes(out).values():
         scene = from_plain(Scene, record["scene"], "scene")
         if scene.damages:
@@ -241,7 +241,7 @@ def test_scene_files_project_the_castings_themselves(out):
                 np.testing.assert_allclose(pixel[:2] / pixel[2], (x, y), atol=0.01)
 
 
-def test_ignored_objects_are_regions_where_a_format_has_them_and_gone_where_not():
+def test_ignored_objects_are_marked_if_a_format_can_and_omitted_otherwise():
     with Generator(seed=5, size=SIZE) as generator:
         generator.config = type(generator.config).from_values(
             {"labels": {"min_visible_px": 150, "min_visible_fraction": 0.5}}

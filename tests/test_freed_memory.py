@@ -1,4 +1,4 @@
-"""Memory between blocks in use goes back to the system."""
+"""Freed memory between blocks in use is returned to the system."""
 
 import subprocess
 import sys
@@ -11,9 +11,9 @@ def resident_kb():
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
 
 before = resident_kb()
-blocks = [bytes([1]) * 20_000 for _ in range(4_000)]  # of a size that glibc does not map alone
+blocks = [bytes([1]) * 20_000 for _ in range(4_000)]  # too small for glibc to map each on its own
 held = resident_kb()
-kept = blocks[::50]  # so that none of it lies at the heap's end
+kept = blocks[::50]  # so that the freed memory is not only at the end of the heap
 del blocks
 return_freed_memory()
 print(held - before, resident_kb() - before, sum(map(len, kept)))

@@ -1,4 +1,4 @@
-"""Whole datasets from the command line: complete, the same bytes, resumable, and clear errors."""
+"""Datasets made from the command line: complete, reproducible, resumable, with clear errors."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def records(out):
     return [json.loads(p.read_text()) for p in sorted(out.glob("scenes/*/*.json"))]
 
 
-def test_every_file_of_the_layout_is_there(dataset):
+def test_every_file_of_the_layout_exists(dataset):
     assert len(list(dataset.glob("images/*/*.jpg"))) == 14
     for record in records(dataset):
         split, stem = record["split"], record["stem"]
@@ -70,7 +70,7 @@ def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):
     assert len(data["names"]) == data["nc"] == 28
     pairs = 0
     for split in ("train", "val", "test"):
-        # ultralytics 8.4, check_det_dataset and img2label_paths: the folder is resolved first
+        # ultralytics 8.4 (check_det_dataset, img2label_paths) also resolves the folder first
         for image in (dataset / "imdg" / data[split]).resolve().glob("*.jpg"):
             head, tail = str(image).rsplit("/images/", 1)
             label = Path(f"{head}/labels/{tail}").with_suffix(".txt")
@@ -79,7 +79,7 @@ def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):
     assert pairs == 14
 
 
-def test_door_folders_hold_the_two_ends(dataset):
+def test_door_folders_contain_the_views_of_the_two_ends(dataset):
     for split in ("train", "val", "test"):
         for folder, camera in (("door", "Cr"), ("no_door", "Cl")):
             for path in (dataset / "door" / split / folder).iterdir():
@@ -96,7 +96,7 @@ def test_all_views_of_a_scene_share_a_split(dataset):
     assert drawn.count("train") / 2000 == pytest.approx(0.7, abs=0.05)
 
 
-def test_scene_files_hold_the_scene(dataset):
+def test_scene_files_contain_the_scene(dataset):
     for record in records(dataset)[:3]:
         scene = Scene.from_json(json.dumps(record["scene"]))
         assert scene.index == int(record["stem"].split("_")[0])
@@ -109,12 +109,12 @@ def test_one_worker_makes_the_same_bytes_as_two(dataset, tmp_path):
 
 def test_contact_sheet_shows_every_image_of_a_small_dataset(dataset):
     sheet = cv2.imread(str(dataset / "contact_sheet.png"))
-    assert sheet.shape == (3 * 333, 6 * 400, 3)  # of images of 96x80, without gaps
+    assert sheet.shape == (3 * 333, 6 * 400, 3)  # images of 96x80, without gaps
     tiles = sheet.reshape(3, 333, 6, 400, 3).swapaxes(1, 2).reshape(-1, 333 * 400 * 3)
     assert sum(np.ptp(tile) > 0 for tile in tiles) == 14
 
 
-def test_crops_hold_the_text_that_the_labels_say(tmp_path):
+def test_crops_show_the_text_of_their_labels(tmp_path):
     out = tmp_path / "out"
     arguments = ["--images", "3", "--size", "640x480", "--cameras", "Cl", "--split", "val"]
     assert main(["generate", str(out), *arguments, "--seed", "3", "--workers", "1"]) == 0
@@ -169,7 +169,7 @@ def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
     assert images.items() <= content(out).items()
 
 
-def test_a_file_astray_is_no_shard(dataset, tmp_path):
+def test_a_stray_file_is_not_taken_for_a_shard(dataset, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(dataset, out, symlinks=True)
     (out / "shards/notes.txt").write_text("mine")
@@ -197,7 +197,7 @@ def test_more_images_extend_a_dataset(dataset, tmp_path):
 
 
 @needs_osmesa
-def test_who_else_drew_some_of_it_is_told(tmp_path, capfd):
+def test_a_dataset_rendered_by_two_backends_is_reported(tmp_path, capfd):
     command = ["generate", str(tmp_path / "out"), "--size", "64x64", "--shard", "1", "--images"]
     assert main([*command, "4", "--backend", "egl"]) == 0
     assert "was drawn by" not in capfd.readouterr().err
@@ -205,7 +205,7 @@ def test_who_else_drew_some_of_it_is_told(tmp_path, capfd):
     assert re.search(r"was drawn by egl \S.* and by osmesa \S.*: they", capfd.readouterr().err)
 
 
-def test_verify_passes_sound_data(dataset):
+def test_verify_passes_an_intact_dataset(dataset):
     assert main(["verify", str(dataset)]) == 0
 
 
@@ -235,7 +235,7 @@ def cut(path):
         ("damage", lambda p: (p / "extra.txt").write_text("x")),
     ],
 )
-def test_verify_names_the_spoilt_file(dataset, tmp_path, capsys, name, spoil):
+def test_verify_names_the_damaged_file(dataset, tmp_path, capsys, name, spoil):
     out = tmp_path / "out"
     shutil.copytree(dataset, out, symlinks=True)
     spoilt = sorted(out.glob(name))[0]
@@ -244,7 +244,7 @@ def test_verify_names_the_spoilt_file(dataset, tmp_path, capsys, name, spoil):
     assert spoilt.relative_to(out).as_posix() in capsys.readouterr().out
 
 
-def test_a_scene_that_always_fails_is_told_of_and_the_rest_goes_on(tmp_path, capfd, monkeypatch):
+def test_a_scene_that_always_fails_is_reported_and_the_rest_is_made(tmp_path, capfd, monkeypatch):
     asked = []
 
     class Broken(Generator):
@@ -276,7 +276,7 @@ def test_a_scene_that_always_fails_is_told_of_and_the_rest_goes_on(tmp_path, cap
     assert main(["verify", str(tmp_path / "out")]) == 0
 
 
-def test_a_run_whose_scenes_all_fail_ends_as_others_do(tmp_path, monkeypatch):
+def test_a_run_whose_scenes_all_fail_still_ends_normally(tmp_path, monkeypatch):
     class Broken(Generator):
         def render(self, **_):
             raise RuntimeError("no such luck")
@@ -293,7 +293,7 @@ def test_a_run_whose_scenes_all_fail_ends_as_others_do(tmp_path, monkeypatch):
     assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
 
 
-def test_a_large_run_does_not_list_its_shards_before_they_are_made(tmp_path):
+def test_a_large_run_does_not_list_all_its_shards_in_advance(tmp_path):
     class Stopped(Exception):
         pass
 
@@ -314,7 +314,7 @@ def test_a_large_run_does_not_list_its_shards_before_they_are_made(tmp_path):
     assert peak(10**6, "large") < peak(4, "small") + 1e6
 
 
-def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):
+def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):
     out = tmp_path / "out"
     shutil.copytree(dataset, out)
     with storage_of(out).locked():
@@ -323,7 +323,7 @@ def test_two_runs_on_one_folder_refuse_each_other(dataset, tmp_path, capsys):
     assert run(out) == 0
 
 
-def test_ctrl_c_stops_cleanly_and_the_run_goes_on_later(dataset, tmp_path):
+def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(dataset, tmp_path):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "fastgen", "generate", str(out), *ARGUMENTS]
     process = subprocess.Popen(
@@ -331,7 +331,7 @@ def test_ctrl_c_stops_cleanly_and_the_run_goes_on_later(dataset, tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        # a shell's background jobs, this test run among them, may ignore it
+        # background jobs of a shell, such as this test run, may ignore SIGINT
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not (out / "dataset.json").exists():
@@ -364,14 +364,14 @@ def test_verify_finds_any_single_flipped_byte(dataset, tmp_path, capsys, seed):
     assert path.name in said.out + said.err
 
 
-def test_stats_counts_what_the_files_hold(dataset, capsys):
+def test_stats_counts_the_labels_in_the_files(dataset, capsys):
     assert main(["stats", str(dataset)]) == 0
     printed = capsys.readouterr().out
     row = next(line for line in printed.splitlines() if line.startswith("container"))
     assert sum(int(v) for v in row.split()[1:]) == 14
 
 
-def test_split_option_puts_all_in_one(tmp_path):
+def test_split_option_puts_all_images_in_one_split(tmp_path):
     out = tmp_path / "out"
     arguments = ["--images", "2", "--size", "64x64", "--cameras", "Cr", "--split", "val"]
     assert main(["generate", str(out), *arguments]) == 0

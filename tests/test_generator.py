@@ -1,4 +1,4 @@
-"""The public class: what it refuses, what it passes on through pickles and forks."""
+"""The Generator class: bad arguments, pickles, forks, threads, interruption and freed memory."""
 
 import contextlib
 import math
@@ -26,7 +26,7 @@ RIG = {"gate": {"face": "door", "focal_mm": 40, "distance_mm": 6000}}
 
 
 def resident_mib():
-    """Megabytes of memory that this process holds."""
+    """Return the resident memory of this process in MiB."""
     return psutil.Process().memory_info().rss / 2**20
 
 
@@ -110,7 +110,7 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
         ("container", {"kind": "30"}, "container.kind: '30' is unknown"),
     ],
 )
-def test_scenes_changed_by_hand_are_refused_by_the_part_that_cannot_be(part, changes, words):
+def test_errors_in_scenes_changed_by_hand_name_the_invalid_part(part, changes, words):
     values = {"damage": {"probability": 1, "kinds": ["concave"]}}
     with Generator(Config.from_values(values), size=SIZE) as generator:
         scene = generator.scene(0)
@@ -121,7 +121,7 @@ def test_scenes_changed_by_hand_are_refused_by_the_part_that_cannot_be(part, cha
             generator.render(scene=bad)
 
 
-def test_a_hundred_damages_of_a_kind_are_refused():
+def test_a_hundred_damages_of_one_kind_are_refused():
     values = {"damage": {"probability": 1, "kinds": ["axis"], "count": [1, 1]}}
     generator = Generator(Config.from_values(values), size=SIZE)
     scene = generator.scene(0)
@@ -129,7 +129,7 @@ def test_a_hundred_damages_of_a_kind_are_refused():
         generator.render(scene=replace(scene, damages=scene.damages * 100))
 
 
-def test_scene_files_with_numbers_that_are_none_are_refused(generator):
+def test_scene_files_with_nan_are_refused(generator):
     text = generator.scene(0).to_json().replace('"focal_mm": 14.5', '"focal_mm": NaN')
     with pytest.raises(ConfigError, match=r"scene.cameras\[0\].focal_mm: nan is out of range"):
         Scene.from_json(text)
@@ -141,13 +141,13 @@ def test_the_first_camera_of_a_rig_is_the_default(generator):
         assert gate.render(index=1).camera.name == "gate"
 
 
-def test_labels_rules_may_be_given_for_one_image(generator):
+def test_label_rules_may_be_given_for_one_image(generator):
     strict = LabelConfig(min_visible_px=10**6)
     assert all(thing.ignored for thing in generator.render(index=1, labels=strict).objects)
     assert not all(thing.ignored for thing in generator.render(index=1).objects)
 
 
-def test_hdris_of_one_name_are_refused(tmp_path):
+def test_hdris_with_the_same_name_are_refused(tmp_path):
     for name in ("dusk.exr", "dusk.hdr"):
         (tmp_path / name).write_bytes(b"")
     with pytest.raises(AssetError, match=r"dusk.exr and dusk.hdr are both called 'dusk'"):
@@ -167,7 +167,7 @@ def render_to(pipe, generator):
 
 
 def parent_and_child():
-    """An image rendered here, the same by the same generator in a fork, and again here."""
+    """Return an image rendered here, by the same generator in a fork, and again here."""
     fork = multiprocessing.get_context("fork")
     ours, theirs = fork.Pipe()
     with Generator(seed=3, size=SIZE, backend="auto") as generator:
@@ -180,7 +180,7 @@ def parent_and_child():
         return before, there, generator.render(index=2).image
 
 
-def test_a_generator_that_rendered_goes_on_in_a_forked_child():
+def test_a_generator_that_rendered_still_works_in_a_forked_child():
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         before, there, after = pool.submit(parent_and_child).result()
     assert there is not None, "the child hangs or failed"
@@ -195,17 +195,14 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
     with Generator(config, seed=4, size=SIZE) as generator:
         steps = []
         generator.preload(lambda: steps.append(1))
-        assert len(steps) > 10  # lights, shapes and ways to draw, each a sign of life
+        assert len(steps) > 10  # lights, shapes and shader variants each report progress
 
         def never(*_: object, **__: object) -> None:
-            raise AssertionError("made after all")
+            raise AssertionError("made after preload")
 
-        for made in ("GpuMesh", "zone_table", "encoded"):
-            monkeypatch.setattr(
-                f"fastgen.{'light.sky_visibility' if made == 'encoded' else 'render.shapes'}.{made}",
-                never,
-            )
-        monkeypatch.setattr("fastgen.render.renderer.GpuLight", never)
+        for made in ("shapes.GpuMesh", "shapes.zone_table", "renderer.GpuLight"):
+            monkeypatch.setattr(f"fastgen.render.{made}", never)
+        monkeypatch.setattr("fastgen.light.sky_visibility.encoded", never)
         monkeypatch.setattr("fastgen.geometry.mesh._Locator.of", never)
         for index in range(30):
             sample = generator.render(index)
@@ -222,20 +219,20 @@ def test_a_sample_prints_in_one_line(generator):
     assert len(words) < 120
 
 
-def test_closing_one_generator_leaves_another_as_it_is():
+def test_closing_one_generator_does_not_affect_another():
     with Generator(seed=2, size=SIZE) as kept:
         before = kept.render(index=0)
         with Generator(seed=1, size=SIZE) as other:
             other.render(index=0)
-            kept.render(index=0)  # so that the other is not current when it goes
+            kept.render(index=0)  # so that `other` is not current when it is closed
         after = kept.render(index=0)
         np.testing.assert_array_equal(after.image, before.image)
         np.testing.assert_array_equal(after.ids, before.ids)
         assert after.objects == before.objects
 
 
-def test_a_generator_goes_from_thread_to_thread():
-    """On EGL a context that one thread holds no other gets, even after that thread ended."""
+def test_a_generator_can_be_used_by_one_thread_after_another():
+    """EGL denies a thread the context that is current in another, even if that one has ended."""
     with Generator(size=SIZE) as other, Generator(size=SIZE) as handed:
         expected = other.render(index=0).image
         for _ in range(3):
@@ -246,7 +243,7 @@ def test_a_generator_goes_from_thread_to_thread():
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_threads_that_share_a_generator_draw_in_turn(backend):
+def test_threads_that_share_a_generator_render_in_turn(backend):
     with Generator(size=SIZE, backend=backend, quality="draft") as shared:
         expected = [shared.render(index=index).image for index in range(4)]
         with ThreadPoolExecutor(3) as pool:
@@ -267,8 +264,10 @@ def dropped_unclosed():
 
 
 def growth_mib(use, count):
-    """By how much a process grows that does something again, `count` times, and the image of a
-    generator that is open all the while, before and after."""
+    """Return the memory growth in MiB over `count` calls of `use` after a first call.
+
+    Also returns two images, before and after, of a generator that stays open throughout.
+    """
     with Generator(seed=2, size=SIZE, quality="draft") as kept:
         before = kept.render(index=0).image
         use()
@@ -279,15 +278,15 @@ def growth_mib(use, count):
 
 
 @pytest.mark.parametrize(("use", "count"), [(drawn_in_a_thread, 4), (dropped_unclosed, 6)])
-def test_what_generators_held_is_freed(use, count):
-    """In a process of its own: of what this one did before, some may be freed or cached."""
+def test_the_memory_of_generators_is_freed(use, count):
+    """Use a fresh process, because this one may still free or reuse memory of earlier tests."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         grown, before, after = pool.submit(growth_mib, use, count).result()
-    assert grown < 200  # each held 130
+    assert grown < 200  # MiB; each generator used 130
     np.testing.assert_array_equal(after, before)
 
 
-def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see():
+def test_cameras_above_and_below_show_the_length_across_the_image_well_exposed():
     rig = {"focal_mm": 20, "distance_mm": 9000, "roll_deg": 0}
     plumb = {"azimuth_deg": 0, "elevation_deg": 0, "target_shift_mm": 0}
     cameras = {
@@ -310,8 +309,8 @@ def test_cameras_above_and_below_see_the_length_across_and_meter_what_they_see()
             assert generator.render(scene=scene, camera="plumb").image.mean() > 25
 
 
-def test_a_render_that_was_stopped_anywhere_spoils_none_after_it(monkeypatch):
-    """Ctrl-C between two draws, as a notebook's stop button may come."""
+def test_an_interrupted_render_does_not_affect_later_ones(monkeypatch):
+    """Interrupt between two draw calls, as a notebook's stop button may do."""
     arguments = {"seed": 7, "size": (96, 64)}
     with Generator(**arguments) as generator:
         wanted = generator.render(index=0, camera="Cr")

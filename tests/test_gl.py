@@ -1,4 +1,4 @@
-"""Contexts: both backends draw what geometry says, are released whole, and work in processes."""
+"""GL contexts: both backends draw correctly, are released completely, and work in processes."""
 
 import itertools
 import multiprocessing
@@ -22,7 +22,10 @@ FRAGMENT = "#version 430\nout uint id; void main() { id = 7u; }"
 
 
 def triangle(backend):
-    """uint32 [32, 48] with 7 inside the triangle (4, 4), (44, 4), (4, 28), row 0 at the bottom."""
+    """Draw 7 inside the triangle (4, 4), (44, 4), (4, 28).
+
+    Returns uint32 [32, 48] with row 0 at the bottom.
+    """
     with gl.open_context(backend) as context:
         ctx = context.ctx
         program = ctx.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
@@ -45,13 +48,13 @@ def test_a_triangle_covers_the_pixel_centres_inside_it(backend):
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-def test_contexts_alive_together_keep_their_own_objects(pair):
+def test_contexts_open_at_the_same_time_keep_their_own_objects(pair):
     with gl.open_context(pair[0]) as first, gl.open_context(pair[1]) as second:
         owned = []
         for content, context in ((b"1111", first), (b"2222", second)):
             context.make_current()
             owned.append((context, context.ctx.buffer(content), content))
-        # the same name in both: had one context taken both buffers, the names would differ
+        # one context holding both buffers would have given them different names
         assert owned[0][1].glo == owned[1][1].glo
         for context, buffer, content in owned * 2:
             context.make_current()
@@ -59,7 +62,7 @@ def test_contexts_alive_together_keep_their_own_objects(pair):
 
 
 @pytest.mark.parametrize("pair", PAIRS)
-def test_releasing_one_context_leaves_the_current_one_at_work(pair):
+def test_releasing_one_context_does_not_affect_the_current_one(pair):
     first = gl.open_context(pair[0])
     with gl.open_context(pair[1]) as second:
         buffer = second.ctx.buffer(b"2222")
@@ -70,7 +73,7 @@ def test_releasing_one_context_leaves_the_current_one_at_work(pair):
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_a_released_context_says_so(backend):
+def test_using_a_released_context_is_an_error(backend):
     context = gl.open_context(backend)
     context.release()
     context.release()
@@ -90,12 +93,12 @@ def _cycles(backend, count):
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_500_contexts_leave_nothing_behind(backend):
-    _cycles(backend, 60)  # what the driver keeps once
+    _cycles(backend, 60)  # memory that the driver allocates once
     memory, files = _resident_mb(), len(os.listdir("/proc/self/fd"))
     _cycles(backend, 500)
     assert len(os.listdir("/proc/self/fd")) <= files
-    # a context holds 0.4 MB or more while it lives, so leaked ones would add 200 MB and over;
-    # the allocator's own wobble is a few
+    # a context uses at least 0.4 MB, so leaking 500 would add at least 200 MB; the allocator's own
+    # variation is a few MB
     assert _resident_mb() - memory < 30
 
 
@@ -113,7 +116,7 @@ def _send(connection, work, *arguments):
 
 
 def in_fork(work, *arguments):
-    """What `work` returns in a forked child, or its ContextError's words; fails if it hangs."""
+    """Return the result of `work` in a forked child, or its ContextError's text; fail on a hang."""
     fork = multiprocessing.get_context("fork")
     ours, theirs = fork.Pipe()
     child = fork.Process(target=_send, args=(theirs, work, *arguments))
@@ -127,7 +130,7 @@ def in_fork(work, *arguments):
 
 
 def parent_and_child(backend, wanted, threads):
-    """A triangle drawn here, then one in a child forked off meanwhile, which asks for `wanted`."""
+    """Return a triangle drawn here, in a forked child with backend `wanted`, and here again."""
     os.environ["LP_NUM_THREADS"] = threads
     here = triangle(backend)
     child = in_fork(triangle, wanted)
@@ -138,7 +141,7 @@ FORKS = (
     ("egl", "egl", "2"),
     ("egl", "osmesa", "2"),
     ("osmesa", "auto", "2"),
-    ("osmesa", "osmesa", "0"),  # without threads nothing is lost
+    ("osmesa", "osmesa", "0"),  # without threads a fork loses nothing
 )
 
 
@@ -152,21 +155,21 @@ def test_a_child_forked_from_a_process_with_a_context_draws(backend, wanted, thr
 
 
 @needs_osmesa
-def test_a_forked_child_that_has_no_display_left_says_so():
+def test_a_forked_child_that_cannot_open_a_display_says_so():
     _, words, _ = spawned(parent_and_child, "osmesa", "osmesa", "2")
     assert "osmesa: was opened before this process was forked" in words
     assert "spawn or forkserver" in words
 
 
 def spawned(work, *arguments):
-    """What `work` returns in a fresh process, which may have children."""
+    """Return the result of `work` in a fresh process, which may start children."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         return pool.submit(work, *arguments).result()
 
 
 def threads_added(backend, counts):
-    """How many threads this process gained by a context with each of `counts`, one by one."""
-    os.environ.pop("LP_NUM_THREADS", None)  # which importing the tests has set
+    """Return the number of threads added by opening a context with each of `counts` in turn."""
+    os.environ.pop("LP_NUM_THREADS", None)  # set by importing the tests
     added = []
     for count in counts:
         before = len(os.listdir("/proc/self/task"))
@@ -176,7 +179,7 @@ def threads_added(backend, counts):
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_the_first_thread_count_of_a_process_stands(backend):
+def test_the_first_thread_count_of_a_process_is_final(backend):
     runs = [(backend, (0,)), (backend, (3, 0, 9))]
     with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
         (alone,), (with_three, *later) = pool.starmap(threads_added, runs, chunksize=1)
@@ -184,7 +187,7 @@ def test_the_first_thread_count_of_a_process_stands(backend):
     assert later == [0, 0]
 
 
-def test_hardware_comes_first_and_software_serves_where_it_fails(monkeypatch):
+def test_hardware_is_tried_first_and_software_is_the_fallback(monkeypatch):
     (software,) = (device for device in gl.egl_devices() if device.software)
     broken = EglDevice(handle=64, software=False)
     tried = []
@@ -199,7 +202,7 @@ def test_hardware_comes_first_and_software_serves_where_it_fails(monkeypatch):
         gl.open_context("egl", device_index=1)
 
 
-def test_surfaceless_serves_where_no_device_is_listed(monkeypatch):
+def test_surfaceless_egl_is_used_if_no_device_is_listed(monkeypatch):
     monkeypatch.setattr(gl.Egl, "devices", lambda _: [])
     np.testing.assert_array_equal(triangle("egl"), expected())
 
@@ -210,13 +213,13 @@ def test_unknown_backends_are_named_with_the_choices():
 
 
 @pytest.mark.parametrize("index", [-1, 99])
-def test_a_device_that_does_not_exist_is_named_and_nothing_stands_in_for_it(index):
+def test_a_device_that_does_not_exist_is_named_and_not_replaced(index):
     with pytest.raises(ContextError, match=f"there is no device {index} among") as caught:
         gl.open_context("auto", device_index=index)
     assert "osmesa" not in str(caught.value)
 
 
-def test_osmesa_takes_no_device_and_threads_count_from_zero():
+def test_a_device_for_osmesa_and_negative_threads_are_refused():
     with pytest.raises(ConfigError, match="device_index: 0: osmesa has no devices"):
         gl.open_context("osmesa", device_index=0)
     with pytest.raises(ConfigError, match="threads: -1"):
@@ -236,7 +239,7 @@ def test_without_libraries_the_error_names_the_packages(monkeypatch):
         gl.open_context("auto")
 
 
-def test_doctor_tells_of_both_backends():
+def test_doctor_reports_on_both_backends():
     words, works = doctor.report()
     assert works
     egl, osmesa = (
@@ -257,7 +260,7 @@ def test_doctor_says_what_fails_on_an_old_driver(monkeypatch):
     assert words.count("OpenGL 4.4 core") >= 2
 
 
-def test_doctor_names_the_packages_where_egl_finds_no_driver(monkeypatch):
+def test_doctor_names_the_packages_if_egl_finds_no_driver(monkeypatch):
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
     egl, osmesa = doctor.diagnose()
     assert not egl.works
@@ -270,7 +273,7 @@ def three_devices():
 
 
 def bad_driver(backend, index):
-    """Crashes on device 0, hangs on device 1, works on device 2; no OSMesa."""
+    """Crash on device 0, hang on device 1 and work on device 2; OSMesa is missing."""
     if index == 0:
         os.abort()
     if index == 1:
@@ -280,7 +283,7 @@ def bad_driver(backend, index):
     return "a renderer"
 
 
-def test_doctor_survives_crashes_and_hangs_and_goes_on(monkeypatch):
+def test_doctor_continues_after_crashes_and_hangs(monkeypatch):
     monkeypatch.setattr(doctor, "_egl_device_names", three_devices)
     monkeypatch.setattr(doctor, "_renderer", bad_driver)
     monkeypatch.setattr(doctor, "_TIMEOUT_S", 1.0)

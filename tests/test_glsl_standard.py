@@ -1,5 +1,7 @@
-"""All shaders by GLSL's reference compiler, vertex shaders with the fragment shaders that they are
-linked with: some drivers let pass what it refuses, and others do not."""
+"""All shaders checked by the GLSL reference compiler, which rejects code that some drivers accept.
+
+Vertex shaders are linked with their fragment shaders.
+"""
 
 import hashlib
 import itertools
@@ -9,7 +11,6 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from fastgen import generator
 from fastgen.light.directional_lights import MOST_SUNS
 from fastgen.render.programs import DAMAGE_VARIANTS, LAYERS, link, listed_classes
 from fastgen.render.shading import Shading
@@ -19,7 +20,7 @@ SUNS = (0, 1, MOST_SUNS)
 
 
 class Recorder(MagicMock):
-    """Stands for a moderngl.Context, and writes the shaders that it is given into `folder`."""
+    """Fake moderngl.Context that writes the shaders it gets into `folder`."""
 
     def program(self, vertex_shader, fragment_shader):
         self.keep(vert=vertex_shader, frag=fragment_shader)
@@ -38,19 +39,19 @@ class Recorder(MagicMock):
 
 @pytest.fixture
 def recorder(tmp_path):
-    assert shutil.which(COMPILER), "run make glslang"
+    assert shutil.which(COMPILER), "glslangValidator is missing; run make glslang"
     made = Recorder()
     made.folder = tmp_path
     return made
 
 
 def refused(folder):
-    """What the compiler says of programs that it refuses."""
+    """Return the compiler's output for the programs that it rejects."""
     pairs = [sorted(program.iterdir()) for program in folder.iterdir()]
     compute = [pair[0] for pair in pairs if len(pair) == 1]
     commands = [["-l", *pair] for pair in pairs if len(pair) > 1]
     if compute:
-        commands.append(compute)  # in one process, which takes a third of the time
+        commands.append(compute)  # one process for all takes a third of the time
     assert commands
     words = ""
     for files in commands:
@@ -59,10 +60,10 @@ def refused(folder):
     return words
 
 
-@pytest.mark.parametrize("quality", generator.QUALITY)
-def test_shading_is_glsl(recorder, quality):
-    chosen = generator.QUALITY[quality]
-    # large images have fewer samples than their quality asks for
+@pytest.mark.parametrize("quality", settings.QUALITY)
+def test_shading_is_standard_glsl(recorder, quality):
+    chosen = settings.QUALITY[quality]
+    # large images have fewer samples than their quality specifies
     for samples in [n for n in (1, 2, 3, 5) if n == 1 == chosen[0] or 1 < n <= chosen[0]]:
         for layer in LAYERS if quality in ("draft", "balanced") and samples != 2 else ("all",):
             shading = Shading(
@@ -89,7 +90,7 @@ def link_all(shading, samples):
                     shading._shader(name, suns)
 
 
-def test_all_else_is_glsl(recorder):
+def test_all_other_shaders_are_standard_glsl(recorder):
     for damage in DAMAGE_VARIANTS:
         link(recorder, "geometry.vert", "geometry.frag", {}, damage=damage)
         of_points = {"pixel_class": "decal" if damage == "sound" else "damaged", "damage": damage}
@@ -102,13 +103,13 @@ def test_all_else_is_glsl(recorder):
     assert refused(recorder.folder) == ""
 
 
-def test_what_drivers_alone_take_is_refused(recorder):
+def test_code_that_only_drivers_accept_is_rejected(recorder):
     pasted = "#define ONE(name) name##_1\n#define A_1 1\n#if ONE(A)\n#endif\n"
     recorder.compute_shader(f"#version 430 core\n{pasted}void main() {{}}\n")
     assert "'#if' : unexpected tokens" in refused(recorder.folder)
 
 
-def test_shaders_that_do_not_fit_together_are_refused(recorder):
+def test_shaders_with_mismatched_interfaces_are_rejected(recorder):
     head = "#version 430 core\n"
     vertex = f"{head}out vec2 place; void main() {{ place = vec2(0.0); }}"
     recorder.program(vertex, f"{head}in vec3 place; void main() {{ if (place.z > 0.0) discard; }}")

@@ -1,4 +1,4 @@
-"""Which letters of a text the shader looks at, against all letters whose tile holds a point."""
+"""Letters that the shader tests at a point, compared with all whose tile contains the point."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from fastgen.scene.limits import GLYPH_RANGE
 
 
 def texts():
-    """Texts of one to three lines, some with wide gaps, in every direction and size."""
+    """Yield texts of one to three lines, some with wide gaps, in both directions and many sizes."""
     rng = np.random.default_rng(5)
     letters = list("ABCXYZ0123456789")
     for cap_mm in (0.01, 5.0, 80.0, 600.0):
@@ -24,14 +24,14 @@ def texts():
 
 
 def part_of(p, run):
-    """The part of the text that the shader takes for points [N, 2], in its precision."""
+    """Return the part of the text that the shader uses at points [N, 2], in its precision."""
     count = np.float32(len(run.glyphs))
     along = p[:, int(run.parts_per_mm < 0)]
     part = along * np.float32(abs(run.parts_per_mm)) + np.float32(0.5) * count
     return np.clip(part, 0, count - 1).astype(int)
 
 
-def test_a_part_names_every_letter_that_reaches_into_it():
+def test_a_part_lists_every_letter_that_reaches_into_it():
     font = next(iter(glyph_tiles()[1].values()))
     rng = np.random.default_rng(6)
     for lines, cap_mm, vertical in texts():
@@ -44,7 +44,7 @@ def test_a_part_names_every_letter_that_reaches_into_it():
         assert len(found) == len(centers)
         tiles = {g.tile for g in lettering.glyphs}
         assert set(run.glyphs[:, 2].astype(int).tolist()) == tiles
-        # at random, on the parts' borders, and beyond the text's ends
+        # random points, also beyond the ends of the text, and points on the borders of parts
         reach = size / 2 + cap_mm
         points = rng.uniform(-reach, reach, (200, 2)).astype(np.float32)
         borders = np.linspace(-0.5, 0.5, len(found) + 1) * size.max()
@@ -57,14 +57,14 @@ def test_a_part_names_every_letter_that_reaches_into_it():
         assert not (held & ~named).any(), (lines, cap_mm, vertical)
 
 
-def test_a_part_of_a_long_line_names_few_letters():
+def test_a_part_of_a_long_line_lists_few_letters():
     font = next(iter(glyph_tiles()[1].values()))
     run = glyph_run(layout(("CSQU3054383" * 4,), font, 100.0))
     first, end = np.divmod(run.glyphs[:, 3].astype(int), GLYPH_RANGE)
     assert (end - first).mean() < 5
 
 
-def test_the_longest_text_keeps_its_numbers():
+def test_letter_numbers_of_the_longest_text_are_exact():
     count = GLYPH_RANGE - 1
     font = next(iter(glyph_tiles()[1].values()))
     run = glyph_run(layout(("A" * count,), font, 10.0))

@@ -1,4 +1,4 @@
-"""ISO 6346 check digits by a second way of counting."""
+"""ISO 6346 check digits compared with a second implementation."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from fastgen.errors import ConfigError
 
 
 def slow_sum(text):
-    """By the letter table written out, 11, 22 and 33 left out, and powers of two added up."""
+    """Return the ISO 6346 sum: letter values skip 11, 22 and 33, weights are powers of two."""
     table = {}
     value = 10
     for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ":
@@ -26,22 +26,22 @@ def slow_check_digit(text):
     return slow_sum(text) % 11 % 10
 
 
-def test_the_known_container_checks():
+def test_check_digit_of_a_known_container():
     assert check_digit("CSQU305438") == 3
 
 
-def test_every_letter_counts_as_the_standard_has_it():
-    # the letters of the standard's table, by where it leaves out 11, 22 and 33
+def test_every_letter_has_its_value_from_the_standard():
+    # letter values of the standard's table, split where it skips 11, 22 and 33
     values = dict(zip("ABCDEFGHIJK", (10, *range(12, 22)), strict=True))
     values |= dict(zip("LMNOPQRSTU", range(23, 33), strict=True))
     values |= dict(zip("VWXYZ", range(34, 39), strict=True))
     for letter, value in values.items():
-        # at place 0 a letter weighs 1; what the rest adds does not depend on it
+        # the letter at place 0 has weight 1; `rest` is the sum of the other places
         rest = int(sum(10 << place for place in (1, 2, 3)))
         assert check_digit(f"{letter}AAA000000") == (value + rest) % 11 % 10
 
 
-def test_random_identifiers_agree_with_the_slow_count():
+def test_random_identifiers_agree_with_the_second_implementation():
     rng = np.random.default_rng(0)
     for _ in range(500):
         made = sample_identifier(rng, ["HXLU", "QMRU", "ABZU"], "22G1")
@@ -49,7 +49,7 @@ def test_random_identifiers_agree_with_the_slow_count():
         assert int(made.check) == slow_check_digit(made.owner + made.serial)
 
 
-def test_serials_with_a_remainder_of_ten_are_not_given_out():
+def test_serials_with_a_remainder_of_ten_are_not_sampled():
     rng = np.random.default_rng(1)
     remainders = set()
     for _ in range(1000):
@@ -59,6 +59,6 @@ def test_serials_with_a_remainder_of_ten_are_not_given_out():
 
 
 @pytest.mark.parametrize("text", ["CSQU30543", "csqu305438", "CSQ1305438", "CSQU30543X"])
-def test_other_text_is_refused(text):
+def test_malformed_text_is_refused(text):
     with pytest.raises(ConfigError, match="four capital letters and six digits"):
         check_digit(text)

@@ -1,4 +1,4 @@
-"""Light that surfaces throw on a spreader, against rays and sums."""
+"""Indirect light on a spreader, compared with rays and sums."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ TO_SUN, SUN = np.array([0.48, -0.36, 0.8]), np.array([4.0, 3.0, 2.0])
 
 @pytest.fixture(scope="module")
 def world():
-    """Container, spreader and where that sees from; Embree's rays against either."""
+    """Container, spreader, probe points of the spreader, and an Embree ray caster for each body."""
     container, spreader = build_container(KIND), build_spreader(KIND)
     solids = [container, without_cables(spreader)]
     casters = [
@@ -41,7 +41,7 @@ def world():
 
 
 def hits(caster, start, toward):
-    """Where rays [K] first meet a body, [K, 3] and its normals there; nowhere is nan."""
+    """Return the first hits of rays on a body and the normals there, [K, 3], NaN for misses."""
     met = np.full(start.shape, np.nan)
     normals = np.full(start.shape, np.nan)
     where, ray, triangle = caster.intersects_location(start, toward, multiple_hits=False)
@@ -67,8 +67,10 @@ def factors(world, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def outside(world):
-    """Of 500 vertices those that are not within a body: no ray from them meets one from behind.
-    Twist locks stand in the castings, within the container's box."""
+    """Vertices outside both bodies, out of 500 random ones: no ray from them hits a back face.
+
+    Twist locks are excluded because they are inside the castings.
+    """
     _, spreader, points, casters = world
     locks = [".locks." in chart.name for chart in spreader.charts]
     free = np.flatnonzero(~np.array(locks)[spreader.chart])
@@ -86,7 +88,7 @@ def outside(world):
 
 
 def evenly(count):
-    """Unit vectors [count, 3] spread over the sphere."""
+    """Return unit vectors [count, 3] spread evenly over the sphere."""
     step = np.arange(count)
     height = 1 - (2 * step + 1) / count
     turn = step * 2.399963  # the golden angle
@@ -95,8 +97,11 @@ def evenly(count):
 
 
 def by_rays(world, glow, of):
-    """Irradiance / pi [K, 3] of vertices of the spreader, by 800 rays each, off bodies that glow:
-    radiance [N, 3] of a body's number, of places and of normals."""
+    """Return irradiance / pi [K, 3] at spreader vertices `of`, by 800 rays to glowing bodies.
+
+    `glow` maps body number (0 container, 1 spreader), places [N, 3] and normals [N, 3] to radiance
+    [N, 3].
+    """
     _, spreader, points, casters = world
     directions = evenly(1600)
     found = []
@@ -116,12 +121,12 @@ def by_rays(world, glow, of):
 
 
 def pattern(places):
-    """A radiance [K, 3] that changes along the container, across it and upward."""
+    """Return a radiance [K, 3] that varies along, across and up the container."""
     x, y, z = np.asarray(places).T
     return np.stack([1 + x / 6000, 1 + y / 3000, z / 3000], axis=1)
 
 
-def test_light_off_the_container_is_what_rays_bring(world, factors, outside):
+def test_light_from_the_container_matches_rays(world, factors, outside):
     container, spreader, _, _ = world
     cells = Cells.of(container, container_outline(KIND)).mean(pattern(container.positions_mm))
     none = np.zeros((len(spreader.positions_mm), 3))
@@ -133,8 +138,8 @@ def test_light_off_the_container_is_what_rays_bring(world, factors, outside):
     assert np.abs((found - expected).mean(axis=0)).max() < 0.006
 
 
-def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outside):
-    """Off its upper and its lower faces, unlike; so dim that what bounces again does not count."""
+def test_light_from_the_spreader_itself_matches_rays(world, factors, outside):
+    """Upper, lower and side faces glow in one channel each, too dimly for a second bounce."""
     _, spreader, _, _ = world
 
     def glow(normals):
@@ -152,8 +157,8 @@ def test_light_off_the_spreader_itself_is_what_rays_bring(world, factors, outsid
     assert np.abs((found - expected).mean(axis=0)).max() < 0.006
 
 
-def test_light_comes_off_the_face_that_a_ray_meets(world, factors, outside):
-    """Each plane has its own brightness, so that those of a parallel face near by are wrong."""
+def test_light_comes_from_the_face_that_a_ray_hits(world, factors, outside):
+    """Each plane has its own brightness, so taking a parallel face nearby would be an error."""
     _, spreader, _, _ = world
 
     def glow(places, normals):
@@ -177,20 +182,20 @@ def test_two_bounces_are_a_geometric_sum(factors, world):
     dark = np.zeros((1000, 3))
     once, twice, thrice = (factors.light(0 * sun, sun, dark, k * sun) for k in (0.1, 0.2, 0.3))
     assert once.max() > 0.02
-    second = (twice - 2 * once) / 2  # of 0.1
+    second = (twice - 2 * once) / 2  # for paint of 0.1
     np.testing.assert_allclose(thrice, 3 * (once - second) + 9 * second, atol=1e-5)
     assert second.max() > 0.002
 
 
-def test_light_is_neither_lost_nor_made(factors, outside):
-    """Sky and surfaces make up a vertex's hemisphere, but for what is within a body."""
+def test_energy_is_conserved(factors, outside):
+    """Sky and surfaces together fill the hemisphere of a vertex, unless it is inside a body."""
     assert factors.known.max() < 1 + 1e-5
     assert np.median(factors.known[outside]) > 0.999
     assert np.quantile(factors.known[outside], 0.05) > 0.95
 
 
 def by_sky_and_sun(world, points, normals):
-    """Irradiance / pi [K, 3] of surfaces by an even sky of 1, 200 rays each, and by the sun."""
+    """Return irradiance / pi [K, 3] from a uniform sky of radiance 1 (200 rays) and the sun."""
     casters = world[3]
     toward, start = evenly(200), points + 3 * normals
     cosine = np.maximum(normals @ toward.T, 0)
@@ -204,8 +209,10 @@ def by_sky_and_sun(world, points, normals):
 
 @pytest.fixture(scope="module")
 def lit(world, tmp_path_factory):
-    """What SkyProbe finds of the spreader under an even sky of 1, a function of a sun's light, of
-    the paint of sheets and of its own, and of what else lights the container; all else would glare.
+    """Function that returns SkyProbe's light on the spreader under a uniform sky of radiance 1.
+
+    Its arguments are the sun's light, the albedo of the container's sheets, that of the spreader,
+    and optionally the light on the container. Any other material would be far too bright.
     """
     container, spreader, _, _ = world
     ambient = Ambient.of(prefilter_environment("even", np.ones((64, 128, 3), np.float32)))
@@ -229,13 +236,13 @@ BLACK, WHITE = np.zeros(3), np.ones(3)
 
 
 def stored(values):
-    """Light [V, 3] as the shader takes it, of an even sky's irradiance, which is 1."""
+    """Return the light [V, 3] that the shader decodes, for a uniform sky of irradiance 1."""
     values = values.astype(float)
     return values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)
 
 
-def test_all_the_light_of_a_spreader_is_what_rays_bring(world, outside, lit):
-    """Of sky and sun, by themselves and by way of the container's paint and of its own."""
+def test_all_light_on_a_spreader_matches_rays(world, outside, lit):
+    """Test light from sky and sun: direct, off the container, and off the spreader itself."""
     _, spreader, points, _ = world
     chosen = outside[::3]
     dark, roof, beam = lit(SUN, BLACK, BLACK), lit(SUN, ROOF, BLACK), lit(SUN, BLACK, BEAM)
@@ -259,7 +266,7 @@ def test_all_the_light_of_a_spreader_is_what_rays_bring(world, outside, lit):
 
 
 def test_in_a_white_furnace_a_spreader_is_as_bright_as_the_sky(world, lit, monkeypatch):
-    """Also where rays that start within a body know only a part of what is around."""
+    """This includes vertices inside a body, whose rays see only part of the surroundings."""
     monkeypatch.setattr(interreflection, "_BOUNCES", 100)
     container, spreader, _, _ = world
     count = len(container.positions_mm)
@@ -270,8 +277,8 @@ def test_in_a_white_furnace_a_spreader_is_as_bright_as_the_sky(world, lit, monke
     assert np.quantile(light[~np.array(locks)[spreader.chart]], 0.1) > 0.99
 
 
-def test_another_hemisphere_has_other_form_factors(world, tmp_path, monkeypatch):
-    """Though all else is the same: what is kept on disk does not stand for both."""
+def test_other_hidden_directions_give_other_form_factors(world, tmp_path, monkeypatch):
+    """The disk cache must not confuse two inputs that differ only in the hidden directions."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     _, spreader, points, _ = world
     toward = sky_directions()
@@ -285,12 +292,12 @@ def test_another_hemisphere_has_other_form_factors(world, tmp_path, monkeypatch)
         for hidden in (all_hidden, upper_hidden)
     ]
     assert found[0].mean() > 0.1
-    # the container lies below, but for flippers, which hang beside it
+    # the container is below the spreader, except that it is beside the flippers
     assert found[1].mean() < 0.1 * found[0].mean()
 
 
-def test_the_roofs_paint_shows_below_the_spreader():
-    """A red roof and a blue one; the beams are the same grey."""
+def test_the_paint_of_the_roof_tints_the_spreader_above_it():
+    """Compare a red and a blue roof under the same grey beams."""
     reddish = []
     for color in ("#c01010", "#1010c0"):
         config = Config.from_values(
@@ -308,4 +315,4 @@ def test_the_roofs_paint_shows_below_the_spreader():
         reddish.append(seen[:, 0] - seen[:, 2])
     difference = reddish[0] - reddish[1]
     assert np.quantile(difference, 0.99) > 20
-    assert np.abs(np.median(difference)) < 5  # what faces outward
+    assert np.abs(np.median(difference)) < 5  # faces that do not see the roof

@@ -9,9 +9,10 @@ import pytest
 from fastgen.camera.projection import view_of
 from fastgen.camera.tone_curve import displayed, light_of
 from fastgen.config.config import Config
-from fastgen.generator import QUALITY, Generator, Quality
+from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.render.gpu_mesh import facing_groups
+from fastgen.render.settings import QUALITY, Quality
 from fastgen.scene import Spreader
 from fastgen.srgb import DECODED
 from tests import oracle

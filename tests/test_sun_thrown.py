@@ -9,7 +9,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config, Generator
-from fastgen.generator import QUALITY
+from fastgen.render.settings import QUALITY
 from fastgen.scene import EnvironmentView, Spreader
 from tests import oracle
 from tests.plain import EVEN_PAINT

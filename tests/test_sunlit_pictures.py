@@ -9,8 +9,8 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.tone_curve import light_of
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.generator import QUALITY, Quality
 from fastgen.light.environment import load_environment
+from fastgen.render.settings import QUALITY, Quality
 from fastgen.scene import Camera, Damage, EnvironmentView, Spreader
 from fastgen.scene.container_kinds import KINDS
 from tests.plain import EVEN_PAINT

@@ -26,11 +26,12 @@ from fastgen.errors import ConfigError, FastgenError
 from fastgen.export import export_glb
 from fastgen.files.images import jpeg, png, write
 from fastgen.formats import SEAFRONT, known_formats
-from fastgen.generator import QUALITY, Generator, find_camera
+from fastgen.generator import Generator, find_camera
 from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
 from fastgen.render import doctor
 from fastgen.render.gl import BACKENDS
 from fastgen.render.programs import LAYERS
+from fastgen.render.settings import QUALITY
 from fastgen.validation import check_known
 
 SHOWN_LAYERS = (*LAYERS, "ids", "damage")
