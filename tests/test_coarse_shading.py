@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.render import settings
 
 SIZE = (501, 333)  # odd, so blocks at the borders are incomplete
 SCENES = {

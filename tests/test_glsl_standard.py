@@ -12,6 +12,7 @@ from unittest.mock import MagicMock
 import pytest
 
 from fastgen.light.directional_lights import MOST_SUNS
+from fastgen.render import settings
 from fastgen.render.programs import DAMAGE_VARIANTS, LAYERS, link, listed_classes
 from fastgen.render.shading import Shading
 
