@@ -211,10 +211,10 @@ def renderer():
 
 @pytest.mark.parametrize(("number", "apart"), [(3, 3.5), (5, 5.0), (8, 3.0), (11, 2.5), (14, 5.5)])
 def test_an_image_matches_its_path_traced_reference(renderer, number, apart):
-    """Test light, layers, damage and exposure together; `apart` limits the mean error in 8-bit steps.
+    """Test light, layers, damage and exposure together; `apart` limits the mean error.
 
-    The cases are: clean in the sun, rusty in the sun, clean and overcast, clean in the sun, rusty
-    at dusk.
+    `apart` is in 8-bit steps. The cases are: clean in the sun, rusty in the sun, clean and
+    overcast, clean in the sun, rusty at dusk.
     """
     case, reference = reference_set.cases()[number], reference_set.load(number)
     scene = reference.scene
