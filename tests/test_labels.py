@@ -1,4 +1,4 @@
-"""Objects against brute force over the id image and projections of the rest mesh."""
+"""Object labels compared with brute force over the id image."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,7 @@ def test_unoccluded_markers_are_nearly_fully_visible(samples):
 
 def test_boxes_of_random_ids_equal_brute_force():
     ids = np.random.default_rng(0).choice([0, 1, 2, 5, 9], size=(37, 53)).astype(np.uint16)
-    ids[20:24] = 5  # goes on from the end of a row to the next
+    ids[20:24] = 5  # a run that continues from each row's end into the next row
     boxes, areas = value_boxes(ids, 2, 10)
     for value in range(2, 10):
         assert boxes[value - 2] == oracle.box_of(ids == value)

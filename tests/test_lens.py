@@ -1,4 +1,4 @@
-"""Distorted cameras against OpenCV's projection, rays through distorted pixels, dense points."""
+"""Distorted cameras compared with OpenCV, with rays through pixels and with dense points."""
 
 import dataclasses
 import json
@@ -44,7 +44,7 @@ def camera(lens, focal_mm, **changes):
 
 
 def opencv(view, points_mm):
-    """The same points by cv2.projectPoints or cv2.fisheye.projectPoints, in our pixel centres."""
+    """Return the pixels [N, 2] of world points [N, 3] as OpenCV projects them."""
     turn, _ = cv2.Rodrigues(view.rotation)
     lens = view.distortion.lens
     points = np.asarray(points_mm, np.float64).reshape(-1, 1, 3)
@@ -72,7 +72,7 @@ def seen(request):
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_points_within_the_image_are_where_opencv_puts_them(name):
+def test_points_in_the_image_project_as_in_opencv(name):
     view = view_of(camera(*LENSES[name]), SIZE)
     points = np.random.default_rng(3).uniform((-9e3, -1500, -3e3), (9e3, 1500, 6e3), (4000, 3))
     pixels, depth = view.project(points)
@@ -82,7 +82,7 @@ def test_points_within_the_image_are_where_opencv_puts_them(name):
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_rays_pass_through_the_points_they_see(name):
+def test_pixel_rays_project_back_to_their_pixels(name):
     view = view_of(camera(*LENSES[name]), SIZE)
     origin, rays = view.rays()
     pixels, _ = view.project(origin + 7000 * rays)
@@ -91,8 +91,8 @@ def test_rays_pass_through_the_points_they_see(name):
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_what_lies_farther_out_is_seen_farther_out(name):
-    # a polynomial alone would fold back into the image
+def test_distorted_radius_grows_with_undistorted_radius(name):
+    # the bare polynomial would fold distant points back into the image
     distortion = view_of(camera(*LENSES[name]), SIZE).distortion
     radius = np.linspace(0, 40, 4001)
     for angle in np.linspace(0, 2 * np.pi, 7):
@@ -104,7 +104,7 @@ def test_what_lies_farther_out_is_seen_farther_out(name):
     ("lens", "focal_mm"),
     [*LENSES.values(), (Lens("brown_conrady", (-0.15, 0.03, 0.02, -0.015, 0.0)), 24.0)],
 )
-def test_the_shader_sees_the_sky_where_it_is(lens, focal_mm):
+def test_the_shader_removes_the_distortion(lens, focal_mm):
     view = view_of(camera(lens, focal_mm), SIZE)
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     seen = np.stack([x, y], axis=-1).reshape(-1, 2)
@@ -116,7 +116,7 @@ def test_the_shader_sees_the_sky_where_it_is(lens, focal_mm):
             lens_focal=view.focal_px,
             **view.distortion.shader_values,
         )
-        # in rows, as no texture holds all in one
+        # no texture is wide enough for all pixels in one row
         rows = np.pad(seen, ((0, 0), (0, 2))).reshape(SIZE[1], SIZE[0], 4)
         ideal = np.concatenate([run(gl, body, row) for row in rows[::8]])[:, :2]
         del kept
@@ -125,7 +125,7 @@ def test_the_shader_sees_the_sky_where_it_is(lens, focal_mm):
     np.testing.assert_allclose(there + view.center_px, expected, atol=0.05)
 
 
-def test_ids_and_depth_are_what_rays_through_the_pixels_say(seen):
+def test_ids_and_depth_equal_ray_casts_through_pixels(seen):
     for sample, mesh in seen:
         hits = oracle.cast(mesh, sample.view, sample.scene)
         ids = oracle.object_ids(sample.scene, mesh, hits)
@@ -150,7 +150,7 @@ def test_amodal_boxes_bound_dense_points_to_a_tenth_of_a_pixel(seen):
                 edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
                 share = np.linspace(0, 1, 5)[:, None, None]
                 a, b = np.moveaxis(mesh.positions_mm[edges].astype(np.float64), 1, 0)
-                # a triangle's corners are moved by damage, its edges stay straight
+                # damage moves a triangle's corners, its edges stay straight
                 a, b = (damage_law.deform(damages, end) for end in (a, b))
                 points = (a + share * (b - a)).reshape(-1, 3)
             elif item.text or item.class_name[1:2].isdigit():
@@ -162,7 +162,7 @@ def test_amodal_boxes_bound_dense_points_to_a_tenth_of_a_pixel(seen):
                 continue
             low, high = pixels.min(axis=0), pixels.max(axis=0)
             near = low.min() > -SIZE[0] and high.max() < 2 * SIZE[0]
-            # damage moves a decal's dense points too, but of a triangle only the corners
+            # damage moves every dense point of a decal, but only the corners of a triangle
             slack = 0.6 if damages and item.class_name != "container" else 0.1
             if near:
                 np.testing.assert_allclose(item.amodal_bbox, (*low, *high), atol=slack)
@@ -170,7 +170,7 @@ def test_amodal_boxes_bound_dense_points_to_a_tenth_of_a_pixel(seen):
     assert compared > 10
 
 
-def test_visible_fractions_are_those_of_rays_through_a_larger_image(seen):
+def test_visible_fractions_equal_ray_casts_over_a_larger_image(seen):
     compared = 0
     pad = 100
     for sample, mesh in seen:
@@ -196,7 +196,7 @@ def test_visible_fractions_are_those_of_rays_through_a_larger_image(seen):
     assert compared > 2
 
 
-def test_castings_are_where_opencv_puts_the_outer_corners():
+def test_casting_keypoints_equal_opencv_projections_of_the_corners():
     (sample, _), *_ = samples(*LENSES["wide fisheye"])
     scene = dataclasses.replace(sample.scene, damages=())
     kind = KINDS[scene.container.kind]
@@ -211,7 +211,7 @@ def test_castings_are_where_opencv_puts_the_outer_corners():
     np.testing.assert_allclose(found[shown, :2], expected, atol=2e-3)
 
 
-def test_a_lens_changes_nothing_else_of_a_scene_and_survives_json():
+def test_a_lens_changes_nothing_else_in_a_scene_and_survives_json():
     plain = Config.preset()
     rig = {name: {"face": c.face} for name, c in plain.cameras.items()}
     rig["A"]["lens"] = {"model": "fisheye", "k1": [-0.03, 0.01], "k2": 0.002}
@@ -230,7 +230,7 @@ def test_a_lens_changes_nothing_else_of_a_scene_and_survives_json():
     assert dataclasses.replace(with_lens, cameras=cameras) == without
 
 
-def test_scene_files_say_what_opencv_needs():
+def test_scene_files_hold_everything_opencv_needs():
     lens, focal_mm = LENSES["barrel"]
     view = view_of(camera(lens, focal_mm), SIZE)
     values = json.loads(json.dumps(view_values(view)))
@@ -253,7 +253,7 @@ def test_a_divided_mesh_is_the_same_surface_with_short_edges():
         return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
     assert area(fine) == pytest.approx(area(mesh), rel=1e-5)
-    # every inner edge is shared by as many triangles as lie along it: no neighbour skips a corner
+    # every edge belongs to two triangles or more, matched by position: no neighbour skips a corner
     points, index = np.unique(fine.positions_mm.round(2), axis=0, return_inverse=True)
     whole = index.reshape(-1)[fine.triangles]
     before = np.unique(mesh.positions_mm.round(2), axis=0, return_inverse=True)[1]
@@ -309,9 +309,11 @@ def test_strong_tangential_distortion_is_undone(p):
     ("position", "off_px"),
     [((300, -6800, 1400), 0.1), ((300, 200, -5600), 1 / 3), ((300, 200, 8400), 1 / 3)],
 )
-def test_corners_lie_closely_enough_for_a_lens_to_bend(position, off_px):
-    """What a pixel shows lies within a straight triangle between bent corners, as drawn; where
-    Embree meets it, bent by itself, is where it should be."""
+def test_mesh_edges_are_short_enough_for_lens_distortion(position, off_px):
+    """Drawn triangles have straight edges between distorted corners.
+
+    Each ray's hit point is compared with its exact projection through the lens.
+    """
     box = build_container("40HC")
     target = (300, 200, 1300)
     wide = camera(LENSES["wide fisheye"][0], 22.0, position_mm=position, target_mm=target)
@@ -331,7 +333,7 @@ def test_corners_lie_closely_enough_for_a_lens_to_bend(position, off_px):
     assert np.quantile(off, 0.99) < off_px
 
 
-def test_a_lens_that_folds_beside_the_image_alone_is_drawn():
+def test_a_lens_that_folds_only_outside_the_image_is_accepted():
     Distortion(Lens("brown_conrady", (-0.25, 0.03, 0.012, 0, 0)), (0.64, 0.48))
     with pytest.raises(ConfigError, match="folds"):
         Distortion(Lens("brown_conrady", (-0.25, 0.03, 0.02, 0, 0)), (0.64, 0.48))
@@ -353,8 +355,8 @@ def test_a_rig_that_cannot_be_drawn_is_refused_at_once():
         Generator(config)
 
 
-def test_what_a_lens_bows_out_stays_within_the_pixels_that_are_shaded():
-    """Large images through the widest fisheye: points close together on the edges of a box."""
+def test_the_shaded_region_contains_edges_bowed_by_a_fisheye():
+    """Dense points on a box's edges are checked in large images through the widest fisheye."""
     size = 4096
     focal_mm = 18 * 2**0.5 / np.deg2rad(77)
     corners = np.array(list(product((-6096.0, 6096.0), (-1219.0, 1219.0), (0.0, 2896.0))))

@@ -1,4 +1,4 @@
-"""Ink that the shader lays down for a text, against the area of its letters."""
+"""Text coverage computed by the shader, compared with the area of the letters."""
 
 import cv2
 import numpy as np
@@ -32,7 +32,7 @@ BODY = (
     ids=["line", "lines", "columns"],
 )
 def text(request):
-    """A text: how its letters stand, and its ink on a grid of 1 mm, [H, W] from the lower left."""
+    """Layout of a text, its ink on a 1 mm grid [H, W] from the lower left, and its origin."""
     tiles, fonts = glyph_tiles()
     lines, vertical = request.param
     lettering = layout(lines, next(iter(fonts.values())), CAP_MM, vertical)
@@ -50,7 +50,7 @@ def text(request):
 
 
 def seen_ink(text, footprint_mm):
-    """Coverage by the shader on a grid of STEP_MM: points [N, 2] in mm and values [N]."""
+    """Return grid points [N, 2] in mm, STEP_MM apart, and the shader's coverage [N] there."""
     lettering, ink, (left, low) = text
     height, width = ink.shape
     x = np.arange(-MARGIN_MM, width + MARGIN_MM, STEP_MM) + left
@@ -87,8 +87,8 @@ def test_a_text_keeps_its_ink_at_every_distance(text, footprint_mm):
 
 
 @pytest.mark.parametrize("footprint_mm", [10.0, 20.0])
-def test_a_text_looks_like_the_mean_of_its_letters(text, footprint_mm):
-    """Against the ink averaged over squares as wide as the footprint."""
+def test_text_coverage_is_close_to_the_averaged_ink(text, footprint_mm):
+    """Compare with the ink averaged over squares as wide as the footprint."""
     _, ink, (left, low) = text
     points, values = seen_ink(text, footprint_mm)
     pad = int(MARGIN_MM) + 40

@@ -1,4 +1,4 @@
-"""Light on objects, by what must stay the same whatever it is."""
+"""Lighting of objects: relations that must hold in every environment."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ GREY = "#808080"
 
 @pytest.fixture(scope="module", params=["balanced", "high"])
 def generator(request, tmp_path_factory):
-    """Grey objects under three lamps, each of a colour of its own, and the colours permuted."""
+    """Generator of grey objects under three coloured lamps, in three orders of the colours."""
     folder = tmp_path_factory.mktemp("skies")
     toward = np.array([[0.0, -1.0, 0.2], [0.8, 0.3, 0.5], [-0.5, 0.2, -0.8]])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
@@ -38,8 +38,8 @@ def generator(request, tmp_path_factory):
 
 @pytest.mark.parametrize("camera", ["A", "Cl"])
 @pytest.mark.parametrize("order", [[1, 2, 0], [2, 1, 0]])
-def test_a_sky_of_other_colours_is_an_image_of_other_colours(generator, camera, order):
-    """No channel of the light has a part in another channel of the image."""
+def test_permuting_the_skys_channels_permutes_the_images_channels(generator, camera, order):
+    """Each channel of the light affects only the same channel of the image."""
     scene = replace(generator.scene(3), decals=())
 
     def under(name: str, times: float) -> tuple[np.ndarray, float]:
@@ -51,17 +51,17 @@ def test_a_sky_of_other_colours_is_an_image_of_other_colours(generator, camera, 
 
     first, exposure = under("rgb", 1.0)
     name = "".join("rgb"[i] for i in order)
-    metered = under(name, 1.0)[1]  # by luminance, to which channels add unequally
+    metered = under(name, 1.0)[1]  # luminance weights the channels unequally
     image, same = under(name, exposure / metered)
     assert same == pytest.approx(exposure)
     assert np.abs(image - first).mean() > 10
-    # each of some steps rounds to 8 bits
+    # several steps round to 8 bits
     assert np.abs(image - first[..., order]).max() <= 6
 
 
 @pytest.mark.parametrize(("camera", "follows"), [("A", True), ("B", False)])
-def test_exposure_follows_the_light_on_the_side_that_is_seen(tmp_path, camera, follows):
-    """A lamp before the front, out of sight of both cameras, made sixteen times as bright."""
+def test_exposure_follows_the_light_on_the_visible_side(tmp_path, camera, follows):
+    """A lamp in front of the front side, outside both views, becomes sixteen times as bright."""
     toward = texel_grid(128)[0]
     lamp = np.maximum(toward @ [0.0, -0.6, 0.8] - 0.9, 0)[..., None] * np.ones(3)
     for name, times in (("dim", 1.0), ("bright", 16.0)):
@@ -91,8 +91,10 @@ LIT = Config.from_values(
 
 
 def lit_by(monkeypatch, values):
-    """A drawn sample of scene 0 whose every vertex sees what `values` makes of its normals,
-    uint8 [V, VERTEX_BYTES] of float [V, 3]."""
+    """Render scene 0 with stored vertex light from `values` in place of probed light.
+
+    values: function from normals float [V, 3] to uint8 [V, VERTEX_BYTES].
+    """
 
     def seen(mesh):
         return Lit(mesh, values(mesh.normals), *[np.ones(mesh.normals.shape, np.float32)] * 2)
@@ -104,8 +106,8 @@ def lit_by(monkeypatch, values):
             return generator.render(index=0, camera="low")
 
 
-def test_light_of_a_vertex_is_three_channels_times_a_fourth(monkeypatch):
-    """60 fourfold is as bright as 120 twofold, on container and spreader."""
+def test_vertex_light_is_three_channels_scaled_by_a_fourth(monkeypatch):
+    """On container and spreader, 60 at scale 4 is as bright as 120 at scale 2."""
 
     def values(steps, times):
         def of(normals):
@@ -123,9 +125,11 @@ def test_light_of_a_vertex_is_three_channels_times_a_fourth(monkeypatch):
     assert np.abs(images[1] - images[2]).mean() > 10
 
 
-def test_only_containers_get_light_that_is_guessed_from_what_hides_their_sky(monkeypatch):
-    """That of a spreader's surfaces is in its values; of a container's, a share that the sky lacks
-    comes back as light off paint."""
+def test_only_containers_get_estimated_light_from_their_hidden_sky(monkeypatch):
+    """The hidden part of a container's sky counts as light reflected by paint.
+
+    A spreader's stored values include that light already.
+    """
 
     def dark(normals):
         found = open_sky(normals)

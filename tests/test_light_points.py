@@ -1,4 +1,4 @@
-"""Which points of an image rays are cast from, and whose light its pixels have."""
+"""Points from which rays are cast, and how their light spreads over the image."""
 
 import sys
 from dataclasses import replace
@@ -19,7 +19,7 @@ OVERCAST = {"environment": {"names": ["port_overcast"]}}
 
 
 def traced_with(monkeypatch, light):
-    """Let the renderer trace light by `light`, and keep what points it is asked for."""
+    """Replace the light tracer with `light` and return a list that collects its points."""
     asked = []
 
     def traced(points, *rest):
@@ -32,7 +32,7 @@ def traced_with(monkeypatch, light):
 
 @pytest.fixture
 def coarse(monkeypatch):
-    """Points as far apart as in images of several thousand pixels."""
+    """Function that places the points `step` pixels apart, as in much larger images."""
 
     def apart(size, step):
         monkeypatch.setattr(light_points, "_POINTS_PER_AXIS", (size[0] * size[1]) ** 0.5 / step)
@@ -41,7 +41,7 @@ def coarse(monkeypatch):
     return apart
 
 
-def test_as_many_points_as_are_told():
+def test_points_are_at_most_400_along_an_axis_and_no_sparser_than_needed():
     for side in (64, 320, 400, 401, 640, 800, 801, 1440, 4096):
         step = light_points.point_step((side, side))
         assert side / step <= 400
@@ -62,7 +62,7 @@ def test_as_many_points_as_are_told():
         (FISHEYE, (400, 300), 1),
     ],
 )
-def test_points_are_what_the_middle_pixels_of_cells_see(monkeypatch, coarse, changed, size, step):
+def test_points_match_the_middle_pixels_of_cells(monkeypatch, coarse, changed, size, step):
     coarse(size, step)
     asked = traced_with(monkeypatch, lambda points, *_: np.ones((len(points.row), 4, 3)))
     with Generator(Config.from_values(changed), 4, size, quality="high") as generator:
@@ -82,7 +82,7 @@ def test_points_are_what_the_middle_pixels_of_cells_see(monkeypatch, coarse, cha
             toward /= np.linalg.norm(toward, axis=1, keepdims=True)
             np.testing.assert_allclose(points.toward_eye, toward, atol=1e-4)
             assert ((points.roughness > 0) & (points.roughness <= 1)).all()
-            # each that sees something, but holes and cables, which are less than a pixel wide
+            # a point for each visible object; holes and cables thinner than a pixel may differ
             seen = sample.ids[step // 2 :: step, step // 2 :: step] > 0
             known = np.zeros_like(seen)
             known[points.row[first], points.column[first]] = True
@@ -90,7 +90,7 @@ def test_points_are_what_the_middle_pixels_of_cells_see(monkeypatch, coarse, cha
             assert (seen & ~known).sum() < 0.01 * seen.sum()
 
 
-def test_normals_of_points_are_those_of_the_labels(monkeypatch):
+def test_point_normals_equal_label_normals(monkeypatch):
     asked = traced_with(monkeypatch, lambda points, *_: np.ones((len(points.row), 4, 3)))
     with Generator(Config.from_values(DAMAGED), 4, (320, 320), quality="high") as generator:
         sample = generator.render(1, camera="Cl", normals=True)
@@ -98,7 +98,7 @@ def test_normals_of_points_are_those_of_the_labels(monkeypatch):
     points = points.chosen(np.flatnonzero(points.row < 320))
     to_camera = points.normal @ sample.view.rotation.T
     cosine = (to_camera * sample.normals[points.row, points.column]).sum(axis=1)
-    assert np.quantile(cosine, 0.25) > 0.99  # pixels of several surfaces have a mean
+    assert np.quantile(cosine, 0.25) > 0.99  # mixed pixels hold a mean normal
     damaged = sample.damage[points.row, points.column] >= 100
     assert damaged.sum() > 50
     assert np.quantile(cosine[damaged], 0.25) > 0.99
@@ -106,8 +106,8 @@ def test_normals_of_points_are_those_of_the_labels(monkeypatch):
 
 @pytest.mark.parametrize("changed", [OVERCAST, OVERCAST | DAMAGED, OVERCAST | HOLED])
 @pytest.mark.parametrize("size", [(320, 320), (640, 640)])
-def test_almost_all_that_is_seen_has_the_light_that_was_traced(monkeypatch, changed, size):
-    """In the dark all but what has no point near it is black."""
+def test_almost_all_visible_pixels_use_traced_light(monkeypatch, changed, size):
+    """Traced light is black here, so only pixels without a nearby point are bright."""
     traced_with(monkeypatch, lambda points, *_: np.zeros((len(points.row), 4, 3)))
     config = Config.from_values(changed)
     with Generator(config, 4, size, quality="high") as generator:
@@ -119,8 +119,8 @@ def test_almost_all_that_is_seen_has_the_light_that_was_traced(monkeypatch, chan
 
 @pytest.mark.parametrize("step", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_light_reaches_as_far_on_either_side_of_points(monkeypatch, coarse, step, axis):
-    """One lit row or column of points lights what is up to a cell and a half away."""
+def test_light_reaches_equally_far_on_both_sides_of_points(monkeypatch, coarse, step, axis):
+    """One lit row or column of points lights pixels up to a cell and a half away."""
     size = (320, 323)
     coarse(size, step)
     rows = len(range(step // 2, size[1], step))
@@ -146,7 +146,7 @@ def test_light_reaches_as_far_on_either_side_of_points(monkeypatch, coarse, step
     assert weight @ near == pytest.approx(middle, abs=0.25 * step)
 
 
-def test_high_is_the_same_to_the_byte_from_another_generator():
+def test_high_is_byte_identical_across_generators():
     images = []
     for _ in range(2):
         with Generator(Config.from_values(DAMAGED), 7, (128, 96), quality="high") as generator:
@@ -155,9 +155,9 @@ def test_high_is_the_same_to_the_byte_from_another_generator():
     np.testing.assert_array_equal(images[0][0], images[0][2])
 
 
-def test_nothing_of_earlier_images_is_left(monkeypatch, coarse):
-    """Below an image's samples lie those of what holes show at its top."""
-    size = (92, 92)  # the last cells end with the image, and would go on for a pixel
+def test_points_do_not_depend_on_earlier_images(monkeypatch, coarse):
+    """Samples seen through holes lie directly below the image's own samples in the targets."""
+    size = (92, 92)  # the image border cuts one pixel off the last cells
     coarse(size, 3)
     asked = traced_with(monkeypatch, lambda points, *_: np.ones((len(points.row), 4, 3)))
     holed = Generator(Config.from_values(HOLED), 3).scene(1)

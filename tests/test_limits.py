@@ -1,4 +1,4 @@
-"""At the limits: many decals, extreme sizes, borders, nothing in view, look-alikes in a row."""
+"""Limits: many decals, extreme sizes, image borders, empty views and identical markers."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from tests import oracle
 
 
 def bare(generator, index=0, kind=None):
-    """A scene with nothing on its container."""
+    """Return a scene whose container has no decals, damages or spreader."""
     scene = generator.scene(index)
     container = Container(kind or scene.container.kind, scene.container.profiles)
     return replace(scene, container=container, decals=(), damages=(), spreader=Spreader())
@@ -35,7 +35,7 @@ def markers(count, columns, step, names, size=120.0):
 
 
 def check(sample):
-    """Ids and boxes against rays and brute force over pixels."""
+    """Compare ids with ray casts, and boxes and areas with brute force over pixels."""
     scene = sample.scene
     mesh = build_container(scene.container.kind, scene.container.profiles)
     truth = oracle.object_ids(scene, mesh, oracle.cast(mesh, sample.view, scene))
@@ -95,8 +95,8 @@ def test_the_largest_size_renders():
     assert (sample.ids > 0).mean() > 0.02
 
 
-def test_an_image_too_high_for_all_samples_of_its_quality_takes_fewer():
-    """In front of a hole, for which there are two views."""
+def test_an_image_too_high_for_its_quality_takes_fewer_samples():
+    """A hole needs a second view, which doubles the height of the targets."""
     holes = {"probability": 1, "count": [1, 1], "kinds": ["perforation"]}
     config = Config.from_values({"damage": holes, "spreader": {"probability": 0}})
     samples = []
@@ -112,7 +112,7 @@ def test_an_image_too_high_for_all_samples_of_its_quality_takes_fewer():
     assert (samples[0].damage != samples[1].damage).mean() < 1e-3
 
 
-def test_nothing_in_view_has_objects_without_boxes():
+def test_objects_out_of_view_have_no_boxes():
     with Generator(seed=8, size=(96, 64)) as generator:
         camera = Camera("away", (0, -8000, 1000), (0, -20000, 1000), 14.5)
         sample = generator.render(index=2, camera=camera)
@@ -165,7 +165,7 @@ def test_a_marker_on_the_border_is_truncated_and_one_within_is_not():
         mesh = build_container(scene.container.kind, scene.container.profiles)
         (x, y, z), *_ = mesh.sheet_to_surface("front", scene.decals[0].center_mm)[0]
         shift = 0.0
-        # moved until the marker's left tip lies just within the image, then just beyond it
+        # shift the camera until the marker's left tip is just inside the image, then just outside
         for gap, cut in ((0.3, False), (-1.3, True)):
             for _ in range(4):
                 camera = Camera("at", (x + shift, y - 4000, z), (x + shift, y, z), 36.0)

@@ -1,4 +1,4 @@
-"""Placement of decals: geometry, proportions and norms, over many sampled scenes."""
+"""Placement of decals over many sampled scenes: geometry, statistics and standards."""
 
 import math
 from collections import Counter
@@ -27,7 +27,7 @@ def scenes():
 
 
 def corners(decal):
-    """Corners of what the decal covers: a marker's diamond, else its rectangle."""
+    """Return the corners [4, 2] of a marker's diamond or of another decal's rectangle."""
     half = np.array(decal.size_mm) / 2
     if decal.kind == "marker":
         points = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]]) * half
@@ -39,7 +39,7 @@ def corners(decal):
 
 
 def apart(a, b):
-    """Whether a line parallel to an edge separates two convex polygons."""
+    """Return True if a line parallel to an edge separates two convex polygons."""
     for polygon in (a, b):
         for p, q in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
             normal = np.array([q[1] - p[1], p[0] - q[0]])
@@ -48,7 +48,7 @@ def apart(a, b):
     return False
 
 
-def test_labelled_things_never_overlap(scenes):
+def test_labelled_decals_never_overlap(scenes):
     for scene in scenes[:60]:
         for face in ("front", "back", "door", "no_door", "roof"):
             shapes = [corners(d) for d in scene.decals if d.face == face and d.class_name]
@@ -56,7 +56,7 @@ def test_labelled_things_never_overlap(scenes):
                 assert all(apart(a, b) for b in shapes[:i])
 
 
-def test_neighbours_in_the_pattern_clear_each_other_however_they_tilt():
+def test_tilted_neighbours_in_the_pattern_never_overlap():
     values = {"marker_tilt_deg": [-15, 15], "marker_gap_mm": [1, 1], "markers_per_face": [4, 8]}
     generator = Generator(Config.from_values({"markings": values}), seed=2)
     for index in range(30):
@@ -68,7 +68,7 @@ def test_neighbours_in_the_pattern_clear_each_other_however_they_tilt():
                 assert all(apart(a, b) for b in shapes[:i])
 
 
-def test_everything_lies_on_its_sheet(scenes):
+def test_every_decal_lies_on_its_sheet(scenes):
     for scene in scenes:
         mesh = build_container(scene.container.kind, scene.container.profiles)
         sizes = sheet_sizes(mesh)
@@ -83,10 +83,11 @@ def test_marker_classes_are_uniform(scenes):
     total = sum(counts.values())
     expected = total / len(MARKER_CLASSES)
     chi_square = sum((counts[name] - expected) ** 2 / expected for name in MARKER_CLASSES)
-    assert chi_square < 25 + 5 * math.sqrt(50)  # five deviations above the mean of 25 degrees
+    # 25 degrees of freedom: five standard deviations above the mean
+    assert chi_square < 25 + 5 * math.sqrt(50)
 
 
-def test_one_identifier_is_on_every_face_and_the_same(scenes):
+def test_every_face_bears_the_same_identifier(scenes):
     for scene in scenes:
         texts = [d for d in scene.decals if d.class_name == "text"]
         letters = {d.text.replace(" ", "")[:11] for d in texts}
@@ -94,22 +95,22 @@ def test_one_identifier_is_on_every_face_and_the_same(scenes):
         assert {d.face for d in texts} == {"front", "back", "door", "no_door", "roof"}
 
 
-def test_mean_counts_a_face_are_those_the_configuration_asks_for(scenes):
+def test_mean_counts_per_face_match_the_configuration(scenes):
     config = Config.preset().markings
     walls = [d for s in scenes for d in s.decals if d.face != "roof"]
     markers = sum(d.kind == "marker" for d in walls) / (4 * len(scenes))
     texts = sum(d.class_name == "text" for d in walls) / (4 * len(scenes))
-    # uniform from low to high; four deviations of the mean of 1,000 faces
+    # uniform from low to high; within four standard deviations of the mean over 1,000 faces
     low, high = config.markers_per_face
     deviation = math.sqrt(((high - low + 1) ** 2 - 1) / 12 / (4 * len(scenes)))
     assert markers == pytest.approx((low + high) / 2, abs=4 * deviation)
-    # one a wall, and another on two of four with its probability
+    # one per wall; two of the four walls have a second one with probability p
     p = config.second_identifier
     deviation = math.sqrt(p * (1 - p) / (2 * len(scenes))) / 2
     assert texts == pytest.approx(1 + p / 2, abs=4 * deviation)
 
 
-def test_only_markers_and_identifiers_bear_a_label(scenes):
+def test_only_markers_and_identifiers_have_a_class(scenes):
     for decal in (d for s in scenes for d in s.decals):
         if decal.kind == "marker":
             assert decal.class_name == decal.art in MARKER_CLASSES
@@ -154,7 +155,7 @@ def test_columns_on_the_end_wall_stand_on_outer_flats(scenes):
                 assert min(abs(decal.center_mm[0] - m) for m in middles) < 0.1
 
 
-def test_letters_are_as_high_as_the_standard_asks(scenes):
+def test_letters_are_at_least_as_high_as_the_standard_requires(scenes):
     for scene in scenes:
         for decal in scene.decals:
             if decal.class_name == "text":
@@ -163,7 +164,7 @@ def test_letters_are_as_high_as_the_standard_asks(scenes):
                 assert decal.cap_mm >= 50
 
 
-def test_several_layouts_and_fonts_come(scenes):
+def test_several_layouts_and_fonts_occur(scenes):
     texts = [d for s in scenes for d in s.decals if d.class_name == "text"]
     assert {len(d.lines) for d in texts if not d.vertical} == {2, 3}
     assert any(d.vertical for d in texts)
@@ -224,8 +225,8 @@ def test_owner_codes_are_four_letters_ending_in_u():
     assert all(len(c) == 4 and c.isalpha() and c.isupper() and c[-1] == "U" for c in codes)
 
 
-def test_a_stream_more_does_not_move_the_rest():
-    """Turning stickers off leaves the markers' classes and the identifier as they were."""
+def test_turning_stickers_off_changes_no_other_draw():
+    """Cameras, surface and marker classes stay as they were."""
     plain = Generator(seed=3)
     bare = Generator(Config.from_values({"markings": {"stickers_per_face": [0, 0]}}), seed=3)
     for index in range(20):
@@ -236,8 +237,8 @@ def test_a_stream_more_does_not_move_the_rest():
         assert classes[0] == classes[1]
 
 
-def test_wear_takes_print_off_in_proportion():
-    """Of the same spots, half as much by half the wear; all of it leaves a part of the print."""
+def test_wear_removes_print_in_proportion():
+    """Half the wear removes half as much from the same spots; full wear leaves some print."""
     config = Config.from_values({"damage": {"probability": 0}, "spreader": {"probability": 0}})
     images = []
     with Generator(config, seed=4, size=(256, 256), quality="draft") as generator:
@@ -250,5 +251,5 @@ def test_wear_takes_print_off_in_proportion():
     fresh, half, all_worn = (image - DECODED[bare.image] for image in images)
     printed = np.abs(fresh).max(axis=2) > 0.2
     share = 1 - all_worn[printed] / np.where(np.abs(fresh[printed]) > 0.1, fresh[printed], np.nan)
-    assert 0.3 < np.nanmean(share) < 0.5  # where an even noise is above 0.6
+    assert 0.3 < np.nanmean(share) < 0.5  # uniform noise exceeds 0.6 in 40 % of the area
     np.testing.assert_allclose(half[printed], ((fresh + all_worn) / 2)[printed], atol=0.05)

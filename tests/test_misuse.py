@@ -1,4 +1,4 @@
-"""The command line where people go wrong: odd folders, damaged files, pipes that close."""
+"""Command line under misuse: odd folders, damaged files and closed pipes."""
 
 import json
 import os
@@ -30,7 +30,7 @@ def dataset(tmp_path_factory):
 
 
 def flip(path):
-    """Change one byte, and nothing that a listing of the folder shows."""
+    """Change one byte of a file without changing its name or size."""
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.unlink()
@@ -41,10 +41,10 @@ def flip(path):
     "name",
     ["images/*/*.jpg", "shards/000000.json", "damage/coco_train.json", "scenes/*/*.json"],
 )
-def test_repair_makes_again_what_resuming_cannot_see(dataset, copy, capsys, name):
+def test_repair_restores_damage_that_resuming_cannot_see(dataset, copy, capsys, name):
     flip(sorted(copy.glob(name))[0])
     assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
-    if "coco" not in name and "shards" not in name:  # these are written anew by every run
+    if "coco" not in name and "shards" not in name:  # every run rewrites these
         capsys.readouterr()
         assert main(["verify", str(copy)]) == 1
         assert f"fastgen verify {copy} --repair" in capsys.readouterr().out
@@ -58,11 +58,11 @@ def test_repair_makes_again_what_resuming_cannot_see(dataset, copy, capsys, name
 @pytest.mark.parametrize(
     ("target", "fault"),
     [
-        (".", "cannot be read (Is a directory)"),  # which no read takes, not even root's
+        (".", "cannot be read (Is a directory)"),  # unreadable even for root
         ("nowhere", "missing"),
     ],
 )
-def test_verify_goes_on_past_a_file_that_cannot_be_read(copy, capsys, target, fault):
+def test_verify_continues_after_an_unreadable_file(copy, capsys, target, fault):
     unreadable = copy / "shards" / "000000.json"
     unreadable.unlink()
     unreadable.symlink_to(target)
@@ -73,7 +73,7 @@ def test_verify_goes_on_past_a_file_that_cannot_be_read(copy, capsys, target, fa
     assert "stray.txt: does not belong here" in said
 
 
-def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys):
+def test_repair_keeps_unknown_files_and_refuses_a_changed_manifest(copy, capsys):
     (copy / "images/notes.txt").write_text("mine")
     assert main(["verify", str(copy), "--repair"]) == 1
     assert "images/notes.txt: does not belong here" in capsys.readouterr().out
@@ -85,11 +85,11 @@ def test_repair_leaves_alone_what_it_cannot_trust_or_does_not_know(copy, capsys)
 
 
 @pytest.mark.parametrize("others", ["lights", "workers"])
-def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
+def test_a_refused_repair_removes_nothing(copy, tmp_path, others):
     flip(next(copy.glob("images/*/*.jpg")))
     flip(next(copy.glob("scenes/*/*.json")))
     arguments = ["verify", str(copy), "--repair", "--workers", "1"]
-    if others == "lights":  # as of a dataset made with --hdri, repaired without
+    if others == "lights":  # the dataset was made without --hdri
         shutil.copy(bundled_hdris()["sky"], tmp_path / "mine.exr")
         arguments += ["--hdri", str(tmp_path)]
     else:
@@ -99,7 +99,7 @@ def test_a_repair_that_cannot_go_on_removes_nothing(copy, tmp_path, others):
     assert content(copy) == before
 
 
-def test_a_repair_by_no_worker_is_refused_where_nothing_is_to_be_made_too(dataset, capsys):
+def test_repair_refuses_zero_workers_even_with_nothing_to_repair(dataset, capsys):
     assert main(["verify", str(dataset), "--repair", "--workers", "0"]) == 2
     assert capsys.readouterr().err == "fastgen: workers: 0 is out of range; give 1 to 1000000000\n"
 
@@ -111,7 +111,7 @@ def test_strange_files_among_the_images_do_not_stop_a_run(copy):
     assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
 
 
-def test_a_refused_device_leaves_everything_as_it_was(copy, tmp_path, capsys):
+def test_a_refused_device_changes_nothing(copy, tmp_path, capsys):
     before = content(copy)
     more = [*ARGUMENTS[2:], "--device-index", "99"]
     assert main(["generate", str(copy), "--images", "10", *more]) == 2
@@ -128,8 +128,8 @@ def test_a_refused_device_leaves_everything_as_it_was(copy, tmp_path, capsys):
     assert content(tmp_path / "new") == {}
 
 
-def test_a_folder_of_the_shipped_hdris_is_another_choice(copy, tmp_path, capsys):
-    """Their weights in the draw are not those of a folder's, which are all alike."""
+def test_resuming_with_a_folder_of_the_shipped_hdris_is_refused(copy, tmp_path, capsys):
+    """HDRIs from a folder are drawn with equal weights, the shipped ones are not."""
     (tmp_path / "hdri").mkdir()
     for path in bundled_hdris().values():
         (tmp_path / "hdri" / path.name).symlink_to(path)
@@ -141,7 +141,7 @@ def test_a_folder_of_the_shipped_hdris_is_another_choice(copy, tmp_path, capsys)
 
 
 @pytest.mark.parametrize("line", ["-1 0.1 0.1 0.2 0.2 0.1 0.2", "1 nan 0.1 0.2 0.2 0.1 0.2", "9 x"])
-def test_labels_that_the_contact_sheet_cannot_show_are_told(copy, line):
+def test_labels_that_the_contact_sheet_cannot_read_are_reported(copy, line):
     images = [(path.parent.name, path.stem) for path in copy.glob("images/*/*.jpg")]
     contact_sheet(copy, images)
     next(copy.glob("damage/yolo/*/*.txt")).write_text(line)
@@ -157,7 +157,7 @@ def test_a_damaged_image_of_the_contact_sheet_is_named(copy, capsys):
     assert "_A.jpg: it or its labels are damaged; run fastgen verify" in error
 
 
-def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
+def test_changed_settings_are_reported_with_both_values(copy, tmp_path, capsys):
     (tmp_path / "port.yaml").write_text("damage: {probability: 0.5}")
     for more, words in (
         (["--seed", "4"], "seed was 3, is now 4"),
@@ -172,7 +172,7 @@ def test_other_settings_are_told_with_both_values(copy, tmp_path, capsys):
         assert f"fastgen: {copy}: was made with other settings ({words}" in error
 
 
-def test_all_settings_that_differ_are_told_with_the_options_that_set_them(copy, capsys):
+def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
     more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "2", "--split", "val"]
     assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
     error = capsys.readouterr().err
@@ -185,14 +185,14 @@ def test_all_settings_that_differ_are_told_with_the_options_that_set_them(copy, 
     assert told[2].startswith(options)
 
 
-def test_what_another_version_made_is_to_be_resumed_with_that(copy, monkeypatch, capsys):
+def test_resuming_another_versions_dataset_names_that_version(copy, monkeypatch, capsys):
     words = f"install fastgen {fastgen.__version__} to resume, or give another folder"
     monkeypatch.setattr(fastgen, "__version__", "99.1.0")
     assert main(["generate", str(copy), *ARGUMENTS, "--seed", "4"]) == 2
     assert words in capsys.readouterr().err
 
 
-def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, capsys):
+def test_other_hdris_are_reported_with_their_option(copy, tmp_path, capsys):
     (tmp_path / "lights").mkdir()
     shutil.copy(bundled_hdris()["dawn"], tmp_path / "lights/mine.exr")
     assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
@@ -201,7 +201,7 @@ def test_other_lights_are_told_with_the_option_that_gives_them(copy, tmp_path, c
     assert " more); repeat them by --hdri to resume" in error
 
 
-def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp_path, capsys):
+def test_reordered_formats_resume_and_other_formats_are_listed_in_full(tmp_path, capsys):
     run = ["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1", "--images", "1"]
     assert main([*run, "--also", "ids,depth"]) == 0
     assert main([*run, "--also", "depth,ids"]) == 0
@@ -211,14 +211,14 @@ def test_further_formats_in_another_order_resume_and_others_are_told_in_full(tmp
 
 
 @pytest.mark.parametrize("names", ["", "A,", "A,A"])
-def test_cameras_that_name_none_or_one_twice_are_refused(tmp_path, capsys, names):
+def test_empty_or_repeated_camera_names_are_refused(tmp_path, capsys, names):
     out = tmp_path / "out"
     assert main(["generate", str(out), "--images", "1", "--cameras", names]) == 2
     assert capsys.readouterr().err.startswith("fastgen: cameras: ")
     assert not out.exists()
 
 
-def test_stats_equal_a_foreign_readers_count(dataset, capsys):
+def test_stats_equal_counts_from_pycocotools(dataset, capsys):
     assert main(["stats", str(dataset)]) == 0
     lines = capsys.readouterr().out.splitlines()
     table = lines[lines.index("Table 2: instances in the damage task") :]
@@ -240,7 +240,7 @@ def test_stats_equal_a_foreign_readers_count(dataset, capsys):
         (lambda p: (p / "shards/000000.json").write_text("[]"), "is damaged; run fastgen verify"),
     ],
 )
-def test_stats_of_half_a_dataset_say_what_to_do(copy, capsys, spoil, words):
+def test_stats_of_an_incomplete_dataset_say_what_to_do(copy, capsys, spoil, words):
     spoil(copy)
     assert main(["stats", str(copy)]) == 2
     assert words in capsys.readouterr().err
@@ -261,7 +261,7 @@ def manifest_is_a_folder(path):
 
 
 @pytest.mark.parametrize("spoil", [lock_is_a_folder, images_are_a_file, manifest_is_a_folder])
-def test_what_cannot_be_written_is_named_in_one_line(tmp_path, capsys, spoil):
+def test_an_unwritable_path_is_named_in_one_line(tmp_path, capsys, spoil):
     spoil(tmp_path / "out")
     capsys.readouterr()
     assert main(["generate", str(tmp_path / "out"), *ARGUMENTS, "--workers", "1"]) == 2
@@ -271,7 +271,7 @@ def test_what_cannot_be_written_is_named_in_one_line(tmp_path, capsys, spoil):
 
 
 @pytest.mark.parametrize("below", [".", "deeper/still"])
-def test_a_link_to_nowhere_is_called_one(tmp_path, capsys, below):
+def test_a_dangling_link_is_reported(tmp_path, capsys, below):
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "unmounted")
     assert main(["generate", str(link / below), *ARGUMENTS, "--workers", "1"]) == 2
@@ -281,18 +281,18 @@ def test_a_link_to_nowhere_is_called_one(tmp_path, capsys, below):
 
 
 @pytest.mark.parametrize("arguments", [["stats", "{}"], ["verify", "{}"], ["generate", "--help"]])
-def test_a_reader_that_goes_away_is_no_error(dataset, arguments):
+def test_a_closed_pipe_is_no_error(dataset, arguments):
     filled = [each.format(dataset) for each in arguments]
     command = [sys.executable, "-m", "fastgen", *filled]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     process.stdout.close()
     assert process.stderr.read() == ""
-    assert process.wait() in (0, 141)  # argparse ends with 0
+    assert process.wait() in (0, 141)  # --help exits with 0
 
 
 @pytest.mark.parametrize("arguments", [["stats", "{}"], ["config"]])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_standard_output_that_takes_no_more_is_called_so(dataset, arguments, unbuffered):
+def test_a_full_standard_output_is_reported(dataset, arguments, unbuffered):
     command = [sys.executable, "-m", "fastgen", *(each.format(dataset) for each in arguments)]
     with open("/dev/full", "w") as full:
         done = subprocess.run(
@@ -307,7 +307,7 @@ def test_standard_output_that_takes_no_more_is_called_so(dataset, arguments, unb
     assert done.stderr == "fastgen: standard output: No space left on device\n"
 
 
-def test_closed_streams_stop_no_run(tmp_path):
+def test_closed_output_streams_do_not_stop_a_run(tmp_path):
     out = tmp_path / "out"
     run = ["generate", str(out), "--images", "1", "--size", "64x64", "--workers", "1"]
     command = ["sh", "-c", 'exec "$@" >&- 2>&-', "sh", sys.executable, "-m", "fastgen", *run]
@@ -346,7 +346,7 @@ def test_show_takes_the_first_camera_of_a_rig(tmp_path):
         ("a: &a [*a]", "a: unknown key"),
     ],
 )
-def test_odd_files_are_named(tmp_path, capsys, text, words):
+def test_malformed_config_files_are_named(tmp_path, capsys, text, words):
     path = tmp_path / "port.yaml"
     path.write_text(text)
     arguments = ["--config", str(path), "--index", "0", "-o", str(tmp_path / "x.png")]
@@ -358,7 +358,7 @@ def test_odd_files_are_named(tmp_path, capsys, text, words):
 
 
 @pytest.mark.parametrize("command", ["generate", "show", "export", "stats", "verify"])
-def test_the_readme_knows_every_option(command, capsys):
+def test_the_readme_mentions_every_option(command, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
     words = (Path(__file__).parent.parent / "README.md").read_text()

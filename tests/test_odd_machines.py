@@ -1,4 +1,4 @@
-"""What machines are like that nobody sets up on purpose."""
+"""Unusual machines: full disks, missing home folders, odd folder names and little memory."""
 
 import errno
 import os
@@ -24,7 +24,7 @@ Disk = namedtuple("Disk", "f_bavail f_frsize")
 
 
 @pytest.mark.parametrize(("free_bytes", "switched"), [(1 << 20, "true"), (1 << 30, None)])
-def test_mesa_caches_nothing_on_a_disk_that_is_nearly_full(
+def test_mesas_shader_cache_is_off_on_a_nearly_full_disk(
     monkeypatch, tmp_path, free_bytes, switched
 ):
     asked = []
@@ -42,7 +42,7 @@ def test_mesa_caches_nothing_on_a_disk_that_is_nearly_full(
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == switched
 
 
-def test_a_user_without_a_home_caches_among_temporary_files(monkeypatch, tmp_path):
+def test_a_user_without_a_home_caches_in_the_temporary_folder(monkeypatch, tmp_path):
     def no_home():
         raise RuntimeError("Could not determine home directory.")
 
@@ -76,13 +76,13 @@ class FullLog:
         pass
 
 
-def test_a_log_that_takes_no_more_ends_no_run():
+def test_an_unwritable_log_does_not_end_a_run():
     progress = Progress(10, stream=FullLog())
     progress.add(10)
     progress.close()
 
 
-def test_a_volume_of_its_own_is_an_empty_place(tmp_path):
+def test_a_new_volume_with_lost_and_found_counts_as_empty(tmp_path):
     (tmp_path / "lost+found").mkdir()
     (tmp_path / "lost+found" / "#1").write_text("x")
     assert Folder(tmp_path).names() == []
@@ -90,20 +90,20 @@ def test_a_volume_of_its_own_is_an_empty_place(tmp_path):
     assert shard_numbers(Folder(tmp_path)) == []
 
 
-def test_too_little_memory_is_no_mistake_of_ours():
+def test_running_out_of_memory_is_reported_with_advice():
     assert in_words(MemoryError(), "scene 3") == (
         "scene 3: out of memory; give fewer workers or a smaller size"
     )
 
 
-def test_what_cannot_be_printed_leaves_the_exit_code_as_it_is(tmp_path):
+def test_a_full_stderr_keeps_the_exit_code_but_a_full_stdout_fails(tmp_path):
     command, out = [sys.executable, "-m", "fastgen"], str(tmp_path / "out")
     make = [*command, "generate", out, "--images", "1", "--size", "64x64"]
     with Path("/dev/full").open("w") as full:
         assert subprocess.run(make, stderr=full, check=False).returncode == 0
         bad = [*command, "verify", str(tmp_path / "none")]
         assert subprocess.run(bad, stderr=full, check=False).returncode == 2
-        # what was asked for and is lost is a fault
+        # losing requested output is an error
         told = subprocess.run(
             [*command, "verify", out], stdout=full, stderr=subprocess.PIPE, check=False
         )

@@ -1,4 +1,4 @@
-"""Openness to the sky, against rays and integrals."""
+"""Sky visibility compared with ray casts and integrals."""
 
 from dataclasses import replace
 
@@ -40,14 +40,14 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def decoded(values):
-    """Directions [V, 3] and shares [V] of the cones in `values`, uint8 [V, 3 or more]."""
+    """Return the bent normals [V, 3] and visible shares [V] stored in `values`, uint8 [V, 3+]."""
     cone = (values[:, :3].astype(float) - 128) / 127
     length = np.linalg.norm(cone, axis=1)
     return cone / length[:, None], 1 - np.clip(2 - 2 * length, 0, 1) ** 2
 
 
 def sphere():
-    """Directions [H, 2H, 3] and solid angles [H, 1] of an equirectangular map, +x in its middle."""
+    """Return directions [H, 2H, 3] and solid angles [H, 1] of an equirectangular map around +x."""
     height = 256
     polar = np.pi * (np.arange(height) + 0.5)[:, None] / height
     around = np.pi - np.pi * (np.arange(2 * height) + 0.5) / height
@@ -57,7 +57,7 @@ def sphere():
 
 
 def light_of(radiance):
-    """The Ambient of radiance [..., 3], a function of directions [..., 3]."""
+    """Return the Ambient of `radiance`, a function from directions to radiance, both [..., 3]."""
     return Ambient.of(prefilter_environment("made", radiance(sphere()[0]).astype(np.float32)))
 
 
@@ -66,7 +66,7 @@ def even(d):
 
 
 def sunset(d):
-    """A warm glow on one side of a dim blue sky, above dark ground."""
+    """Radiance of a dim blue sky with a warm glow on one side, above dark ground."""
     glow = np.exp(4 * (d @ np.array([0.6, 0.75, 0.28]) - 1))[..., None] * [6.0, 3.0, 1.0]
     return np.where(d[..., 2:] > 0, [0.15, 0.3, 0.6] + glow, 0.08)
 
@@ -77,7 +77,7 @@ def even_sky():
 
 
 def rays_open(meshes, points, directions):
-    """Whether each of rays [K] from points [K, 3] leaves all meshes behind."""
+    """Return bool [K]: True if the ray from a point [K, 3] misses all meshes."""
     free = np.ones(len(points), bool)
     for mesh in meshes:
         body = trimesh.Trimesh(mesh.positions_mm, mesh.triangles.astype(np.int64), process=False)
@@ -85,7 +85,7 @@ def rays_open(meshes, points, directions):
     return free
 
 
-def test_under_an_open_sky_a_surface_sees_all_of_it_about_its_normal():
+def test_an_open_sky_is_fully_visible_with_the_normal_as_bent_normal():
     normals = np.random.default_rng(0).normal(size=(500, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     for values in (encoded(normals, np.ones((1, 1), bool)), open_sky(normals)):
@@ -94,8 +94,8 @@ def test_under_an_open_sky_a_surface_sees_all_of_it_about_its_normal():
         np.testing.assert_allclose(direction, normals, atol=0.01)
 
 
-def test_a_wall_beside_a_surface_takes_half_and_turns_the_light_away_from_it():
-    """Open on the +x side only: half the light, from (2/3, 0, pi/3) by integration."""
+def test_a_wall_halves_sky_visibility_and_tilts_the_bent_normal():
+    """Only +x is open: half the light, with mean direction (2/3, 0, pi/3) by integration."""
     open_to = (sky_directions()[:, 0] > 0)[None]
     direction, share = decoded(encoded(np.array([[0.0, 0.0, 1.0]]), open_to))
     assert share[0] == pytest.approx(0.5, abs=0.03)
@@ -104,21 +104,20 @@ def test_a_wall_beside_a_surface_takes_half_and_turns_the_light_away_from_it():
 
 
 def half_open(normals, side):
-    """The Openness of surfaces with `normals` [V, 3] where only the half sphere about a side [3]
-    is open."""
+    """Return the sky visibility of surfaces that see only the half sphere around `side` [3]."""
     open_to = np.tile(sky_directions() @ side > 0, (len(normals), 1))
     return Openness(normals, np.packbits(open_to, axis=1), encoded(normals, open_to))
 
 
 def facing(count):
-    """Unit normals [count, 3] all around."""
+    """Return random unit normals, float32 [count, 3]."""
     normals = np.random.default_rng(2).normal(size=(count, 3)).astype(np.float32)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 200.0])
 @pytest.mark.parametrize("radiance", [even, sunset])
-def test_light_beside_a_wall_is_the_integral_over_what_the_wall_leaves(radiance, yaw_deg):
+def test_light_beside_a_wall_is_the_integral_over_the_visible_sky(radiance, yaw_deg):
     normals = facing(60)
     side = np.array([0.36, -0.48, 0.8])
     values = half_open(normals, side).under(Sky(light_of(radiance), yaw_deg))
@@ -134,15 +133,15 @@ def test_light_beside_a_wall_is_the_integral_over_what_the_wall_leaves(radiance,
     off = []
     for normal, direction, steps in zip(normals, decoded(values)[0], values[:, 4:7], strict=True):
         expected = integral(normal, world @ side > 0)
-        found = steps / 127 * integral(direction)  # as the shader takes it
+        found = steps / 127 * integral(direction)  # decoded as in the shader
         off.append((found - expected) / integral(normal))
-    # a sum over 96 directions, which the wall's edge parts into whole ones
+    # the sum has 96 directions, each either fully visible or fully hidden
     assert (np.sqrt(np.mean(np.square(off), axis=0)) < 0.04).all()
     assert (np.abs(np.mean(off, axis=0)) < 0.02).all()
 
 
-def test_alike_vertices_are_lit_as_each_is_by_itself():
-    """Found once for each kind, in whatever order they stand; and all at once as one by one."""
+def test_equal_vertices_are_lit_as_when_alone():
+    """Light is computed once per distinct vertex; order and batching must not change it."""
     rng = np.random.default_rng(11)
     normals = facing(12)
     open_to = rng.random((12, 96)) < rng.random((12, 1))
@@ -158,14 +157,14 @@ def test_alike_vertices_are_lit_as_each_is_by_itself():
         expected = np.concatenate([getattr(one, of_one)(sky) for one in alone])
         np.testing.assert_allclose(found, expected[mixed], rtol=1e-5, atol=1e-6)
     values = np.concatenate([one.under(sky) for one in alone])[mixed].astype(int)
-    assert np.abs(together.under(sky) - values).max() <= 1  # matrices of one row round otherwise
+    assert np.abs(together.under(sky) - values).max() <= 1  # one-row products round differently
     for found, expected in zip(
         together.lit(sky), (together.under(sky, light), light + sun, light), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
 
 
-def test_where_nothing_hides_the_sky_any_light_is_whole():
+def test_a_fully_visible_sky_gives_full_light():
     normals = facing(100)
     bits = np.full((100, 12), 255, np.uint8)
     whole = Openness(normals, bits, open_sky(normals)[:, :3])
@@ -173,8 +172,8 @@ def test_where_nothing_hides_the_sky_any_light_is_whole():
         assert (whole.under(Sky(light_of(radiance), 30.0)) == open_sky(normals)).all()
 
 
-def test_light_is_kept_however_much_brighter_than_the_sky_about_the_cone():
-    """As of a sunlit roof above dark ground; beyond 130 times as bright, the colour is."""
+def test_light_may_be_much_brighter_than_the_sky_around_the_bent_normal():
+    """Sunlit roofs above dark ground need this. Beyond a ratio of 130 only the colour is kept."""
     normals = facing(2000)
     openness = half_open(normals, np.array([0.0, 0.0, 1.0]))
     sky = Sky(light_of(sunset), 70.0)
@@ -182,7 +181,7 @@ def test_light_is_kept_however_much_brighter_than_the_sky_about_the_cone():
     whole = sky_irradiance(sky.light, about.astype(np.float32), sky.yaw_deg)
     ratio = 10 ** np.random.default_rng(7).uniform(-2, 2, (2000, 3))
     values = openness.under(sky, whole * ratio).astype(float)
-    found = values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)  # as the shader takes it
+    found = values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)  # decoded as in the shader
     brightest = np.maximum(ratio.max(axis=1, keepdims=True), 1)
     assert (np.abs(found - ratio) / brightest).max() < 0.005
     values = openness.under(sky, whole * [3000.0, 1500.0, 300.0]).astype(int)
@@ -190,15 +189,15 @@ def test_light_is_kept_however_much_brighter_than_the_sky_about_the_cone():
     np.testing.assert_allclose(values[:, 4:7], np.tile([[255, 127.5, 25.5]], (2000, 1)), atol=1)
 
 
-def test_under_an_even_sky_light_is_the_share_of_it_that_is_open(even_sky):
+def test_under_an_even_sky_light_equals_sky_visibility(even_sky):
     values = half_open(facing(200), np.array([0.6, 0.0, 0.8])).under(even_sky)
-    # the share has the steps of the cone: where it is small, a length of 1/127 is 2/64 of it
+    # the stored cone length has steps of 1/127, which change a small share by up to 4/127
     for channel in values[:, 4:7].T:
         np.testing.assert_allclose(channel / 127, decoded(values)[1], atol=0.04)
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
-def test_sunlight_falls_where_the_sun_stands_in_the_open_half(yaw_deg):
+def test_sunlight_reaches_surfaces_that_see_the_sun(yaw_deg):
     ambient = replace(light_of(even), suns=(Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),))
     yaw = np.deg2rad(yaw_deg)
     sun = np.array([0.6 * np.cos(yaw), 0.6 * np.sin(yaw), 0.8])
@@ -230,7 +229,7 @@ def test_sunlight_of_several_suns_adds_up():
     np.testing.assert_allclose(lit_by(lamps), sum(each), atol=1e-6)
 
 
-def test_a_black_sky_leaves_no_light_undefined():
+def test_a_black_sky_gives_defined_light():
     normals = facing(50)
     black = Sky(light_of(lambda d: np.zeros(d.shape)), 0.0)
     values = half_open(normals, np.array([0.0, 0.0, 1.0])).under(black)
@@ -239,7 +238,7 @@ def test_a_black_sky_leaves_no_light_undefined():
 
 @pytest.mark.parametrize("kind", ["20", "45HC"])
 @pytest.mark.parametrize("held", [False, True])
-def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
+def test_sky_visibility_equals_ray_casts(gl, even_sky, kind, held):
     container = build_container(kind)
     spreader = build_spreader(kind) if held else None
     probe = SkyProbe(gl.ctx)
@@ -256,15 +255,15 @@ def test_the_share_of_open_sky_is_that_of_rays(gl, even_sky, kind, held):
     meshes = [container] if spreader is None else [container, spreader]
     free = rays_open(meshes, points, np.tile(directions, (len(chosen), 1)))
     expected = (cosine * free.reshape(cosine.shape)).sum(1) / cosine.sum(1)
-    # vertices within another part see nothing; what is interpolated from them is better not dark
+    # rays from vertices buried in another part see nothing, but interpolation needs them bright
     error = (share[chosen] - expected)[expected > 0.02]
     assert len(error) > 600
     assert np.quantile(np.abs(error), 0.9) < 0.1
     assert abs(error.mean()) < 0.02
 
 
-def test_nothing_is_open_to_the_sky_through_the_container(gl, even_sky):
-    """As creases would be, over which a thin sheet is all that depth maps have of the wall."""
+def test_no_vertex_sees_the_sky_through_the_container(gl, even_sky):
+    """Creases are at risk: there a depth map holds only a thin sheet of the wall."""
     container = build_container("20")
     probe = SkyProbe(gl.ctx)
     bits = probe.openness(container, None, even_sky).values[:, 8:]
@@ -279,14 +278,14 @@ def test_nothing_is_open_to_the_sky_through_the_container(gl, even_sky):
     assert found > 100_000
 
 
-def test_lobe_masks_hold_the_nearest_directions_and_the_hemisphere():
+def test_lobe_masks_contain_the_nearest_directions_and_the_hemisphere():
     cells = 16
     masks = np.unpackbits(lobe_masks(cells)[..., :3].view(np.uint8), axis=-1).astype(bool)
     directions = sky_directions()
     for row, column in np.random.default_rng(4).integers(0, cells, (40, 2)):
         x, y = (2 * (column + 0.5) / cells - 1, 2 * (row + 0.5) / cells - 1)
         z = 1 - abs(x) - abs(y)
-        if z < 0:  # the corners of the square fold under
+        if z < 0:  # the corners of the octahedral square are the lower hemisphere
             x, y = (1 - abs(y)) * np.sign(x), (1 - abs(x)) * np.sign(y)
         toward = np.array([x, y, z])
         order = np.argsort(-directions @ toward)
@@ -295,12 +294,12 @@ def test_lobe_masks_hold_the_nearest_directions_and_the_hemisphere():
         np.testing.assert_array_equal(below, directions @ toward > 0)
 
 
-def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
+def test_the_disk_cache_returns_the_computed_values(gl, even_sky, monkeypatch):
     container, spreader = build_container("20"), build_spreader("20")
     first = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
 
     def never(*_: object) -> None:
-        raise AssertionError("probed again")
+        raise AssertionError("cached sky visibility was computed again")
 
     monkeypatch.setattr(SkyProbe, "_open_to", never)
     again = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
@@ -308,7 +307,7 @@ def test_what_is_kept_on_disk_is_what_was_found(gl, even_sky, monkeypatch):
 
 
 @needs_osmesa
-def test_backends_find_the_same(even_sky):
+def test_backends_compute_the_same_sky_visibility(even_sky):
     container = build_container("20")
     found = []
     for backend in ("egl", "osmesa"):
@@ -319,8 +318,8 @@ def test_backends_find_the_same(even_sky):
 
 
 @pytest.mark.parametrize(("camera", "index"), [("A", 2), ("Cl", 5), ("Cr", 3)])
-def test_what_mirrors_open_sky_is_what_rays_find(camera, index):
-    """Rays some 17 degrees about the mirrored one, from points that pixels see."""
+def test_sky_visibility_of_reflections_is_close_to_ray_casts(camera, index):
+    """Rays from visible points are spread by about 17 degrees around the mirror direction."""
     size = (120, 90)
     sound = Config.from_values({"damage": {"probability": 0.0}})
     with Generator(sound, 8, size, quality="draft") as g:

@@ -40,7 +40,7 @@ def test_contact_sheet_outlines_damages_along_their_masks(tmp_path):
         around = cv2.dilate(inside, np.ones((5, 5))) - cv2.erode(inside, np.ones((3, 3)))
         drawn = np.abs(tile - color).max(axis=-1) < 40
         assert drawn[around == 1].sum() >= 0.15 * around.sum()
-        within = cv2.erode(inside, np.ones((9, 9))) == 1  # where names of others may stand
+        within = cv2.erode(inside, np.ones((9, 9))) == 1  # other objects' names may lie here
         assert drawn[within].sum() <= 0.1 * within.sum()
         seen += inside.any()
     assert seen >= 2

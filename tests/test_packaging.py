@@ -1,4 +1,4 @@
-"""The wheel: shaders and assets travel with it, tests and caches do not."""
+"""Wheel contents: shaders and assets are included, tests and caches are not."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ ROOT = Path(__file__).parent.parent
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory):
-    """Files in a wheel built from a clean copy of what git or a user would have."""
+    """Names of the files in a wheel built from a clean copy of the sources."""
     place = tmp_path_factory.mktemp("wheel")
     source = place / "source"
     subprocess.run(["cp", "-r", *(str(ROOT / p) for p in _parts()), str(_made(source))], check=True)
@@ -45,7 +45,7 @@ def test_every_shader_and_asset_is_in_the_wheel(names):
         assert wanted <= set(names)
 
 
-def test_no_tests_or_caches_travel(names):
+def test_the_wheel_contains_no_tests_or_caches(names):
     assert not [n for n in names if n.startswith("tests") or "__pycache__" in n]
 
 

@@ -1,4 +1,4 @@
-"""Frames by lists of pixels: each pixel in one, and the same whatever came before, in any bands."""
+"""Pixel lists for shading: one list per pixel, independent of earlier frames and of bands."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ KINDS = {
 
 
 def drawn(values, quality, scenes=2):
-    """Frames of two cameras of each scene, and how often each pixel of them is listed."""
+    """Return, for two cameras of each scene, the frame and how often each pixel is listed."""
     config = Config.from_values({**values, "spreader": {"probability": 1}})
     found = []
     with Generator(config, seed=3, size=SIZE, quality=quality) as generator:
@@ -28,7 +28,7 @@ def drawn(values, quality, scenes=2):
 
 
 def listed(lists):
-    """How often each pixel [H, W] is in one of the lists."""
+    """Return how often each pixel occurs in the lists, [H, W]."""
     count = np.zeros(SIZE[::-1], int)
     for name, entries in lists.items():
         x, y, group = entries & 0x3FFF, entries >> 14 & 0x3FFF, entries >> 28
@@ -47,14 +47,14 @@ def test_each_pixel_that_sees_an_object_is_in_one_list(kind, quality):
     for frame, count in drawn(KINDS[kind], quality):
         assert count.max() == 1
         assert (count[(frame.ids > 0) | (frame.cover > 0)] == 1).all()
-        if quality == "draft":  # no filter reaches beyond a pixel, but for cables
+        if quality == "draft":  # in draft only cables reach beyond a pixel
             holes = frame.damage // 100 == 5
             shaded = (frame.ids > 0) | holes | (frame.cover > 0)
             np.testing.assert_array_equal(count == 1, shaded)
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
-def test_bands_of_an_image_are_what_the_whole_is(monkeypatch, quality):
+def test_an_image_drawn_in_bands_equals_the_whole(monkeypatch, quality):
     whole = drawn(KINDS["holed"], quality)
     monkeypatch.setattr(pixel_lists, "ROOM", 17 * SIZE[0])  # 16 rows
     for (one, _), (other, _) in zip(whole, drawn(KINDS["holed"], quality), strict=True):
@@ -63,8 +63,8 @@ def test_bands_of_an_image_are_what_the_whole_is(monkeypatch, quality):
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced", "high"])
-def test_a_frame_is_the_same_whatever_was_drawn_before(monkeypatch, quality):
-    """Where no damage is near, nothing asks which damage an earlier scene had there."""
+def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
+    """Pixels far from damage must not read rest positions that an earlier scene left there."""
     scenes = 1 if quality == "high" else 2
     first = drawn(KINDS["holed"], quality, scenes)
     config = Config.from_values({**KINDS["holed"], "spreader": {"probability": 1}})

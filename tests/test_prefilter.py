@@ -1,4 +1,4 @@
-"""Prefiltered maps against plain sums and random samples."""
+"""Prefiltered maps compared with direct sums and Monte Carlo samples."""
 
 import cv2
 import numpy as np
@@ -50,7 +50,7 @@ def test_specular_levels_equal_monte_carlo_of_the_ggx_lobe(patches):
             )
             reflected = 2 * (half @ normal)[:, None] * half - normal
             cosine = np.maximum(reflected @ normal, 1e-6)
-            # half vectors are drawn as D says, so what is left of the integrand is masking
+            # half vectors are sampled from D, so only the masking term of the integrand remains
             weight = (reflected @ normal > 0) / (1 + smith_lambda(cosine, alpha))
             row = np.arccos(np.clip(reflected[:, 2], -1, 1)) / np.pi * height
             column = (0.5 - np.arctan2(reflected[:, 1], reflected[:, 0]) / (2 * np.pi)) * 2 * height
@@ -61,7 +61,7 @@ def test_specular_levels_equal_monte_carlo_of_the_ggx_lobe(patches):
 
 
 def smith_lambda(cosine: np.ndarray, alpha: float) -> np.ndarray:
-    """Of Smith's masking 1 / (1 + lambda) for GGX: Heitz 2014, eq. 72."""
+    """Lambda of Smith's masking term 1 / (1 + lambda) for GGX: Heitz 2014, eq. 72."""
     return (np.sqrt(1 + alpha**2 * (1 / cosine**2 - 1)) - 1) / 2
 
 
@@ -74,14 +74,14 @@ def test_irradiance_equals_the_direct_cosine_sum(patches):
     np.testing.assert_allclose(irradiance_at(light, normals, 0.0), expected, rtol=0.01)
 
 
-def test_a_light_appears_in_the_direction_where_it_stands():
-    toward = np.array([0.48, 0.6, 0.64])  # right of +y seen from +x, above the horizon
+def test_a_light_appears_in_its_direction():
+    toward = np.array([0.48, 0.6, 0.64])  # between +x and +y, above the horizon
     light = prefilter_environment("lamp", one_light(toward, 1000.0))
     size = light.background.shape[0]
     row, column = np.unravel_index(
         unpacked(light.background)[1:-1, 1:-1, 0].argmax(), (size - 2, size - 2)
     )
-    # the layout of the module docstring, spelt out for what lies ahead, x > 0
+    # the levelled octahedral layout, written out for x > 0
     y, z = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
     found = np.array([1 - abs(y) - abs(z), y, z])
     assert found @ toward / np.linalg.norm(found) > np.cos(np.deg2rad(3))
@@ -91,7 +91,7 @@ def test_a_light_appears_in_the_direction_where_it_stands():
 
 @pytest.mark.parametrize(
     ("toward", "tolerance"),
-    # interpolating between the rows around a pole is not quite area-preserving
+    # interpolation between the rows around a pole does not quite preserve area
     [((0, 0, 1), 0.12), ((0, 0, -1), 0.12), ((-1, 0, 0), 0.03), ((0.6, 0, 0.8), 0.03)],
 )
 def test_energy_of_a_single_texel_survives_every_map(toward, tolerance):
@@ -99,7 +99,7 @@ def test_energy_of_a_single_texel_survives_every_map(toward, tolerance):
     expected = (radiance[..., 0] * texel_grid(128)[1]).sum() / (4 * np.pi)
     light = prefilter_environment("lamp", radiance)
     directions = even_directions(200_000)
-    # a sun of irradiance pi E has a mean radiance of pi E / (4 pi)
+    # a directional light of irradiance pi E has a mean radiance of pi E / (4 pi)
     aside = sum(sun.light[0] for sun in light.suns) / 4
     for layer, rest in (
         (unpacked(light.background), 0.0),
@@ -118,7 +118,7 @@ def test_a_million_fold_sun_neither_speckles_nor_overflows():
         assert np.isfinite(values).all()
         assert values.min() >= 0.499
         assert values.max() <= 65504
-    # away from the sun every lobe only falls off, along any great circle
+    # every lobe falls off monotonically along any great circle away from the sun
     side = np.linalg.svd(toward[None])[2][1:]
     angle = np.deg2rad(np.arange(0, 120, 3.0))[:, None]
     for level in range(3, len(ROUGHNESS_LEVELS)):
@@ -129,7 +129,7 @@ def test_a_million_fold_sun_neither_speckles_nor_overflows():
             assert (seen[1:] <= seen[:-1] * 1.01).all()
 
 
-def test_a_sun_beyond_half_range_keeps_its_energy():
+def test_a_sun_beyond_the_range_of_half_floats_keeps_its_energy():
     radiance = one_light(np.array([0.0, 0.6, 0.8]), 1e6)
     expected = (radiance[..., 0] * texel_grid(128)[1]).sum() / (4 * np.pi)
     light = prefilter_environment("sun", radiance)
@@ -150,7 +150,7 @@ def test_lookup_is_continuous_over_every_seam(patches):
     _, light = patches
     angle = np.linspace(0.01, np.pi / 2, 50)
     below = np.stack([np.cos(angle), np.zeros(50), -np.sin(angle)], axis=-1)
-    for quarter in range(4):  # the square's edges are the meridians of the axes, below the horizon
+    for quarter in range(4):  # the map's edges are the axes' meridians below the horizon
         c, s = round(np.cos(quarter * np.pi / 2)), round(np.sin(quarter * np.pi / 2))
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
         left, right = ((below + np.array([0, e, 0])) @ turn.T for e in (1e-7, -1e-7))
@@ -181,19 +181,19 @@ def test_fine_checkerboard_does_not_alias_in_the_background():
 
 
 def test_the_background_is_as_sharp_as_the_hdri():
-    """Along the horizon an HDRI's smallest detail, stripes a texel wide, keeps its contrast."""
+    """Stripes one texel wide along the horizon keep their contrast."""
     stripes = np.zeros((256, 512, 3), np.float32)
     stripes[:, ::2] = 1.0
     background = unpacked(prefilter_environment("stripes", stripes).background)
     middle = 2 * np.pi * (np.arange(512) + 0.5) / 512
     along = np.stack([-np.cos(middle), np.sin(middle), np.full(512, 1e-3)], axis=1)
     seen = sample_octahedral(background, levelled(along))[:, 0]
-    # with as many texels as the HDRI has columns, under half of it was left
+    # a background as wide in texels as the HDRI would lose over half of the contrast
     assert seen[::2].mean() - seen[1::2].mean() > 0.6
 
 
 def test_a_level_edge_stays_level_in_the_background():
-    """Where a bright sky ends above dark land, nothing changes within three degrees of azimuth."""
+    """A horizon between bright sky and dark land shows no detail finer than three degrees."""
     sky = np.full((256, 512, 3), 0.1, np.float32)
     sky[:128], sky[120:127] = 20.0, 5.0
     background = unpacked(prefilter_environment("level", sky).background)
@@ -203,22 +203,22 @@ def test_a_level_edge_stays_level_in_the_background():
         seen = sample_octahedral(background, levelled(ring))[:, 0]
         waves = np.fft.rfft(seen)
         teeth = np.fft.irfft(np.where(np.arange(len(waves)) < 120, 0, waves))
-        assert teeth.std() < 0.05 * seen.mean()  # 0.33 where the horizon is a diagonal
+        assert teeth.std() < 0.05 * seen.mean()  # 0.33 if the horizon is a diagonal of the map
 
 
 def unpolarized(cosine, index=1.5):
-    """What Fresnel's equations and Snell's law reflect of light from air at this cosine."""
+    """Fresnel reflectance of unpolarized light from air, by the cosine of its angle."""
     inside = np.sqrt(1 - (1 - cosine**2) / index**2)
     across = (cosine - index * inside) / (cosine + index * inside)
     along = (inside - index * cosine) / (inside + index * cosine)
     return (across**2 + along**2) / 2
 
 
-def test_reflectance_climbs_by_snell_and_fresnel():
+def test_reflectance_follows_fresnels_equations():
     cosine = np.linspace(0, 1, 101)
     expected = (unpolarized(cosine) - 0.04) / 0.96
     np.testing.assert_allclose(fresnel_climb(cosine), expected, atol=1e-12)
-    # Walsh 1926: what even light from all around gives back at an index of 1.5
+    # Walsh 1926: reflectance under uniform light at an index of 1.5
     middles = (np.arange(10000) + 0.5) / 10000
     assert np.mean(2 * middles * unpolarized(middles)) == pytest.approx(0.0918, abs=1e-4)
 
@@ -236,7 +236,7 @@ def test_dfg_equals_brute_force_over_light_directions(row, column):
     length = np.sqrt(2 + 2 * v_dot_l)
     n_dot_h, v_dot_h = (n_dot_v + z) / length, (1 + v_dot_l) / length
     spread = alpha**2 / (np.pi * (n_dot_h**2 * (alpha**2 - 1) + 1) ** 2)
-    # height-correlated visibility, G / (4 n.l n.v), in the form Lagarde 2014 gives
+    # height-correlated visibility, G / (4 n.l n.v), in the form of Lagarde 2014
     visible = 0.5 / (
         z * np.sqrt(n_dot_v**2 * (1 - alpha**2) + alpha**2)
         + n_dot_v * np.sqrt(z**2 * (1 - alpha**2) + alpha**2)
@@ -255,8 +255,8 @@ def test_smooth_surfaces_reflect_all_light_and_rough_ones_never_more():
 
 
 @pytest.mark.parametrize("f0", [0.0, 0.04, 0.5, 1.0])
-def test_a_smooth_surface_mirrors_the_mean_of_fresnels_equations(f0):
-    """Over the cosine-weighted hemisphere."""
+def test_a_smooth_surface_reflects_the_mean_of_fresnels_equations(f0):
+    """The mean is over the cosine-weighted hemisphere."""
     cosine = (np.arange(10000) + 0.5) / 10000
     climb = (unpolarized(cosine) - 0.04) / 0.96
     mean = np.mean(2 * cosine * (f0 + (1 - f0) * climb))

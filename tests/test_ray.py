@@ -1,4 +1,4 @@
-"""Runs on a Ray cluster of two nodes give the bytes of a run without Ray, whatever dies."""
+"""Runs on a two-node Ray cluster: same bytes as without Ray, even when nodes or actors die."""
 
 import os
 import secrets
@@ -31,7 +31,7 @@ NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": F
 
 
 class SlowMaker(QuickMaker):
-    """Leaves the time to kill a node in mid-run, and names the node that makes a shard."""
+    """Maker slow enough to kill a node in mid-run; reports the node and process of each shard."""
 
     def __call__(self, task):
         self._report("made on", (ray.get_runtime_context().get_node_id(), os.getpid()))
@@ -49,7 +49,7 @@ class FaultyMaker(QuickMaker):
 
 
 class PreparingMaker(QuickMaker):
-    """Takes four times HANG_S ahead of its first shard, and says now and then that it lives."""
+    """Maker that needs four times HANG_S before its first shard, and reports that it is busy."""
 
     _prepared = False
 
@@ -73,11 +73,11 @@ def job_at(out, scenes):
 
 @pytest.fixture(scope="module")
 def cluster():
-    """A head node and one more, a CPU each; this process has joined it."""
+    """Cluster of a head node and one more node, one CPU each, which this process has joined."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
-        # the nodes' processes import this file and the fastgen that is tested
+        # the nodes' processes must import this file and the fastgen under test
         patch.setenv("PYTHONPATH", ROOT, prepend=os.pathsep)
         made = Cluster(initialize_head=True, head_node_args=NODE)
         made.add_node(**NODE)
@@ -89,7 +89,7 @@ def cluster():
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """An undisturbed run without Ray."""
+    """Output folder of an undisturbed run without Ray."""
     out = tmp_path_factory.mktemp("whole") / "out"
     generate(job_at(out, SCENES), 2, run_here(2, maker=QuickMaker))
     return out
@@ -113,9 +113,9 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
     def kill():
         while [node for node, _ in seen].count(victim.node_id) < 2:
             time.sleep(0.01)
-        # a machine that dies takes its actors along; a killed raylet alone lets them live a while
+        # a dying machine takes its actors along, but they outlive a killed raylet for a while
         (pid,) = {pid for node, pid in seen if node == victim.node_id}
-        # ahead of it all: on a busy machine the rest is done before the node is removed
+        # recorded first: on a busy machine the run may end before the node is removed
         seen.append(("killed", pid))
         os.kill(pid, signal.SIGKILL)
         cluster.remove_node(victim, allow_graceful=False)
@@ -126,12 +126,12 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
     killer.join(timeout=10)
     nodes = [node for node, _ in seen]
     after = nodes[nodes.index("killed") + 1 :]
-    assert set(after) - {victim.node_id}  # others went on
+    assert set(after) - {victim.node_id}  # other nodes continued
     assert not victim.any_processes_alive()
     assert content(out) == content(whole)
 
 
-def test_scenes_that_kill_or_hang_their_actors_are_given_up_and_no_other(cluster, whole, tmp_path):
+def test_only_scenes_that_kill_or_hang_their_actors_are_given_up(cluster, whole, tmp_path):
     out = tmp_path / "out"
     runner = run_on_ray(None, 2, hang_s=HANG_S, maker=FaultyMaker)
     made = generate(job_at(out, SCENES), 2, runner)
@@ -143,7 +143,7 @@ def test_scenes_that_kill_or_hang_their_actors_are_given_up_and_no_other(cluster
     assert content(out / "images").items() <= content(whole / "images").items()
 
 
-def test_an_actor_that_prepares_for_long_and_says_so_is_not_given_up(cluster, tmp_path):
+def test_a_slow_start_that_reports_progress_is_not_given_up(cluster, tmp_path):
     runner = run_on_ray(None, 2, hang_s=HANG_S, maker=PreparingMaker)
     made = generate(job_at(tmp_path / "out", 4), 2, runner)
     assert not made["failed"]
@@ -155,16 +155,16 @@ def test_an_actors_error_reaches_the_caller_in_its_own_words(cluster, tmp_path):
         generate(job_at(tmp_path / "out", 8), 2, run_on_ray(None, maker=BrokenMaker))
 
 
-def test_a_place_that_other_nodes_do_not_see_is_named(cluster):
-    # fsspec's memory is that of one process
+def test_an_output_that_other_nodes_cannot_see_is_named(cluster):
+    # fsspec's memory:// belongs to one process
     with pytest.raises(OutputError, match=r"node .*memory://unseen.* all nodes share"):
         generate(job_at("memory://unseen", 8), 2, run_on_ray(None))
 
 
-def test_rendered_images_are_those_of_a_run_without_ray(cluster, tmp_path):
+def test_rendered_images_equal_a_run_without_ray(cluster, tmp_path):
     arguments = ["--images", "6", "--size", "64x64", "--seed", "3", "--shard", "1"]
     assert main(["generate", str(tmp_path / "here"), *arguments, "--workers", "1"]) == 0
-    # the relative path is the driver's; actors have folders of their own
+    # the path is relative to the driver's folder; actors have their own working folders
     command = [sys.executable, "-m", "fastgen", "generate", "there", *arguments]
     subprocess.run([*command, "--ray", cluster.address], cwd=tmp_path, check=True)
     assert len(list((tmp_path / "there").glob("images/*/*.jpg"))) == 6
@@ -190,7 +190,7 @@ def test_a_signal_stops_ray_and_the_folder_is_left_clean(tmp_path, monkeypatch, 
     process = run_alone(out, "--ray", "--workers", "1", "--shard", "1")
     while not list(out.glob("shards/*.json")) and process.poll() is None:
         time.sleep(0.05)
-    # Ctrl-C reaches the whole group, docker tells the first process alone
+    # Ctrl-C reaches the whole process group, docker signals only the first process
     (os.killpg if stop == signal.SIGINT else os.kill)(process.pid, stop)
     error = process.communicate(timeout=120)[1]
     assert process.returncode == 128 + stop

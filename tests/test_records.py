@@ -1,4 +1,4 @@
-"""Plain values to dataclasses and back, and the errors on the way."""
+"""Conversion between plain values and dataclasses, and its error messages."""
 
 from dataclasses import dataclass, field
 
@@ -41,7 +41,7 @@ def test_missing_fields_come_from_the_base():
     assert changed.name == "x"
 
 
-def test_a_mapping_replaces_the_bases_and_namesakes_inherit():
+def test_a_mapping_replaces_the_base_but_equal_keys_inherit():
     changed = from_plain(Outer, {"many": {"a": {"span": [2, 3]}}}, base=Outer("x"))
     assert changed.many == {"a": Inner(1.5, Range(2, 3))}
 

@@ -1,4 +1,4 @@
-"""Regions of the image."""
+"""Set operations on rectangular regions of the image."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from fastgen.render.regions import bands, merged, outside, within
 
 
 def painted(regions, size=(40, 30)):
-    """How often each pixel [H, W] is covered."""
+    """Return how often the regions cover each pixel, [H, W]."""
     count = np.zeros(size[::-1], int)
     for x, y, width, height in regions:
         count[y : y + height, x : x + width] += 1
     return count
 
 
-def test_bands_hold_all_regions_and_no_pixel_twice():
+def test_bands_cover_all_regions_and_no_pixel_twice():
     rng = np.random.default_rng(3)
     for _ in range(300):
         low = rng.integers(0, [30, 20], (rng.integers(1, 5), 2))
@@ -21,7 +21,7 @@ def test_bands_hold_all_regions_and_no_pixel_twice():
         asked, given = painted(regions), painted(bands(regions))
         assert given.max() <= 1
         assert (given[asked > 0] == 1).all()
-        # nor a row that no region is in
+        # rows without a region stay uncovered; regions of zero width are exempt
         assert (given.any(axis=1) == asked.any(axis=1)).all() or any(r[2] == 0 for r in regions)
 
 
@@ -31,7 +31,7 @@ def test_one_region_stays_whole_and_an_unknown_one_is_the_image():
     assert bands([(3, 4, 5, 6), None]) == [None]
 
 
-def test_merged_regions_hold_all_and_no_pixel_twice():
+def test_merged_regions_cover_all_and_no_pixel_twice():
     rng = np.random.default_rng(4)
     fewer = 0
     for _ in range(300):
@@ -48,7 +48,7 @@ def test_merged_regions_hold_all_and_no_pixel_twice():
     assert merged([]) == []
 
 
-def test_outside_is_each_pixel_of_some_regions_that_others_lack():
+def test_outside_is_the_difference_of_regions():
     rng = np.random.default_rng(9)
     for _ in range(300):
         low = rng.integers(0, [30, 20], (rng.integers(1, 4), 2))
@@ -61,7 +61,7 @@ def test_outside_is_each_pixel_of_some_regions_that_others_lack():
         assert all(width > 0 and height > 0 for _, _, width, height in given)
 
 
-def test_within_is_what_regions_and_another_share():
+def test_within_is_the_intersection_with_one_region():
     rng = np.random.default_rng(10)
     for _ in range(200):
         low = rng.integers(0, [30, 20], (rng.integers(1, 4), 2))

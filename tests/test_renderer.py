@@ -1,4 +1,4 @@
-"""What the renderer draws against rays, algebra and itself at other sizes."""
+"""Rendered images and labels compared with rays, algebra and renders at other sizes."""
 
 from dataclasses import replace
 
@@ -47,12 +47,12 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     assert not (wrong & ~oracle.near_edge(expected)).any()
     both = np.isfinite(hits.depth_m) & (sample.ids > 0)
     error = np.abs(sample.depth[both] - hits.depth_m[both]) / hits.depth_m[both]
-    # a pixel centre may fall on either side of an inner edge, hence a quantile and not all
+    # a pixel centre may fall on either side of an inner edge, so a few pixels may differ
     assert np.quantile(error, 0.999) < 1e-5
     assert np.isinf(sample.depth[sample.ids == 0]).all()
 
 
-def test_damage_is_the_sound_container_wherever_that_is_seen(generator):
+def test_damage_is_the_undamaged_value_wherever_the_container_is_visible(generator):
     sample = generator.render(index=3, camera="B")
     container = (sample.ids > 0) & (sample.ids != oracle.SPREADER)
     np.testing.assert_array_equal(sample.damage, np.where(container, 101, 0))
@@ -65,14 +65,14 @@ def test_ids_do_not_depend_on_antialiasing():
             frames.append(generator.render(index=1, camera="Cr"))
     for other in frames[1:]:
         assert (frames[0].ids != other.ids).mean() < 2e-4
-        # the picture is the same but for its edges
+        # the pictures differ only at edges
         difference = np.abs(frames[0].image.astype(int) - other.image.astype(int))
         assert np.median(difference) == 0
         assert difference.mean() < 6
 
 
 def test_antialiasing_approaches_a_fine_render_averaged_down():
-    """An image of 4 x 4 as many pixels, box-filtered as light before the tone curve, is it."""
+    """The reference has 4x4 as many pixels, averaged as linear light before the tone curve."""
     fine = (4 * SIZE[0], 4 * SIZE[1])
     with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
         light = light_of(generator.render(index=1, camera="Cl").image)
@@ -88,7 +88,7 @@ def test_antialiasing_approaches_a_fine_render_averaged_down():
 
 
 def test_the_layers_of_high_approach_a_fine_render_averaged_down():
-    """Likewise away from edges, where a pixel sees one surface; others look its layers up once."""
+    """Away from edges, `high` looks up the layers several times per pixel and `draft` once."""
     rusty = Config.from_values({"surface": {"rust_coverage": 0.2}, "damage": {"probability": 0}})
     fine = (5 * SIZE[0], 5 * SIZE[1])
     with Generator(rusty, seed=5, size=fine, quality="draft") as generator:
@@ -105,7 +105,7 @@ def test_the_layers_of_high_approach_a_fine_render_averaged_down():
 
 
 def test_a_marker_behind_a_locking_bar_shows_up_to_the_bar():
-    """Also in pixels whose centre the bar or the gasket covers: a fine render averaged down."""
+    """Pixels whose centre the bar or gasket covers also match a fine render averaged down."""
     dark = {"surface": {"colors": {"paint": "#101010"}, "rust_coverage": 0}}
     rig = {"cameras": {"end": {"face": "door", "focal_mm": 45, "distance_mm": 6000}}}
     config = Config.from_values({**dark, **rig, "damage": {"probability": 0}})
@@ -124,17 +124,18 @@ def test_a_marker_behind_a_locking_bar_shows_up_to_the_bar():
 
 
 @pytest.mark.parametrize("samples", [9, 25, 4])
-def test_cover_is_the_share_of_a_pixel_that_is_no_sky(samples, monkeypatch):
-    """That of the ids of 12 x 12 as many pixels, under the tent of four samples, else a box.
+def test_cover_is_the_share_of_a_pixel_that_objects_cover(samples, monkeypatch):
+    """Compare with ids at 12x12 the resolution, filtered by a tent for four samples, else a box.
 
-    Pixels' centres alone are off by 0.006 in the mean."""
+    Pixel centres alone would have a mean error of 0.006.
+    """
     times = 12
     fine = (times * SIZE[0], times * SIZE[1])
     with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
         seen = (generator.render(index=1, camera="B").ids > 0).astype(np.float32)
     half = times // 2
     if samples == 4:
-        seen = cv2.blur(seen, (times + 1, times + 1))  # a box on a box is a tent
+        seen = cv2.blur(seen, (times + 1, times + 1))  # two box filters make a tent
     expected = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
     monkeypatch.setitem(QUALITY, "balanced", Quality(round(samples**0.5), 1))
     with Generator(SOUND, seed=5, size=SIZE) as generator:
@@ -154,8 +155,8 @@ def test_the_same_scene_renders_to_the_same_bytes(generator):
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
-def test_what_was_drawn_before_leaves_no_trace(quality):
-    """Views of all kinds, in one order and in the other."""
+def test_renders_do_not_depend_on_earlier_ones(quality):
+    """Render the same views in one order and in the opposite order."""
     damaged = Config.from_values({"damage": {"probability": 0.7}})
     views = [(index, camera) for index in range(6) for camera in ("A", "Cl", "Cr")]
     found = []
@@ -180,7 +181,7 @@ def test_backends_agree_on_every_label():
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_faces_left_out_are_never_seen(generator, camera):
+def test_culled_faces_are_never_visible(generator, camera):
     scene = generator.scene(index=6)
     mesh = rest_mesh(scene)
     position = scene.camera(camera).position_mm
@@ -194,7 +195,7 @@ def test_faces_left_out_are_never_seen(generator, camera):
 
 
 @pytest.mark.parametrize("size", [(64, 64), (100, 37 + 64), (1333, 800), (4096, 64)])
-def test_any_size_is_drawn_whole(size):
+def test_every_size_is_drawn_completely(size):
     with Generator(SOUND, seed=5, size=size) as generator:
         sample = generator.render(index=0, camera="Cr")
     assert sample.image.shape == (size[1], size[0], 3)
@@ -218,8 +219,8 @@ def test_a_camera_inside_the_wall_crosses_the_near_plane_without_harm(generator)
     assert (sample.ids > 0).mean() > 0.2
 
 
-def test_a_lone_marker_moves_no_other_pixel(generator):
-    """Removing a decal changes ids nowhere but where it was."""
+def test_removing_markers_changes_no_other_ids(generator):
+    """Ids change only in the pixels of the removed markers."""
     scene = generator.scene(index=7)
     sample = generator.render(scene=scene, camera="Cr")
     bare = replace(scene, decals=tuple(d for d in scene.decals if d.kind != "marker"))
@@ -231,7 +232,7 @@ def test_a_lone_marker_moves_no_other_pixel(generator):
     np.testing.assert_array_equal(same_text, (without.ids > 1) & ~covered)
 
 
-def test_normals_are_those_of_the_triangles_seen():
+def test_normals_equal_those_of_the_visible_triangles():
     with Generator(SOUND, seed=5, size=SIZE, quality="draft") as generator:
         for camera in ("A", "Cl"):
             scene = replace(generator.scene(1), spreader=Spreader())
@@ -248,7 +249,7 @@ def test_normals_are_those_of_the_triangles_seen():
 
 @pytest.mark.parametrize("quality", ["balanced", "high"])
 def test_normals_at_edges_face_the_camera(quality):
-    """What a pixel sees of the sky has no direction to average in."""
+    """Sky samples of a pixel must not contribute to its mean normal."""
     with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:
         for camera in CAMERAS:
             sample = generator.render(index=1, camera=camera, normals=True)

@@ -1,4 +1,4 @@
-"""Packed radiance against the driver's own packing, and against what nine bits promise."""
+"""Packed radiance compared with the driver's packing and with the 9-bit error bound."""
 
 import moderngl
 import numpy as np
@@ -12,7 +12,7 @@ _RGB9_E5 = 0x8C3D
 
 
 def colours() -> np.ndarray:
-    """[64, 64, 3] over all exponents, with black, single channels, and what rounds up."""
+    """Colours [64, 64, 3] over all exponents, with black, single channels and rounding up."""
     rng = np.random.default_rng(4)
     values = 2.0 ** rng.uniform(-26, 15.99, (64, 64, 3))
     values[:8] *= rng.random((8, 64, 3)) < 0.5
@@ -23,7 +23,7 @@ def colours() -> np.ndarray:
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_the_driver_packs_alike(backend):
+def test_packing_equals_the_drivers(backend):
     values = colours()
     with open_context(backend) as gl:
         texture = gl.ctx.texture(
@@ -50,12 +50,12 @@ def test_the_driver_packs_alike(backend):
     np.testing.assert_array_equal(unpacked(packed(values)), theirs)
 
 
-def test_a_channel_is_off_by_half_a_step_of_the_largest():
+def test_the_error_is_at_most_half_a_step_of_the_largest_channel():
     values = colours()
     error = np.abs(unpacked(packed(values)) - values)
     largest = np.maximum(values.max(axis=-1, keepdims=True), 2.0**-15)
     assert (error <= largest / 2**9).all()
 
 
-def test_what_is_too_bright_is_clamped():
+def test_out_of_range_values_are_clamped():
     assert unpacked(packed(np.array([1e6, 0.0, -1.0]))).tolist() == [LARGEST, 0.0, 0.0]

@@ -1,4 +1,4 @@
-"""A roof below a spreader, against the same lit by rays."""
+"""Light on a roof below a spreader, compared with the ray-traced preset."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ ROOF = Config.from_values(
 
 
 @pytest.mark.parametrize(("paint", "spreader"), [(0.03, 0.7), (0.6, 0.02)])
-def test_what_hides_a_roofs_sky_has_the_spreaders_paint(paint, spreader):
+def test_light_from_a_roofs_hidden_sky_has_the_spreaders_colour(paint, spreader):
     light, roof = {}, None
     for quality in ("high", "balanced"):
         with Generator(ROOF, seed=1, size=(160, 160), quality=quality) as generator:
@@ -45,6 +45,6 @@ def test_what_hides_a_roofs_sky_has_the_spreaders_paint(paint, spreader):
             up = (sample.normals @ sample.view.rotation)[..., 2] > 0.9
             roof = up & (sample.ids > 0) & ~np.isin(sample.ids, held)
             assert roof.sum() > 1000
-        # after the tone curve, which takes the same from both
+        # after the tone curve, which affects both alike
         light[quality] = (((sample.image[roof] / 255 + 0.055) / 1.055) ** 2.4).mean()
     assert light["balanced"] == pytest.approx(light["high"], rel=0.2)

@@ -1,4 +1,4 @@
-"""Rust on a wall: it recurs nowhere, and water takes it down."""
+"""Rust on walls: no visible repetition, and streaks that run down."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ BORDER = 8
 
 @pytest.fixture(scope="module", params=[0, 1])
 def wall(request):
-    """How bright the rusty side of a white container is, [H, W], row 0 lowest; rust is black."""
+    """Brightness [H, W] of a white container's side with black rust; row 0 is the lowest."""
     config = Config.from_values(
         {
             "container": {"kinds": {"40": 1}},
@@ -41,8 +41,8 @@ def wall(request):
     return DECODED[inside].mean(axis=-1)
 
 
-def test_rust_does_not_recur_along_a_wall(wall):
-    """A tile that repeats is as it was one length on; of a sum of two, a half is."""
+def test_rust_does_not_repeat_along_a_wall(wall):
+    """A repeated tile would correlate fully at its period, and a sum of two tiles by half."""
     apart = wall - wall.mean()
     alike = [
         (apart[:, lag:] * apart[:, :-lag]).mean() / apart.var()
@@ -51,7 +51,7 @@ def test_rust_does_not_recur_along_a_wall(wall):
     assert max(alike) < 0.65
 
 
-def test_water_takes_rust_down_a_wall(wall):
+def test_rust_streaks_run_down_a_wall(wall):
     """Paint below rust is darker than paint above it."""
     rusty = wall < 0.3
     step = int(200 / TEXEL_MM)
@@ -61,7 +61,7 @@ def test_water_takes_rust_down_a_wall(wall):
     assert below < above - 0.05
 
 
-def test_most_runs_down_from_a_walls_top(wall):
+def test_most_streaks_start_at_the_top_of_a_wall(wall):
     """Rust stains more of the paint below the upper edge than above the lower one."""
     sound = np.where(wall < 0.3, np.nan, wall)
     rows = int(300 / TEXEL_MM)
@@ -69,7 +69,7 @@ def test_most_runs_down_from_a_walls_top(wall):
     assert top < bottom - 0.02
 
 
-def test_old_rust_is_darker_and_lies_within_what_is_younger():
+def test_old_rust_is_darker_and_lies_inside_younger_rust():
     values = {"surface": {"colors": {"white": "#ffffff"}, **EVEN_PAINT, "rust_coverage": 0.2}}
     config = Config.from_values({"damage": {"probability": 0}, **values})
     with Generator(config, 3, (64, 64)) as generator:

@@ -1,4 +1,4 @@
-"""Where samples lie, against what OpenGL makes of clip space and against shares of pixels."""
+"""Sample positions compared with OpenGL's clip-space mapping and with pixel coverage."""
 
 import cv2
 import numpy as np
@@ -10,7 +10,7 @@ from fastgen.render.sample_lattice import SampleLattice, fitting
 
 
 def texels_of(lattice, places, size):
-    """Where places [..., 2] of an image lie in its targets, by way of clip space, [..., 2]."""
+    """Map image positions [..., 2] through clip space to texels of the targets, [..., 2]."""
     clip = 2 * np.asarray(places) / size - 1
     slanted = clip @ lattice.to_clip(size).T
     return (slanted + 1) / 2 * lattice.texels(size)
@@ -18,7 +18,7 @@ def texels_of(lattice, places, size):
 
 @pytest.mark.parametrize("per_axis", [1, 2, 3, 5])
 @pytest.mark.parametrize("size", [(7, 5), (64, 90), (641, 480)])
-def test_samples_of_the_filter_are_centres_of_texels_within_the_targets(per_axis, size):
+def test_filter_samples_are_texel_centres_inside_the_targets(per_axis, size):
     lattice = SampleLattice(per_axis)
     columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
     pixels = np.stack([columns, rows], axis=-1)
@@ -33,14 +33,14 @@ def test_samples_of_the_filter_are_centres_of_texels_within_the_targets(per_axis
 
 
 @pytest.mark.parametrize("per_axis", [2, 3, 5])
-def test_samples_of_a_pixel_stand_in_columns_of_their_own(per_axis):
+def test_each_sample_of_a_pixel_has_its_own_column(per_axis):
     lattice = SampleLattice(per_axis)
     offsets = [(right, down) for down in range(per_axis) for right in range(per_axis)]
     across = sorted(lattice.from_center(offset)[0] for offset in offsets)
     np.testing.assert_allclose(np.diff(across), 1 / per_axis**2)
 
 
-def test_filters_add_up_and_are_centred():
+def test_filter_weights_sum_to_one_and_are_centred():
     for per_axis in (1, 2, 3, 5):
         lattice = SampleLattice(per_axis)
         places = np.array([lattice.from_center(offset) for offset in lattice.filter])
@@ -49,16 +49,16 @@ def test_filters_add_up_and_are_centred():
         np.testing.assert_allclose(weights @ places, 0, atol=1e-12)
         offsets = list(lattice.filter)
         assert offsets[0] == (0, 0)
-        # those that decide whether a pixel sees one surface reach as far as all others
+        # the samples that decide whether a pixel sees one surface reach as far as the whole filter
         near, whole = (np.array(o) for o in (offsets[: lattice.near], offsets))
         assert (np.abs(near).max(axis=0) == np.abs(whole).max(axis=0)).all() or per_axis == 2
         assert len(near) == (1 if per_axis == 1 else 9)
-        # and shaders/keys_around.glsl gathers them from within a texel
+        # the shader gathers them from neighbouring texels
         assert per_axis == 5 or np.abs(near).max() <= 1
 
 
 @pytest.mark.parametrize("per_axis", [2, 3, 5])
-def test_a_region_s_columns_and_rows_hold_its_samples(per_axis):
+def test_a_regions_columns_and_rows_contain_its_samples(per_axis):
     lattice, size = SampleLattice(per_axis), (40, 30)
     region = (11, 9, 6, 4)
     left, right = lattice.columns(region)
@@ -81,7 +81,7 @@ def room_for_two(samples, size, limit):
 
 
 @pytest.mark.parametrize("limit", [8192, 16384])
-def test_as_many_samples_are_taken_as_two_views_have_room_for(limit):
+def test_the_sample_count_is_the_largest_that_fits_two_views(limit):
     rng = np.random.default_rng(1)
     found = set()
     for width, height in rng.integers(64, 4097, (300, 2)).tolist():
@@ -94,15 +94,16 @@ def test_as_many_samples_are_taken_as_two_views_have_room_for(limit):
             assert not any(room_for_two(n, (width, height), limit) for n in better)
     assert found == {1, 2, 3, 5}
     assert fitting(5, (640, 640), limit) == 5
-    assert fitting(5, (2048, 1536), 1 << 20) == 3  # 25 would take gigabytes
+    assert fitting(5, (2048, 1536), 1 << 20) == 3  # 25 samples would take gigabytes
 
 
 @pytest.mark.parametrize(("quality", "most"), [("balanced", 0.09), ("high", 0.06)])
-def test_upright_edges_come_in_many_shades(quality, most):
-    """The share of a pixel that an all but upright edge leaves, beside that of 12 x 12 ids.
+def test_upright_edges_have_many_levels_of_coverage(quality, most):
+    """Coverage at nearly upright edges is compared with 12x12 ids per pixel.
 
-    Samples in columns above one another would be off by a sixth and a tenth; ids in columns are
-    off by up to a twenty-fourth themselves."""
+    Samples stacked in columns would be off by 1/6 (balanced) and 1/10 (high). The reference
+    itself is off by up to 1/24.
+    """
     size, times = (160, 120), 12
     upright = {"roll_deg": 1.0, "elevation_deg": 0.0, "azimuth_deg": 0.0, "distance_mm": 9000}
     config = Config.from_values({"damage": {"probability": 0}, "cameras": {"Cl": upright}})
@@ -113,7 +114,7 @@ def test_upright_edges_come_in_many_shades(quality, most):
     share = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
     with Generator(config, 5, size, quality=quality) as generator:
         cover = generator.render(scene=scene, camera="Cl").cover / 255
-    # beside edges that run from row to row alike
+    # rows in which all edges are nearly upright
     rows = slice(60, 90)
     edge = (share[rows] > 0.02) & (share[rows] < 0.98)
     assert edge.sum() > 40

@@ -1,4 +1,4 @@
-"""Scenes changed by hand: whatever field is spoilt is named, and what was drawn passes."""
+"""Scene checks: errors name the invalid field, and sampled scenes pass."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ SIZE = (64, 64)
 
 @pytest.fixture(scope="module")
 def full():
-    """A scene that has some of everything that a scene can have."""
+    """A scene that uses every optional part."""
     damage = {"probability": 1, "count": [8, 8]}
     scene = Generator(Config.from_values({"damage": damage}), seed=2, size=SIZE).scene(3)
     assert {damage.kind for damage in scene.damages} >= {"dented", "perforation"}
@@ -32,7 +32,7 @@ def full():
 
 
 def leaves(part, path=()):
-    """Path of each number, text and truth below a part; of long tuples the first and last item."""
+    """Yield the path of each scalar below `part`; of tuples only the first and last item."""
     if dataclasses.is_dataclass(part):
         for field in dataclasses.fields(part):
             yield from leaves(getattr(part, field.name), (*path, field.name))
@@ -44,7 +44,7 @@ def leaves(part, path=()):
 
 
 def spoilt(part, path, value):
-    """The part with a value in place of what is at a path, whatever a constructor thinks of it."""
+    """Return `part` with `value` at `path`, without running any constructor."""
     if not path:
         return value
     if isinstance(part, tuple):
@@ -66,7 +66,7 @@ def name(path):
     return "scene" + "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in path)
 
 
-def test_what_is_drawn_passes():
+def test_sampled_scenes_pass():
     extreme = {
         "surface": {"rust_coverage": 1.0, "dirt_reach_mm": 1e6, "wear_scale_mm": 1e5},
         "sensor": {"defocus": {"probability": 1, "focus": 100.0}, "vignetting": 0.95},
@@ -82,7 +82,7 @@ def test_what_is_drawn_passes():
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e12, "x", None, True, [1.0], (1.0,)])
-def test_every_spoilt_leaf_is_named(full, value):
+def test_every_invalid_leaf_is_named(full, value):
     check_scene(full)
     paths = list(leaves(full))
     assert len(paths) > 100
@@ -125,13 +125,13 @@ def test_every_missing_or_foreign_part_is_named(full):
         (("seed",), 2**64),
     ],
 )
-def test_what_means_nothing_is_named(full, path, value):
+def test_out_of_range_values_are_named(full, path, value):
     with pytest.raises(ConfigError) as caught:
         check_scene(spoilt(full, path, value))
     assert str(caught.value).startswith(f"{name(path)}: ")
 
 
-def test_what_a_damages_formula_divides_by_is_above_zero(full):
+def test_divisors_in_a_damages_formula_must_be_above_zero(full):
     for kind, places in (("dented", (0, 3, 5)), ("perforation", (0,))):
         number = next(i for i, damage in enumerate(full.damages) if damage.kind == kind)
         for i in places:
@@ -140,7 +140,7 @@ def test_what_a_damages_formula_divides_by_is_above_zero(full):
                 check_scene(spoilt(full, path, 0.0))
 
 
-def test_a_hole_s_outline_goes_once_about_its_centre(full):
+def test_a_holes_outline_must_go_once_around_its_centre(full):
     number = next(i for i, damage in enumerate(full.damages) if damage.kind == "perforation")
     for i in (1, 3, 5, 7, 9):
         path = ("damages", number, "shape", i)
@@ -149,7 +149,7 @@ def test_a_hole_s_outline_goes_once_about_its_centre(full):
             check_scene(spoilt(full, path, 0.2))
 
 
-def test_a_camera_given_by_itself_is_held_to_the_same(full):
+def test_a_camera_passed_separately_is_checked_too(full):
     camera = Camera("c", (0, -9000, 1000), (0, 0, 1000), 20)
     assert check_camera(camera, full.container) is camera
     assert view_of(camera, SIZE).size == SIZE
@@ -171,7 +171,7 @@ def test_a_camera_inside_the_container_is_refused(full, inside):
 
 
 @pytest.mark.parametrize("labels", ["x", {}, 3])
-def test_rules_of_labels_are_a_label_config(labels):
+def test_labels_must_be_a_label_config(labels):
     with (
         Generator(size=SIZE) as generator,
         pytest.raises(ConfigError, match=r"^labels: expected a LabelConfig"),
@@ -186,7 +186,7 @@ def test_a_letter_that_the_font_lacks_is_named(full):
         check_scene(spoilt(full, path, ("ÜBER",)))
 
 
-def test_a_text_of_too_many_letters_is_named(full):
+def test_a_text_with_too_many_letters_is_named(full):
     i = next(i for i, decal in enumerate(full.decals) if decal.kind == "text")
     path = ("decals", i, "lines")
     check_scene(spoilt(full, path, ("A " * 2000, "B" * 2095)))
@@ -194,7 +194,7 @@ def test_a_text_of_too_many_letters_is_named(full):
         check_scene(spoilt(full, path, ("A " * 2000, "B" * 2096)))
 
 
-def test_a_decal_beside_its_sheet_is_named():
+def test_a_decal_off_its_sheet_is_named():
     with Generator(seed=2, size=SIZE) as generator:
         scene = generator.scene(3)
         beside = replace(scene.decals[0], center_mm=(90000.0, 300.0))
@@ -203,7 +203,7 @@ def test_a_decal_beside_its_sheet_is_named():
             generator.render(scene=scene, camera="A")
 
 
-def test_a_marker_that_is_no_square_is_refused(full):
+def test_a_marker_that_is_not_square_is_refused(full):
     number = next(i for i, decal in enumerate(full.decals) if decal.kind == "marker")
     oblong = replace(full.decals[number], size_mm=(250.0, 500.0))
     decals = (*full.decals[:number], oblong, *full.decals[number + 1 :])
@@ -211,7 +211,7 @@ def test_a_marker_that_is_no_square_is_refused(full):
         check_scene(replace(full, decals=decals))
 
 
-def test_a_camera_beyond_sight_is_refused(full):
+def test_a_camera_too_far_away_is_refused(full):
     near = replace(full.cameras[0], position_mm=(0.0, -170e3, 0.0), lens=None)
     assert check_camera(near, full.container) == near
     with pytest.raises(ConfigError, match=r"camera.position_mm: .* sight ends at 180 m"):

@@ -1,4 +1,4 @@
-"""Parts meet without gaps: by algebra on the meshes, and by looking for pinholes in images."""
+"""Parts meet without gaps, checked on the meshes and by looking for pinholes in images."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ def areas(positions, triangles):
 
 
 def test_edges_are_split_where_neighbours_have_vertices():
-    # a square of two triangles beside three narrow ones, and below it one edge with a middle vertex
+    # a square of two triangles; three narrow ones share its right edge and two its lower edge
     positions = np.array(
         [[0, 0, 0], [3, 0, 0], [3, 3, 0], [0, 3, 0], [3, 1, 0], [3, 2, 0], [5, 0, 0], [1.5, 0, 0]]
         + [[1, -2, 0], [0, 0, 0], [3, 0, 0], [3, 3, 0]],
@@ -35,7 +35,7 @@ def test_edges_are_split_where_neighbours_have_vertices():
     for triangle in range(len(triangles)):
         whole = areas(positions, triangles[[triangle]]).sum()
         assert areas(points, faces[source == triangle]).sum() == pytest.approx(whole)
-    # every edge inside is shared by two triangles now, by position
+    # every inner edge is now shared by two triangles, matched by position
     names = np.unique(points.round(6), axis=0, return_inverse=True)[1].ravel()[faces]
     edges = [tuple(sorted((t[i], t[(i + 1) % 3]))) for t in names.tolist() for i in range(3)]
     border = [e for e in set(edges) if edges.count(e) == 1]
@@ -47,7 +47,7 @@ def test_edges_are_split_where_neighbours_have_vertices():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_no_vertex_lies_within_an_edge_that_has_one_side(kind):
+def test_no_vertex_lies_within_an_edge_of_only_one_triangle(kind):
     for mesh in (build_container(kind, WallProfiles()), build_spreader(kind)):
         points, names = np.unique(mesh.positions_mm, axis=0, return_inverse=True)
         corners = names.ravel()[mesh.triangles].astype(np.int64)

@@ -1,4 +1,4 @@
-"""Sensor and weather against optics, statistics and the laws they stand for."""
+"""Sensor and weather effects compared with optics, statistics and physical laws."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ SIZE = (160, 120)
 
 
 def tone(c):
-    """Khronos PBR Neutral and sRGB of one colour, written after their specifications."""
+    """Tone-map and encode one colour by Khronos PBR Neutral and sRGB, as they are specified."""
     x = min(c)
     offset = x - 6.25 * x * x if x < 0.08 else 0.04
     c = [v - offset for v in c]
@@ -35,14 +35,14 @@ def tone(c):
     return [255 * (12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055) for v in c]
 
 
-def test_light_is_shown_through_the_tone_curve_of_the_renderer():
+def test_displayed_light_uses_the_tone_curve_of_the_renderer():
     light = np.random.default_rng(1).random((40, 30, 3)).astype(np.float32) ** 3 * 6
     expected = [[tone(pixel) for pixel in row] for row in light.tolist()]
     np.testing.assert_allclose(displayed(light), expected, atol=0.52)
 
 
-def test_an_image_survives_the_way_to_light_and_back():
-    # brighter colours of one channel alone lose more: eight bits hold too little of their others
+def test_an_image_survives_conversion_to_light_and_back():
+    # brighter colours of a single channel would lose more: 8 bits hold too little of the others
     light = np.random.default_rng(2).random((200, 200, 3)).astype(np.float32)
     image = displayed(light)
     apart = np.abs(displayed(light_of(image)).astype(int) - image)
@@ -69,7 +69,7 @@ def test_noise_has_the_variance_of_counted_electrons(level):
     assert counted.var() == pytest.approx(3000 * level + 81, rel=0.02)
 
 
-def test_noise_is_that_of_its_seed():
+def test_noise_depends_only_on_its_seed():
     light = np.full((30, 30, 3), 0.3, np.float32)
     first = noisy(light, Noise(1000, 5, 7))
     np.testing.assert_array_equal(first, noisy(light, Noise(1000, 5, 7)))
@@ -82,14 +82,14 @@ def test_blur_is_as_wide_as_traced_marginal_rays():
     sensor_at = 1 / (1 / 50 - 1 / 3000)
     for depth_mm in (1500.0, 3000.0, 9000.0):
         image_at = 1 / (1 / 50 - 1 / depth_mm)
-        # the ray through the aperture's rim, 12.5 mm off the axis, on its way to image_at
+        # a ray through the aperture's rim, 12.5 mm off the axis, converges at image_at
         on_sensor_mm = abs(12.5 * (1 - sensor_at / image_at))
         radius = blur_radius_px(defocus, camera, 640, np.array([[depth_mm / 1e3]], np.float32))
         assert radius[0, 0] == pytest.approx(on_sensor_mm / 36 * 640, rel=1e-4, abs=1e-3)
     assert np.isfinite(blur_radius_px(defocus, camera, 640, np.array([[np.inf]], np.float32)))
 
 
-def test_a_point_out_of_focus_becomes_a_disc_of_its_light():
+def test_a_point_out_of_focus_becomes_a_disc_of_equal_energy():
     light = np.zeros((41, 41, 3), np.float32)
     light[20, 20] = 1
     spread = defocused(light, np.full((41, 41), 6.0, np.float32))[..., 0]
@@ -100,7 +100,7 @@ def test_a_point_out_of_focus_becomes_a_disc_of_its_light():
     np.testing.assert_allclose(spread[away < 5], spread[20, 20], rtol=1e-3)
 
 
-def test_movement_spreads_a_point_evenly_about_where_it_is():
+def test_motion_spreads_a_point_evenly_around_its_position():
     light = np.zeros((61, 61, 3), np.float32)
     light[30, 30] = 1
     spread = moved(light, (20.0, 8.0))[..., 0]
@@ -108,7 +108,7 @@ def test_movement_spreads_a_point_evenly_about_where_it_is():
     assert spread.sum() == pytest.approx(1, rel=1e-4)
     assert (spread * column).sum() == pytest.approx(0, abs=1e-3)
     assert (spread * row).sum() == pytest.approx(0, abs=1e-3)
-    # a uniform line of length l has variance l^2 / 12; the pixels' own share is below 1/4
+    # a uniform line of length l has variance l^2 / 12; pixel size adds less than 1/4
     assert (spread * column**2).sum() == pytest.approx(20**2 / 12, abs=0.3)
     assert (spread * row**2).sum() == pytest.approx(8**2 / 12, abs=0.3)
     assert moved(light, (0.0, 0.0)) is light
@@ -126,8 +126,8 @@ def test_fog_leaves_a_fiftieth_of_a_contrast_at_its_visibility():
     np.testing.assert_allclose(behind, np.broadcast_to(air, behind.shape), atol=1e-6)
 
 
-def test_fog_lies_between_an_edge_and_what_shows_beside_it():
-    # a thing 20 m away covers a part of a pixel; so does one that meets no pixel's centre
+def test_fog_at_an_edge_veils_object_and_background_separately():
+    # an object 20 m away partly covers an edge pixel; a thin one covers no pixel centre
     air, sky, thing = (
         np.array([0.4, 0.5, 0.6]),
         np.array([2.0, 1.8, 1.5]),
@@ -146,7 +146,7 @@ def test_fog_lies_between_an_edge_and_what_shows_beside_it():
 
 
 def test_detail_behind_an_edge_does_not_shine_through_fog():
-    """However bright: an edge and a cable stay between their own veiled light and the air's."""
+    """An edge and a cable stay between their own veiled light and that of the air."""
     rng = np.random.default_rng(8)
     air, thing = np.array([0.4, 0.5, 0.6]), np.array([0.1, 0.2, 0.05])
     sky = rng.exponential(2.0, (40, 40, 3))
@@ -166,7 +166,7 @@ def test_detail_behind_an_edge_does_not_shine_through_fog():
     assert (seen >= air * (1 - near * share) - 1e-5).all()
 
 
-def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
+def test_rain_is_hidden_by_nearer_surfaces_and_repeats():
     view = view_of(Camera("T", (0, -9000, 0), (0, 0, 0), 30.0), SIZE)
     light = np.full((120, 160, 3), 0.1, np.float32)
     depth = np.full((120, 160), np.inf, np.float32)
@@ -182,8 +182,8 @@ def test_rain_falls_before_what_is_behind_it_and_is_the_same_each_time():
     assert heavy.sum() > seen.sum()
 
 
-def test_drops_shine_with_nearly_all_of_the_light_around():
-    """With 94 % of it (Garg and Nayar 2007): what is as bright hides them."""
+def test_drops_have_94_percent_of_the_light_around_them():
+    """Garg and Nayar 2007; drops vanish in front of a background of the same brightness."""
     view = view_of(Camera("T", (0, -9000, 0), (0, 0, 0), 30.0), SIZE)
     depth = np.full((120, 160), np.inf, np.float32)
     sky = np.array([2.0, 1.0, 0.5], np.float32)
@@ -198,8 +198,8 @@ def test_drops_shine_with_nearly_all_of_the_light_around():
 
 
 @pytest.mark.parametrize(("wide", "long"), [(0.3, 2.0), (0.3, 20.0), (1.05, 20.0), (2.1, 5.4)])
-def test_a_drop_hides_as_much_as_it_is_large(wide, long):
-    """Whatever pixels its streak begins and ends in: its width squared, over the exposure."""
+def test_a_drops_total_coverage_depends_only_on_its_width(wide, long):
+    """A drop covers its width squared over the exposure, wherever its streak begins and ends."""
     ways = np.array([[0.0, long], [long * 0.6, long * 0.8]])
     middle = np.array([[20.3, 40.6], [60.8, 41.1]])
     depth = np.full((80, 100), np.inf, np.float32)
@@ -214,7 +214,7 @@ def test_a_drop_hides_as_much_as_it_is_large(wide, long):
         ((0, -9000, 0), 0.0, 8),
         ((0, -9000, 0), 90.0, 8),
         ((0, -9000, 0), -35.0, 8),
-        ((0, -500, 9000), 0.0, 2),  # streaks are short about where they run to
+        ((0, -500, 9000), 0.0, 2),  # streaks are short near their vanishing point
     ],
 )
 def test_streaks_of_rain_run_where_falling_points_are_projected(position, roll, ratio):
@@ -225,7 +225,7 @@ def test_streaks_of_rain_run_where_falling_points_are_projected(position, roll, 
     rain = Rain(150, 0.01, 0.0, 3)
     seen = rained(dark, depth, view, rain, np.ones(3, np.float32))[..., 0]
     dy, dx = np.gradient(cv2.GaussianBlur(seen, (0, 0), 1.5))
-    # where a point on each pixel's ray, three metres away, moves to as it falls
+    # image direction of a falling point three metres along each pixel's ray
     rows, columns = np.mgrid[0:240, 0:320] + 0.5
     offset = (np.stack([columns, rows], axis=-1) - view.center_px) / view.focal_px
     rays = np.concatenate([offset, np.ones((240, 320, 1))], axis=-1) @ view.rotation
@@ -248,7 +248,7 @@ def test_stamps_stay_in_their_corner():
         assert columns.min() < 20 if "left" in corner else columns.max() > 300
 
 
-def test_jpeg_loses_more_at_less_quality():
+def test_jpeg_loses_more_at_lower_quality():
     image = np.random.default_rng(0).integers(0, 255, (64, 64, 3)).astype(np.uint8)
     coarse, fine = (
         np.abs(through_jpeg(image, quality).astype(int) - image).mean() for quality in (20, 90)
@@ -262,7 +262,7 @@ def test_by_default_cameras_are_perfect_and_the_sky_is_clear():
     assert all(camera.sensor is None and camera.lens is None for camera in scene.cameras)
 
 
-def test_the_crane_preset_changes_cameras_and_weather_alone_and_survives_json():
+def test_the_crane_preset_changes_only_cameras_and_weather_and_survives_json():
     crane, plain = Generator(Config.preset("crane"), seed=4), Generator(seed=4)
     kinds = set()
     for index in range(12):
@@ -280,18 +280,18 @@ def test_the_crane_preset_changes_cameras_and_weather_alone_and_survives_json():
     assert kinds == {"noise", "stamp", "defocus"}
 
 
-def test_the_shortest_shutter_that_may_be_is_drawn_and_rendered():
+def test_the_shortest_allowed_shutter_is_sampled_and_rendered():
     weather = {"rain_probability": 1.0, "shutter_s": [1e-5, 1.2e-5]}
     with Generator(Config.from_values({"weather": weather}), size=SIZE) as generator:
         drawn = {generator.scene(index).weather.rain.shutter_s for index in range(5)}
         assert len(drawn) == 5
         assert min(drawn) >= 1e-5
         assert max(drawn) <= 1.2e-5
-        # a drop that hardly moves covers a spot: it must be seen, not divided by
+        # a drop that hardly moves has a streak of almost no length, which must not be divided by
         assert np.ptp(generator.render(index=0).image) > 0
 
 
-def test_labels_are_those_without_the_sensor_and_bytes_repeat():
+def test_the_sensor_changes_no_label_and_its_images_repeat():
     sensor = Sensor(
         defocus=Defocus(1500, 1.4),
         motion=(0.01, 0.004),
@@ -317,7 +317,7 @@ def test_labels_are_those_without_the_sensor_and_bytes_repeat():
     np.testing.assert_array_equal(real.image, repeated.image)
 
 
-def test_water_darkens_what_is_porous():
+def test_water_darkens_porous_surfaces():
     config = Config.from_values({"surface": {"rust_coverage": 0.4}})
     with Generator(config, seed=6, size=SIZE) as generator:
         scene = generator.scene(1)
@@ -350,7 +350,7 @@ def test_bad_values_are_named(values, words):
 
 
 @pytest.mark.parametrize("lens", [None, Lens("fisheye", (-0.02, 0.0, 0.0, 0.0))])
-def test_fog_counts_the_way_along_each_ray(lens):
+def test_fog_depends_on_the_distance_along_each_ray(lens):
     camera = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0, lens=lens)
     with Generator(seed=6, size=SIZE) as generator:
         scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
@@ -368,8 +368,8 @@ def test_fog_counts_the_way_along_each_ray(lens):
     assert np.abs(expected.astype(int) - sample.image)[unmixed].max() <= 1
 
 
-def test_before_an_even_sky_fog_is_as_bright_as_the_sky(tmp_path):
-    """It sends as much light to the eye as it takes, whatever its colour."""
+def test_in_front_of_an_even_sky_fog_is_as_bright_as_the_sky(tmp_path):
+    """Fog scatters as much light to the camera as it removes, for a sky of any colour."""
     write_exr(tmp_path / "even.exr", np.full((128, 256, 3), [0.11, 0.08, 0.05], np.float32))
     camera = Camera("T", (0, -9000, 1200), (0, 0, 3600), 14.0, exposure_ev=-1.0)
     with Generator(seed=6, size=SIZE, hdri_dir=tmp_path) as generator:

@@ -1,4 +1,4 @@
-"""Single GLSL functions run by themselves, against algebra and numpy."""
+"""Single GLSL functions compared with algebra and numpy."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def gl():
 
 
 def white_light(gl):
-    """An environment that shines 1 from everywhere, and the real split-sum table."""
+    """Return textures of a uniform environment of radiance 1 and the real split-sum table."""
     ctx = gl.ctx
 
     def ones(size, layers):
@@ -41,7 +41,7 @@ def white_light(gl):
 
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
 def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
-    """Whatever the roughness and the angle, all light comes back: radiance 1, within 1 %."""
+    """All light comes back at every roughness and angle: radiance 1 within 1 %."""
     kept = blocks(gl, yaw=(1, 0), background_size=16)
     roughness, cosine = np.meshgrid(np.linspace(0.05, 1, 20), np.linspace(0.05, 1, 20))
     rows = np.stack([roughness, cosine, np.full_like(cosine, metallic), cosine], -1).reshape(-1, 4)
@@ -74,9 +74,11 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
     del kept
 
 
-def test_light_that_rays_found_stands_for_the_sky(gl):
-    """Under a white sky surfaces as bright as it change nothing, however much of it they hide, and
-    what is hidden by black ones is lost, whatever the cone says."""
+def test_ray_traced_light_replaces_the_hidden_sky(gl):
+    """Surfaces as bright as the white sky change nothing, at every share of hidden sky.
+
+    Black surfaces remove the light that they hide; the sky visibility cone has no effect.
+    """
     kept = blocks(gl, yaw=(1, 0), background_size=16)
     rng = np.random.default_rng(5)
     rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, open, cone
@@ -100,9 +102,8 @@ def test_light_that_rays_found_stands_for_the_sky(gl):
     del kept
 
 
-def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
-    """Under a white sky, a part of which is hidden: the brighter what hides it, the brighter the
-    surface, up to what the whole sky gives, whatever the surface's own paint."""
+def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
+    """Brighter occluders make a surface brighter, up to the light of the whole white sky."""
     kept = blocks(gl, yaw=(1, 0), background_size=16)
     rng = np.random.default_rng(3)
     rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, paint, rim
@@ -118,7 +119,7 @@ def test_what_hides_the_sky_throws_its_own_color_and_no_more_than_it_gets(gl):
     assert (black <= grey + 1e-6).all()
     assert (grey <= white + 1e-6).all()
     assert (white <= 1.01).all()
-    # in the depth of a recess there is no other light, whatever the surface's own paint
+    # deep in a recess no other light arrives, for any paint of the surface
     deep = np.c_[rows[:, :3], np.full(len(rows), 1.0)]
     assert run(gl, body, deep, white_light(gl))[:, 0].max() < 0.06
     bright, hidden = rows[:, 2] > 0.5, rows[:, 3] > 0.5
@@ -134,9 +135,12 @@ def test_fresnels_equations_equal_their_numpy_twin(gl):
 
 
 @pytest.mark.parametrize("slope_deg", [10, 50, 60])
-def test_black_paint_mirrors_of_a_sun_what_it_mirrors_toward_it(gl, slope_deg):
-    """All that comes back of one direction's light, over all views, is by Helmholtz's reciprocity
-    what comes back in that direction of light from all around: the split-sum table's."""
+def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
+    """By Helmholtz reciprocity the reflected energy is the split-sum table's value.
+
+    Light from one direction, reflected into all views, equals light from all around, reflected
+    into that direction.
+    """
     slope, roughness, steps = np.deg2rad(slope_deg), 0.31, 120
     toward = np.tile([np.sin(slope), 0, np.cos(slope), 0], (4, 1))
     kept = blocks(gl, yaw=(1, 0), sun_toward=toward, sun_light=np.ones((4, 4)))
@@ -176,7 +180,7 @@ def test_octahedral_mapping_equals_its_numpy_twin(gl):
     assert out[:, 2].max() < 1e-5
 
 
-def test_surface_keys_keep_zone_and_normal(gl):
+def test_packed_surface_ids_keep_zone_and_normal(gl):
     directions = np.random.default_rng(2).normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     directions[:6] = np.r_[np.eye(3), -np.eye(3)]
@@ -214,7 +218,7 @@ def test_tone_curve_keeps_order_and_range(gl):
 
 @pytest.mark.parametrize("coverage", [0.05, 0.2, 0.5])
 def test_a_noise_threshold_covers_the_same_share_at_every_distance(gl, coverage):
-    """What is rusty near by is as rusty from afar."""
+    """A surface is equally rusty from nearby and from afar."""
     steps = 1000 * (np.arange(128) + 0.37) / 128
     points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     shares = [
@@ -225,8 +229,8 @@ def test_a_noise_threshold_covers_the_same_share_at_every_distance(gl, coverage)
 
 
 @pytest.mark.parametrize("coverage", [0.05, 0.2, 0.5])
-def test_a_wide_lookup_covers_what_lookups_within_it_do(gl, coverage):
-    """A spot of rust is as dark from afar as it is, neither washed out nor hardened."""
+def test_a_wide_lookup_is_close_to_the_mean_of_lookups_within_it(gl, coverage):
+    """A spot of rust keeps its darkness from afar, neither washed out nor hardened."""
     side = 16.0
     points, within = points_and_steps(side)
     near = rusty_share(gl, (points[:, None] + within).reshape(-1, 2), 1.0, coverage)
@@ -241,7 +245,7 @@ def test_a_wide_lookup_covers_what_lookups_within_it_do(gl, coverage):
     [(1, "z", 0.35, 0.1), (1, "z", 0.35, 0.3), (1, "z", 0.35, 0.9), (0, "w", 0.15, 0.6)],
 )
 def test_a_soft_threshold_keeps_its_share_from_afar(gl, layer, channel, softness, threshold):
-    """Dirt lies as thick from afar as near by, and prints are as worn."""
+    """Dirt is as thick, and decals are as worn, from afar as from nearby."""
     side = 16.0
     points, within = points_and_steps(side)
     ramp = f"covered(n.value.{channel}, x.w, n.lost.{channel}, {softness})"
@@ -253,8 +257,8 @@ def test_a_soft_threshold_keeps_its_share_from_afar(gl, layer, channel, softness
 
 
 @pytest.mark.parametrize("coverage", [0.003, 0.01, 0.04])
-def test_scratches_cover_the_share_that_they_are_given(gl, coverage):
-    """Near by, and from afar where a pixel covers many."""
+def test_scratches_cover_the_configured_share(gl, coverage):
+    """The share holds from nearby and from afar, where a pixel covers many scratches."""
     steps = 1000 * (np.arange(256) + 0.37) / 256
     points = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     for footprint in (0.5, 2.0, 8.0, 32.0):
@@ -263,21 +267,24 @@ def test_scratches_cover_the_share_that_they_are_given(gl, coverage):
 
 
 def points_and_steps(side):
-    """Points [300, 2] on the sheet, and steps [256, 2] over a square of a side around one, mm."""
+    """Return sheet points [300, 2] and offsets [256, 2] over a square of width `side`, in mm."""
     steps = (np.arange(16) + 0.5) / 16 - 0.5
     points = np.random.default_rng(5).uniform(0, 1000, (300, 2))
     return points, np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) * side
 
 
 def rusty_share(gl, points, footprint, coverage):
-    """Share [N] of pixels of a width, at points [N, 2] on the sheet, that is rusty; both in mm."""
+    """Return the rusty share [N] of pixels `footprint` mm wide at sheet points [N, 2] in mm."""
     rust = "normal_covered(n.value.y, normal_threshold(x.w), n.lost.y, 0.03)"
     return noise_share(gl, 0, rust, points, footprint, coverage)
 
 
 def noise_share(gl, layer, share, points, footprint, w=0.0, **scene):
-    """GLSL `share` [N] of the noise sample n under pixels of a width at points [N, 2], and x.w;
-    scene: of the uniform blocks."""
+    """Evaluate the GLSL expression `share` for pixels `footprint` mm wide at points [N, 2].
+
+    The expression may use the noise sample `n` and the value `w` as `x.w`. scene: values of the
+    uniform blocks. Returns float32 [N].
+    """
     texture = noise_texture(gl)
     read = "read_without_period" if layer == 0 else "read_noise"
     kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4), **scene)

@@ -1,4 +1,4 @@
-"""The sky behind the container, against rays into the environment's map."""
+"""The sky behind the container, compared with rays into the environment map."""
 
 from dataclasses import replace
 
@@ -21,7 +21,10 @@ def generator():
 
 
 def displayed(radiance):
-    """Exposed radiance [..., 3] to sRGB 0..255: Khronos PBR Neutral, section 2; IEC 61966-2-1."""
+    """Tone-map and encode exposed radiance [..., 3] to sRGB 0..255.
+
+    Khronos PBR Neutral, section 2; IEC 61966-2-1.
+    """
     low = radiance.min(axis=-1, keepdims=True)
     color = radiance - np.where(low < 0.08, low - 6.25 * low**2, 0.04)
     peak = color.max(axis=-1, keepdims=True)
@@ -34,7 +37,7 @@ def displayed(radiance):
     return 255 * np.where(color <= 0.0031308, 12.92 * color, curve)
 
 
-# ahead, straight up and down, and across the map's seams; most of the container out of sight
+# ahead, almost straight up and down, and across the map's seams; little container in view
 @pytest.mark.parametrize("toward", [(1, 0.2, 0.1), (0, 0.01, 1), (-1, -1, -0.3), (0.02, 1, -3)])
 @pytest.mark.parametrize("roll_deg", [0.0, 37.0])
 def test_the_sky_is_the_environment_along_each_pixels_ray(generator, toward, roll_deg):
@@ -56,8 +59,8 @@ def test_the_sky_is_the_environment_along_each_pixels_ray(generator, toward, rol
     radiance = sample_octahedral(unpacked(light.background), levelled(directions))
     radiance = radiance.reshape(rays.shape)
     expected = displayed(generator.exposure(scene, camera) * radiance)
-    # pixels beside the container hold some of it
+    # pixels next to the container are mixed
     sky = cv2.erode((sample.ids == 0).astype(np.uint8), np.ones((5, 5))) > 0
     assert sky.mean() > 0.3
-    # the map on the GPU has nine bits a channel
+    # the map on the GPU has nine bits per channel
     assert np.abs(sample.image[sky] - expected[sky]).max() < 2.5

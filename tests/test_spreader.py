@@ -1,4 +1,4 @@
-"""The spreader: its shape by rays and algebra, what it hides by Embree, its place in the scene."""
+"""The spreader: shape, occlusion and place in the scene, checked with rays and algebra."""
 
 import json
 import math
@@ -34,7 +34,7 @@ def generator():
 
 
 def surface_points(mesh):
-    """Points [N, 3] all over the triangles."""
+    """Return points [N, 3] spread over all triangles."""
     steps = [(i / 8, j / 8, (8 - i - j) / 8) for i in range(9) for j in range(9 - i)]
     return np.einsum("sc,tcd->tsd", steps, mesh.positions_mm[mesh.triangles]).reshape(-1, 3)
 
@@ -61,7 +61,7 @@ def test_solids_are_closed_and_face_outward(kind, down):
 @pytest.mark.parametrize("kind", ISO_668)
 @pytest.mark.parametrize("down", POSES)
 @pytest.mark.parametrize("gap", [0.0, 20.0])
-def test_nothing_touches_the_container_but_twistlocks_in_their_apertures(kind, down, gap):
+def test_only_twistlocks_in_their_apertures_touch_the_container(kind, down, gap):
     length, width, height, _ = ISO_668[kind]
     x, y, z = surface_points(build_spreader(kind, down, gap)).T
     from_axis = np.hypot(np.abs(x) - (length / 2 - 101.5), np.abs(y) - (width / 2 - 89))
@@ -80,10 +80,10 @@ def test_nothing_touches_the_container_but_twistlocks_in_their_apertures(kind, d
 
 @pytest.mark.parametrize("kind", ISO_668)
 @pytest.mark.parametrize("gap", [5.0, 30.0])
-def test_it_is_drawn_out_to_stand_over_all_four_castings(kind, gap):
+def test_the_spreader_extends_over_all_four_castings(kind, gap):
     length, width, height, _ = ISO_668[kind]
     mesh = build_spreader(kind, (False, False), gap)
-    # beside the twistlock, which stands in the middle of the aperture
+    # next to the twistlock in the middle of the aperture
     corners = [
         (end * (length / 2 - 60), side * (width / 2 - 50), height + 1)
         for end in (-1, 1)
@@ -98,7 +98,7 @@ def test_it_is_drawn_out_to_stand_over_all_four_castings(kind, gap):
     assert np.allclose([low[1], high[1]], [-width / 2 - 155, width / 2 + 155], atol=1)
 
 
-def test_eight_cables_go_up_beyond_the_usual_picture():
+def test_eight_cables_rise_above_the_usual_image():
     mesh = build_spreader("40")
     height = 2591 + 8000
     x = np.arange(-2000, 2000, 2.0)
@@ -123,7 +123,7 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     assert (expected == oracle.SPREADER).sum() > 300
     wrong = sample.ids != expected
     assert wrong.mean() < 3e-4
-    # what is wrong away from edges: a centre right on a seam between two sheets of the container
+    # away from edges, only a pixel centre exactly on a seam between two sheets may differ
     of_spreader = (sample.ids == oracle.SPREADER) | hits.spreader
     assert not (wrong & of_spreader & ~oracle.near_edge(expected)).any()
     assert (wrong & ~oracle.near_edge(expected)).sum() <= 1
@@ -133,7 +133,7 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     assert np.quantile(error, 0.999) < 1e-3
     spreader = both & hits.spreader
     error = np.abs(sample.depth[spreader] - hits.depth_m[spreader]) / hits.depth_m[spreader]
-    # a pixel centre may fall on either side of an inner edge, hence a quantile and not all
+    # a pixel centre may fall on either side of an inner edge, so a few pixels may differ
     assert np.quantile(error, 0.99) < 1e-5
 
 
@@ -141,7 +141,7 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
     ("quality", "camera"), [("draft", "B"), ("balanced", "A"), ("balanced", "B"), ("high", "A")]
 )
 def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
-    """A cable of a third of a pixel comes out neither in dashes nor in steps."""
+    """A cable a third of a pixel wide shows neither dashes nor steps."""
     size, steps = (240, 240), 12
     with Generator(seed=6, size=size, quality=quality) as generator:
         scene = generator.scene(0)
@@ -149,7 +149,7 @@ def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
         scene = replace(scene, spreader=held)
         sample = generator.render(scene=scene, camera=camera, layer="base")
     code = sample.image[8:32].mean(axis=2) / 255
-    # the sky is white in a layer; all codes here lie above the linear part of sRGB
+    # a layer image has a white sky; all values here lie above the linear part of sRGB
     lit = 1 - ((np.maximum(code, 0.05) + 0.055) / 1.055) ** 2.4
 
     offset = (np.arange(steps) + 0.5) / steps - 0.5
@@ -167,8 +167,8 @@ def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
     assert np.abs(lit / black - expected)[expected > 0.1].mean() < 0.03
 
 
-def test_no_sky_shows_through_cables_that_hang_before_the_spreader():
-    """Whatever covers all of a pixel and of those about it in balanced covers it in draft too."""
+def test_no_sky_shows_through_cables_in_front_of_the_spreader():
+    """A pixel that `balanced` covers fully with all its neighbours is fully covered in `draft`."""
     above = {"face": "door", "focal_mm": 20, "distance_mm": 9000, "elevation_deg": [40, 60]}
     rig = {"Cl": {}, "Cr": {}, "above": above}
     config = Config.from_values({"cameras": rig, "spreader": {"probability": 1}})
@@ -182,8 +182,8 @@ def test_no_sky_shows_through_cables_that_hang_before_the_spreader():
     assert (covers["draft"][np.stack(whole)] == 255).all()
 
 
-def test_a_thin_cable_looks_like_the_mean_of_what_is_seen_of_it_from_nearby():
-    """Within a pixel it is of one steel; nearby each sample of its sides has its own layers."""
+def test_a_thin_cable_has_the_mean_look_of_a_near_one():
+    """A thin cable has one material per pixel; from nearby every sample has its own layers."""
     rusty = {"surface": {"rust_coverage": 0.2}, "spreader": {"probability": 1}}
     config = Config.from_values({**rusty, "damage": {"probability": 0}})
     colors = {}
@@ -207,7 +207,7 @@ def test_a_thin_cable_looks_like_the_mean_of_what_is_seen_of_it_from_nearby():
 
 
 def front_marker(scene, down):
-    """The scene with one marker up in the front side's left corner, and a camera before it."""
+    """Return the scene with one marker in the front's upper left corner and a camera facing it."""
     kind = scene.container.kind
     mesh = build_container(kind, scene.container.profiles)
     _, _, _, height = mesh.charts[mesh.chart_index("front")].rect_mm
@@ -258,7 +258,7 @@ def test_damage_neither_moves_nor_marks_the_spreader():
     assert np.concatenate(inner).mean() > 0.99
 
 
-def test_decals_do_not_print_on_the_spreader(generator):
+def test_decals_do_not_appear_on_the_spreader(generator):
     scene = generator.scene(2)
     bare = replace(scene, decals=())
     for camera in scene.cameras:
@@ -270,7 +270,7 @@ def test_decals_do_not_print_on_the_spreader(generator):
         np.testing.assert_array_equal(spreader, without.ids == oracle.SPREADER)
 
 
-def test_paint_of_the_spreader_is_the_scenes(generator):
+def test_the_spreader_has_the_scenes_paint(generator):
     scene = generator.scene(1)
     red = replace(scene, spreader=replace(scene.spreader, albedo=(0.6, 0.02, 0.02)))
     sample = generator.render(scene=red, camera="Cl", layer="base")
@@ -279,7 +279,7 @@ def test_paint_of_the_spreader_is_the_scenes(generator):
     assert painted > 0.6
 
 
-def test_the_renderer_gives_the_mesh_that_it_draws(generator):
+def test_spreader_mesh_returns_the_mesh_that_is_drawn(generator):
     scene = generator.scene(1)
     generator.render(scene=scene, camera="B")
     mesh = spreader_mesh(scene)
@@ -306,7 +306,7 @@ def test_scenes_round_trip_through_json_and_older_ones_have_no_spreader(generato
     assert Scene.from_json(json.dumps(plain)).spreader == Spreader(present=False)
 
 
-def test_nine_scenes_in_ten_have_one_and_nothing_else_depends_on_it():
+def test_nine_scenes_in_ten_have_a_spreader_and_nothing_else_depends_on_it():
     usual, never = (
         Generator(seed=8),
         Generator(Config.from_values({"spreader": {"probability": 0}}), 8),

@@ -1,4 +1,4 @@
-"""Runs that are stopped from without: quietly, at once, and to be gone on with."""
+"""Runs stopped by signals: they end quietly and at once, and can be resumed."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ STOPPED = "fastgen: stopped; run the same command again to go on"
 
 
 def begun(out, images="4000"):
-    """A run that has begun to write, in a session of its own."""
+    """Start a run in its own session and return it once it has begun to write."""
     command = [
         sys.executable,
         "-m",
@@ -37,16 +37,16 @@ def begun(out, images="4000"):
 
 
 def wait_for(condition):
-    """Poll for minutes: the machine may be busy with other things."""
+    """Poll for up to two minutes, because the machine may be busy."""
     for _ in range(2400):
         if condition():
             return
         time.sleep(0.05)
-    raise AssertionError("it never came")
+    raise AssertionError("the condition did not hold within two minutes")
 
 
 def gone(processes):
-    """Whether all have ended; nobody may be there to bury a zombie."""
+    """Return True if all have ended. Zombies count: there may be no parent to reap them."""
     _, alive = psutil.wait_procs(processes, timeout=0)
     return all(each.status() == psutil.STATUS_ZOMBIE for each in alive)
 
@@ -58,7 +58,7 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
     if moment == "shards are made":
         wait_for(lambda: list(out.glob("shards/*.json")))
     family = psutil.Process(process.pid).children(recursive=True)
-    process.send_signal(signal.SIGTERM)  # to the parent alone, as docker sends it
+    process.send_signal(signal.SIGTERM)  # only to the parent, as docker does
     error = process.communicate(timeout=300)[1]
     assert process.returncode == 128 + signal.SIGTERM
     assert "Traceback" not in error
@@ -68,11 +68,11 @@ def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path, moment):
 
 
 def test_a_stop_waits_until_a_process_has_started():
-    """Even where another thread than the one that starts it gets the signal."""
+    """The signal may also reach a thread other than the one that starts the process."""
     heard = []
     before = signal.signal(signal.SIGTERM, lambda *_: heard.append("late" if over else "early"))
     over, done = False, threading.Event()
-    threading.Thread(target=done.wait, daemon=True).start()  # it masks nothing
+    threading.Thread(target=done.wait, daemon=True).start()  # it masks no signal
     try:
         with undisturbed():
             masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
@@ -86,7 +86,7 @@ def test_a_stop_waits_until_a_process_has_started():
     assert heard == ["late"]
 
 
-def test_workers_whose_parent_was_killed_end_without_a_word(tmp_path):
+def test_workers_whose_parent_was_killed_end_silently(tmp_path):
     out = tmp_path / "out"
     process = begun(out)
     wait_for(lambda: list(out.glob("shards/*.json")))
@@ -94,11 +94,11 @@ def test_workers_whose_parent_was_killed_end_without_a_word(tmp_path):
     assert len(family) >= 2
     process.kill()
     wait_for(lambda: gone(family))
-    # it is read to its end, which comes when the last that could write is gone
+    # the stream ends only when the last process that could write to it is gone
     assert "Traceback" not in process.communicate(timeout=300)[1]
 
 
-def test_a_run_that_sigterm_stopped_goes_on(tmp_path):
+def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     out = tmp_path / "out"
     process = begun(out, "40")
     process.send_signal(signal.SIGTERM)
@@ -131,12 +131,12 @@ def test_a_signal_while_modules_load_ends_in_one_line(module, number):
     assert (code, error) == (128 + number, f"{STOPPED}\n")
 
 
-def test_what_ignores_ctrl_c_ignores_it_while_modules_load():
+def test_an_ignored_ctrl_c_stays_ignored_while_modules_load():
     assert loading("numpy", signal.SIGINT, "signal.SIG_IGN") == (0, "")
 
 
 def loading(module, number, before):
-    """Exit code and standard error of a command that is sent a signal as it loads a module."""
+    """Return exit code and stderr of a command that gets a signal while it loads a module."""
     text = LOADING.replace("MODULE", repr(module)).replace("SIGNAL", str(int(number)))
     command = [sys.executable, "-c", text.replace("BEFORE", before)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)

@@ -1,4 +1,4 @@
-"""Nothing is lost: killed processes, dead and hung workers, full disks, vanished folders."""
+"""Crash safety: killed processes, dead and hung workers, and full disks."""
 
 import contextlib
 import hashlib
@@ -36,14 +36,14 @@ def whole(tmp_path_factory):
 
 
 def is_sound(out):
-    """No file that a manifest lists is anything but what it says."""
+    """Check that every file listed in a manifest has the listed size and hash."""
     for path in out.glob("shards/*.json"):
         for name, (size, digest) in json.loads(path.read_text())["files"].items():
             data = (out / name).read_bytes()
             assert (len(data), hashlib.sha256(data).hexdigest()) == (size, digest)
 
 
-def test_the_parent_hears_of_each_scene_once_and_of_all_images(tmp_path):
+def test_each_scene_and_each_image_is_reported_once(tmp_path):
     heard = []
     job = Job(
         str(tmp_path), 99, Config.preset(), 1, (64, 64), ("A", "B"), None, "auto", shard_scenes=3
@@ -57,7 +57,7 @@ def test_the_parent_hears_of_each_scene_once_and_of_all_images(tmp_path):
     assert not heard
 
 
-def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_path):
+def test_fifty_kills_at_random_moments_end_in_the_same_bytes(whole, tmp_path):
     rng = random.Random(4)
     out = tmp_path / "out"
     kills = 0
@@ -73,7 +73,7 @@ def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_p
             if rng.random() < 0.5:
                 os.killpg(process.pid, signal.SIGKILL)
                 kills += 1
-            else:  # one of its processes: a worker is replaced, the parent takes all with it
+            else:  # kill one process: a dead worker is replaced, a dead parent ends all
                 family = psutil.Process(process.pid).children(recursive=True)
                 victim = rng.choice([psutil.Process(process.pid), *family])
                 victim.kill()
@@ -90,7 +90,7 @@ def test_killed_fifty_times_at_any_moment_it_ends_in_the_same_bytes(whole, tmp_p
     assert content(out) == content(whole)
 
 
-def test_stopped_after_the_last_shard_it_ends_in_the_same_bytes(whole, tmp_path):
+def test_a_stop_after_the_last_shard_ends_in_the_same_bytes(whole, tmp_path):
     def stop():
         raise KeyboardInterrupt
 
@@ -100,7 +100,7 @@ def test_stopped_after_the_last_shard_it_ends_in_the_same_bytes(whole, tmp_path)
     assert content(tmp_path / "out") == content(whole)
 
 
-def test_a_scene_that_kills_its_worker_is_given_up_and_no_other(whole, tmp_path, monkeypatch):
+def test_only_the_scene_that_kills_its_worker_is_given_up(whole, tmp_path, monkeypatch):
     monkeypatch.setenv("FAULT", "crash")
     made = make(tmp_path / "out", SCENES, 2)
     (failed,) = made["failed"]
@@ -114,7 +114,7 @@ def test_a_scene_that_kills_its_worker_is_given_up_and_no_other(whole, tmp_path,
 
 def test_a_scene_that_hangs_its_worker_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setenv("FAULT", "hang")
-    # beside other work a worker takes seconds to start
+    # on a busy machine a worker takes seconds to start
     made = make(tmp_path / "out", 8, 2, hang_s=10.0)
     (failed,) = made["failed"]
     assert failed["scene"] == FAULTY_SCENE
@@ -150,7 +150,7 @@ def test_a_small_disk_stops_the_run_with_one_line(tmp_path):
         f"sys.argv[1:] = ['{tmp_path / 'out'}', '8', '1'];"
         f"import runpy; runpy.run_path('{SCRIPT}', run_name='__main__')"
     )
-    # SIGXFSZ is ignored by Python, so that writes fail as on a full disk
+    # Python ignores SIGXFSZ, so writes fail as on a full disk
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "cannot be written" in done.stderr

@@ -1,4 +1,4 @@
-"""Meshes and tables that the disk cache keeps are those that were computed."""
+"""Meshes from the disk cache equal the computed ones."""
 
 from dataclasses import fields, replace
 
@@ -23,7 +23,7 @@ def built() -> Mesh:
 
 
 def never():
-    raise AssertionError("built again")
+    raise AssertionError("the cached mesh was built again")
 
 
 def assert_equal(found: Mesh, wanted: Mesh) -> None:
@@ -37,16 +37,16 @@ def assert_equal(found: Mesh, wanted: Mesh) -> None:
             assert one == other
 
 
-def test_a_mesh_comes_back_as_it_was(folder, built):
+def test_a_cached_mesh_equals_the_built_one(folder, built):
     stored("box", ("20", 1.5), lambda: built)
     found = stored("box", ("20", 1.5), never)
     assert_equal(found, built)
-    # the hull is that of the very points, in whichever order they are found
+    # the hull spans the same points, in any order
     away = found.points_mm @ np.random.default_rng(1).normal(size=(3, 200))
     np.testing.assert_array_equal(away[found.hull].max(axis=0), away.max(axis=0))
 
 
-def test_what_differs_is_built_anew(folder, built, monkeypatch):
+def test_other_arguments_or_other_code_rebuild_the_mesh(folder, built, monkeypatch):
     moved = replace(built, positions_mm=built.positions_mm + np.float32(1))
     stored("box", ("20", 1.5), lambda: built)
     assert_equal(stored("box", ("20", 2.5), lambda: moved), moved)
@@ -54,7 +54,7 @@ def test_what_differs_is_built_anew(folder, built, monkeypatch):
     assert_equal(stored("box", ("20", 1.5), lambda: moved), moved)
 
 
-def test_a_damaged_entry_is_made_again(folder, built):
+def test_a_damaged_cache_entry_is_rebuilt(folder, built):
     stored("box", 1, lambda: built)
     (entry,) = folder.glob("box-*.npz")
     whole = entry.read_bytes()
@@ -63,13 +63,13 @@ def test_a_damaged_entry_is_made_again(folder, built):
     assert entry.read_bytes() == whole
 
 
-def test_nothing_is_needed_of_the_disk(tmp_path, monkeypatch, built):
+def test_an_unusable_cache_folder_is_no_error(tmp_path, monkeypatch, built):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setattr(disk_cache, "default_folder", lambda: tmp_path / "file" / "cache")
     assert_equal(stored("box", 1, lambda: built), built)
 
 
-def test_any_change_of_code_is_other_code(tmp_path, monkeypatch):
+def test_any_change_of_code_or_opencv_changes_the_digest(tmp_path, monkeypatch):
     modules = {name: tmp_path / f"{name}.py" for name in ("cache", "mesh")}
     for path in modules.values():
         path.write_text("a = 1")

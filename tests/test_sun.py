@@ -1,4 +1,4 @@
-"""The suns of an environment, found in it and taken out, against what was put there."""
+"""Directional lights extracted from environments, compared with the lights put there."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ DISC = np.array([9000.0, 8000.0, 6000.0])
 
 
 def sunny(height=512):
-    """A sky that brightens upward and to the sun, and a disc of constant radiance."""
+    """Return a sky that brightens toward a sun disc, its directions, solid angles and disc mask."""
     direction, solid_angle = texel_grid(height)
     sky = 1.0 + 0.5 * direction[..., 2:] + np.exp((direction @ TOWARD - 1)[..., None] / 0.01)
     sky = sky * np.array([0.5, 0.7, 1.0])
@@ -31,7 +31,7 @@ def test_direction_light_and_radius_of_a_known_sun_are_found():
     assert rest.max() < 5
 
 
-def test_sun_and_rest_together_light_surfaces_as_the_whole_does():
+def test_sun_and_remaining_sky_together_give_the_original_irradiance():
     radiance, direction, solid_angle, _ = sunny()
     light = prefilter_environment("sunny", radiance)
     assert len(light.suns) == 1
@@ -63,8 +63,8 @@ def test_lamps_of_a_night_are_found_brightest_first():
     np.testing.assert_allclose(rest, 0.02, rtol=1e-3)
 
 
-def test_of_many_lamps_those_count_that_light_a_side_alone():
-    """Five strong ones stand side by side, a faint one opposite; all light is kept."""
+def test_the_only_lamp_on_one_side_is_extracted_among_many():
+    """Five strong lamps are side by side and a faint one is opposite; no light is lost."""
     turn = np.deg2rad([-40, -20, 0, 20, 40, 180])
     toward = np.stack([np.cos(turn), np.sin(turn), 0.2 + 0 * turn], axis=-1) / np.hypot(1, 0.2)
     strength = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 0.2])[:, None] * np.ones(3)
@@ -87,7 +87,7 @@ def test_suns_come_back_from_the_cache(tmp_path, radiance):
     assert load_environment(file, tmp_path / "cache").suns == first.suns
 
 
-def test_lamps_side_by_side_are_one_sun_and_a_broad_lamp_is_not_cut_up():
+def test_lamps_side_by_side_are_one_sun_and_a_broad_lamp_is_not_split():
     side = np.cross(LAMPS[0], [0.0, 0.0, 1.0])
     two = LAMPS[0] + np.outer([-1, 1], np.tan(np.deg2rad(1.4)) * side / np.linalg.norm(side))
     two /= np.linalg.norm(two, axis=1, keepdims=True)
@@ -100,8 +100,8 @@ def test_lamps_side_by_side_are_one_sun_and_a_broad_lamp_is_not_cut_up():
 
 
 @pytest.mark.parametrize("times", [0.7, 1.4])
-def test_a_lamp_is_a_sun_from_its_share_of_the_light_there_on(times):
-    """Before windows that are brighter and many, and too broad to be one."""
+def test_a_lamp_is_extracted_above_a_share_of_the_light_on_its_side(times):
+    """The other light comes from many brighter windows that are too broad to be extracted."""
     turn = np.deg2rad(np.arange(0, 360, 18))
     windows = np.stack([np.cos(turn), np.sin(turn), 0.2 + 0 * turn], axis=-1) / np.hypot(1, 0.2)
     around = lamps_at_night(windows, np.ones((20, 3)), radius_deg=7.0)
@@ -119,8 +119,8 @@ def test_a_lamp_is_a_sun_from_its_share_of_the_light_there_on(times):
 
 
 @pytest.mark.parametrize("elevation_deg", [3.0, 60.0, 84.0, 88.0])
-def test_a_sun_at_any_height_stands_out_of_the_sky_that_is_around_it(elevation_deg):
-    """Texels crowd near the poles."""
+def test_a_sun_is_found_at_any_elevation(elevation_deg):
+    """Texels of the map are crowded near the poles."""
     up = np.deg2rad(elevation_deg)
     toward = np.array([np.cos(up), 0.0, np.sin(up)])
     radiance = lamps_at_night(toward[None], np.ones((1, 3)))

@@ -1,4 +1,4 @@
-"""The depth map of an environment's suns, against rays and algebra."""
+"""Shadow maps of directional lights, compared with rays and algebra."""
 
 from contextlib import contextmanager
 
@@ -51,15 +51,14 @@ def detailed(gl, detail):
 
 
 def depth_in(shadow):
-    """Its texture, [rows, columns]."""
+    """Return the shadow map's depth texture, float32 [rows, columns]."""
     across = shadow.depth.size[::-1]
     return np.frombuffer(shadow.depth.read(alignment=1), np.float32).reshape(across)
 
 
 @pytest.mark.parametrize("suns", [1, 2, 3, 4])
-def test_shadows_of_the_spreader_are_those_of_rays(detailed, detail, suns):
-    """On all sheets that face a sun, high or low, by itself or one of several: the map says what
-    Embree says."""
+def test_shadows_of_the_spreader_equal_ray_casts(detailed, detail, suns):
+    """All sheets that face a sun are checked, for high and low suns, alone and several at once."""
     ways = [(0.8, -0.58, 0.14), (0.55, -0.6, 0.58), (-0.7, 0.3, 0.4), (0.1, 0.9, 0.2)][:suns]
     ways = np.array(ways) / np.linalg.norm(ways, axis=1, keepdims=True)
     container, spreader = build_container("20"), build_spreader("20")
@@ -70,8 +69,8 @@ def test_shadows_of_the_spreader_are_those_of_rays(detailed, detail, suns):
         check_against_rays(container, spreader, toward, depth, matrix, eye_m, 10 / detail)
 
 
-def test_the_outline_throws_the_shadow_of_the_whole_mesh(shadow):
-    """But for charts that a damage reaches, which it lacks the vertices to follow."""
+def test_the_outline_casts_the_shadow_of_the_whole_mesh(shadow):
+    """Charts that a damage reaches need the whole mesh, as the outline lacks the vertices."""
     toward = np.array([[-0.7, -0.6, 0.4]]) / np.linalg.norm([-0.7, -0.6, 0.4])
     dent = Damage(
         "concave", "front", (0.0, -KINDS["20"].size_mm[1] / 2, 1300.0), (1.0, 0.0, 0.0),
@@ -81,11 +80,11 @@ def test_the_outline_throws_the_shadow_of_the_whole_mesh(shadow):
     depths = []
     for damages, lesser in (((dent,), None), ((dent,), outline), ((), outline)):
         shadow.cast(whole, None, toward, damages, lesser)
-        columns, rows = (shadow.tiles[0, 2:] * shadow.depth.size).astype(int)  # of the first tile
+        columns, rows = (shadow.tiles[0, 2:] * shadow.depth.size).astype(int)  # the first tile
         depths.append(depth_in(shadow)[:rows, :columns].copy())
     spans_mm = 2 / np.linalg.norm(shadow.from_ray(np.zeros(3))[0, 2, :3]) * 500
     apart = np.abs(depths[1] - depths[0]) * spans_mm
-    assert (apart > 5).mean() < 2e-4  # along the edges of facets
+    assert (apart > 5).mean() < 2e-4  # at facet edges
     assert (np.abs(depths[2] - depths[0]) * spans_mm > 20).mean() > 0.01
 
 
@@ -97,13 +96,15 @@ def check_against_rays(container, spreader, toward, depth, matrix, eye_m, texel_
 
 
 def agreement(container, spreader, toward, depth, picked, at, texel_mm):
-    """How often rays to the sun from vertices `picked` say what the map does, looked up `at` places
-    [K, 3], away from a shadow's border."""
+    """Return the share of vertices `picked` whose rays to the sun agree with the map.
+
+    at: places [K, 3] of the vertices in the map. Vertices near a shadow's border do not count.
+    """
     points = probe_points(container)[picked]
     column, row = (at[:, :2] * depth.shape[::-1]).astype(int).T
     found = at[:, 2] <= depth[row, column]
 
-    # around each point too: within a texel of a shadow's border the map may say either
+    # rays around each point find shadow borders: within a texel of one the map may say either
     aside = np.cross(container.normals[picked], toward)
     steps = (aside, np.cross(container.normals[picked], aside))
     around = [np.zeros(3), *(sign * texel_mm * step for sign in (-1, 1) for step in steps)]
@@ -118,7 +119,7 @@ def agreement(container, spreader, toward, depth, picked, at, texel_mm):
         body = trimesh.Trimesh(mesh.positions_mm, triangles, process=False)
         free &= ~RayMeshIntersector(body).intersects_any(rays, np.tile(toward, (len(rays), 1)))
     free = free.reshape(len(around), -1)
-    # what lies within another part is seen by nobody
+    # vertices buried in another part are never visible
     body = trimesh.Trimesh(container.positions_mm, container.triangles.astype(np.int64))
     buried = RayMeshIntersector(body).intersects_any(points, container.normals[picked])
     clear = (free == free[0]).all(axis=0) & ~buried
@@ -129,8 +130,8 @@ def agreement(container, spreader, toward, depth, picked, at, texel_mm):
 @pytest.mark.parametrize(
     "toward", [(0.75, -0.6, 0.2), (0.3, 0.4, 0.8), (0.9, 0.3, 0.3), (-0.6, -0.75, 0.25)]
 )
-def test_shadows_on_an_end_are_those_of_rays(detailed, detail, toward):
-    """To four millimetres, or eight, in the tile that the end has for itself."""
+def test_shadows_on_an_end_equal_ray_casts(detailed, detail, toward):
+    """The end's own tile is accurate to 4 mm, or to 8 mm at half detail."""
     toward = np.array(toward) / np.linalg.norm(toward)
     container, spreader = build_container("40"), build_spreader("40")
     detailed.cast(container, without_cables(spreader), toward[None])
@@ -147,8 +148,8 @@ def test_shadows_on_an_end_are_those_of_rays(detailed, detail, toward):
     assert found > 0.98
 
 
-def test_a_dent_shades_itself_as_rays_say(shadow):
-    """Under a raking sun, half of a deep dent lies in the shade of the other."""
+def test_a_dents_shadow_on_itself_equals_ray_casts(shadow):
+    """Under a raking sun, half of a deep dent lies in the shadow of the other half."""
     toward = np.array([0.93, -0.3, 0.2]) / np.linalg.norm([0.93, -0.3, 0.2])
     container = build_container("20")
     half_width = KINDS["20"].size_mm[1] / 2
@@ -188,7 +189,7 @@ def test_a_dent_shades_itself_as_rays_say(shadow):
 
 @pytest.mark.parametrize(("across_mm", "depth_mm"), [(1200.0, 260.0), (20000.0, 900.0)])
 def test_a_door_pushed_in_deep_is_lit(shadow, across_mm, depth_mm):
-    """Deeper than front faces are sunk, or the whole end: nothing stands before what is left."""
+    """The dent is deeper than the map shifts front faces, or it moves the whole end."""
     container = build_container("20")
     half_length = KINDS["20"].size_mm[0] / 2
     dent = Damage(
@@ -207,7 +208,7 @@ def test_a_door_pushed_in_deep_is_lit(shadow, across_mm, depth_mm):
     assert depth.min() < 1.0
 
 
-def test_the_tile_of_an_end_is_for_suns_before_it(shadow):
+def test_only_a_sun_that_faces_an_end_gets_the_ends_tile(shadow):
     container = build_container("20")
     for x, there in ((0.6, True), (0.0, False), (-0.6, True)):
         shadow.cast(container, None, np.array([[x, -0.8, 0.6]]) / np.hypot(x, 1.0))
@@ -216,7 +217,7 @@ def test_the_tile_of_an_end_is_for_suns_before_it(shadow):
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)])
-def test_a_sun_along_an_axis_lights_what_is_outermost(shadow, axis):
+def test_a_sun_along_an_axis_lights_the_outermost_surface(shadow, axis):
     container = build_container("20")
     shadow.cast(container, None, np.array([axis]))
     depth = depth_in(shadow)
@@ -230,8 +231,8 @@ def test_a_sun_along_an_axis_lights_what_is_outermost(shadow, axis):
 
 
 @pytest.mark.parametrize("toward", [(0.95, 0.25, 0.12), (0.35, 0.9, 0.25), (-0.3, -0.8, 0.5)])
-def test_what_has_the_container_before_the_sun_lies_in_its_shade(shadow, toward):
-    """A millimetre off the surface too, in every crease of rails, posts and walls."""
+def test_points_behind_the_container_lie_in_its_shadow(shadow, toward):
+    """Points lie a millimetre off the surface, in every crease of rails, posts and walls."""
     toward = np.array(toward) / np.linalg.norm(toward)
     container = build_container("20")
     shadow.cast(container, None, toward[None])

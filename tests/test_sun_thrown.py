@@ -1,4 +1,4 @@
-"""Light that the sun throws from one part of a container on another, against rays."""
+"""Indirect sunlight between parts of a container, compared with ray casts."""
 
 from dataclasses import replace
 
@@ -22,14 +22,16 @@ EVEN = {**EVEN_PAINT, "colors": {"grey": "#bcbcbc"}, "roughness": 1.0}
 
 @pytest.fixture(scope="module", params=[(0.7, 0.5, 0.5), (0.6, -0.75, 0.3)], ids=["right", "left"])
 def recess(request, tmp_path_factory):
-    """Of pixels of faces about a door's leaf that no sun meets, under a sky that is black but for
-    it: what an image shows of each, and what light that comes over one other surface would show."""
+    """Rendered and expected colours [N, 3] of shaded pixels around a door leaf.
+
+    The sky is black except for one sun. The expected colours are one-bounce light found by rays.
+    """
     toward = np.array(request.param) / np.linalg.norm(request.param)
     folder = tmp_path_factory.mktemp("skies")
     write_exr(folder / "sun.exr", one_light(toward, 1e6, 512) + np.float32(1e-3))
     config = Config.from_values({"surface": EVEN, "damage": {"probability": 0}})
     with pytest.MonkeyPatch.context() as patch:
-        # rays go through pixel centres: each pixel is shaded there, by itself
+        # rays go through pixel centres, so each pixel must be shaded individually there
         single = QUALITY["draft"]._replace(coarse=False)
         patch.setitem(QUALITY, "draft", single)
         made = Generator(config, 3, (240, 240), "auto", folder, "draft")
@@ -49,7 +51,7 @@ def recess(request, tmp_path_factory):
     plain = np.char.startswith(names, "door") | np.char.startswith(names, "post.door")
     plain &= np.isin(paint, ["paint_sheet", "paint_frame"])
     flat = mesh.normals[mesh.triangles[:, 0]].astype(float)
-    # faces beside the leaf, for which it is the wall that hides the sky
+    # faces beside the leaf; the leaf is the wall that hides their sky
     plain &= np.abs(flat[:, 0]) < 0.7
     seen = plain[hits.triangle] & (hits.triangle >= 0)
 
@@ -65,12 +67,12 @@ def recess(request, tmp_path_factory):
     def in_shade(places):
         return body.intersects_any(places, np.tile(toward, (len(places), 1)))
 
-    # well within the shade
+    # keep only points well within the shadow
     steps = 20.0 * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
     dark = np.all([in_shade(points + step) for step in steps], axis=0) | (normals @ toward < -0.1)
     chosen = np.flatnonzero(dark)[:: max(1, dark.sum() // 500)]
     points, normals = points[chosen], normals[chosen]
-    # cosine-weighted: a point of the unit sphere about the normal's end
+    # cosine-weighted directions: points on a unit sphere around the normal's tip
     rng = np.random.default_rng(0)
     around = rng.normal(size=(len(points), RAYS, 3))
     around /= np.linalg.norm(around, axis=2, keepdims=True)
@@ -89,8 +91,8 @@ def recess(request, tmp_path_factory):
     return sample.image[seen][chosen] / 255, expected
 
 
-def test_what_the_sun_throws_on_faces_in_the_shade_is_as_bright_as_rays_find(recess):
-    """To a factor of two in what is displayed: walls are taken for endless and for lit all over."""
+def test_indirect_sunlight_on_shaded_faces_is_close_to_ray_casts(recess):
+    """Displayed values agree within a factor of two, as walls count as endless and fully lit."""
     found, expected = (colors.mean(axis=1) for colors in recess)
     assert len(found) > 150
     assert 0.8 < found.mean() / expected.mean() < 2.0

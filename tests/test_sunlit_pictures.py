@@ -1,4 +1,4 @@
-"""Pictures under suns and lamps: where their light falls, and where it must not."""
+"""Pictures under suns and lamps: places where their light must and must not fall."""
 
 from dataclasses import replace
 
@@ -18,12 +18,12 @@ from tests.sky_samples import lamps_at_night, one_light
 from tests.test_environment import write_exr
 
 GREY = np.full((512, 1024, 3), 0.2, np.float32)
-"""An even sky for suns to stand in."""
+"""An even sky to which suns are added."""
 
 
 @pytest.mark.parametrize(("camera", "x"), [("Cr", 0.75), ("Cl", -0.75)])
-def test_pictures_of_an_end_ask_its_own_tile(tmp_path, camera, x):
-    """Shadows of bars and ribs have finer edges there, and lie where the other tile has them."""
+def test_pictures_of_an_end_use_its_own_shadow_tile(tmp_path, camera, x):
+    """Shadows of bars and ribs have finer edges in that tile, at the same places."""
     toward = np.array([x, -0.6, 0.2])
     write_exr(tmp_path / "low.exr", GREY + one_light(toward / np.linalg.norm(toward), 3e5, 512))
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
@@ -39,7 +39,7 @@ def test_pictures_of_an_end_ask_its_own_tile(tmp_path, camera, x):
 
 
 def test_no_sunlight_leaks_through_a_wall(tmp_path):
-    """The grooves of a wall that is turned away lie centimetres behind what the map holds."""
+    """Grooves of a wall that faces away from the sun lie centimetres behind the mapped surface."""
     toward = np.array([0.95, 0.25, 0.12])
     write_exr(tmp_path / "behind.exr", GREY + one_light(toward, 3e5, 512))
     with Generator(seed=1, size=(640, 640), hdri_dir=tmp_path) as generator:
@@ -65,8 +65,10 @@ def test_no_sunlight_leaks_through_a_wall(tmp_path):
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_no_sunlight_leaks_along_a_post(tmp_path, side):
-    """Nothing of the end that faces away from a low sun, almost along the axis, is in its light;
-    flanks of its posts would be but for what is thick behind them. Deep dents in both sides."""
+    """No part of an end that faces away from a low sun, almost along the axis, is sunlit.
+
+    Flanks of its posts would be, without the thick parts behind them. Both sides have deep dents.
+    """
     toward = np.array([-0.982, side * 0.053, 0.183])
     write_exr(tmp_path / "low.exr", GREY + one_light(toward, 3e5, 512))
     length, width, height = KINDS["20"].size_mm
@@ -92,8 +94,8 @@ def test_no_sunlight_leaks_along_a_post(tmp_path, side):
 
 
 @pytest.mark.parametrize("quality", ["balanced", "high"])
-def test_shadows_fall_where_they_do_without_antialiasing(quality):
-    """Away from edges; looked up beside their place they would move by up to half the image."""
+def test_antialiasing_does_not_move_shadows(quality):
+    """Away from edges; a lookup at the wrong place would move shadows by up to half the image."""
     config = Config.from_values(
         {
             "environment": {"names": ["park"]},
@@ -113,9 +115,11 @@ def test_shadows_fall_where_they_do_without_antialiasing(quality):
 
 
 @pytest.mark.parametrize("others", [0, 1, 3])
-def test_edges_of_shadows_have_no_teeth(tmp_path, others):
-    """A flipper's straight edge throws a straight one on the end beam, at 2 mm a pixel, and so it
-    does where fainter lamps stand behind the container."""
+def test_shadow_edges_are_not_jagged(tmp_path, others):
+    """A flipper's straight edge casts a straight shadow on the end beam, at 2 mm per pixel.
+
+    Fainter lamps behind the container do not change that.
+    """
     toward = np.array([[0.3, -0.75, 0.6], [-0.9, 0.3, 0.1], [-0.9, -0.3, 0.3], [-0.5, 0.8, 0.2]])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     lights = [one_light(way, 1e5 if k == 0 else 5e3, 512) for k, way in enumerate(toward)]
@@ -138,7 +142,7 @@ def test_edges_of_shadows_have_no_teeth(tmp_path, others):
     strip = image[60:155, 100:180].astype(float).sum(axis=2)
     shade, light = strip[:, :20].mean(axis=1), strip[:, -20:].mean(axis=1)
     assert (light > 1.3 * shade).all()
-    # how many columns of each row lie in the shade
+    # number of shaded columns in each row
     ends = ((light[:, None] - strip) / (light - shade)[:, None]).sum(axis=1)
     rows = np.arange(len(ends))
     apart = ends - np.polyval(np.polyfit(rows, ends, 1), rows)
@@ -152,14 +156,14 @@ LIGHTS = np.array([1.0, 0.6, 0.8, 0.7])[:, None] * np.ones(3)
 
 @pytest.fixture
 def by_night(tmp_path, monkeypatch):
-    """(generator, function of the names of lamps of LAMPS): the scene under these alone."""
+    """Generator, and a function that returns the scene under only the named lamps of LAMPS."""
     surface = {**EVEN_PAINT, "colors": {"grey": "#808080"}, "roughness": 0.9}
     config = Config.from_values({"surface": surface, "damage": {"probability": 0}})
     for name in ("0", "1", "2", "3", "012", "0123"):
         on = [int(digit) for digit in name]
         sky = lamps_at_night(LAMPS[on], LIGHTS[on]) - np.float32(0.0199)
         write_exr(tmp_path / f"{name}.exr", sky)
-    # a sample a pixel, each shaded by itself
+    # one sample per pixel, shaded individually
     monkeypatch.setitem(QUALITY, "draft", Quality(1, 1))
     with Generator(config, 1, (240, 240), "auto", tmp_path, "draft") as generator:
         scene = replace(
@@ -171,14 +175,14 @@ def by_night(tmp_path, monkeypatch):
 
 
 def above_the_spreader(container):
-    """A camera that looks closely at the hoist cables, which reach over the map."""
+    """Return a camera close to the hoist cables, which extend beyond the shadow map."""
     top = KINDS[container.kind].size_mm[2]
     return Camera("cables", (12000.0, -4000.0, top + 7000.0), (0.0, 0.0, top + 6500.0), 500.0)
 
 
 @pytest.mark.parametrize("view", ["Cr", "cables"])
 def test_light_of_several_lamps_adds_up(by_night, view):
-    """What an image shows under all of them is the sum of what each shows by itself."""
+    """The light in an image under all lamps is the sum of the light under each one."""
     generator, scene_under = by_night
     light, inside, edges = {}, np.ones((240, 240), bool), np.zeros((240, 240), bool)
     for name in ("0123", "0", "1", "2", "3"):
@@ -190,10 +194,10 @@ def test_light_of_several_lamps_adds_up(by_night, view):
         inside &= (sample.ids == (CONTAINER_ID if view == "Cr" else SPREADER_ID)) & (
             sample.image.max(axis=2) < 230
         )
-        # those that a cable covers in part are not shaded by themselves
+        # pixels that a cable partly covers are not shaded individually
         inside &= sample.cover == 255
         if name != "0123":
-            # the brightest sun's shadow is filtered, others' are not
+            # only the brightest sun's shadow is filtered
             around = [f(light[name], np.ones((3, 3))) for f in (cv2.dilate, cv2.erode)]
             edges |= around[0] - around[1] > 0.1
     if view == "Cr":
@@ -201,12 +205,12 @@ def test_light_of_several_lamps_adds_up(by_night, view):
     together, apart = light["0123"][inside], sum(light[name][inside] for name in "0123")
     assert inside.sum() > (5000 if view == "Cr" else 1000)
     assert all((light[name][inside] > 0.02).mean() > 0.1 for name in "0123")
-    # in steps of 255, of which the sum has four times as many
+    # 8-bit rounding: the sum of four images has the error of four
     assert np.percentile(np.abs(together - apart), 90) < 0.015 * apart.mean()
     assert abs(together.mean() / apart.mean() - 1) < 0.003
 
 
-def test_images_do_not_depend_on_the_lamps_of_the_one_before(by_night):
+def test_images_do_not_depend_on_the_lamps_of_earlier_images(by_night):
     generator, scene_under = by_night
     camera = above_the_spreader(scene_under("0").container)
     shown = {}

@@ -1,4 +1,4 @@
-"""Values for the shader's blocks, against what the shader makes of them."""
+"""Surface values for the uniform blocks, compared with the shader's results."""
 
 from dataclasses import replace
 
@@ -14,8 +14,8 @@ from fastgen.srgb import DECODED
 
 
 @pytest.mark.parametrize("rust", [0.0, 0.12, 0.2])
-def test_mean_albedo_under_rust_is_that_of_baked_textures(rust):
-    """Of the roof, the frame, castings and the spreader."""
+def test_mean_albedo_under_rust_equals_baked_textures(rust):
+    """Checked on the roof, the frame, castings, the spreader and its cables."""
     config = Config.from_values(
         {
             "damage": {"probability": 0.0},
@@ -56,7 +56,7 @@ def test_mean_albedo_under_rust_is_that_of_baked_textures(rust):
         )
 
 
-def test_what_is_reflected_is_albedo_and_a_few_percent_mirrored_before_it():
+def test_reflectance_is_albedo_plus_a_few_percent_specular():
     with Generator(seed=3, size=(64, 64)) as generator:
         scene = generator.scene(index=1)
         meshes = (generator._gpu.renderer().mesh(scene.container),)
@@ -70,7 +70,7 @@ def test_what_is_reflected_is_albedo_and_a_few_percent_mirrored_before_it():
 
 
 def points_on(mesh, chosen, count=20000):
-    """Points [N, 2] in the atlas, in mm, spread evenly over triangles `chosen` [T] of a mesh."""
+    """Return atlas points [N, 2] in mm, spread evenly over the triangles `chosen` [T]."""
     rng = np.random.default_rng(1)
     corners = mesh.positions_mm[mesh.triangles[chosen]].astype(float)
     sides = corners[:, 1:] - corners[:, :1]

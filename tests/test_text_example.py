@@ -1,4 +1,4 @@
-"""The example that reads identifiers: how crops become strips and letters, how reads are scored."""
+"""The example that reads identifiers: strips and letters from crops, and scores of reads."""
 
 from functools import cache
 
@@ -13,7 +13,7 @@ from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import layout
 
 
-def test_edit_distance_is_the_shortest_of_all_ways():
+def test_edit_distance_equals_exhaustive_search():
     @cache
     def shortest(a, b):
         if not a or not b:
@@ -28,7 +28,7 @@ def test_edit_distance_is_the_shortest_of_all_ways():
         assert text.edit_distance(a, b) == shortest(a, b)
 
 
-def test_reads_are_scored_without_their_blanks_and_by_their_check_digit():
+def test_reads_are_scored_without_blanks_and_by_check_digit():
     truth = ["CSQU305438 3 22G1", "CSQU3054383 22G1", "CSQU3054383 22G1"]
     read = ["CSQU305438322G1", "CSQU305438422G1", "CSQU305438322G"]
     found = text.measured(truth, read)
@@ -68,12 +68,12 @@ def test_slanted_rows_become_level(slant):
     ink = straightened(grey) < 110
     rows = np.flatnonzero(ink.any(axis=1))
     between = np.diff(rows).max()
-    assert between > 8  # a free band across the whole width
+    assert between > 8  # an empty band across the whole width
     assert strip(torch.from_numpy(np.repeat(grey[None], 3, axis=0))).shape == (1, 24, 400)
 
 
 def columns_of(lines, cap=24):
-    """Black on white, each line a column of letters at the pitch of identifiers."""
+    """Draw each line as a column of black letters on white, at the pitch of identifiers."""
     pitch, apart = 1.35 * cap, round(1.6 * cap)
     shape = (round(pitch * 10) + cap + 80, apart * (len(lines) - 1) + cap + 80)
     grey = np.full(shape, 255, np.uint8)
@@ -104,7 +104,7 @@ def test_letters_of_leaning_columns_come_upright_and_in_order(lean, slant):
         picture = 255 - letter[0].numpy().astype(np.float32)
         scores = {}
         for char, ink in known.items():
-            # as large as a capital of 1.62 caps' height
+            # letter images are 1.62 caps high: a pitch of 1.35 and a tenth on each side
             scaled = cv2.resize(ink, None, fx=0.65, fy=0.65, interpolation=cv2.INTER_AREA)
             scores[char] = cv2.matchTemplate(picture, scaled, cv2.TM_CCOEFF_NORMED).max()
         return max(scores, key=scores.get)
@@ -114,11 +114,11 @@ def test_letters_of_leaning_columns_come_upright_and_in_order(lean, slant):
 
 @pytest.mark.parametrize("columns", [1, 2])
 @pytest.mark.parametrize("ratio", [0.8, 1.0, 1.25])
-def test_letters_of_a_column_seen_in_perspective_are_cut_between(columns, ratio):
+def test_a_column_in_perspective_is_cut_between_its_letters(columns, ratio):
     count = 15 if columns == 1 else 11
     first = np.arange(count) * 1.35 + 0.6 * (np.arange(count) >= 11)
     share = np.stack([first, first + 1], axis=1) / (first[-1] + 1)
-    # a line between two ends whose distances from the camera are at this ratio
+    # perspective image of a line; `ratio` is that of its ends' distances from the camera
     ink = 3 + 300 * share * ratio / (1 - share + share * ratio)
     column = np.full((306, 20), 200, np.uint8)
     for low, high in np.round(ink).astype(int):

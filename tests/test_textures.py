@@ -1,4 +1,4 @@
-"""Textures hold what they are given."""
+"""Contents of data textures."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from fastgen.render.textures import data_texture
 
 @pytest.mark.parametrize("dtype", [np.float32, np.uint32])
 @pytest.mark.parametrize("shape", [(1, 1, 4), (2, 143, 4), (32, 5, 4), (33, 64, 2)])
-def test_data_textures_hold_their_values_and_zeros_up_to_powers_of_two(shape, dtype):
+def test_data_textures_are_padded_with_zeros_to_powers_of_two(shape, dtype):
     values = np.random.default_rng(5).integers(1, 1 << 20, shape).astype(dtype)
     with open_context() as gl:
         texture = data_texture(gl.ctx, values)

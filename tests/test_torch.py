@@ -1,4 +1,4 @@
-"""What a model is fed, when: every position once, in order, resumable, and the bytes of renders."""
+"""Datasets and loaders: every position once, in order, resumable, with the bytes of renders."""
 
 import itertools
 import multiprocessing
@@ -41,7 +41,7 @@ def test_torchvision_is_not_needed():
 
 @pytest.fixture
 def bare(monkeypatch):
-    """Items are (epoch, position) in place of renders; forked workers see it too."""
+    """Replace rendered items with (epoch, position), in forked workers too."""
     monkeypatch.setattr(
         ContainerDataset,
         "item",
@@ -50,7 +50,7 @@ def bare(monkeypatch):
 
 
 def seen(loader):
-    """Positions in the order in which batches bring them."""
+    """Return the positions in the order in which batches deliver them."""
     return [position for batch in loader for position in batch[1]]
 
 
@@ -63,7 +63,7 @@ def stream(length=23, **options):
 
 
 @pytest.mark.parametrize("stop", [1, 2, 5, 24, 37])
-def test_ranks_and_workers_part_every_range_without_gap_or_overlap(stop):
+def test_ranks_and_workers_divide_every_range_without_gap_or_overlap(stop):
     for world, workers, block in itertools.product((1, 2, 3, 5), (1, 2, 4), (1, 3)):
         for start in (0, 1, 7):
             found = [
@@ -78,7 +78,7 @@ def test_ranks_and_workers_part_every_range_without_gap_or_overlap(stop):
 @pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("kind", ["dataset", "stream"])
 @pytest.mark.parametrize("workers", [0, 1, 2])
-def test_ranks_of_real_loaders_bring_each_position_once(kind, workers):
+def test_ranks_of_real_loaders_deliver_each_position_once(kind, workers):
     found = []
     for rank in range(3):
         part = {"rank": rank, "world_size": 3}
@@ -93,14 +93,14 @@ def test_ranks_of_real_loaders_bring_each_position_once(kind, workers):
 
 
 @pytest.mark.usefixtures("bare")
-def test_a_stream_keeps_its_order_whatever_the_number_of_workers():
+def test_a_streams_order_does_not_depend_on_the_number_of_workers():
     for workers in (0, 1, 2):
         loader = Loader(stream(), batch_size=4, num_workers=workers)
         assert seen(loader) == list(range(23))
 
 
 @pytest.mark.usefixtures("bare")
-def test_a_plain_dataloader_brings_each_position_of_a_stream_once():
+def test_a_plain_dataloader_delivers_each_position_of_a_stream_once():
     loader = DataLoader(stream(), batch_size=3, num_workers=2, collate_fn=collate_lists)
     assert sorted(seen(loader)) == list(range(23))
 
@@ -108,7 +108,7 @@ def test_a_plain_dataloader_brings_each_position_of_a_stream_once():
 @pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("make", [dataset, stream])
 @pytest.mark.parametrize("workers", [0, 2])
-def test_a_resumed_loader_goes_on_with_the_next_sample(make, workers):
+def test_a_resumed_loader_continues_with_the_next_sample(make, workers):
     options = {"num_workers": workers, "shuffle": make is dataset}
 
     def loader():
@@ -124,9 +124,9 @@ def test_a_resumed_loader_goes_on_with_the_next_sample(make, workers):
         state = pickle.loads(pickle.dumps(first.state_dict()))
         second = Loader(make(), batch_size=5, **options)
         second.load_state_dict(state)
-        second.set_epoch(2)  # as a training loop over epochs says it again
+        second.set_epoch(2)  # a training loop sets the epoch again
         assert begun + seen(second) == whole
-        assert seen(second) == whole  # the next pass is a whole one
+        assert seen(second) == whole  # the next pass is complete
 
 
 @pytest.mark.usefixtures("bare")
@@ -156,7 +156,7 @@ def test_the_end_of_an_epoch_resumes_to_nothing_and_the_next_epoch_is_whole():
 
 @pytest.mark.usefixtures("bare")
 @pytest.mark.parametrize("make", [dataset, stream])
-def test_workers_that_persist_see_the_epoch_and_the_place(make):
+def test_persistent_workers_see_the_epoch_and_the_position(make):
     loader = Loader(make(), batch_size=4, **PERSISTENT)
     for epoch in (0, 1, 5):
         loader.set_epoch(epoch)
@@ -168,13 +168,13 @@ def test_workers_that_persist_see_the_epoch_and_the_place(make):
     assert {value for batch in batches for value in batch[0]} == {7}
     assert [p for batch in batches for p in batch[1]] == list(range(9, 23))
     for _ in loader:
-        break  # leaves batches that workers have fetched ahead
+        break  # leaves prefetched batches in the workers
     loader.set_epoch(8)
     assert [value for batch in loader for value in batch[0]] == [8] * 23
 
 
 @pytest.mark.usefixtures("bare")
-def test_an_endless_stream_goes_on_and_resumes():
+def test_an_endless_stream_continues_and_resumes():
     loader = Loader(stream(length=None), batch_size=5, num_workers=2)
     batches = iter(loader)
     assert [p for _ in range(9) for p in next(batches)[1]] == list(range(45))
@@ -230,7 +230,7 @@ def test_each_epoch_has_new_scenes_unless_fixed():
     assert [still.locate(p, 5) for p in range(23)] == places[0]
 
 
-def test_splits_are_those_that_generate_deals_out():
+def test_splits_equal_those_of_generate():
     config = Config.preset()
     by_split = {
         split: [dataset(split=split, cameras=["B"]).locate(p, 0)[0] for p in range(20)]
@@ -245,7 +245,7 @@ def test_splits_are_those_that_generate_deals_out():
         assert later >= 2 * EPOCH_SCENES
 
 
-def test_one_view_a_scene_takes_the_cameras_in_turn():
+def test_one_view_per_scene_takes_the_cameras_in_turn():
     one = dataset(all_views=False, cameras=["A", "Cr"])
     assert [one.locate(p) for p in range(4)] == [(0, "A"), (1, "Cr"), (2, "A"), (3, "Cr")]
 
@@ -264,7 +264,7 @@ def test_a_curriculum_sets_the_chance_of_damage_by_epoch():
     data.close()
 
 
-def test_a_curriculum_sets_what_is_too_little_to_train_on_by_epoch():
+def test_a_curriculum_sets_the_label_thresholds_by_epoch():
     data = ContainerDataset(
         "imdg",
         size=SMALL,
@@ -280,7 +280,7 @@ def test_a_curriculum_sets_what_is_too_little_to_train_on_by_epoch():
 
 @pytest.fixture(scope="module")
 def renders():
-    """Images [3, H, W] of the first six positions, by Generator in this process."""
+    """Images [3, H, W] of the first six positions, rendered by a Generator in this process."""
     with Generator(seed=4, size=SMALL) as generator:
         cameras = list(generator.config.cameras)
         images = [generator.render(index=p // 4, camera=cameras[p % 4]).image for p in range(6)]
@@ -290,7 +290,7 @@ def renders():
 @pytest.mark.parametrize(("context", "workers"), [(None, 0), ("fork", 2), ("spawn", 1)])
 def test_images_equal_plain_renders_after_gl_was_opened_here(renders, context, workers):
     data = dataset(length=6)
-    np.testing.assert_array_equal(data[0][0].numpy(), renders[0])  # this process has GL open now
+    np.testing.assert_array_equal(data[0][0].numpy(), renders[0])  # opens GL in this process
     loader = Loader(data, batch_size=2, num_workers=workers, multiprocessing_context=context)
     images = [image for batch in loader for image in batch[0]]
     assert len(images) == 6

@@ -1,4 +1,4 @@
-"""What datasets and loaders refuse: bad arguments, and states that are not theirs."""
+"""Bad arguments and foreign states that datasets and loaders refuse."""
 
 import json
 
@@ -61,7 +61,7 @@ def test_bad_arguments_are_named(arguments, words):
 
 def test_the_last_epoch_has_scenes_and_the_next_is_refused():
     data = dataset()
-    last = (2**63 - 1 - 10**9) // 10**9  # e times a thousand million, and as many scenes more
+    last = (2**63 - 1 - 10**9) // 10**9  # epoch e has scenes e x 10^9 to (e + 1) x 10^9
     for epoch in (last, np.int64(last)):
         data.set_epoch(epoch)
         assert data.locate(0)[0] == last * 10**9
@@ -98,26 +98,26 @@ def picture(path, level):
     assert cv2.imwrite(str(path), radiance)
 
 
-def test_a_state_fits_loaders_of_the_same_light_alone(tmp_path):
+def test_a_state_fits_only_loaders_with_the_same_hdris(tmp_path):
     folders = [tmp_path / name for name in ("one", "moved", "other")]
     for folder, level in zip(folders, (0.5, 0.5, 0.7), strict=True):
         folder.mkdir()
         picture(folder / "sky.hdr", level)
     one, moved, other = (Loader(dataset(hdri_dir=folder)) for folder in folders)
     state = json.loads(json.dumps(one.state_dict()))
-    moved.load_state_dict(state)  # another path, but the same bytes
+    moved.load_state_dict(state)  # another path with the same bytes
     for loader in (other, Loader(dataset())):
         with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
             loader.load_state_dict(state)
 
 
-def test_a_state_fits_no_loader_that_draws_the_same_light_more_often():
+def test_a_state_does_not_fit_a_loader_with_other_hdri_weights():
     shipped = next(iter(bundled_hdris().values())).parent
     with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
         Loader(dataset(hdri_dir=shipped)).load_state_dict(Loader(dataset()).state_dict())
 
 
-def test_a_state_fits_loaders_whose_curriculum_teaches_the_same():
+def test_a_state_fits_only_loaders_with_an_equal_curriculum():
     def rarer(epoch):
         return {"damage": {"probability": 1.0 / (1 + epoch)}}
 
@@ -133,7 +133,7 @@ def test_a_state_fits_loaders_whose_curriculum_teaches_the_same():
         lambda epoch: rarer(epoch + 1),
         lambda epoch: rarer(0 if epoch == 1 else epoch),
         lambda epoch: rarer(min(epoch, 3)),
-        lambda epoch: [rarer(0), rarer(1)][epoch],  # has no epoch 5
+        lambda epoch: [rarer(0), rarer(1)][epoch],  # fails at epoch 5
     ):
         with pytest.raises(ConfigError, match="state: was taken with another curriculum"):
             taught(other).load_state_dict(state)
@@ -150,7 +150,7 @@ def test_a_state_fits_loaders_whose_curriculum_teaches_the_same():
         ({"epoch": None}, "state.epoch: None is not a whole number"),
     ],
 )
-def test_a_state_of_no_place_is_refused_and_changes_nothing(change, words):
+def test_an_invalid_state_is_refused_and_changes_nothing(change, words):
     loader = Loader(dataset())
     loader.set_epoch(2)
     state = loader.state_dict()

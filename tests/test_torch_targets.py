@@ -1,4 +1,4 @@
-"""Targets of each task as the files of `fastgen generate` say, and class counts as rendered."""
+"""Targets of each task compared with generated files, and class counts with renders."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ SMALL = (64, 64)
 
 
 def view(task, position=0, size=(320, 320), **options):
-    """A dataset's item, and the Sample that it comes from."""
+    """Return a dataset's item and the Sample it was made from."""
     data = ContainerDataset(task, seed=2, size=size, length=40, **options)
     made = data[position], data.sample(position)
     data.close()
@@ -32,7 +32,7 @@ def view(task, position=0, size=(320, 320), **options):
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Files of one image of 640x640 that `fastgen generate` would leave, and its Sample."""
+    """Folder with the files of one 640x640 image, as `fastgen generate` writes them."""
     out = tmp_path_factory.mktemp("written")
     with Generator(seed=2, size=(640, 640)) as generator:
         sample = generator.render(index=1, camera="Cr")
@@ -47,7 +47,7 @@ def _damaged():
     return view("damage", position=4, config=config)
 
 
-def test_damage_boxes_and_areas_are_those_of_their_masks():
+def test_damage_boxes_and_areas_match_their_masks():
     (image, target), sample = _damaged()
     assert image.shape == (3, 320, 320)
     masks = target["masks"].numpy()
@@ -66,7 +66,7 @@ def test_damage_boxes_and_areas_are_those_of_their_masks():
     assert target["iscrowd"].tolist() == [0] * len(masks)
 
 
-def test_an_image_without_anything_has_empty_targets_of_the_right_shape():
+def test_an_empty_image_has_empty_targets_of_the_right_shape():
     rig = {"face": "front", "focal_mm": 2000, "distance_mm": 1e5, "target_shift_mm": 1e4}
     away = Config.from_values({"cameras": {"A": rig}})
     (_, target), _ = view("damage", size=SMALL, config=away)
@@ -77,7 +77,7 @@ def test_an_image_without_anything_has_empty_targets_of_the_right_shape():
     assert collate_yolo([(image, rows), (image, rows)])[1].shape == (0, 6)
 
 
-def test_marker_targets_of_both_forms_are_what_the_label_file_says(written):
+def test_marker_targets_of_both_forms_equal_the_label_file(written):
     lines = (written / "imdg/labels/train/000001_Cr.txt").read_text().splitlines()
     file = np.array([[float(v) for v in line.split()] for line in lines])
     (_, rows), _ = view("imdg", position=7, size=(640, 640), form="yolo")
@@ -101,7 +101,7 @@ def test_yolo_batches_name_the_image_of_each_row():
         assert torch.equal(rows[rows[:, 0] == number, 1:], target)
 
 
-def test_text_crops_are_the_files_and_their_strings(written):
+def test_text_crops_and_strings_equal_the_files(written):
     lines = sorted((written / "text/train").glob("*.png"), key=lambda p: int(p.stem.split("_")[2]))
     data = ContainerDataset("text", seed=2, size=(640, 640), length=40)
     position = 7
@@ -115,7 +115,7 @@ def test_text_crops_are_the_files_and_their_strings(written):
         assert text == by_instance[int(path.stem.split("_")[2])]
 
 
-def test_door_labels_are_an_image_folders(written):
+def test_door_labels_equal_those_of_an_image_folder(written):
     folders = sorted(p.name for p in (written / "door/train").iterdir())
     data = ContainerDataset("door", seed=2, size=SMALL, length=4)
     labels = {data.locate(p)[1]: data[p][1] for p in range(4)}
@@ -139,7 +139,7 @@ def test_transforms_get_image_and_target_and_floats_lie_in_0_to_1():
     np.testing.assert_allclose(image.numpy() * 255, plain.flip(-1).numpy(), atol=1e-4)
 
 
-def test_counts_without_gl_come_near_those_of_rendered_labels():
+def test_counts_without_gl_are_close_to_rendered_labels():
     data = ContainerDataset("imdg", seed=6, length=24, form="yolo")
     rendered = np.zeros(len(DETECTION_CLASSES))
     for position in range(24):
@@ -151,7 +151,7 @@ def test_counts_without_gl_come_near_those_of_rendered_labels():
     assert np.abs(counted - rendered)[2:].max() <= 2
 
 
-def test_damage_counts_without_gl_come_near_those_of_rendered_masks():
+def test_damage_counts_without_gl_are_close_to_rendered_masks():
     config = Config.from_values({"damage": {"probability": 1.0}})
     data = ContainerDataset("damage", config, seed=6, size=(320, 320), length=80, form="yolo")
     rendered = np.zeros(len(SEGMENTATION_CLASSES))
@@ -163,14 +163,14 @@ def test_damage_counts_without_gl_come_near_those_of_rendered_masks():
     assert abs(counted.sum() - rendered.sum()) < 0.15 * (rendered.sum() - 80)
 
 
-def test_weights_even_the_classes_out():
+def test_weights_balance_the_classes():
     counts = class_counts("damage", scenes=60).double()
     weights = class_weights("damage", scenes=60).double()
     shares = counts * weights
     np.testing.assert_allclose(shares, np.full(5, counts.sum() / 5), rtol=1e-5)
 
 
-def test_classes_that_never_come_are_named():
+def test_classes_that_never_occur_are_named():
     config = Config.from_values({"damage": {"kinds": ["dented"], "probability": 1.0}})
     with pytest.warns(UserWarning, match="axis, concave, perforation did not come in 5 scenes"):
         weights = class_weights("damage", config, scenes=5)

@@ -1,4 +1,4 @@
-"""Light that rays find at points, against form factors, algebra and sums over a whole sky."""
+"""Ray-traced light at points, compared with form factors, algebra and sums over the sky."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,11 @@ LIGHT = np.array([0.5, 0.7, 0.9], np.float32)
 
 
 def plate(center, along, across, facing=1):
-    """A rectangle, PAINT under LIGHT; along, across: vectors to the middles of its edges. Its front
-    is where along x across points to, for facing 1."""
+    """Return a rectangle with reflectance PAINT under LIGHT.
+
+    along, across: vectors from the center to the middles of two edges. The front faces
+    along x across for facing 1, and the opposite way for -1.
+    """
     center, along, across = (np.array(v, np.float64) for v in (center, along, across))
     corners = [center + a * along + b * across for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     triangles = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)[:, ::facing]
@@ -29,7 +32,7 @@ def plate(center, along, across, facing=1):
 
 
 def points(normal, toward_eye=None, roughness=0.4, place=(0, 0, 0)):
-    """A whole tile at one place."""
+    """Return the points of one full tile, all at the same place."""
     row, column = np.divmod(np.arange(4), 2)
     normal = np.array(normal, float) / np.linalg.norm(normal)
     eye = normal if toward_eye is None else np.array(toward_eye) / np.linalg.norm(toward_eye)
@@ -38,13 +41,15 @@ def points(normal, toward_eye=None, roughness=0.4, place=(0, 0, 0)):
 
 
 def found(at, bodies, sky=EVEN, yaw_deg=0.0, suns=()):
-    """The mean over a tile, [4, 3]."""
+    """Return the traced light averaged over a tile, [4, 3]."""
     return traced_light(at, RayBodies(bodies, suns), sky, yaw_deg).mean(axis=0)
 
 
 def square_factor(half_side, height):
-    """Form factor of a square to an element that lies parallel below its middle: Siegel and Howell,
-    Thermal Radiation Heat Transfer, configuration B-3, four times over."""
+    """Form factor of a square to a parallel element below its middle.
+
+    Siegel and Howell, Thermal Radiation Heat Transfer, configuration B-3, times four.
+    """
     x = half_side / height
     root = np.sqrt(1 + x * x)
     return 4 / (2 * np.pi) * 2 * x / root * np.arctan(x / root)
@@ -53,7 +58,7 @@ def square_factor(half_side, height):
 FAR = plate((0, 0, -1e7), (1, 0, 0), (0, 1, 0))
 
 
-def test_an_open_place_has_all_of_the_sky():
+def test_an_open_place_sees_the_whole_sky():
     for normal in ((0, 0, 1), (1, 0, 0), (0.3, -0.8, 0.1)):
         open_, thrown, mirrored, shown = found(points(normal), [FAR])
         assert (open_ == 1).all()
@@ -63,7 +68,7 @@ def test_an_open_place_has_all_of_the_sky():
 
 
 @pytest.mark.parametrize("half_side", [300, 1000, 4000])
-def test_a_square_above_hides_and_throws_its_form_factor(half_side):
+def test_a_square_above_occludes_and_reflects_by_its_form_factor(half_side):
     above = plate((0, 0, 1000), (half_side, 0, 0), (0, half_side, 0), facing=-1)
     open_, thrown, *_ = found(points((0, 0, 1)), [above])
     factor = square_factor(half_side, 999)
@@ -71,14 +76,14 @@ def test_a_square_above_hides_and_throws_its_form_factor(half_side):
     np.testing.assert_allclose(thrown, factor * PAINT * LIGHT, atol=0.04 * PAINT.max())
 
 
-def test_the_back_of_a_surface_hides_and_throws_nothing():
+def test_the_back_of_a_surface_occludes_but_reflects_nothing():
     above = plate((0, 0, 1000), (1000, 0, 0), (0, 1000, 0))
     open_, thrown, *_ = found(points((0, 0, 1)), [above])
     np.testing.assert_allclose(open_, 1 - square_factor(1000, 999), atol=0.04)
     assert (thrown == 0).all()
 
 
-def test_a_sunlit_wall_throws_the_suns_light_and_a_shaded_one_does_not():
+def test_a_sunlit_wall_reflects_the_sun_and_a_shaded_one_does_not():
     wall = plate((-1000, 0, 0), (0, 1e5, 0), (0, 0, 1e5))
     toward = np.array([0.6, 0.0, 0.8])
     sun = DistantLight(toward.astype(np.float32), np.full(3, 5, np.float32))
@@ -86,7 +91,7 @@ def test_a_sunlit_wall_throws_the_suns_light_and_a_shaded_one_does_not():
     lit = found(points((0, 0, 1)), [wall], suns=[sun])[1]
     np.testing.assert_allclose(dark, 0.5 * PAINT * LIGHT, atol=0.01)  # half the hemisphere
     np.testing.assert_allclose(lit - dark, 0.5 * PAINT * 5 * 0.6, rtol=0.03)
-    # far out, with its dark back to the wall
+    # far away, with its unlit back toward the wall
     roof = plate(toward * 3e5, np.cross(toward, (0, 1, 0)) * 1e6, (0, 1e6, 0), facing=-1)
     shaded = found(points((0, 0, 1)), [wall, roof], suns=[sun])[1]
     np.testing.assert_allclose(shaded, dark, atol=0.01)
@@ -99,7 +104,7 @@ def test_a_sun_behind_a_wall_does_not_light_it():
     np.testing.assert_array_equal(behind, without)
 
 
-def test_a_mirror_shows_what_stands_where_it_points():
+def test_a_mirror_shows_the_surface_in_its_direction():
     eye = (-1, 0, 1)
     there = plate((1000, 0, 1000), (300, 0, -300), (0, 400, 0), facing=-1)
     aside = plate((0, 1000, 1000), (400, 0, 0), (0, 300, -300), facing=1)
@@ -112,7 +117,7 @@ def test_a_mirror_shows_what_stands_where_it_points():
 
 
 def test_rough_mirrors_show_a_wall_in_part():
-    """In a point of a wall's foot the lobe of an eye above is cut in half."""
+    """At the foot of a wall, the wall cuts the lobe of a view from above in half."""
     wall = plate((-2, 0, 0), (0, 1e6, 0), (0, 0, 1e6))
     *_, mirrored, shown = found(points((0, 0, 1), roughness=0.6), [wall])
     np.testing.assert_allclose(mirrored, 0.5, atol=0.04)
@@ -120,7 +125,7 @@ def test_rough_mirrors_show_a_wall_in_part():
 
 
 def spherical_share(sky, yaw_deg, normal, hidden):
-    """Of the irradiance of a map [N, N, 3] what comes from directions that are not hidden."""
+    """Return the share of a map's irradiance that comes from directions that are not hidden."""
     step = (np.arange(SIDE) + 0.5) / SIDE
     toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
     solid_angle = np.abs(toward).sum(axis=1) ** 3
@@ -132,11 +137,11 @@ def spherical_share(sky, yaw_deg, normal, hidden):
 
 @pytest.mark.parametrize("name", ["venice", "sunset", "night", "port_noon"])
 @pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
-def test_real_skies_lose_what_a_sum_over_all_of_them_does(name, yaw_deg):
+def test_occlusion_of_real_skies_equals_a_sum_over_the_sky(name, yaw_deg):
     radiance = load_environment(bundled_hdris()[name]).specular[0, 1:-1, 1:-1]
     sky = SkyRays(np.ascontiguousarray(radiance), DIRECTIONS)
     normal = np.array([0.0, -1.0, 0.0])
-    # a screen from 45 degrees above the horizon up, to the right of the middle
+    # a screen to the right of the middle, from 45 degrees above the horizon upward
     screen = plate((2e6, -1000, 2e6 + 1000), (2e6, 0, 0), (0, 0, 2e6), facing=1)
 
     def hidden(toward):
@@ -146,8 +151,8 @@ def test_real_skies_lose_what_a_sum_over_all_of_them_does(name, yaw_deg):
     np.testing.assert_allclose(open_, spherical_share(radiance, yaw_deg, normal, hidden), atol=0.04)
 
 
-def test_runs_of_spread_points_are_nets():
-    """Each of 2^k has one point in every elementary interval of its area."""
+def test_runs_of_spread_points_form_nets():
+    """Each run of 2^k points has one point in every elementary interval of area 2^-k."""
     u, v = spread_points(256)
     for start, count in ((0, 256), (64, 64), (128, 64), (208, 16)):
         part = slice(start, start + count)
@@ -159,13 +164,15 @@ def test_runs_of_spread_points_are_nets():
 
 @pytest.fixture
 def many_rays(monkeypatch):
-    """As many rays as tell a wrong formula from noise."""
+    """Trace enough rays to distinguish a wrong formula from noise."""
     monkeypatch.setattr(fastgen.light.traced_light, "MIRRORED_RAYS", 4096)
 
 
 def ggx_share(sky, yaw_deg, normal, eye, roughness, hidden):
-    """Of what a mirror [N, N, 3] shows, the share that is not hidden: a sum over all texels of
-    F D G1 G1 / n.v, written out."""
+    """Return the share of a mirrored map [N, N, 3] that is not hidden.
+
+    Sums F D G1 G1 / n.v over all texels.
+    """
     step = (np.arange(SIDE) + 0.5) / SIDE
     toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1)).reshape(-1, 3)
     solid_angle = np.abs(toward).sum(axis=1) ** 3
@@ -187,7 +194,7 @@ def ggx_share(sky, yaw_deg, normal, eye, roughness, hidden):
 @pytest.mark.parametrize("name", ["sunset", "port_noon"])
 @pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
 @pytest.mark.parametrize("roughness", [0.5, 0.8])
-def test_mirrors_of_real_skies_lose_what_a_sum_over_the_lobe_does(
+def test_occlusion_of_mirrored_skies_equals_a_sum_over_the_lobe(
     many_rays, name, yaw_deg, roughness
 ):
     radiance = np.ascontiguousarray(load_environment(bundled_hdris()[name]).specular[0, 1:-1, 1:-1])
@@ -200,7 +207,7 @@ def test_mirrors_of_real_skies_lose_what_a_sum_over_the_lobe_does(
     sky = SkyRays(radiance, DIRECTIONS)
     traced = traced_light(points(normal, eye, roughness), RayBodies([screen], ()), sky, yaw_deg)
     expected = ggx_share(radiance, yaw_deg, normal, eye, roughness, hidden)
-    assert np.abs(expected - 0.5).max() < 0.47  # part of it
+    assert np.abs(expected - 0.5).max() < 0.47  # the screen hides a part
     np.testing.assert_allclose(traced[:, 2].mean(axis=0), expected, atol=0.03)
     even = ggx_share(np.ones_like(radiance), 0, normal, eye, roughness, hidden)
     thrown = traced[:, 3].mean(axis=0)
@@ -209,21 +216,21 @@ def test_mirrors_of_real_skies_lose_what_a_sum_over_the_lobe_does(
 
 @pytest.mark.parametrize("cosine", [0.3, 0.9])
 @pytest.mark.parametrize("roughness", [0.4, 0.9])
-def test_rays_of_a_lobe_stand_for_the_hemisphere(many_rays, cosine, roughness):
+def test_rays_of_a_lobe_integrate_over_the_hemisphere(many_rays, cosine, roughness):
     eye = (0, (1 - cosine**2) ** 0.5, cosine)
     toward, weight, density = lobe(points((0, 0, 1), eye, roughness), 0)
     np.testing.assert_allclose(np.linalg.norm(toward, axis=-1), 1, atol=1e-3)
     np.testing.assert_array_equal(weight[0] > 0, toward[0, :, 2] > 0)
-    if roughness > 0.5:  # narrower ones leave too little for the rest
+    if roughness > 0.5:  # narrower lobes sample the rest too rarely
         upward = np.where(toward[..., 2] > 0, 1 / density, 0).mean()
         assert upward == pytest.approx(2 * np.pi, rel=0.05)
     table = dfg_table()
     scale, bias = table[int(roughness * len(table)), int(cosine * len(table))]
-    albedo = scale * DIELECTRIC_F0 + bias  # which has G2 with masking and shadowing correlated
+    albedo = scale * DIELECTRIC_F0 + bias  # the table has correlated masking (G2)
     assert weight.mean() == pytest.approx(albedo, rel=0.2)
 
 
-def test_directions_stand_for_the_whole_sky():
+def test_sky_directions_integrate_over_the_whole_sky():
     rng = np.random.default_rng(3)
     radiance = rng.random((SIDE, SIDE, 3)).astype(np.float32) ** 8
     sky = SkyRays(radiance, DIRECTIONS)
@@ -237,7 +244,7 @@ def test_directions_stand_for_the_whole_sky():
     assert np.abs(axes).max() < 0.05 * 4 * np.pi
 
 
-def test_means_over_solid_angles_are_those_of_the_map():
+def test_means_over_solid_angles_equal_those_of_the_map():
     step = (np.arange(SIDE) + 0.5) / SIDE
     toward = octahedral_decode(np.stack(np.meshgrid(step, step), axis=-1))
     radiance = np.stack([1 + toward[..., 0], 2 - toward[..., 1], 1.5 + 0 * toward[..., 2]], axis=-1)
@@ -249,13 +256,13 @@ def test_means_over_solid_angles_are_those_of_the_map():
     for solid_angle, apart in ((1e-3, 0.03), (0.02, 0.12), (0.3, 0.4)):
         means = sky.mean(asked, np.full(500, solid_angle, np.float32))
         np.testing.assert_allclose(means, expected, atol=apart)
-    everywhere = sky.mean(asked, np.full(500, 100, np.float32))  # no wider than the last level
+    everywhere = sky.mean(asked, np.full(500, 100, np.float32))  # limited to the coarsest level
     np.testing.assert_allclose(everywhere, expected, atol=0.5)
 
 
-def test_light_between_means_of_levels_is_of_as_many_texels_as_asked_for():
+def test_means_between_levels_cover_the_requested_solid_angle():
     radiance = np.zeros((SIDE, SIDE, 3), np.float32)
-    radiance[63, 63] = 1  # straight up, a texel of some 4 pi / SIDE^2
+    radiance[63, 63] = 1  # straight up; the texel covers about 4 pi / SIDE^2
     sky = SkyRays(radiance, DIRECTIONS)
     up = np.array([[0.01, 0.01, 1]], np.float32)
     texel = 4 * np.pi / SIDE**2

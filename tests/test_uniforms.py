@@ -1,4 +1,4 @@
-"""std140 packing against the driver's own reading of the block."""
+"""Uniform blocks packed by std140, compared with the values that the driver reads."""
 
 import moderngl
 import numpy as np
@@ -58,6 +58,6 @@ def test_the_driver_reads_back_what_was_packed():
     np.testing.assert_array_equal(values, np.arange(1, len(READ) + 1))
 
 
-def test_a_forgotten_member_is_our_own_mistake():
+def test_a_missing_member_raises_an_assertion_error():
     with pytest.raises(AssertionError, match="missing"):
         BLOCK.pack({key: value for key, value in VALUES.items() if key != "c"})

@@ -1,4 +1,4 @@
-"""WebDataset shards streamed by the webdataset package, and datasets in an S3-compatible store."""
+"""WebDataset shards read by the webdataset package, and datasets in an S3-compatible store."""
 
 import io
 import json
@@ -58,7 +58,7 @@ def test_samples_stream_with_all_their_labels(out, tmp_path):
     assert seen == 12
 
 
-def test_a_decoder_of_the_manual_keeps_sixteen_bits(out):
+def test_the_documented_decoder_keeps_sixteen_bits(out):
     page = Path(__file__).parents[1] / "docs/output.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
     seen = 0
@@ -106,7 +106,7 @@ def bucket(monkeypatch):
     ):
         monkeypatch.setenv(name, value)
     boto3.client("s3", endpoint_url=address).create_bucket(Bucket="port")
-    S3FileSystem.clear_instance_cache()  # it remembers the address of an earlier server
+    S3FileSystem.clear_instance_cache()  # the cache remembers the address of an earlier server
     yield "s3://port/made"
     S3FileSystem.clear_instance_cache()
     server.stop()
@@ -130,7 +130,7 @@ def test_a_dataset_in_an_s3_store_equals_one_on_disk_and_resumes(bucket, out, ca
     assert "was made with other settings (formats was [" in capsys.readouterr().err
 
 
-def test_a_bucket_that_is_not_there_is_named_and_not_made(bucket, capsys):
+def test_a_missing_bucket_is_named_and_not_created(bucket, capsys):
     assert main(["generate", "s3://prot/made", *ARGUMENTS]) == 2
     error = capsys.readouterr().err
     assert error.startswith("fastgen: s3://prot/made")
@@ -153,12 +153,12 @@ def test_a_store_without_credentials_gives_one_line(bucket, monkeypatch, capsys,
         assert error.count("\n") == 1
 
 
-def test_the_memory_of_one_process_is_refused(capsys):
+def test_storage_in_process_memory_is_refused(capsys):
     assert main(["generate", "memory://made", *ARGUMENTS]) == 2
     assert "memory://made: is the memory of this process" in capsys.readouterr().err
 
 
-def test_stats_of_tar_files_are_those_of_a_folder(out, tmp_path, capsys):
+def test_stats_of_tar_files_equal_those_of_a_folder(out, tmp_path, capsys):
     plain = tmp_path / "plain"
     at = ARGUMENTS.index("--format")
     assert main(["generate", str(plain), *ARGUMENTS[:at]]) == 0

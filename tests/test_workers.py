@@ -1,4 +1,4 @@
-"""Worker processes that end when nobody expects it."""
+"""Worker processes: unexpected deaths, slow starts, thread counts and order of tasks."""
 
 import contextlib
 import os
@@ -17,7 +17,7 @@ from tests.crash_run import QuickMaker
 
 
 class DiesAfterItsTask:
-    """Reports, does its task, and ends a little later."""
+    """Worker that reports its task and exits 0.3 s later."""
 
     def __init__(self, _setup, report):
         self._report = report
@@ -28,7 +28,7 @@ class DiesAfterItsTask:
 
 
 class StartsSlowly:
-    """Takes longer to begin than a worker may be silent; speaks up meanwhile, or does not."""
+    """Worker that starts slower than the limit for silence; reports that it is busy if `speaks`."""
 
     def __init__(self, speaks, report):
         for _ in range(24):
@@ -41,7 +41,7 @@ class StartsSlowly:
 
 
 class Reports:
-    """Says of each task that it is done."""
+    """Worker that reports each task as done."""
 
     def __init__(self, report):
         self._report = report
@@ -51,8 +51,7 @@ class Reports:
 
 
 class TellsItsThreads:
-    """Reports what is set of matrices' threads, and how many of the process's threads are not
-    Python's."""
+    """Worker that reports OPENBLAS_NUM_THREADS and the number of threads not started by Python."""
 
     def __init__(self, report):
         self._report = report
@@ -67,7 +66,7 @@ class TellsItsThreads:
 
 
 def threads_of_a_worker(whole_machine):
-    """What a worker tells as TellsItsThreads."""
+    """Return what a TellsItsThreads worker reports."""
     heard = []
 
     def on_death(task, place, ended):
@@ -80,7 +79,7 @@ def threads_of_a_worker(whole_machine):
     return heard[0]
 
 
-def test_where_workers_fill_the_machine_they_have_no_threads_for_matrices(monkeypatch):
+def test_workers_that_fill_the_machine_start_no_matrix_threads(monkeypatch):
     for name in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
     before = dict(os.environ)
@@ -90,7 +89,7 @@ def test_where_workers_fill_the_machine_they_have_no_threads_for_matrices(monkey
 
 
 @pytest.mark.parametrize("name", ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"])
-def test_threads_that_the_user_asked_for_are_left(monkeypatch, name):
+def test_thread_counts_set_by_the_user_are_kept(monkeypatch, name):
     for other in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
         monkeypatch.delenv(other, raising=False)
     monkeypatch.setenv(name, "2")
@@ -100,7 +99,7 @@ def test_threads_that_the_user_asked_for_are_left(monkeypatch, name):
 
 
 @pytest.mark.parametrize("speaks", [True, False])
-def test_a_slow_start_is_no_hang_where_it_says_so(speaks):
+def test_a_slow_start_that_reports_busy_is_no_hang(speaks):
     ends = []
 
     def on_death(task, place, ended):
@@ -113,12 +112,12 @@ def test_a_slow_start_is_no_hang_where_it_says_so(speaks):
 
 
 @pytest.mark.parametrize("tasks", [[1], [1, 2, 3]])
-def test_a_worker_that_dies_between_tasks_costs_none(tasks):
+def test_a_worker_that_dies_between_tasks_loses_none(tasks):
     heard = []
 
     def slow(_kind, value):
         heard.append(value)
-        time.sleep(1.0)  # its end is there when it is listened to again
+        time.sleep(1.0)  # by the next read the worker has exited
 
     def on_death(task, place, ended):
         raise AssertionError(f"{task} at {place}: {ended}")
@@ -127,7 +126,7 @@ def test_a_worker_that_dies_between_tasks_costs_none(tasks):
     assert heard == tasks
 
 
-def test_tasks_are_asked_for_when_a_worker_is_free():
+def test_tasks_are_fetched_only_when_a_worker_is_free():
     asked, done = [], []
 
     def tasks():
@@ -137,7 +136,7 @@ def test_tasks_are_asked_for_when_a_worker_is_free():
 
     def hear(_kind, task):
         done.append(task)
-        assert len(asked) <= len(done) + 2  # what each of two workers is at
+        assert len(asked) <= len(done) + 2  # one task in progress per worker
 
     def on_death(task, place, ended):
         raise AssertionError(ended)
@@ -146,7 +145,7 @@ def test_tasks_are_asked_for_when_a_worker_is_free():
     assert sorted(done) == list(range(20))
 
 
-def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_asked():
+def test_a_task_put_back_comes_next_and_no_task_is_fetched_early():
     source = iter(range(1000))
     waiting = workers.Waiting(source)
     assert waiting.up_to(3) == 3
@@ -159,17 +158,15 @@ def test_a_task_that_is_put_back_comes_next_and_no_more_are_looked_for_than_aske
 
 @pytest.mark.parametrize(
     ("scenes", "count", "words"),
-    [  # two scenes a shard
+    [  # two scenes per shard
         (2, 2, "no more than 1 of 2 workers have something to do, with 2 scenes a shard; in an"),
         (3, 4, "no more than 2 of 4 workers"),
-        (1, 2, ""),  # which no shard shares
+        (1, 2, ""),  # a single scene cannot be shared
         (3, 2, ""),
-        (5, 4, ""),  # one of four would make two scenes anyway
+        (5, 4, ""),  # one of four workers would make two scenes anyway
     ],
 )
-def test_workers_that_find_nothing_to_do_are_told_of(
-    tmp_path, monkeypatch, capsys, scenes, count, words
-):
+def test_idle_workers_are_reported(tmp_path, monkeypatch, capsys, scenes, count, words):
     monkeypatch.setattr("fastgen.dataset.generate.run_here", partial(run_here, maker=QuickMaker))
     size, out = (64, 64), str(tmp_path / "out")
     job = Job(out, scenes, Config.preset(), 1, size, ("A",), None, "auto", shard_scenes=2)
@@ -180,4 +177,4 @@ def test_workers_that_find_nothing_to_do_are_told_of(
         assert line.startswith(f"fastgen: {words}")
         assert line.endswith("in another folder, --shard 1 shares the work")
     generate(replace(job, images=scenes + 2), count)
-    assert "shares the work" not in capsys.readouterr().err  # what is there stays as it is
+    assert "shares the work" not in capsys.readouterr().err  # existing shards keep their size

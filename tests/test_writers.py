@@ -1,4 +1,4 @@
-"""Encoders and label formats, read back by foreign readers."""
+"""Encoders and label formats, read back with third-party readers."""
 
 import json
 
@@ -68,7 +68,7 @@ def test_images_keep_their_colour_order():
         assert np.abs(decoded[10, 60].astype(int) - image[10, 60]).max() < 6
 
 
-def test_writing_leaves_nothing_aside(tmp_path):
+def test_writing_leaves_no_temporary_files(tmp_path):
     encode.write(tmp_path / "a.txt", "one")
     encode.write(tmp_path / "a.txt", "two")
     assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
@@ -79,7 +79,7 @@ def item(name, bbox, ignored=False):
     return Object(2, name, 1, bbox, None, 1000, 1.0, False, ignored=ignored)
 
 
-def test_yolo_boxes_are_centres_and_sizes_and_never_beyond_one():
+def test_yolo_boxes_are_centres_and_sizes_and_never_exceed_one():
     text = yolo.detection_lines([item("C9.1", (0, 0, 100, 50)), item("text", None)], (100, 50))
     assert text == f"{DETECTION_CLASSES.index('C9.1')} 0.500000 0.500000 1.000000 1.000000\n"
     for width in (3, 7, 97, 1333):
@@ -144,13 +144,13 @@ def test_yolo_outlines_are_the_borders_of_their_masks(samples):
             packed["counts"] = packed["counts"].encode()
             mask = coco_mask.decode(packed)
             union = (drawn | mask).sum()
-            # holes are filled, and slanted borders cut corners by half a pixel
+            # outlines fill holes, and slanted borders cut half pixels off corners
             assert (drawn & mask).sum() / union > (0.95 if mask.sum() > 2000 else 0.6)
             seen += mask.sum() <= 2000
     assert seen
 
 
-def test_an_image_of_nothing_has_files_and_no_annotation():
+def test_an_empty_image_has_files_but_no_annotations():
     away = Camera("A", (0.0, -8000.0, 1000.0), (0.0, -20000.0, 1000.0), 14.5)
     with Generator(seed=2, size=(64, 64)) as generator:
         sample = generator.render(index=0, camera=away, normals=True)
@@ -164,7 +164,7 @@ def test_an_image_of_nothing_has_files_and_no_annotation():
     assert record["facts"]["bop"]["gt"] == []
 
 
-def test_records_are_json_that_any_reader_takes(samples):
+def test_records_survive_json(samples):
     files, record = assemble(item_of(samples[0]), list(known_formats().values()))
     assert json.loads(json.dumps(record)) == record
     assert json.loads(files["scenes/train/000000_A.json"])["objects"]

@@ -1,4 +1,4 @@
-"""Zones: which way is down in the atlas, where a side ends, and what dirt and rust make of it."""
+"""Atlas zones: orientation, extent, and their effect on dirt and rust."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def gl():
 
 @pytest.fixture(scope="module")
 def even():
-    """A generator, and a scene whose surfaces are plain paint."""
+    """Generator, and a scene whose surfaces are plain paint."""
     config = Config.from_values({"damage": {"probability": 0}, "surface": EVEN_PAINT})
     with Generator(config, 3, (64, 64)) as generator:
         yield generator, generator.scene(0)
@@ -52,7 +52,7 @@ def zone_of(mesh):
 
 
 @pytest.mark.parametrize("kind", ISO_668)
-def test_a_step_up_in_a_zone_is_the_steepest_of_four_in_the_world(kind):
+def test_a_zones_up_is_the_steepest_of_four_directions(kind):
     for mesh in meshes(kind):
         atlas = mesh.atlas_mm[mesh.triangles].astype(float)
         heights = mesh.positions_mm[mesh.triangles, 2].astype(float)
@@ -60,7 +60,7 @@ def test_a_step_up_in_a_zone_is_the_steepest_of_four_in_the_world(kind):
         sides = np.concatenate([atlas.transpose(0, 2, 1), np.ones((len(atlas), 1, 3))], axis=1)
         area = np.abs(np.linalg.det(sides))
         climbs = []
-        for step in UP_IN_ATLAS:  # heights there by barycentric weights, one mm away
+        for step in UP_IN_ATLAS:  # height one mm away, by barycentric weights
             place = np.column_stack([middle + step, np.ones(len(middle))])
             weights = np.linalg.solve(sides, place[..., None])[..., 0]
             climb = (weights * heights).sum(axis=1) - heights.mean(axis=1)
@@ -91,7 +91,7 @@ def test_zones_bound_their_triangles_tightly_and_share_no_vertex(kind):
 
 @pytest.mark.parametrize("kind", ISO_668)
 def test_every_side_of_a_box_beam_is_a_zone(kind):
-    """Their rectangles are the sides: together as large as the surface, and each of one normal."""
+    """The rectangles of the zones are as large as the beam's surface, and each has one normal."""
     mesh = build_spreader(kind)
     normals = winding_normals(mesh)
     a, b, c = mesh.positions_mm[mesh.triangles].astype(float).transpose(1, 0, 2)
@@ -106,7 +106,7 @@ def test_every_side_of_a_box_beam_is_a_zone(kind):
             assert (mine @ mine[0]).min() > 1 - 1e-6
 
 
-def test_walls_and_roof_are_one_zone_and_each_door_leaf_is():
+def test_walls_roof_and_door_leaves_are_one_zone_each():
     mesh = build_container("40")
     counts = {
         name: len(np.unique(zone_of(mesh)[triangles_of(mesh, name)]))
@@ -135,7 +135,7 @@ def test_the_shader_turns_a_zone_so_that_up_is_up(gl):
 
 
 def test_the_shader_finds_the_upper_side_of_a_zone(gl):
-    """Whatever bits its code has beside."""
+    """Other bits of the zone's code must not matter."""
     points = np.random.default_rng(0).uniform(0, (300, 200), (20, 2))
     for turns, up in enumerate(UP_IN_ATLAS):
         for more in (0, 64, 128, 64 + 128 + 256):
@@ -149,7 +149,7 @@ def test_the_shader_finds_the_upper_side_of_a_zone(gl):
 
 @pytest.mark.parametrize("kind", ISO_668)
 def test_level_zones_are_those_that_neither_rise_nor_fall(kind):
-    """A roof's waves go up and down alike."""
+    """A roof is level, because its waves rise and fall equally."""
     for mesh in meshes(kind):
         tilt = np.abs(mesh.normals[mesh.triangles[:, 0], 2])
         corners = mesh.positions_mm[mesh.triangles].astype(float)
@@ -163,8 +163,10 @@ def test_level_zones_are_those_that_neither_rise_nor_fall(kind):
 
 
 def baked_sides(generator, scene, layer_mm, value=np.array):
-    """Mean albedo, or value of it, along the long borders, and along the middle, of a main beam's
-    long sides."""
+    """Return the mean of `value(albedo)` at rim and middle of a main beam's long sides, [4, 2].
+
+    layer_mm: width of the rim, and half the width of the middle band.
+    """
     scene = replace(scene, spreader=replace(scene.spreader, present=True, albedo=(0.5, 0.5, 0.5)))
     atlas = generator.bake_spreader(scene, 8.0)
     mesh = build_spreader(scene.container.kind, scene.spreader.flippers_down)
@@ -175,7 +177,7 @@ def baked_sides(generator, scene, layer_mm, value=np.array):
         x, y, width, height = np.array(zone.rect_mm) / atlas.texel_mm
         side = linear[int(y) + 2 : int(y + height) - 1, int(x) + 2 : int(x + width) - 1]
         side = side if width > height else side.T
-        if side.shape[1] > 8 * side.shape[0]:  # no cap
+        if side.shape[1] > 8 * side.shape[0]:  # skip the end caps
             rim = round(layer_mm / atlas.texel_mm)
             ends = side[:, side.shape[0] : -side.shape[0]]
             middle = ends[len(ends) // 2 - rim : len(ends) // 2 + rim]
@@ -185,7 +187,7 @@ def baked_sides(generator, scene, layer_mm, value=np.array):
 
 
 def test_dirt_keeps_to_the_edges_of_each_side_of_a_beam(even):
-    """However far it reaches on what is wider: to a good part of the way to the middle."""
+    """A large reach is limited to part of the way to the middle of a narrow side."""
     generator, scene = even
     dirt = replace(scene.surface.dirt, strength=1.0, albedo=(0.0, 0.0, 0.0), reach_mm=3000.0)
     scene = replace(scene, surface=replace(scene.surface, dirt=dirt))
@@ -206,7 +208,7 @@ def test_rust_starts_at_the_edges_of_each_side_of_a_beam(even):
 
 
 def test_ageing_darkens_the_ends_of_a_beam_and_not_its_middle(even):
-    """From the corners, at most half as far as a side is wide: a beam is no wall."""
+    """Ageing reaches from the corners by at most half the width of a side: little on a beam."""
     generator, scene = even
     ageing = replace(scene.surface.ageing, strength=1.0, reach_mm=5000.0)
     scene = replace(scene, surface=replace(scene.surface, ageing=ageing))
@@ -214,7 +216,10 @@ def test_ageing_darkens_the_ends_of_a_beam_and_not_its_middle(even):
 
 
 def seen_straight(scene, target, right, out):
-    """A camera 2 mm a pixel, straight before `target`; x in the image runs along `right`."""
+    """Return the scene with a camera at 2 mm per pixel, straight in front of `target`.
+
+    x in the image runs along `right`.
+    """
     place = np.array(target) + 6000.0 * np.array(out, float)
     assert np.allclose(np.cross((0, 0, 1), out), right)
     camera = Camera("straight", tuple(place), tuple(target), 6000.0 / (2.0 * 320) * 36.0)
@@ -223,7 +228,7 @@ def seen_straight(scene, target, right, out):
 
 @pytest.mark.parametrize("part", ["door header", "end beam", "telescopic beam"])
 def test_streaks_of_dirt_run_down(part):
-    """They change faster across than down, on parts that the atlas lays out along their length."""
+    """Streaks change faster across than down, even on parts laid out lengthwise in the atlas."""
     with Generator(DIRTY, 6, (320, 320), quality="draft") as generator:
         scene = generator.scene(0)
         length, _, height, _ = ISO_668[scene.container.kind]
@@ -238,15 +243,14 @@ def test_streaks_of_dirt_run_down(part):
     rows = round(half / 2)
     strip = image[160 - rows : 160 + rows, 60:260].astype(float).sum(axis=2)
     across = np.abs(np.diff(strip, axis=1)).mean()
-    # dirt grows toward the edges, which is no streak
+    # without the row means, as dirt also grows toward the edges
     down = np.abs(np.diff(strip - strip.mean(axis=1, keepdims=True), axis=0)).mean()
     assert across > 0.5
     assert across > 1.3 * down
 
 
-def test_holes_leave_the_locking_bars():
-    """Where rays meet the gear of the sound door, its depth is what an image shows, but for what
-    the sheet's torn rim bends."""
+def test_holes_do_not_cut_the_locking_bars():
+    """The bar's depth equals ray casts on the undamaged door, within the bend of the torn rim."""
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
     bare = {"probability": 0}
     config = Config.from_values({"damage": values, "spreader": bare})
@@ -280,13 +284,13 @@ def test_holes_leave_the_locking_bars():
     np.testing.assert_allclose(sample.depth[sure], hits.depth_m[sure], atol=bends_m)
     beside = torn & ~bar
     assert (beside & (sample.depth > 4.0)).sum() > 1000
-    # nor are they scarred as the rim is
+    # the bar has no scars like those of the rim
     assert np.abs(rusty - paint)[sure].mean() < 4
     assert np.abs(rusty - paint)[torn & ~bar].mean() > 15
 
 
 def test_a_bar_is_seen_from_behind_through_holes_in_both_ends():
-    """The back of the bar stands before the sky that the hole in its leaf shows."""
+    """The back of the bar is visible against the sky behind the hole in its leaf."""
     bare = {"damage": {"probability": 0}, "spreader": {"probability": 0}}
     with Generator(Config.from_values(bare), 77, (320, 320)) as generator:
         scene = generator.scene(3)
@@ -312,7 +316,7 @@ def test_a_bar_is_seen_from_behind_through_holes_in_both_ends():
     np.testing.assert_allclose(row[bar], length / 1000 + 1.44, atol=0.06)
 
 
-def test_an_exported_hole_is_cut_out_of_the_leaf_and_not_of_the_bar_before_it():
+def test_an_exported_hole_cuts_the_leaf_but_not_the_bar_in_front_of_it():
     mesh = build_container("20")
     radius = 200.0
     hole = Damage(
@@ -331,7 +335,7 @@ def test_an_exported_hole_is_cut_out_of_the_leaf_and_not_of_the_bar_before_it():
             u, v = (b - a)[mine].T, (c - a)[mine].T
             areas.append((u[0] * v[1] - u[1] * v[0]).sum() / 2)
         lost[name] = areas[0] - areas[1]
-    # slopes of the swages are longer on the sheet than seen from before it
+    # slopes of the swages are longer on the sheet than in a front view
     assert np.pi * radius**2 < lost.pop("door") < 1.25 * np.pi * radius**2
     np.testing.assert_allclose(list(lost.values()), 0.0, atol=1.0)
 
@@ -352,6 +356,6 @@ def test_small_pieces_age_alike_wherever_they_lie_in_the_atlas(even):
     left = colors / (0.93 * np.mean(scene.surface.paint.albedo))
     pieces, others = (left[of_frame & (small[zone_of(mesh)] == of_small)] for of_small in (1, 0))
     assert len(pieces) > 100
-    assert pieces.min() > 0.5  # the tone still tells
+    assert pieces.min() > 0.5  # noise limits the ageing
     assert pieces.max() < 0.8
     assert others.max() > 0.95
