@@ -20,7 +20,7 @@ def test_the_door_task_takes_the_cameras_that_always_see_an_end():
 
 
 @pytest.mark.parametrize("position", [-1, 1.5, "a"])
-def test_positions_are_whole_numbers(position):
+def test_locate_refuses_positions_that_are_no_whole_numbers(position):
     with pytest.raises(ConfigError, match=r"position: .* is not a whole number of 0 or more"):
         dataset().locate(position)
 
@@ -160,7 +160,7 @@ def test_an_invalid_state_is_refused_and_changes_nothing(change, words):
 
 
 @pytest.mark.parametrize("position", ["a", 1.5, None])
-def test_only_whole_numbers_are_positions(position):
+def test_indexing_refuses_positions_that_are_no_whole_numbers(position):
     with pytest.raises(TypeError, match="is no whole number"):
         dataset()[position]
 
