@@ -1,6 +1,6 @@
-"""Frame: the images that one draw returns."""
+"""Frame: the images of one render."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,17 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One draw's targets, row 0 at the top.
+    """Image and per-pixel labels of one render, row 0 at the top.
 
-    image: uint8 [H, W, 3], sRGB. cover: uint8 [H, W], how much of a pixel container and spreader
-    cover, 255 for all of it; the surroundings show in the rest. ids: uint16 [H, W], 0 where void.
-    damage: uint16 [H, W], class * 100 + instance. depth: float32 [H, W], metres along the optical
-    axis, inf where void.
+    Attributes:
+        image: uint8 [H, W, 3], sRGB.
+        cover: uint8 [H, W], coverage of the pixel by container and spreader; 255 is full coverage.
+            The surroundings fill the rest.
+        ids: uint16 [H, W], object id at the pixel centre, 0 for the surroundings.
+        damage: uint16 [H, W], damage class * 100 + instance.
+        depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
+        radiance: float32 [H, W, 3], linear Rec. 709 after exposure and before the tone curve;
+            None unless requested.
     """
 
     image: NDArray[np.uint8]
@@ -21,3 +26,4 @@ class Frame:
     ids: NDArray[np.uint16]
     damage: NDArray[np.uint16]
     depth: NDArray[np.float32]
+    radiance: NDArray[np.float32] | None = field(default=None, kw_only=True)
