@@ -48,7 +48,7 @@ class Element:
 
 
 class Absence:
-    """Removes an element from all renders made while the context `gone` is active."""
+    """Removal of an element from all renders made while the context `gone` is active."""
 
     def __init__(self, element: Element) -> None:
         self.element = element

@@ -16,7 +16,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-import results  # noqa: F401 finds the fastgen beside this folder
+import results  # noqa: F401 makes the fastgen of this checkout importable
 
 from fastgen.dataset.verify import examine
 from fastgen.errors import FastgenError

@@ -84,4 +84,4 @@ def write_picture(path: Path, image: Picture) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     options = [cv2.IMWRITE_JPEG_QUALITY, 88] if path.suffix == ".jpg" else []
     if not cv2.imwrite(str(path), image, options):
-        raise SystemExit(f"{path}: cannot be written")
+        raise SystemExit(f"{path}: cannot write the image; check the folder and the file extension")

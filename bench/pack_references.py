@@ -43,7 +43,7 @@ def channels(path: Path) -> dict[str, Array]:
 
 
 def radiance(path: Path) -> tuple[Array, NDArray[np.bool_]]:
-    """Return linear radiance [H, W, 3] of a Cycles file, and a mask of what was rendered."""
+    """Return linear radiance [H, W, 3] of a Cycles file, and a mask of the rendered pixels."""
     planes = channels(path)
     return np.stack([planes[f"Combined.{c}"] for c in "RGB"], axis=-1), planes["Combined.A"] > 0.5
 

@@ -133,7 +133,7 @@ def _marker_mesh(scene: Scene, mesh: Mesh, decal: Decal) -> trimesh.Trimesh:
     """Return the marker's diamond as a grid of triangles in front of the sheet, metres, y up."""
     steps = np.linspace(-0.5, 0.5, _CELLS + 1)
     s, t = (a.ravel() for a in np.meshgrid(steps, steps))
-    local = np.stack([s - t, s + t], axis=-1) / 2  # a diamond in [-1/2, 1/2] squared
+    local = np.stack([s - t, s + t], axis=-1) / 2  # a diamond within [-1/2, 1/2] on both axes
     sheet = local * decal.size_mm @ decal.turn.T + decal.center_mm
     positions, normals = mesh.sheet_to_surface(decal.face, sheet)
     lifted = (deform(scene.damages, positions) + _LIFT_MM * normals) * MM @ _Y_UP.T

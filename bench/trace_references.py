@@ -38,7 +38,7 @@ TEXEL_MM = 3.0
 
 
 class Tracer:
-    """Renders cases with Cycles into a folder, each file once."""
+    """Renderer of cases with Cycles into a folder, each file once."""
 
     def __init__(self, python: Path, folder: Path, threads: int) -> None:
         self._python = python
