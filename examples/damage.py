@@ -1,10 +1,11 @@
-"""Damage: detected and segmented, scored as in Tables 4 to 7 of the paper.
+"""Damage: train a detector with masks, and score it as in Tables 4 to 7 of the paper.
 
     python examples/damage.py [--full]
 
-Also looks at small and at thin damages by themselves. Needs fastgen[examples]. The CPU version
-trains an own small detector on the end cameras at 320x320, on images with more damages than the
-test images have; --full trains a wider one on all cameras at 640x640 on a GPU while workers render.
+Also reports recall for small and for thin damages. Needs fastgen[examples]. The CPU version trains
+a small detector of its own on the end cameras at 320x320. Its training images have more damages
+than the test images. --full trains a wider one on all cameras at 640x640 on a GPU while workers
+render.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,13 +34,13 @@ PLANS = {
 MANY_DAMAGES = {
     "damage": {"probability": 1.0, "count": [2, 6], "faces": ["door", "no_door"]},
 }
-"""All containers damaged, where the end cameras see it, for the CPU version."""
+"""Damages on every container, on the faces that the end cameras see, for the CPU version."""
 
 SMALL_PX = 32 * 32
-"""Visible pixels below which COCO calls a thing small."""
+"""Visible pixels below which COCO calls an object small."""
 
 THIN = 3.0
-"""A thin damage is at least this many times as long as it is wide, by its least rectangle."""
+"""Smallest length-to-width ratio of a thin damage, from its minimum-area rectangle."""
 
 PAPER = {
     "box": {"AP": 71.5, "AP50": 89.9, "AP75": 79.2, "AP_S": 12.5, "AP_M": 50.3, "AP_L": 77.8}
@@ -47,11 +48,11 @@ PAPER = {
     "mask": {"AP": 67.5, "AP50": 88.6, "AP75": 74.4, "AP_S": 12.6, "AP_M": 45.8, "AP_L": 73.3}
     | {"AR": 71.1, "AR_S": 14.1, "AR_M": 49.4, "AR_L": 77.0},
 }
-"""Cascade Mask R-CNN, Tables 4 to 7."""
+"""Results of Cascade Mask R-CNN, Tables 4 to 7."""
 
 
 def training_data(run: Run) -> ContainerDataset:
-    """All cameras as the preset has them; on a CPU the two end cameras, with many damages."""
+    """Return the preset's images of all cameras; on a CPU, images of the ends with many damages."""
     plan = run.plan
     config = Config.preset() if run.full else Config.from_values(MANY_DAMAGES)
     options: dict[str, Any] = {"cameras": None if run.full else ("Cl", "Cr"), "split": "train"}
@@ -59,7 +60,7 @@ def training_data(run: Run) -> ContainerDataset:
 
 
 def test_data(run: Run) -> Kept:
-    """The preset's images of scenes that training never has, from the same cameras."""
+    """Return the preset's images of test scenes, from the same cameras as the training images."""
     plan = run.plan
     options: dict[str, Any] = {"length": plan.test_images, "split": "test", "fixed": True}
     options["cameras"] = None if run.full else ("Cl", "Cr")
@@ -68,16 +69,16 @@ def test_data(run: Run) -> Kept:
 
 
 def slenderness(mask: np.ndarray) -> float:
-    """Length over width of the least rectangle around a mask [H, W], 1 and up."""
+    """Return the length-to-width ratio of the minimum-area rectangle around a mask [H, W]."""
     rows, columns = np.nonzero(mask)
     points = np.stack([columns, rows], axis=1).astype(np.float32)
-    # a pixel has a size: a row of n pixels is n times as long as wide
+    # plus one, because pixels have a size: a row of n pixels has the ratio n
     sides = np.array(cv2.minAreaRect(points)[1]) + 1
     return float(sides.max() / sides.min())
 
 
 def groups_of(target: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Which labels of an image are damages of each sort, bool [N] by name."""
+    """Return for each kind of damage which labels of an image belong to it, bool [N] by name."""
     labels = target["labels"].numpy()
     damages = labels > 1
     small = damages & (target["area"].numpy() < SMALL_PX)
@@ -91,7 +92,13 @@ def groups_of(target: Mapping[str, Any]) -> dict[str, np.ndarray]:
 def recall_table(
     targets: Sequence[Mapping[str, Any]], found: Sequence[Found], least: float
 ) -> Table:
-    """How many damages of each sort are found, by box and by mask, at a score of `least`."""
+    """Return how many damages of each kind are found, by box and by mask.
+
+    Args:
+        targets: Labels by image, in the loader's detection form.
+        found: Detections by image.
+        least: Smallest score that counts.
+    """
     tally: dict[str, np.ndarray] = {}
     for target, each in zip(targets, found, strict=True):
         boxes, masks = hits(target, each, least), hits(target, each, least, masks=True)
@@ -112,7 +119,7 @@ def recall_table(
 
 
 def summary_table(kind: str, scores: Scores) -> Table:
-    """COCO's means beside the paper's; kind: box or mask."""
+    """Return COCO's mean scores next to the paper's, for the kind "box" or "mask"."""
     names = list(scores.summary)
     rows = [
         ["here", *scores.summary.values()],
@@ -122,7 +129,7 @@ def summary_table(kind: str, scores: Scores) -> Table:
 
 
 def class_table(boxes: Scores, masks: Scores) -> Table:
-    """AP50 and AP of each class by box and mask."""
+    """Return AP50 and AP of each class by box and by mask."""
     rows = [
         [name, boxes.counts[k], boxes.class_ap50[k], boxes.class_ap[k]]
         + [masks.class_ap50[k], masks.class_ap[k]]
@@ -133,7 +140,7 @@ def class_table(boxes: Scores, masks: Scores) -> Table:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Train, test, and write what was found."""
+    """Train, test, and write the results."""
     run = start("damage", __doc__ or "", PLANS, argv)
     plan = run.plan
     feed = feed_of(training_data(run), run)

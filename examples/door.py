@@ -1,9 +1,9 @@
-"""Door or no door: a ResNet learns Cr against Cl and is tested as in Table 10 of the paper.
+"""Door or no door: train a ResNet to tell camera Cr from Cl, scored as in Table 10 of the paper.
 
     python examples/door.py [--full]
 
-Experiment 1 tests on Cl and Cr, experiment 2 takes A and B as further negatives, which the model
-never saw. Needs fastgen[examples]; --full trains ResNet-50 on a GPU while workers render.
+Experiment 1 tests on Cl and Cr. Experiment 2 adds A and B as negatives that the model never saw.
+Needs fastgen[examples]. --full trains ResNet-50 on a GPU while workers render.
 """
 
 from collections.abc import Sequence
@@ -28,13 +28,13 @@ PLANS = {
 }
 
 DOOR = class_names("door").index("door")
-"""Its label, as fastgen.torch numbers them."""
+"""Label of a door in fastgen.torch."""
 
 PAPER = {"1: Cl, Cr": (100.0, 100.0), "2: with A, B": (90.4, 96.0)}
 
 
 class Classifier(Learner):
-    """ResNet-50, or a narrow ResNet-10 where `full` is false, from fresh weights."""
+    """ResNet-50, or a narrow ResNet-10 if `full` is false, with newly initialized weights."""
 
     def __init__(self, full: bool) -> None:
         super().__init__()
@@ -45,21 +45,26 @@ class Classifier(Learner):
         self.net = ResNetForImageClassification(ResNetConfig(**settings))
 
     def forward(self, images: list[torch.Tensor]) -> torch.Tensor:
-        """Logits [B, 2] of images uint8 [3, H, W]."""
+        """Return logits [B, 2] of images uint8 [3, H, W]."""
         pixels = torch.stack(images).to(next(self.parameters()).device)
         logits: torch.Tensor = self.net(pixels.float() / 127.5 - 1).logits
         return logits
 
     def loss(self, images: list[torch.Tensor], targets: list[int]) -> torch.Tensor:
-        """Cross entropy of a batch."""
+        """Return the cross entropy of a batch."""
         logits = self(images)
         return functional.cross_entropy(logits, torch.tensor(targets, device=logits.device))
 
 
 def precision_recall(door: torch.Tensor, called_door: torch.Tensor) -> tuple[float, float]:
-    """Percent of calls that are doors, and of doors that are called; bool [N] each.
+    """Return precision and recall of the class door in percent.
 
-    A share of nothing is nan.
+    Args:
+        door: True labels, bool [N].
+        called_door: Predictions, bool [N].
+
+    Returns:
+        Precision and recall; nan where there is nothing to divide by.
     """
     hits = int((door & called_door).sum())
     called, doors = int(called_door.sum()), int(door.sum())
@@ -74,42 +79,46 @@ FROM_AFAR = {
     "azimuth_deg": [-20, 20],
     "target_shift_mm": [-600, 600],
 }
-"""Where Cl and Cr stand for two thirds of the CPU version's images: containers are then as small as
-A and B have them, of which a net that saw large ones only makes what chance has it."""
+"""Distant poses of Cl and Cr for two thirds of the CPU version's training images.
+
+Containers are then as small as in the images of A and B. A model that has only seen large ones
+performs at chance level there.
+"""
 
 
 def training_data(run: Run) -> tuple[ContainerDataset, list[ContainerDataset]]:
-    """Images of Cl and Cr as the preset has them, and what the CPU version adds from afar."""
+    """Return the preset's images of Cl and Cr, and the distant ones that the CPU version adds."""
     plan = run.plan
     options: dict[str, Any] = {"size": plan.size, "split": "train"}
     near = ContainerDataset("door", seed=run.seed, length=plan.images, **options)
     if run.full:
         return near, []
     config = Config.from_values({"cameras": {"Cl": FROM_AFAR, "Cr": FROM_AFAR}})
-    # with another seed: not the same scenes again
+    # another seed gives other scenes
     far = ContainerDataset("door", config, run.seed + 1, length=2 * plan.images, **options)
     return near, [far]
 
 
 def test_data(run: Run) -> tuple[Kept, Kept]:
-    """Images of Cl and Cr with their labels, and as many of A and B, whose targets mean nothing."""
+    """Return images of Cl and Cr with their labels, and as many of A and B with meaningless
+    targets."""
     plan = run.plan
     options: dict[str, Any] = {"seed": run.seed, "size": plan.size, "length": plan.test_images}
     ends = ContainerDataset("door", split="test", fixed=True, **options)
-    # A and B are none of the door task's cameras
+    # the door task has no cameras A and B
     sides = ContainerDataset("imdg", cameras=("A", "B"), split="test", fixed=True, **options)
     return rendered(ends, run.cache), rendered(sides, run.cache)
 
 
 @torch.no_grad()
 def probabilities(model: Classifier, data: Kept, batch: int) -> torch.Tensor:
-    """Probability of a door for each image, float32 [N]."""
+    """Return the probability of a door for each image, float32 [N]."""
     parts = [model(images).softmax(1)[:, DOOR].cpu() for images, _ in in_order(data, batch)]
     return torch.cat(parts)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Train, test both experiments, and write what was found."""
+    """Train, test both experiments, and write the results."""
     run = start("door", __doc__ or "", PLANS, argv)
     plan = run.plan
     near, far = training_data(run)
@@ -135,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     groups = {
         "Cr, door": of_ends[door_of_ends],
         "Cl": of_ends[~door_of_ends],
-        # test_data has them in turn
+        # A and B alternate in the test data
         "A": of_sides[0::2],
         "B": of_sides[1::2],
     }

@@ -1,12 +1,14 @@
-"""Does fast cost accuracy? A classifier of markers trained on our images and on Cycles', tested on
-Cycles' images of other scenes.
+"""Test whether fast rendering costs accuracy, with marker classifiers trained on both renderers.
 
     python examples/fast_or_true.py --blender-python PYTHON     # PYTHON: a Python with bpy 4.5
 
-Both renderers are given the same scenes, so that they differ in light alone. Three questions:
-what the same number of images teaches, what the same rendering time teaches, and what each element
-of realism is worth. Everything made is kept in the results' cache and not made again: stop it at
-any time and go on. Without --blender-python it works with the Cycles images that are there.
+One classifier is trained on our images and one on Cycles'. Both are tested on Cycles' images of
+other scenes. The renderers get the same scenes, so only the light differs. The tables answer three
+questions: what the same number of images teaches, what the same rendering time teaches, and what
+each element of realism contributes.
+
+Every intermediate result is stored in the cache of the results folder, so the run can be stopped
+and continued. Without --blender-python, only existing Cycles images are used.
 """
 
 import argparse
@@ -19,7 +21,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-# read as soon as Mesa and PyTorch are loaded: cost counts in core-seconds, so one core draws
+# set before Mesa and PyTorch load: cost is measured in CPU seconds, so one core draws
 os.environ.setdefault("LP_NUM_THREADS", "0")
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
@@ -48,10 +50,19 @@ LONG = ", long"
 
 @dataclass(frozen=True)
 class Study:
-    """How much of everything. test, train: scenes rendered by both. numbers: training scenes of
-    the comparison at equal number. more: of the larger ones that only we render. steps: of
-    every training; long_steps: of the largest sets once more. seeds: trainings of each comparison;
-    few_seeds: of each element and of the long ones."""
+    """Sizes of the experiment.
+
+    Attributes:
+        test: Test scenes, rendered by both renderers.
+        train: Training scenes, rendered by both renderers.
+        numbers: Numbers of training scenes to compare at equal number.
+        more: Larger numbers of training scenes, which only fastgen renders.
+        steps: Steps of each training.
+        long_steps: Steps of the additional long trainings on the largest sets.
+        seeds: Trainings per comparison.
+        few_seeds: Trainings per element, and per long training.
+        elements: Names of the elements to remove.
+    """
 
     test: int
     train: int
@@ -72,7 +83,7 @@ STUDIES = {
 
 @dataclass(frozen=True)
 class Work:
-    """What the command line asked for, and where things are."""
+    """Settings from the command line, and paths."""
 
     study: Study
     mode: str
@@ -84,7 +95,12 @@ class Work:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Which test crops a training named rightly, bool [N]: in Cycles' images, and in ours."""
+    """Correctness of a training's answer for each test crop, bool [N].
+
+    Attributes:
+        on_traced: In Cycles' images.
+        on_ours: In our images.
+    """
 
     on_traced: NDArray[np.bool_]
     on_ours: NDArray[np.bool_]
@@ -92,16 +108,17 @@ class Outcome:
 
 @dataclass(eq=False)
 class Trainings:
-    """Trains what is asked for and keeps the outcomes."""
+    """The trainings that were run, and their stored outcomes."""
 
     work: Work
     tests: tuple[CropSet, CropSet]
     done: dict[tuple[str, int], list[Outcome]] = field(default_factory=dict)
 
     def add(self, name: str, crops: CropSet, scenes: int, seed: int) -> None:
-        """Train on `scenes` scenes of a set; the seed draws them, weights and order.
+        """Train on `scenes` scenes of a set.
 
-        LONG at the end of the name trains for the study's long_steps.
+        The seed selects the scenes, the initial weights and the order. A name that ends in LONG
+        trains for the study's long_steps.
         """
         path = self.work.cache / f"run_{name}_{scenes}_{seed}.npz".replace(" ", "_")
         if not path.exists():
@@ -124,29 +141,30 @@ class Trainings:
             self.done.setdefault((name, scenes), []).append(Outcome(found["traced"], found["ours"]))
 
     def right(self, name: str, scenes: int, where: str = "on_traced") -> NDArray[np.float64]:
-        """What `interval` takes, float64 [seeds, N]."""
+        """Return the correct classifications for `interval`, float64 [seeds, N]."""
         return np.stack([getattr(o, where) for o in self.done[name, scenes]]).astype(float)
 
     def mean(self, name: str, scenes: int, where: str = "on_traced") -> Mean:
-        """Score of a training in percent."""
+        """Return the score of a training in percent."""
         return interval(self.right(name, scenes, where), self.tests[0].scenes)
 
     def difference(self, a: tuple[str, int], b: tuple[str, int]) -> Mean:
-        """Score of `a` less that of `b` on the same crops of Cycles' images, in points."""
+        """Return the score of `a` minus that of `b` on the same Cycles crops, in percentage
+        points."""
         right_a, right_b = self.right(*a), self.right(*b)
-        seeds = min(len(right_a), len(right_b))  # of one the first few alone are trained
+        seeds = min(len(right_a), len(right_b))  # `a` or `b` may have fewer
         return interval(right_a[:seeds] - right_b[:seeds], self.tests[0].scenes)
 
 
 def asked(argv: Sequence[str] | None) -> Work:
-    """Read the command line."""
+    """Parse the command line."""
     first, _, rest = (__doc__ or "").partition("\n\n")
     parser = argparse.ArgumentParser(
         description=first, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--blender-python", type=Path, help="a Python 3.11 with bpy 4.5")
-    parser.add_argument("--smoke", action="store_true", help="a few steps, to see that it runs")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder for what it finds")
+    parser.add_argument("--blender-python", type=Path, help="Python 3.11 with bpy 4.5")
+    parser.add_argument("--smoke", action="store_true", help="run only a few steps, as a test")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder for the results")
     told = parser.parse_args(argv)
     mode = "smoke" if told.smoke else "cpu"
     cache = told.results / "cache" / f"fast_or_true_{mode}"
@@ -156,8 +174,14 @@ def asked(argv: Sequence[str] | None) -> Work:
 
 
 def rendered(work: Work, generator: Generator) -> dict[str, CropSet]:
-    """All sets of crops by name: both renderers' test and training sets, more of ours, and ours
-    without each element."""
+    """Return all sets of crops by name.
+
+    They are the test and training sets of both renderers, more of ours, and ours without each
+    element.
+
+    Raises:
+        ConfigError: Cycles images are missing and no Python with bpy was given.
+    """
     study = work.study
     indices = {
         "test": range(study.test),
@@ -184,8 +208,8 @@ def rendered(work: Work, generator: Generator) -> dict[str, CropSet]:
         ]
         if len(images) < VIEWS * len(indices[which]):
             raise ConfigError(
-                f"{work.references}: holds {len(images)} of {VIEWS * len(indices[which])} Cycles "
-                f"images to {which} with; give --blender-python, a Python with bpy"
+                f"{work.references}: has {len(images)} of {VIEWS * len(indices[which])} Cycles "
+                f"images of the {which} set; render the rest with --blender-python PYTHON"
             )
         same = [image.scene for image in images[::VIEWS]]
         add(f"traced {which}", traced, images)
@@ -198,7 +222,7 @@ def rendered(work: Work, generator: Generator) -> dict[str, CropSet]:
 
 
 def trained(work: Work, sets: dict[str, CropSet]) -> Trainings:
-    """All trainings of the study, a seed at a time."""
+    """Run all trainings of the study, one seed after the other."""
     study = work.study
     made = Trainings(work, (sets["traced test"], sets["ours test"]))
     for seed in range(study.seeds):
@@ -217,7 +241,8 @@ def trained(work: Work, sets: dict[str, CropSet]) -> Trainings:
 
 
 def equal_number(made: Trainings) -> Table:
-    """What the same number of images of the same scenes teaches."""
+    """Return a table of the scores after training on the same number of images of the same
+    scenes."""
     study, rows = made.work.study, []
     for end, scenes in [*(("", n) for n in study.numbers), (LONG, study.train)]:
         a, b = ("ours" + end, scenes), ("traced" + end, scenes)
@@ -238,7 +263,10 @@ def equal_number(made: Trainings) -> Table:
 
 
 def equal_time(made: Trainings, costs: dict[str, float]) -> Table:
-    """What the same rendering time teaches: of our trainings the largest that it pays for."""
+    """Return a table of the scores after the same rendering time.
+
+    Each row compares with our largest training set that this time allows.
+    """
     study, rows = made.work.study, []
     for end, scenes in [*(("", n) for n in study.numbers), (LONG, study.train)]:
         spent = scenes * VIEWS * costs["traced"]
@@ -250,12 +278,12 @@ def equal_time(made: Trainings, costs: dict[str, float]) -> Table:
         row = [f"{scenes * VIEWS}{end}", f"{spent:.0f}", told(made.mean(*b))]
         row += [str(most * VIEWS), f"{most * VIEWS * costs['ours']:.0f}", told(made.mean(*a))]
         rows.append([*row, signed(made.difference(a, b))])
-    heads = ["Cycles' images", "core-s", "score", "our images", "core-s", "score", "difference"]
+    heads = ["Cycles' images", "CPU s", "score", "our images", "CPU s", "score", "difference"]
     return Table("The same rendering time, %", heads, rows)
 
 
 def elements_worth(made: Trainings) -> Table:
-    """What leaving single elements out of our images costs."""
+    """Return a table of the score lost when one element is missing from our training images."""
     size = made.work.study.train
     rows = []
     for name in made.work.study.elements:
@@ -267,17 +295,17 @@ def elements_worth(made: Trainings) -> Table:
 
 
 def told(mean: Mean) -> str:
-    """A mean and its interval as text."""
+    """Format a mean and its interval."""
     return f"{mean.mean:.1f} ({mean.low:.1f} to {mean.high:.1f})"
 
 
 def signed(mean: Mean) -> str:
-    """A difference and its interval as text."""
+    """Format a difference and its interval."""
     return f"{mean.mean:+.1f} ({mean.low:+.1f} to {mean.high:+.1f})"
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Render, train, and write what was found."""
+    """Render, train, and write the results."""
     work = asked(argv)
     study = work.study
     torch.set_num_threads(1)
@@ -294,7 +322,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             ("trained on ours", "ours", (*study.numbers, *study.more)),
         )
     }
-    charts.score_by_cost(curves, "core-seconds of rendering", work.folder / "fast_or_true.png")
+    charts.score_by_cost(curves, "CPU seconds of rendering", work.folder / "fast_or_true.png")
     losses = {
         name: made.difference(("ours", study.train), (f"no {name}", study.train))
         for name in study.elements

@@ -1,10 +1,10 @@
-"""Dangerous-goods markers: 28 classes detected, scored as in Tables 8 and 9 of the paper.
+"""Dangerous-goods markers: train a detector of 28 classes, and score it as in Tables 8 and 9.
 
     python examples/imdg.py [--full]
 
-Also says which look-alike classes are taken for each other. Needs fastgen[examples]. The CPU
-version trains an own small detector on the end cameras at 320x320, where a marker is about 25
-pixels wide, with more markers on a face than the test images have; --full trains RT-DETR on all
+Also lists which similar classes are confused. Needs fastgen[examples]. The CPU version trains a
+small detector of its own on the end cameras at 320x320, where a marker is about 25 pixels wide. Its
+training images have more markers on a face than the test images. --full trains RT-DETR on all
 cameras at 640x640 on a GPU while workers render.
 """
 
@@ -32,14 +32,14 @@ PLANS = {
 }
 
 MANY_MARKERS = {"markings": {"markers_per_face": [8, 24]}}
-"""More examples of each class in an image than the preset's 1 to 6, for the CPU version."""
+"""More examples of each class per image than the preset's 1 to 6, for the CPU version."""
 
 PAPER = {"P": 79.9, "R": 95.3, "AP50": 83.0, "AP": 79.6}
-"""YOLOv7, Table 8."""
+"""Results of YOLOv7, Table 8."""
 
 
 def training_data(run: Run) -> ContainerDataset:
-    """All cameras as the preset has them; on a CPU the two end cameras, with many markers."""
+    """Return the preset's images of all cameras; on a CPU, images of the ends with many markers."""
     plan = run.plan
     config = Config.preset() if run.full else Config.from_values(MANY_MARKERS)
     options: dict[str, Any] = {"cameras": None if run.full else ("Cl", "Cr"), "split": "train"}
@@ -47,7 +47,7 @@ def training_data(run: Run) -> ContainerDataset:
 
 
 def test_data(run: Run) -> Kept:
-    """The preset's images of scenes that training never has, from the same cameras."""
+    """Return the preset's images of test scenes, from the same cameras as the training images."""
     plan = run.plan
     cameras = None if run.full else ("Cl", "Cr")
     data = ContainerDataset(
@@ -63,7 +63,7 @@ def test_data(run: Run) -> Kept:
 
 
 def class_table(scores: Scores, point: OperatingPoint) -> Table:
-    """Precision, recall, AP50 and AP of each class, and of all, in percent."""
+    """Return precision, recall, AP50 and AP in percent, of all classes and of each."""
     rows: list[list[str | float]] = [
         ["all", sum(scores.counts), point.mean_precision, point.mean_recall, scores.ap50, scores.ap]
     ]
@@ -75,7 +75,7 @@ def class_table(scores: Scores, point: OperatingPoint) -> Table:
 
 
 def confused_table(counts: np.ndarray, most: int = 12) -> Table:
-    """The pairs of classes that are taken for each other most often, and how often."""
+    """Return the most frequent confusions of two classes."""
     square = counts[:, : len(counts)].copy()
     np.fill_diagonal(square, 0)
     order = np.argsort(square, axis=None)[::-1][:most]
@@ -86,11 +86,11 @@ def confused_table(counts: np.ndarray, most: int = 12) -> Table:
             rows.append(
                 [DETECTION_CLASSES[true], DETECTION_CLASSES[found], int(square[true, found]), share]
             )
-    return Table("Taken for another class", ["is", "found as", "times", "% of the class"], rows)
+    return Table("Confused classes", ["true class", "found as", "times", "% of the class"], rows)
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Train, test, and write what was found."""
+    """Train, test, and write the results."""
     run = start("imdg", __doc__ or "", PLANS, argv)
     plan = run.plan
     feed = feed_of(training_data(run), run)

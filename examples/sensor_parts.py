@@ -1,4 +1,4 @@
-"""A picture of one scene through each part of a sensor and in each weather: docs/sensor_parts.jpg.
+"""Picture of one scene with each part of the sensor model and each weather: docs/sensor_parts.jpg.
 
 python examples/sensor_parts.py docs/sensor_parts.jpg
 """
@@ -43,7 +43,7 @@ WEATHERS = {
 
 
 def tiles(generator: Generator, scene: Scene, camera: Camera) -> list[np.ndarray]:
-    """One image [H, W, 3] for each part, its name in the lower left corner."""
+    """Return an image [H, W, 3] for each part, with its name in the lower left corner."""
     found = []
     for name, (lens, focal_mm) in LENSES.items():
         found.append((name, scene, replace(camera, lens=lens, focal_mm=focal_mm)))
@@ -61,9 +61,9 @@ def tiles(generator: Generator, scene: Scene, camera: Camera) -> list[np.ndarray
 
 
 def main() -> None:
-    """Write the picture, five tiles a row."""
+    """Write the picture with five tiles per row."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("out", type=Path, help="the JPEG file to write")
+    parser.add_argument("out", type=Path, help="JPEG file to write")
     path = parser.parse_args().out
     with Generator(Config.preset(), seed=7, size=SIZE) as generator:
         scene = generator.scene(INDEX)

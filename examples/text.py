@@ -1,10 +1,11 @@
-"""Identifiers read from crops: a small convolutional net with CTC.
+"""Identifiers: train a small convolutional network with CTC to read them from crops.
 
     python examples/text.py [--full]
 
-Scores how many identifiers are read without a mistake, and the character error rate, by layout; and
-what the check digit of ISO 6346 catches. The letters of columns are read one at a time before whole
-identifiers are. Needs fastgen[examples]. --full trains a wider net on a GPU while workers render.
+Reports by layout how many identifiers are read without a mistake, the character error rate, and
+what the check digit of ISO 6346 catches. Training uses single letters of identifiers in columns
+first, and whole identifiers after that. Needs fastgen[examples]. --full trains a wider network on a
+GPU while workers render.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,31 +32,33 @@ PLANS = {
     ),
     "smoke": Plan(images=4, test_images=4, size=(640, 640), batch=4, passes=1, rate=1e-3),
 }
-"""Images of the end cameras, and on a CPU as many of the side cameras."""
+"""Images of the end cameras; on a CPU, as many of the side cameras are added."""
 
 SIDES_SIZE = (1600, 480)
-"""Of the side cameras' images on a CPU: letters are as large as on the end cameras' images."""
+"""Image size of the side cameras on a CPU, so that letters are as large as in the end cameras."""
 
 LETTERS = Plan(images=800, test_images=0, size=(0, 0), batch=240, passes=3, rate=4e-3)
-"""How letters by themselves are read first. --full renders so many images for it, once."""
+"""Training on single letters, which comes first. --full renders this many images for it, once."""
 
 CHARACTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 
 class Size(nn.Module):
-    """Absolute values: what a filter makes of light on dark is what it makes of dark on light."""
+    """Absolute values, so that a filter responds the same to light on dark and dark on light."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """Of any shape."""
+        """Return the absolute values of a tensor."""
         return x.abs()
 
 
 class Reader(Learner):
-    """Strips to characters. width: channels of the first layer.
+    """Network from strips to characters.
 
-    It sees about three letters around each column. A recurrent layer in place of the last
-    convolution seemed to learn the few owner and size codes by heart: it read 45G1 as 42G1 where
-    the 5 is plain to see.
+    It sees only about three letters around each column. A recurrent layer instead of the last
+    convolution memorized the few owner and size codes, and read a clear 45G1 as 42G1.
+
+    Args:
+        width: Channels of the first layer.
     """
 
     def __init__(self, width: int = 16) -> None:
@@ -66,7 +69,7 @@ class Reader(Learner):
             *(_conv(width, 2 * width), nn.BatchNorm2d(2 * width), nn.ReLU(), nn.MaxPool2d(2)),
             *(_conv(2 * width, 4 * width), nn.BatchNorm2d(4 * width), nn.ReLU()),
             nn.MaxPool2d((2, 1)),
-            # as high as what is left: where in a letter a stroke lies tells 6 from 9
+            # covers the full height, because the position of a stroke distinguishes 6 from 9
             *(_conv(4 * width, last, padding=(0, 1)), nn.BatchNorm2d(last), nn.ReLU()),
         )
         self.context = nn.Conv1d(last, last, 5, padding=2, bias=False)
@@ -74,7 +77,8 @@ class Reader(Learner):
         self.letters = nn.Conv1d(last, len(CHARACTERS) + 1, 1)
 
     def forward(self, strips: torch.Tensor) -> torch.Tensor:
-        """Logarithms of shares [B, T, 37] from strips uint8 [B, 1, H, W]; 0 stands for none."""
+        """Return log probabilities [B, T, 37] of strips uint8 [B, 1, H, W]; class 0 is CTC's
+        blank."""
         grey = strips.to(self.letters.weight.device).float()
         if self.training:
             grey = varied(grey)
@@ -84,7 +88,7 @@ class Reader(Learner):
         return self.letters(surrounded).transpose(1, 2).log_softmax(-1)
 
     def loss(self, images: list[torch.Tensor], targets: list[str]) -> torch.Tensor:
-        """CTC of a batch of strips against what they read without its blanks."""
+        """Return the CTC loss of a batch of strips; spaces in the texts are ignored."""
         words = [[CHARACTERS.index(c) + 1 for c in joined(text)] for text in targets]
         shares = self(torch.stack(images))
         return functional.ctc_loss(
@@ -96,12 +100,12 @@ class Reader(Learner):
 
     @torch.no_grad()
     def read(self, images: list[torch.Tensor]) -> list[str]:
-        """What each strip reads, by the best character at each column."""
+        """Return the text of each strip, from the best character at each column."""
         return [decoded(best) for best in self(torch.stack(images)).argmax(2).tolist()]
 
 
 class Pictures(Dataset[Any]):
-    """Strips or letters, and what each reads."""
+    """Strips or letters, with their texts."""
 
     def __init__(self, items: Sequence[tuple[torch.Tensor, str]]) -> None:
         self._items = items
@@ -114,12 +118,12 @@ class Pictures(Dataset[Any]):
 
 
 def strips_in(crops: Kept) -> Pictures:
-    """Kept crops as strips."""
+    """Return the crops as strips."""
     return Pictures([(strip(crop), text) for crop, text in _each(crops)])
 
 
 def letters_in(crops: Kept) -> Pictures:
-    """The letters of those kept crops that hold columns."""
+    """Return the letters of the crops that are laid out in columns."""
     return Pictures(
         [
             pair
@@ -130,23 +134,23 @@ def letters_in(crops: Kept) -> Pictures:
 
 
 def decoded(best: Sequence[int]) -> str:
-    """Characters of CTC's best path: repeats are one, 0 is none."""
+    """Decode CTC's best path: merge repeats and drop the blank 0."""
     kept = [k for k, before in zip(best, [0, *best], strict=False) if k and k != before]
     return "".join(CHARACTERS[k - 1] for k in kept)
 
 
 def joined(text: str) -> str:
-    """A text without its blanks, which say how it is laid out."""
+    """Return a text without spaces, which only describe its layout."""
     return text.replace(" ", "")
 
 
 def layout_of(text: str) -> str:
-    """'columns' or 'rows': letters below one another have no blank inside the identifier."""
+    """Return 'columns' or 'rows'. An identifier written in a column has no space inside."""
     return "columns" if text.count(" ") == 1 else "rows"
 
 
 def edit_distance(a: str, b: str) -> int:
-    """Least number of characters put in, left out or changed to make b of a. Levenshtein 1966."""
+    """Return the Levenshtein distance (1966): fewest insertions, deletions and substitutions."""
     row = list(range(len(b) + 1))
     for i, left in enumerate(a, start=1):
         before, row = row, [i]
@@ -156,7 +160,7 @@ def edit_distance(a: str, b: str) -> int:
 
 
 def checks(text: str) -> bool:
-    """Whether a read begins with a whole identifier whose check digit is right."""
+    """Return whether the text starts with a whole identifier with the correct check digit."""
     try:
         return len(text) == 15 and str(check_digit(text[:10])) == text[10]
     except ConfigError:
@@ -164,8 +168,12 @@ def checks(text: str) -> bool:
 
 
 def measured(texts: Sequence[str], read: Sequence[str]) -> dict[str, float]:
-    """Exact matches and character error rate in percent; share of reads whose check digit is right,
-    and how many of those are exact. nan for a share of nothing."""
+    """Score texts that were read.
+
+    Returns:
+        Percentages: exact matches, character error rate, reads with a correct check digit, and
+            exact matches among these. nan where there is nothing to divide by.
+    """
     pairs = [(joined(text), got) for text, got in zip(texts, read, strict=True)]
     exact = [wanted == got for wanted, got in pairs]
     passed = [right for right, (_, got) in zip(exact, pairs, strict=True) if checks(got)]
@@ -183,12 +191,15 @@ def measured(texts: Sequence[str], read: Sequence[str]) -> dict[str, float]:
 
 
 def strips_of(crops: Any, target: dict[str, Any]) -> tuple[list[torch.Tensor], dict[str, Any]]:
-    """The crops of an image as strips, for a loader's `transforms`."""
+    """Convert the crops of an image to strips, as `transforms` of a dataset."""
     return [strip(crop) for crop in crops], target
 
 
 def data_of(run: Run, split: str) -> list[ContainerDataset]:
-    """End cameras and side cameras, each image of another container; with --full all at once."""
+    """Return datasets of end and side cameras, with a new container in each image.
+
+    With --full, one dataset covers all cameras.
+    """
     plan = run.plan
     training = split == "train"
     length = plan.images if training else plan.test_images
@@ -201,7 +212,7 @@ def data_of(run: Run, split: str) -> list[ContainerDataset]:
 
 
 def kept(run: Run, split: str) -> Kept:
-    """The crops of a split, rendered once."""
+    """Return the crops of a split, rendered once."""
     crops = Kept([])
     for data in data_of(run, split):
         crops = crops.with_more(rendered(data, run.cache))
@@ -209,7 +220,7 @@ def kept(run: Run, split: str) -> Kept:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Train, test, and write what was found."""
+    """Train, test, and write the results."""
     run = start("text", __doc__ or "", PLANS, argv)
     plan = run.plan
     source: Any
@@ -221,7 +232,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         crops = kept(run, "train")
         source = strips_in(crops)
     model = Reader(width=48 if run.full else 16)
-    # CTC alone can take longer than this whole training to find where the letters are
+    # letters first, because CTC can take longer than this whole training to locate them
     single = letters_in(crops)
     if len(single):
         train(model, Feed(single, LETTERS.batch, run.seed), replace(run, plan=LETTERS))

@@ -1,1 +1,1 @@
-"""What the examples share: data rendered once, a training loop, a detector, metrics and charts."""
+"""Shared parts of the examples: cached images, training loop, detector, metrics and charts."""

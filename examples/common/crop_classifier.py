@@ -1,4 +1,4 @@
-"""A small convolutional net that names the marker in a crop."""
+"""A small convolutional network that classifies the marker in a crop."""
 
 import torch
 from torch import nn
@@ -12,10 +12,17 @@ _LIGHT, _TINT = 0.2, 0.05  # standard deviations of augmented brightness and col
 def fit(
     pixels: torch.Tensor, classes: torch.Tensor, steps: int, seed: int, count: int
 ) -> nn.Module:
-    """Train on crops uint8 [N, 24, 24, 3] of classes int64 [N] below `count`; weights start anew.
+    """Train a new network on crops.
 
-    The number of steps does not depend on how many crops there are. Crops are drawn with
-    replacement, shifted by a pixel or two, and varied in brightness and colour.
+    Crops are drawn with replacement, shifted by a pixel or two, and varied in brightness and
+    colour.
+
+    Args:
+        pixels: uint8 [N, 24, 24, 3].
+        classes: int64 [N], below `count`.
+        steps: Training steps, independent of the number of crops.
+        seed: Seed of weights and order.
+        count: Number of classes.
     """
     torch.manual_seed(seed)
     net = _net(count)
@@ -33,7 +40,7 @@ def fit(
 
 @torch.no_grad()
 def named(net: nn.Module, pixels: torch.Tensor) -> torch.Tensor:
-    """The class of each crop uint8 [N, 24, 24, 3], int64 [N]."""
+    """Return the class of each crop uint8 [N, 24, 24, 3], int64 [N]."""
     return torch.cat([net(_input(part)).argmax(1) for part in pixels.split(512)])
 
 
@@ -52,7 +59,7 @@ def _net(count: int) -> nn.Sequential:
 
 
 def _input(pixels: torch.Tensor) -> torch.Tensor:
-    """[N, H, W, 3] as the net reads it, 0..1; channels stay last in memory."""
+    """Convert pixels [N, H, W, 3] to the network's input in 0..1, channels last in memory."""
     return pixels.permute(0, 3, 1, 2).float() / 255
 
 

@@ -1,4 +1,4 @@
-"""Sets of marker crops, each from one renderer, and what rendering them cost."""
+"""Sets of marker crops from one renderer each, and the cost of rendering them."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -17,8 +17,14 @@ from fastgen.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class CropSet:
-    """pixels: uint8 [N, 24, 24, 3]. classes: int64 [N], places in MARKER_CLASSES. scenes: int64
-    [N], the index of each crop's scene. core_s: seconds of all cores for an image, on average."""
+    """Marker crops from one renderer.
+
+    Attributes:
+        pixels: uint8 [N, 24, 24, 3].
+        classes: Positions in MARKER_CLASSES, int64 [N].
+        scenes: Index of each crop's scene, int64 [N].
+        core_s: Mean CPU seconds per image.
+    """
 
     pixels: NDArray[np.uint8]
     classes: NDArray[np.int64]
@@ -26,19 +32,19 @@ class CropSet:
     core_s: float
 
     def of(self, scenes: Sequence[int]) -> "CropSet":
-        """The crops of these scenes alone."""
+        """Return only the crops of these scenes."""
         chosen = np.isin(self.scenes, scenes)
         return CropSet(self.pixels[chosen], self.classes[chosen], self.scenes[chosen], self.core_s)
 
     def save(self, path: Path) -> None:
-        """Write an .npz file, whole or not at all."""
+        """Write an .npz file atomically."""
         aside = path.with_suffix(".part.npz")
         np.savez_compressed(aside, **asdict(self))
         aside.replace(path)
 
     @staticmethod
     def load(path: Path) -> "CropSet":
-        """Read what `save` wrote."""
+        """Read a file written by `save`."""
         with np.load(path) as stored:
             return CropSet(
                 stored["pixels"], stored["classes"], stored["scenes"], float(stored["core_s"])
@@ -46,7 +52,7 @@ class CropSet:
 
 
 def ours(generator: Generator, scenes: Iterable[Scene]) -> CropSet:
-    """Every scene through both cameras. The cost is that of all there is to do, labels included."""
+    """Render every scene through both cameras. The cost includes everything, labels too."""
     made, images = _Gathered(), 0
     began = time.process_time()
     for scene in scenes:
@@ -60,7 +66,8 @@ def ours(generator: Generator, scenes: Iterable[Scene]) -> CropSet:
 
 
 def traced(generator: Generator, images: Iterable[Traced]) -> CropSet:
-    """Cycles images, cut where ours would be. The cost is that of Cycles' render calls alone."""
+    """Cut Cycles images at the same boxes as ours. The cost is that of Cycles' render calls
+    only."""
     made, spent = _Gathered(), []
     for image in images:
         camera = image.scene.camera(image.camera)
@@ -73,7 +80,7 @@ def traced(generator: Generator, images: Iterable[Traced]) -> CropSet:
 
 
 def stored(path: Path, make: Callable[[], CropSet]) -> CropSet:
-    """The set in `path`, made now where it is not there."""
+    """Return the set in `path`, and create it first if the file does not exist."""
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         make().save(path)
@@ -81,7 +88,7 @@ def stored(path: Path, make: Callable[[], CropSet]) -> CropSet:
 
 
 class _Gathered:
-    """Crops as they come."""
+    """Collector of crops."""
 
     def __init__(self) -> None:
         self._pixels: list[NDArray[np.uint8]] = []

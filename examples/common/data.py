@@ -1,4 +1,4 @@
-"""Images for training: rendered once and kept as JPEG, or rendered anew for every pass."""
+"""Training images: rendered once and cached as JPEG, or rendered anew for every pass."""
 
 import hashlib
 import json
@@ -17,15 +17,15 @@ from fastgen.files.images import jpeg
 from fastgen.torch import ContainerDataset, Loader, collate_lists
 
 Batch = tuple[list[torch.Tensor], list[Any]]
-"""Images, uint8 [3, H, W] each, and as many targets."""
+"""Images, uint8 [3, H, W] each, and one target per image."""
 
 _REPORT_S = 30.0
 
 
 class Kept(Dataset[Any]):
-    """Items that `rendered` made: image uint8 [3, H, W] and what the loader gives as its target.
+    """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
-    A text item is one crop and the string that it reads.
+    A text item is one crop with its text.
     """
 
     def __init__(self, items: list[dict[str, Any]]) -> None:
@@ -43,14 +43,15 @@ class Kept(Dataset[Any]):
         return torch.from_numpy(pixels.transpose(2, 0, 1).copy()), target
 
     def with_more(self, other: "Kept") -> "Kept":
-        """These items, then those of another."""
+        """Return these items followed by those of another."""
         return Kept(self._items + other._items)
 
 
 def rendered(data: ContainerDataset, folder: Path) -> Kept:
-    """All items of `data` in its present epoch, read from `folder` where they were rendered before.
+    """Return all items of `data` in its current epoch, from a file in `folder` if there is one.
 
-    The file is named after everything that decides the items, so that it never serves others.
+    The name of the file is a hash of everything that affects the items, so stale files are not
+    used.
     """
     told = json.dumps([fastgen.__version__, data.epoch, data.description], sort_keys=True)
     path = folder / f"{data.task}_{hashlib.sha256(told.encode()).hexdigest()[:12]}.pt"
@@ -78,10 +79,13 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
 
 
 class Feed:
-    """Batches of lists, one pass at a time, in an order that the seed and the pass decide.
+    """Batches of lists, one pass at a time, in an order that depends on the seed and the pass.
 
-    source: items with a length, or a ContainerDataset, which renders new scenes for every pass.
-    workers: processes that render; other items are fetched in this one.
+    Args:
+        source: Items with a length, or a ContainerDataset that renders new scenes for every pass.
+        batch: Items per batch.
+        seed: Seed of the order.
+        workers: Processes that render. Other items are read in this process.
     """
 
     def __init__(self, source: Dataset[Any], batch: int, seed: int, workers: int = 0) -> None:
@@ -91,7 +95,7 @@ class Feed:
         if isinstance(source, ContainerDataset):
             options: dict[str, Any] = {"num_workers": workers}
             if workers:
-                # a process that has opened CUDA or OpenGL is no good to fork
+                # a process that uses CUDA or OpenGL must not be forked
                 options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
             collate = None if source.task == "text" else collate_lists
             self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
@@ -104,7 +108,7 @@ class Feed:
         return len(self._loader)
 
     def passed(self, number: int) -> Iterator[Batch]:
-        """The batches of pass `number`, counted from 0."""
+        """Return the batches of pass `number`, counted from 0."""
         self._order.manual_seed(self._seed + number)
         if isinstance(self._loader, Loader):
             self._loader.set_epoch(number)
@@ -112,7 +116,7 @@ class Feed:
 
 
 def in_order(source: Dataset[Any], batch: int) -> Iterator[Batch]:
-    """Batches of items in their order, each item once."""
+    """Return batches of the items in their order, each item once."""
     return iter(DataLoader(source, batch, collate_fn=collate_lists))
 
 

@@ -1,7 +1,7 @@
-"""COCO's metrics by size and class, precision and recall at one score, and who is taken for whom.
+"""COCO metrics by size and class, precision and recall at one score, and confusion of classes.
 
-Targets are the loader's detection form, detections what `Detector.predict` gives. All shares are in
-percent; nan where there is nothing to measure.
+Targets are in the loader's detection form, detections in the form of `Detector.predict`. All shares
+are in percent, and nan if there is nothing to measure.
 """
 
 import contextlib
@@ -33,14 +33,22 @@ _SUMMARY = {
     "AR_M": 10,
     "AR_L": 11,
 }
-"""Where COCOeval keeps what the paper's Tables 4 to 7 call so."""
+"""Index in COCOeval's statistics of each name in the paper's Tables 4 to 7."""
 
 
 @dataclass(frozen=True)
 class Scores:
-    """summary: COCO's means, keys of the paper. class_ap50, class_ap, counts: by class. scored:
-    for each class the scores of its detections, whether each hit a label at an IoU of 0.5, and how
-    many labels there are."""
+    """COCO scores.
+
+    Attributes:
+        names: Names of the classes.
+        summary: COCO's mean scores, by the paper's names.
+        class_ap50: AP50 of each class.
+        class_ap: AP of each class.
+        counts: Number of labels of each class.
+        scored: For each class, the scores of its detections, whether each matches a label at an IoU
+            of 0.5, and the number of labels.
+    """
 
     names: Sequence[str]
     summary: dict[str, float]
@@ -60,7 +68,7 @@ class Scores:
         return self.summary["AP50"]
 
     def by_class(self) -> dict[str, dict[str, float]]:
-        """Labels, AP50 and AP of each class by name."""
+        """Return labels, AP50 and AP of each class by name."""
         return {
             name: {
                 "labels": self.counts[k],
@@ -73,7 +81,7 @@ class Scores:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Precision and recall of each class where only detections of `score` and above count."""
+    """Precision and recall of each class for detections with at least this score."""
 
     score: float
     precision: list[float]
@@ -81,12 +89,12 @@ class OperatingPoint:
 
     @property
     def mean_precision(self) -> float:
-        """Mean over the classes that have one."""
+        """Mean over the classes with detections."""
         return _mean(np.array(self.precision))
 
     @property
     def mean_recall(self) -> float:
-        """Mean over the classes that have labels."""
+        """Mean over the classes with labels."""
         return _mean(np.array(self.recall))
 
 
@@ -97,9 +105,14 @@ def score(
     size: tuple[int, int],
     masks: bool = False,
 ) -> Scores:
-    """Measure detections, image by image, against labels with pycocotools, by box or by mask.
+    """Score detections against labels with pycocotools.
 
-    size: (width, height) of the images.
+    Args:
+        targets: Labels by image.
+        found: Detections by image.
+        names: Names of the classes.
+        size: (width, height) of the images.
+        masks: Compare masks instead of boxes.
     """
     truth = COCO()
     truth.dataset = {
@@ -115,7 +128,7 @@ def score(
         ],
     }
     for number, one in enumerate(truth.dataset["annotations"], start=1):
-        one["id"] = number  # COCOeval takes a match with id 0 for none
+        one["id"] = number  # COCOeval treats a match with id 0 as no match
     with contextlib.redirect_stdout(io.StringIO()):
         truth.createIndex()
         detections = [
@@ -143,7 +156,7 @@ def score(
 
 
 def operating_point(scores: Scores) -> OperatingPoint:
-    """The score at which F1, averaged over the classes, is best: as YOLOv7 reports P and R."""
+    """Return the score with the best F1, averaged over the classes, as YOLOv7 reports P and R."""
     thresholds = np.linspace(0.01, 0.99, 99)
     curves = [_curve(thresholds, *each) for each in scores.scored]
     precision = np.array([p for p, _ in curves])
@@ -161,10 +174,14 @@ def operating_point(scores: Scores) -> OperatingPoint:
 def confusion(
     targets: Sequence[Mapping[str, Any]], found: Sequence[Found], classes: int, least_score: float
 ) -> NDArray[np.int64]:
-    """Counts [classes, classes + 1] of what each label is found as; the last column: missed.
+    """Count the class in which each label is found.
 
-    Detections of `least_score` and above take, best first, the free label that they overlap most,
-    of any class, where IoU is at least 0.5; the first class, which spans the others, apart.
+    Detections with at least `least_score` take, best first, the free label with the largest IoU, if
+    that is at least 0.5. The label may have any class, except that the first class, which contains
+    the others, only matches itself.
+
+    Returns:
+        Counts [classes, classes + 1]; the last column counts missed labels.
     """
     counts = np.zeros((classes, classes + 1), np.int64)
     for target, each in zip(targets, found, strict=True):
@@ -187,9 +204,10 @@ def confusion(
 def hits(
     target: Mapping[str, Any], each: Found, least_score: float, masks: bool = False
 ) -> NDArray[np.bool_]:
-    """Which labels of one image are found: class right and IoU at least 0.5; bool [N].
+    """Return which labels of one image are found, bool [N].
 
-    Best detections first, each takes the label that it overlaps most among those still free.
+    A detection must have the label's class and an IoU of at least 0.5. Best detections come first,
+    and each takes the free label with the largest overlap.
     """
     order = each["scores"].argsort(descending=True, stable=True).tolist()
     overlap = _mask_iou(each["masks"], target["masks"]) if masks else None
@@ -215,9 +233,9 @@ def _rle(masks: torch.Tensor) -> list[dict[str, Any]]:
 
 
 def _entries(one: Mapping[str, Any], image_id: int, masks: bool) -> list[dict[str, Any]]:
-    """Class and mask, or class and box, of each thing of an image as COCO's JSON has them.
+    """Return the class, and the mask or box, of each object of an image in COCO's JSON form.
 
-    A detection's size class follows from what it bears, so that it never bears both.
+    COCO derives the size class of a detection from its mask or box, so it must have only one.
     """
     shapes: list[dict[str, Any]]
     if masks:
@@ -242,7 +260,7 @@ def _nothing(truth: COCO) -> COCO:
 def _scored(
     measured: COCOeval, k: int, images: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-    """Of one class, over all sizes, at an IoU of 0.5: see Scores.scored."""
+    """Return Scores.scored of one class, over all sizes."""
     areas = len(measured.params.areaRng)
     entries = measured.evalImgs[k * areas * images : k * areas * images + images]
     seen = [entry for entry in entries if entry is not None]
@@ -259,7 +277,7 @@ def _curve(
     hit: NDArray[np.bool_],
     labels: int,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Precision and recall 0..1 at each threshold; nan where nothing is called or labelled."""
+    """Return precision and recall in 0..1 at each threshold; nan without detections or labels."""
     kept = values[None] >= thresholds[:, None]
     right, called = (kept & hit).sum(axis=1), kept.sum(axis=1)
     precision = np.where(called > 0, right / np.maximum(called, 1), np.nan)
@@ -272,5 +290,5 @@ def _mean(values: NDArray[np.float64]) -> float:
 
 
 def _percent(share: float) -> float:
-    """COCOeval says -1 where there is nothing to measure."""
+    """Convert a share to percent. COCOeval reports -1 if there is nothing to measure."""
     return 100 * share if share >= 0 else float("nan")

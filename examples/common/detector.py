@@ -1,9 +1,9 @@
 """A small anchor-free detector: a heat map of centres, the four sides of a box, and masks.
 
-Centres and their Gaussians as in CenterNet (Zhou et al. 2019), boxes trained over the Gaussian as
-in TTFNet (Liu et al. 2020). The first class spans the image and the others lie on it, so that boxes
-and masks have two groups: the first class, and the rest. An instance's mask is its group's mask
-inside its box.
+Centres and their Gaussians follow CenterNet (Zhou et al. 2019). Boxes are trained over the Gaussian
+like in TTFNet (Liu et al. 2020). The first class spans the image and contains the others, so boxes
+and masks have two groups: the first class, and all others. An instance's mask is the mask of its
+group inside its box.
 """
 
 import itertools
@@ -18,18 +18,18 @@ from common.boxes import generalized_iou, iou
 from common.run import Learner
 
 STRIDE = 4
-"""Image pixels to a cell of the maps; image sides are multiples of 32."""
+"""Image pixels per cell of the maps. The sides of an image must be multiples of 32."""
 
 _SPREAD = 0.09  # Gaussian's sigma per side of the box; TTFNet's alpha 0.54, over 6
 _LEAST_SPREAD = 0.3  # cells
-_RARE = 0.01  # heat that the maps start from
+_RARE = 0.01  # initial heat of the maps
 _BOX_WEIGHT = 5.0
 _MASK_WEIGHT = 2.0
-_RARE_MASK_WEIGHT = 4.0  # of a pixel of the second group, which covers little of an image
-_LONGEST_LOG = 6.5  # of a side in pixels over the stride
+_RARE_MASK_WEIGHT = 4.0  # weight of pixels in the second group, which covers little of an image
+_LONGEST_LOG = 6.5  # limit of the logarithm of a side's distance in cells
 _CANDIDATES = 100
 _LEAST_SCORE = 0.01
-_SAME_THING = 0.6  # IoU of two boxes of a class
+_SAME_THING = 0.6  # IoU above which two boxes of a class show the same object
 
 
 def _conv(before: int, after: int, stride: int = 1) -> nn.Sequential:
@@ -48,8 +48,14 @@ class _Residual(nn.Module):
 
 
 class Detector(Learner):
-    """classes: how many, the first the container. width: channels at stride 4. blocks: residual
-    blocks at each coarser level. masks: whether it segments too."""
+    """The detector network.
+
+    Args:
+        classes: Number of classes, the container first.
+        width: Channels at stride 4.
+        blocks: Residual blocks at each coarser level.
+        masks: Predict masks, too.
+    """
 
     def __init__(self, classes: int, width: int = 32, blocks: int = 1, masks: bool = False) -> None:
         super().__init__()
@@ -70,10 +76,11 @@ class Detector(Learner):
         nn.init.constant_(self.heat.bias, -math.log(1 / _RARE - 1))
 
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Maps at a quarter of the size of images [B, 3, H, W] in -1..1.
+        """Return maps at a quarter of the size of images [B, 3, H, W] in -1..1.
 
-        Heat logits [B, classes, h, w]; of both groups the logarithms of the sides' distances in
-        cells [B, 2, 4, h, w]; and mask logits [B, 2, h, w] if it segments.
+        Returns:
+            Heat logits [B, classes, h, w]. Logarithms of the distances to the four sides in cells,
+                for both groups [B, 2, 4, h, w]. Mask logits [B, 2, h, w] if the detector has masks.
         """
         x = self.stem(pixels)
         seen = [x]
@@ -87,9 +94,11 @@ class Detector(Learner):
         return (*maps, self.mask(features)) if self.mask is not None else tuple(maps)
 
     def loss(self, images: list[torch.Tensor], targets: list[dict[str, Any]]) -> torch.Tensor:
-        """Focal loss of the heat, GIoU of the boxes, and cross entropy and Dice of the masks.
+        """Return the loss: focal (heat), GIoU (boxes), cross entropy and Dice (masks).
 
-        images: uint8 [3, H, W]; targets: the loader's detection form.
+        Args:
+            images: uint8 [3, H, W] each.
+            targets: Labels in the loader's detection form.
         """
         maps = self(self._pixels(images))
         heat, box = maps[0], maps[1]
@@ -113,8 +122,13 @@ class Detector(Learner):
 
     @torch.no_grad()
     def predict(self, images: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
-        """Boxes float32 [N, 4] in pixels, labels int64 [N] from 1 and scores float32 [N], best
-        first, for each image; and masks bool [N, H, W] if it segments. All on the CPU."""
+        """Detect objects in images uint8 [3, H, W].
+
+        Returns:
+            For each image, best first and on the CPU: boxes float32 [N, 4] in pixels, labels int64
+                [N] from 1, and scores float32 [N]. Also masks bool [N, H, W] if the detector has
+                masks.
+        """
         maps = [m.float() for m in self(self._pixels(images))]
         heat = maps[0].sigmoid()
         peaks = heat * (functional.max_pool2d(heat, 3, 1, 1) == heat)
@@ -130,7 +144,7 @@ class Detector(Learner):
             boxes = _boxes(sides, columns + 0.5, rows + 0.5)
             limit = boxes.new_tensor([width, height, width, height]) * STRIDE
             boxes = boxes.clamp(min=0).minimum(limit)
-            # a broad bell has several peaks
+            # a wide Gaussian has several peaks
             alone = distinct(boxes, classes)
             boxes, classes = boxes[alone], classes[alone]
             one = {"boxes": boxes, "labels": classes + 1, "scores": scores[number, kept][alone]}
@@ -144,7 +158,7 @@ class Detector(Learner):
 
     def _mask_loss(self, logits: torch.Tensor, targets: list[dict[str, Any]]) -> torch.Tensor:
         wanted = torch.stack([_group_masks(t) for t in targets]).to(logits.device)
-        # shares of a cell, not 0 or 1: thin things stay
+        # cells hold the covered share instead of 0 or 1, so that thin objects do not vanish
         wanted = functional.avg_pool2d(wanted, STRIDE)
         rare = logits.new_tensor([1.0, _RARE_MASK_WEIGHT])[:, None, None]
         crossed = functional.binary_cross_entropy_with_logits(logits, wanted, pos_weight=rare)
@@ -155,9 +169,14 @@ class Detector(Learner):
 
 
 def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
-    """A bell over the cell that holds each box's centre, 1 there; float32 [N, h, w].
+    """Return a Gaussian around the cell of each box's centre, with the value 1 there.
 
-    boxes: [N, 4] in pixels; shape: (h, w) of the maps.
+    Args:
+        boxes: [N, 4] in pixels.
+        shape: (h, w) of the maps.
+
+    Returns:
+        float32 [N, h, w].
     """
     height, width = shape
     sides = (boxes[:, 2:] - boxes[:, :2]) / STRIDE
@@ -173,7 +192,12 @@ def gaussians(boxes: torch.Tensor, shape: torch.Size) -> torch.Tensor:
 
 
 def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
-    """Which boxes [N, 4], best first, no better one of the same class lies on; bool [N]."""
+    """Return a mask of the boxes that overlap no better box of their class, bool [N].
+
+    Args:
+        boxes: [N, 4], best first.
+        classes: [N].
+    """
     same = (iou(boxes, boxes) > _SAME_THING) & (classes[:, None] == classes[None])
     rest = same.cpu().triu(1)
     kept = torch.ones(len(boxes), dtype=torch.bool)
@@ -184,7 +208,7 @@ def distinct(boxes: torch.Tensor, classes: torch.Tensor) -> torch.Tensor:
 
 
 def _group_masks(target: dict[str, Any]) -> torch.Tensor:
-    """What the first class covers, and what the rest covers; float32 [2, H, W]."""
+    """Return the areas covered by the first class and by all others, float32 [2, H, W]."""
     masks = torch.zeros(2, *target["masks"].shape[1:])
     for label, mask in zip(target["labels"], target["masks"], strict=True):
         group = int(label > 1)
@@ -193,7 +217,7 @@ def _group_masks(target: dict[str, Any]) -> torch.Tensor:
 
 
 def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
-    """CenterNet's focal loss with fewer penalties near a centre, summed over the maps."""
+    """Return CenterNet's focal loss, summed over the maps, with lower penalties near a centre."""
     heat = logits.sigmoid()
     at_centre = (1 - heat) ** 2 * functional.logsigmoid(logits)
     elsewhere = (1 - wanted) ** 4 * heat**2 * functional.logsigmoid(-logits)
@@ -201,9 +225,9 @@ def _focal(logits: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
 
 
 def _box_loss(sides: torch.Tensor, boxes: torch.Tensor, bells: torch.Tensor) -> torch.Tensor:
-    """1 - GIoU over each box's bell, weighted by it, summed over boxes; sides: [4, h, w].
+    """Return the sum over boxes of 1 - GIoU, averaged with each box's Gaussian; sides: [4, h, w].
 
-    Where bells meet a cell learns both boxes, each by its weight.
+    A cell where Gaussians overlap learns both boxes, each by its weight.
     """
     which, rows, columns = (bells > 0.1).nonzero(as_tuple=True)
     weights = bells[which, rows, columns]
@@ -214,8 +238,11 @@ def _box_loss(sides: torch.Tensor, boxes: torch.Tensor, bells: torch.Tensor) -> 
 
 
 def _boxes(sides: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    """Pixel boxes [N, 4] from logarithms of distances [N, 4] (left, top, right, bottom) and the
-    centres x and y [N] of cells; all in cells."""
+    """Return boxes [N, 4] in pixels.
+
+    sides [N, 4] are logarithms of the distances (left, top, right, bottom); x and y [N] are cell
+    centres. Both are in cells.
+    """
     left, top, right, bottom = sides.clamp(max=_LONGEST_LOG).exp().unbind(-1)
     return torch.stack([x - left, y - top, x + right, y + bottom], dim=-1) * STRIDE
 
@@ -223,7 +250,7 @@ def _boxes(sides: torch.Tensor, x: torch.Tensor, y: torch.Tensor) -> torch.Tenso
 def _instance_masks(
     logits: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor
 ) -> torch.Tensor:
-    """Group masks at image size, each cut to its instance's box; bool [N, H, W]."""
+    """Return group masks at image size, each cut to its instance's box; bool [N, H, W]."""
     grown = functional.interpolate(
         logits[None], scale_factor=float(STRIDE), mode="bilinear", align_corners=False
     )[0]

@@ -1,4 +1,4 @@
-"""Detections drawn onto images."""
+"""Drawing of detections onto images."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,8 +20,11 @@ def drawn(
     names: Sequence[str],
     least_score: float,
 ) -> torch.Tensor:
-    """A copy of an image uint8 [3, H, W] with box, name and, but for the first class, mask of each
-    detection of `least_score` and above."""
+    """Return a copy of an image uint8 [3, H, W] with its detections drawn on it.
+
+    Draws box, class name and mask of each detection with a score of at least `least_score`. The
+    first class gets no mask.
+    """
     canvas = np.ascontiguousarray(image.permute(1, 2, 0).numpy())
     for i in (found["scores"] >= least_score).nonzero()[:, 0].tolist():
         label = int(found["labels"][i])
@@ -45,6 +48,6 @@ def found_pictures(
     path: Path,
     count: int = 8,
 ) -> None:
-    """The first images of `data` with what was found on them, in one PNG."""
+    """Write the first images of `data` with their detections as one PNG."""
     images = [drawn(data[i][0], found[i], names, least_score) for i in range(min(count, len(data)))]
     charts.pictures(images, [f"test image {i}" for i in range(len(images))], path)

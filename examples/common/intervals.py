@@ -1,4 +1,4 @@
-"""Means of repeated trainings with 95 % confidence intervals by bootstrap."""
+"""Means of repeated trainings with 95 % bootstrap confidence intervals."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ _TAILS = (2.5, 97.5)
 
 
 class Mean(NamedTuple):
-    """A mean and the ends of its interval."""
+    """A mean and the ends of its confidence interval."""
 
     mean: float
     low: float
@@ -18,12 +18,16 @@ class Mean(NamedTuple):
 
 
 def interval(values: NDArray[np.floating], scenes: NDArray[np.int64], seed: int = 0) -> Mean:
-    """Mean over all trainings and test items, in percent.
+    """Return the mean over all trainings and test items, in percent, with its interval.
 
-    values: [S, N], of S trainings what each of N items counts, such as 1 where it is right, or
-    the difference of two trainings there. scenes: [N], where each item is from. Items of a scene
-    are not independent, so whole scenes are drawn with replacement, and trainings likewise (a
-    two-way bootstrap; Owen 2007, The pigeonhole bootstrap).
+    Items of a scene are not independent, so the bootstrap draws whole scenes with replacement, and
+    trainings likewise (Owen 2007, The pigeonhole bootstrap).
+
+    Args:
+        values: Value of each of N items in each of S trainings [S, N], for example 1 for a correct
+            answer, or the difference of two trainings.
+        scenes: Scene of each item [N].
+        seed: Seed of the bootstrap.
     """
     names, group = np.unique(scenes, return_inverse=True)
     sums = np.stack([np.bincount(group, row, minlength=len(names)) for row in values])

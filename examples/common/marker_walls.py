@@ -1,7 +1,7 @@
-"""Scenes whose ends are full of markers, so that one image teaches as many as possible, their
-crops, and what such scenes look like with single elements of realism off.
+"""Scenes with ends full of markers, the crops of the markers, and variants without single elements.
 
-Everything here is a function of scenes, so that two renderers are given the very same ones.
+Many markers per image teach a classifier more. Everything here is a function of scenes, so that two
+renderers can get exactly the same ones.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,39 +24,44 @@ from fastgen.sampling.scene import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
 
 CAMERAS = ("Cl", "Cr")
-"""They look at the ends, without doors and with them."""
+"""Cameras that look at the ends, without and with doors."""
 
 CROP_PX = 24
-"""Side of a crop; a marker is 15 to 25 pixels wide in an image of 192x192."""
+"""Side of a crop. A marker is 15 to 25 pixels wide in an image of 192x192."""
 
 LIGHTS = (
     *("city", "city_2", "courtyard", "dawn", "forest", "forest_2", "park", "sky"),
     *("sunrise", "sunset", "sunset_2", "venice"),
 )
-"""The outdoor HDRIs by daylight that references were rendered with: later ones change no scene."""
+"""The outdoor daylight HDRIs of the stored Cycles images.
+
+The list is fixed, so that HDRIs added later do not change a scene.
+"""
 
 CONFIG = Config.from_values(
     {
-        "container": {"kinds": {"20": 1.0}},  # its textures are the smallest, its ends like any
+        "container": {
+            "kinds": {"20": 1.0}
+        },  # smallest textures; the ends are the same for all sizes
         "environment": {"names": list(LIGHTS)},
         "cameras": {name: {"focal_mm": 62.0} for name in CAMERAS},
     }
 )
 
 _FACES = ("no_door", "door")
-_EDGE_MM = 130.0  # sheets reach a little under posts and rails
+_EDGE_MM = 130.0  # because sheets reach a little under posts and rails
 _GAP_MM = 12.0
 _SIDE_MM = (215.0, 270.0)
 _TRIES = 900
-_MARGIN = 0.1  # of a marker's box that a crop also shows, each side
+_MARGIN = 0.1  # margin of a crop on each side, as a share of the marker's box
 _LEAST_SEEN = 0.6
 
 
 def crowded(scene: Scene) -> Scene:
-    """`scene` with markers wherever on its ends they find room beside texts and stickers.
+    """Return `scene` with its ends filled with markers, without overlap with texts and stickers.
 
-    Places are drawn one after another and dropped where they touch what is there; two diamonds
-    touch where their centres are nearer than their diagonals in the sum of both axes.
+    Positions are drawn one after another and rejected if the marker touches another decal. Two
+    diamonds touch if the L1 distance of their centres is below the diagonal.
     """
     mesh = build_container(scene.container.kind, scene.container.profiles)
     sizes = sheet_sizes(mesh)
@@ -95,7 +100,7 @@ def crowded(scene: Scene) -> Scene:
 
 
 def markers(sample: Sample) -> list[Object]:
-    """The markers of an image that are seen well enough to be told apart, in their order."""
+    """Return the markers of an image that are visible enough to be recognized, in their order."""
     return [
         item
         for item in sample.objects
@@ -106,9 +111,10 @@ def markers(sample: Sample) -> list[Object]:
 
 
 def crops(image: NDArray[np.uint8], items: list[Object]) -> NDArray[np.uint8]:
-    """Pixels [N, CROP_PX, CROP_PX, 3] of `items` in `image` [H, W, 3], cut by their exact boxes.
+    """Return the pixels [N, CROP_PX, CROP_PX, 3] of `items` in `image` [H, W, 3].
 
-    The image may be another renderer's of the same scene and camera: the boxes come from geometry.
+    Crops follow the exact boxes from geometry. The image may therefore come from another renderer
+    with the same scene and camera.
     """
     made = np.empty((len(items), CROP_PX, CROP_PX, 3), np.uint8)
     for crop, item in zip(made, items, strict=True):
@@ -166,7 +172,10 @@ def _plain(scene: Scene) -> Scene:
 
 
 SHADE, EVERYTHING = "shade of parts on each other", "all of these"
-"""Without these elements nothing hides the sky: no scene holds that, see `without`."""
+"""Elements whose removal also removes all occlusion of the sky.
+
+No field of a scene controls that, see `without`.
+"""
 
 ELEMENTS: dict[str, Callable[[Scene], Scene]] = {
     "rust and scratches": _no_rust,
@@ -180,14 +189,14 @@ ELEMENTS: dict[str, Callable[[Scene], Scene]] = {
     SHADE: lambda scene: scene,
     EVERYTHING: _plain,
 }
-"""A scene without each element of realism, else the same."""
+"""For each element of realism, a function that returns the scene without it."""
 
 _SKY = (SHADE, EVERYTHING)
 
 
 @contextmanager
 def without(element: str) -> Iterator[None]:
-    """While it lasts, renders lack what of `element` no scene decides."""
+    """Render without the part of `element` that no field of a scene controls."""
 
     def unhidden(_: SkyProbe, container: Mesh, *__: object) -> Lit:
         dark = np.zeros_like(container.normals)

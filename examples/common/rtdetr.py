@@ -1,4 +1,4 @@
-"""RT-DETR (Zhao et al. 2023) of transformers, from a configuration and fresh weights."""
+"""RT-DETR (Zhao et al. 2023) from transformers, configured and newly initialized."""
 
 from typing import Any
 
@@ -11,8 +11,12 @@ _CANDIDATES = 100
 
 
 class RtDetr(Learner):
-    """classes: how many, without a background. small: a backbone and decoder cut down for tests,
-    else ResNet-50. Image sides are multiples of 32."""
+    """RT-DETR as a Learner. The sides of an image must be multiples of 32.
+
+    Args:
+        classes: Number of classes, without a background.
+        small: Use a reduced backbone and decoder for tests instead of ResNet-50.
+    """
 
     def __init__(self, classes: int, small: bool = False) -> None:
         super().__init__()
@@ -28,7 +32,12 @@ class RtDetr(Learner):
         self.net = RTDetrForObjectDetection(config)
 
     def loss(self, images: list[torch.Tensor], targets: list[dict[str, Any]]) -> torch.Tensor:
-        """Its matched set loss. images: uint8 [3, H, W]; targets: the loader's detection form."""
+        """Return the matched set loss.
+
+        Args:
+            images: uint8 [3, H, W] each.
+            targets: Labels in the loader's detection form.
+        """
         pixels = self._pixels(images)
         height, width = pixels.shape[2:]
         size = pixels.new_tensor([width, height, width, height])
@@ -43,7 +52,12 @@ class RtDetr(Learner):
 
     @torch.no_grad()
     def predict(self, images: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
-        """Boxes float32 [N, 4] in pixels, labels int64 [N] from 1, scores [N], best first; CPU."""
+        """Detect objects in images uint8 [3, H, W].
+
+        Returns:
+            For each image, best first and on the CPU: boxes float32 [N, 4] in pixels, labels int64
+                [N] from 1, and scores float32 [N].
+        """
         pixels = self._pixels(images)
         height, width = pixels.shape[2:]
         made = self.net(pixel_values=pixels)

@@ -1,4 +1,4 @@
-"""One way to run an example: options, seeds, the training loop and what it leaves behind."""
+"""The common run of an example: options, seeds, training loop and result files."""
 
 import argparse
 import json
@@ -27,11 +27,17 @@ _REPORT_STEPS = 50
 
 @dataclass(frozen=True)
 class Plan:
-    """How much to render and train.
+    """Amount of rendering and training.
 
-    images, test_images: how many. size: (width, height) in pixels. rate: highest learning rate.
-    workers: processes that render while the model trains, each pass new scenes; 0 renders the
-    images once and keeps them.
+    Attributes:
+        images: Training images.
+        test_images: Test images.
+        size: (width, height) in pixels.
+        batch: Images per batch.
+        passes: Passes over the training images.
+        rate: Highest learning rate.
+        workers: Processes that render new scenes for every pass while the model trains. 0 renders
+            the images once and caches them.
     """
 
     images: int
@@ -45,7 +51,17 @@ class Plan:
 
 @dataclass(frozen=True)
 class Run:
-    """What the command line asked for. full: the larger model. folder: where results go."""
+    """Settings from the command line.
+
+    Attributes:
+        name: Name of the example.
+        mode: "cpu", "full" or "smoke".
+        plan: Amount of rendering and training.
+        full: Use the larger model.
+        folder: Folder for the results.
+        seed: Seed of scenes, weights and order.
+        device: Device to train on.
+    """
 
     name: str
     mode: str
@@ -57,28 +73,28 @@ class Run:
 
     @property
     def cache(self) -> Path:
-        """Where rendered images are kept."""
+        """Folder of the rendered images."""
         return self.folder / "cache"
 
 
 class Learner(nn.Module, ABC):
-    """A model that knows its loss."""
+    """A model that computes its own loss."""
 
     @abstractmethod
     def loss(self, images: list[torch.Tensor], targets: list[Any]) -> torch.Tensor:
-        """Loss of a batch, a scalar."""
+        """Return the loss of a batch, a scalar."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of results: a title, the heads of its columns, and rows of text or numbers."""
+    """A table of results: title, column heads, and rows of text or numbers."""
 
     title: str
     heads: Sequence[str]
     rows: Sequence[Sequence[object]]
 
     def markdown(self) -> str:
-        """The table in Markdown; numbers with one decimal, those that are none as a dash."""
+        """Return the table in Markdown. Floats have one decimal; nan is a dash."""
         lines = [self.heads, ["---"] * len(self.heads), *[map(_cell, row) for row in self.rows]]
         return f"**{self.title}**\n\n" + "\n".join("| " + " | ".join(c) + " |" for c in lines)
 
@@ -86,18 +102,22 @@ class Table:
 def start(
     name: str, description: str, plans: dict[str, Plan], argv: Sequence[str] | None = None
 ) -> Run:
-    """Read the command line, choose one of the plans cpu, full and smoke, and seed torch."""
+    """Parse the command line, choose the plan cpu, full or smoke, and seed torch.
+
+    Raises:
+        ConfigError: The seed is negative.
+    """
     first, _, rest = description.partition("\n")
     parser = argparse.ArgumentParser(
         description=first, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--full", action="store_true", help="the version for a GPU")
-    parser.add_argument("--smoke", action="store_true", help="a few steps, to see that it runs")
-    parser.add_argument("--seed", type=int, default=1, help="of scenes, weights and order")
-    parser.add_argument("--results", type=Path, default=RESULTS, help="folder for what it finds")
+    parser.add_argument("--full", action="store_true", help="run the version for a GPU")
+    parser.add_argument("--smoke", action="store_true", help="run only a few steps, as a test")
+    parser.add_argument("--seed", type=int, default=1, help="seed of scenes, weights and order")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="folder for the results")
     asked = parser.parse_args(argv)
     if asked.seed < 0:
-        raise ConfigError(f"seed: {asked.seed} is not a whole number of 0 or more")
+        raise ConfigError(f"seed: {asked.seed} is negative; use 0 or more")
     mode = "smoke" if asked.smoke else "full" if asked.full else "cpu"
     torch.manual_seed(asked.seed)
     asked.results.mkdir(parents=True, exist_ok=True)
@@ -106,7 +126,10 @@ def start(
 
 
 def feed_of(data: ContainerDataset, run: Run, more: Sequence[ContainerDataset] = ()) -> Feed:
-    """Batches of `data`, rendered anew each pass or once, as the plan has it; once, with `more`."""
+    """Return batches of `data`, rendered anew for each pass or once, as the plan says.
+
+    Images rendered once are followed by those of `more`.
+    """
     plan = run.plan
     if plan.workers:
         return Feed(data, plan.batch, run.seed, plan.workers)
@@ -117,7 +140,11 @@ def feed_of(data: ContainerDataset, run: Run, more: Sequence[ContainerDataset] =
 
 
 def train(model: Learner, feed: Feed, run: Run) -> list[float]:
-    """Train over all passes of the plan with AdamW and one cycle of the rate; losses by step."""
+    """Train for all passes of the plan, with AdamW and one cycle of the learning rate.
+
+    Returns:
+        The loss of each step.
+    """
     plan = run.plan
     model.to(run.device).train()
     steps = max(len(feed) * plan.passes, 2)
@@ -143,12 +170,12 @@ def train(model: Learner, feed: Feed, run: Run) -> list[float]:
 
 
 def parameters(model: nn.Module) -> int:
-    """How many numbers are trained."""
+    """Return the number of trainable parameters."""
     return sum(p.numel() for p in model.parameters() if p.requires_grad)
 
 
 def conclude(run: Run, tables: Sequence[Table], found: dict[str, Any]) -> None:
-    """Print the tables, and write them as NAME.md and everything found as NAME.json."""
+    """Print the tables and write them to NAME.md, and all results to NAME.json."""
     text = "\n\n".join(table.markdown() for table in tables)
     made = {
         "example": run.name,

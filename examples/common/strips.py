@@ -1,4 +1,5 @@
-"""A text crop laid out as one line: slant taken out, rows and letters of columns side by side."""
+"""Conversion of a text crop to one line: slant removed, rows and letters of columns side by
+side."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,32 +16,33 @@ Grey = NDArray[Any]
 """A grey image [h, w], uint8 or float32."""
 
 HEIGHT, WIDTH = 24, 400
-"""Pixels of a strip."""
+"""Size of a strip in pixels."""
 
 LETTER_WIDTH = 32
-"""Pixels of a letter by itself, as high as a strip."""
+"""Width of a single letter in pixels; it is as high as a strip."""
 
-_UPRIGHT = 1.6  # a crop this many times as high as wide holds columns
+_UPRIGHT = 1.6  # ratio of height to width above which a crop contains columns
 _SLANTS = np.linspace(-0.3, 0.3, 31)
-_SHARE = 0.1  # of its height that a row or letter also shows of its neighbours, each side
-_MARGIN_PX = 3  # of a crop around its ink
+_SHARE = 0.1  # margin on each side of a row or letter, as a share of its height
+_MARGIN_PX = 3  # margin of a crop around its ink
 _NUMBER, _ALL = 11, 15  # letters of an identifier, without and with its size and type
-_GAP_CAPS = 0.6  # what a blank adds to a column
-_GRAIN = 6.0  # of 255
-_TILTS = np.linspace(-0.3, 0.3, 25)  # of columns away from the camera
+_GAP_CAPS = 0.6  # extra length of a space in a column, in cap heights
+_GRAIN = 6.0  # largest standard deviation of added noise, in steps of 255
+_TILTS = np.linspace(-0.3, 0.3, 25)  # perspective of a column that tilts away from the camera
 
 
 def strip(crop: torch.Tensor) -> torch.Tensor:
-    """A crop uint8 [3, h, w] as a grey strip, uint8 [1, HEIGHT, WIDTH].
+    """Convert a crop uint8 [3, h, w] to a grey strip, uint8 [1, HEIGHT, WIDTH].
 
-    Rows are put side by side, columns are cut into letters. How many rows or columns there are
-    follows from the proportions of the text without its slant.
+    Rows are placed side by side, and columns are cut into letters. The number of rows or columns
+    follows from the proportions of the text after removing its slant.
     """
     return torch.from_numpy(_in_one_line(_parts(_grey(crop))))[None]
 
 
 def letters(crop: torch.Tensor) -> list[torch.Tensor]:
-    """The letters of a crop of columns, uint8 [1, HEIGHT, LETTER_WIDTH] each; of rows none."""
+    """Return the letters of a crop with columns, uint8 [1, HEIGHT, LETTER_WIDTH] each; none for
+    rows."""
     grey = _grey(crop)
     if not _upright(grey):
         return []
@@ -48,12 +50,12 @@ def letters(crop: torch.Tensor) -> list[torch.Tensor]:
 
 
 def varied(strips: torch.Tensor) -> torch.Tensor:
-    """Strips float32 [B, 1, H, W] stretched, moved, slanted and grainy, each by chance."""
+    """Randomly stretch, shift and slant strips float32 [B, 1, H, W], and add noise."""
 
     def drawn(low: float, high: float) -> torch.Tensor:
         return torch.empty(len(strips), device=strips.device).uniform_(low, high)
 
-    # the sides of an image are at -1 and 1, and a line begins at the left
+    # coordinates run from -1 to 1; stretching leaves the left end, where the text starts, in place
     wide, high = drawn(0.9, 1.12), drawn(0.85, 1.2)
     across = [wide, drawn(-0.012, 0.012), wide - 1 + drawn(-0.04, 0.03)]
     down = [drawn(-0.25, 0.25), high, drawn(-0.15, 0.15)]
@@ -64,9 +66,9 @@ def varied(strips: torch.Tensor) -> torch.Tensor:
 
 
 def straightened(grey: Grey) -> Grey:
-    """Shear [h, w] vertically so that its rows are level, and cut off what that leaves empty.
+    """Shear an image [h, w] vertically so that its rows are level, and cut off the empty edges.
 
-    Level rows are where strokes gather in the fewest image rows.
+    Rows are level when strokes concentrate in the fewest image rows.
     """
     height, width = grey.shape
     best, slant = -1.0, 0.0
@@ -83,7 +85,10 @@ def straightened(grey: Grey) -> Grey:
 
 
 def row_count(shape: tuple[int, int], upright: bool) -> int:
-    """Rows of a level text (height, width): a column is one or two, a block two or three."""
+    """Return the number of rows of a level text of shape (height, width).
+
+    Columns, turned on their side, are one or two; a block has two or three rows.
+    """
     proportion = shape[1] / shape[0]
     if upright:
         return 1 if proportion > 9 else 2
@@ -91,10 +96,11 @@ def row_count(shape: tuple[int, int], upright: bool) -> int:
 
 
 def letter_places(column: Grey, columns: int) -> list[tuple[float, float]]:
-    """Where each letter of the first of `columns` columns begins and ends, in rows of [h, w].
+    """Return the start and end of each letter of a column, in rows of the image.
 
-    Letters stand at one pitch, but the camera sees one end of a column larger: of several ratios
-    the one is taken that leaves the fewest strokes between the letters.
+    The image [h, w] is the first of `columns` columns. Letters are equally spaced, but perspective
+    makes one end of a column larger. Of several perspective ratios, this takes the one with the
+    fewest strokes between letters.
     """
     count, gap = (_NUMBER, 0.0) if columns > 1 else (_ALL, _GAP_CAPS)
     middles = np.arange(count) * GLYPH_PITCH_CAPS + gap * (np.arange(count) >= _NUMBER) + 0.5
@@ -104,7 +110,7 @@ def letter_places(column: Grey, columns: int) -> list[tuple[float, float]]:
     ink = len(column) - 2 * _MARGIN_PX
     best, found = np.inf, ends
     for tilt in _TILTS:
-        # a straight line seen in perspective, both of its ends kept
+        # perspective of a straight line with fixed ends
         places = _MARGIN_PX + ink * share / (1 + tilt * (1 - share))
         between = float(np.interp(places, np.arange(len(strokes)) + 0.5, strokes).mean())
         if between < best:
@@ -121,10 +127,10 @@ def _upright(grey: Grey) -> bool:
 
 
 def _parts(grey: Grey) -> list[Grey]:
-    """Rows of a text, or the letters of columns, in the order in which they are read."""
+    """Return the rows of a text, or the letters of columns, in reading order."""
     upright = _upright(grey)
     level = straightened(_turned(grey) if upright else grey)
-    if upright:  # the letters of both columns too stand level with each other
+    if upright:  # the letters of both columns are level with each other, too
         level = _turned(straightened(_turned(level)))
     count = row_count(level.shape, upright)
     pitch = level.shape[0] / count
@@ -151,13 +157,13 @@ def _turned(image: Grey) -> Grey:
 
 
 def _cut(image: Grey, low: float, high: float) -> Grey:
-    """Rows low to high of an image [h, w], and some of their neighbours."""
+    """Return the rows from low to high of an image [h, w], with a margin."""
     share = _SHARE * (high - low)
     return image[max(round(low - share), 0) : min(round(high + share), len(image))]
 
 
 def _in_one_line(parts: Sequence[Grey], width: int = WIDTH) -> Grey:
-    """Images [h, w] side by side, all HEIGHT high, and beyond them the median of each row."""
+    """Join images [h, w] side by side at HEIGHT, and pad with the median of each row."""
     scaled = []
     for part in parts:
         wide = max(round(part.shape[1] * HEIGHT / part.shape[0]), 1)
