@@ -1,10 +1,10 @@
-"""Bakes assets/fonts/*.woff into one mosaic of signed-distance tiles. Run by hand:
+"""Convert assets/fonts/*.woff to one mosaic of signed-distance tiles.
 
     python assets/build_fonts.py
 
-Needs fastgen, Pillow and scipy. A tile is 64 x 64 and covers a square of 1.6 cap heights: the ink
-centred across it, the baseline 0.3 cap heights above its bottom; 0.5 lies on the outline and 0.15
-cap heights make up the distance to 0 or 1.
+Run by hand. Needs fastgen, Pillow and scipy. A tile is 64 x 64 and covers a square of 1.6 cap
+heights. The ink is centred horizontally, and the baseline is 0.3 cap heights above the bottom. The
+value 0.5 is on the outline; 0 and 1 are 0.15 cap heights away from it.
 """
 
 import json
@@ -24,7 +24,10 @@ COLUMNS = 16
 
 
 def bake(path: Path) -> dict[str, tuple[np.ndarray, float, float, float]]:
-    """Tile, ink left, ink right and advance (cap heights) of every character of a font."""
+    """Return tile, left and right end of the ink, and advance of every character of a font.
+
+    All lengths are in cap heights.
+    """
     side = TILE * OVERSAMPLING
     cap_px = side / TILE_CAPS
     probe = ImageFont.truetype(str(path), 1000)

@@ -1,10 +1,11 @@
-"""Draws the 26 dangerous-goods markers as SVG and bakes them to PNG. Run by hand:
+"""Draw the 26 dangerous-goods markers as SVG and convert them to PNG.
 
     python assets/build_markers.py
 
-Needs fonttools and resvg-py. Colours, symbols and places follow the UN Model Regulations, chapter
-5.2.2.2: a square on its point, here inscribed in 1000 x 1000, the inner line 12.5 / 250 of a side
-from the edge, the class at the bottom corner. All symbols are drawn here from scratch.
+Run by hand. Needs fonttools and resvg-py. Colours, symbols and layout follow the UN Model
+Regulations, chapter 5.2.2.2. A marker is a square standing on its corner, here inscribed in 1000 x
+1000. The inner line is 12.5 / 250 of a side from the edge, and the class number is at the bottom
+corner. All symbols are original drawings.
 """
 
 from pathlib import Path
@@ -31,7 +32,7 @@ FLAME_BASE = '<rect x="352" y="476" width="296" height="22"/>'
 
 
 def words(text: str, x: float, y: float, height: float, color: str) -> str:
-    """`text` centred on x with its baseline at y, capitals `height` high, as an outline."""
+    """Return `text` as outlines, centred on x, baseline at y, with capitals of the given height."""
     glyphs, names = FONT.getGlyphSet(), FONT.getBestCmap()
     scale = height / FONT["OS/2"].sCapHeight
     widths = [glyphs[names[ord(c)]].width * scale for c in text]
@@ -46,18 +47,18 @@ def words(text: str, x: float, y: float, height: float, color: str) -> str:
 
 
 def width_of(text: str, height: float) -> float:
-    """Width of `text` when its capitals are `height` high."""
+    """Return the width of `text` with capitals of the given height."""
     glyphs, names = FONT.getGlyphSet(), FONT.getBestCmap()
     return sum(glyphs[names[ord(c)]].width for c in text) * height / FONT["OS/2"].sCapHeight
 
 
 def words_from(x: float, y: float, text: str, height: float) -> str:
-    """Black `text` that starts at x."""
+    """Return black `text` that starts at x."""
     return words(text, x + width_of(text, height) / 2, y, height, BLACK)
 
 
 def caption(text: str, color: str) -> str:
-    """The hazard in words below the middle; a bar in `text` starts the second line."""
+    """Return the hazard in words below the middle; a `|` in `text` starts the second line."""
     parts = []
     for i, line in enumerate(text.split("|")):
         y = 612 + 74 * i
@@ -140,7 +141,7 @@ def flame_over_circle() -> str:
 
 
 def trefoil(cy: float = 290, r: float = 30) -> str:
-    """A disc of radius r and three blades from 1.5 r to 5 r; 49 CFR 172, appendix B."""
+    """Return a disc of radius r and three blades from 1.5 r to 5 r (49 CFR 172, appendix B)."""
     near, far = 1.5 * r, 5 * r
     cos = 0.75**0.5
     blade = (
@@ -167,7 +168,7 @@ def infectious() -> str:
 
 
 def corrosion() -> str:
-    """Liquids spilling from two glass vessels and attacking a metal and a hand."""
+    """Return liquids that spill from two glass vessels and attack a metal and a hand."""
     tube = (
         '<path d="M0 -25 H150 V-33 H166 V33 H150 V25 H0 A25 25 0 0 1 0 -25 Z"/>'
         f'<path fill="{WHITE}" d="M18 -13 H138 V-2 H18 Z"/>'
@@ -187,7 +188,7 @@ def corrosion() -> str:
 
 
 def stripes(count: int, color: str, upper_only: bool) -> str:
-    """Vertical stripes over the diamond; `count` dark ones with as wide gaps between."""
+    """Return `count` vertical stripes over the diamond, with gaps of the same width."""
     width = 1000 / (2 * count + 1)
     height = 500 if upper_only else 1000
     bars = "".join(
@@ -202,7 +203,7 @@ def lower_half(color: str) -> str:
 
 
 def bordered(color: str, half: str) -> str:
-    """The "upper" or "lower" half within the inner line; the field stays as a border around."""
+    """Fill the "upper" or "lower" half within the inner line; the field remains as a border."""
     tip = {"upper": 0, "lower": 1000}[half]
     return f'<path fill="{color}" clip-path="url(#inner)" d="M0 500 L1000 500 L500 {tip} Z"/>'
 
@@ -215,7 +216,7 @@ def frame(x: float, y: float, width: float, height: float, line: float) -> str:
 
 
 def rule(y: float, height: float) -> str:
-    """A line across, from inner line to inner line."""
+    """Return a horizontal line from inner line to inner line."""
     return (
         f'<rect x="0" y="{y}" width="1000" height="{height}" fill="{BLACK}" '
         'clip-path="url(#inner)"/>'
@@ -223,7 +224,7 @@ def rule(y: float, height: float) -> str:
 
 
 def radioactive(bars: int) -> str:
-    """Category I to III: as many red bars after the word, and an index box from II on."""
+    """Return the body of category I to III: a red bar per category, and an index box from II on."""
     word = width_of("RADIOACTIVE", 44)
     left = 500 - (word + 22 + 58 * bars - 24) / 2
     marks = "".join(
@@ -265,10 +266,19 @@ def marker(
     over: str = "",
     symbol_ink: str = "",
 ) -> str:
-    """One SVG. ink: colour of number and words; symbol_ink: of the symbol where it differs.
+    """Return the SVG of one marker.
 
-    The inner line has the symbol's colour in the upper half and the number's in the lower half
-    (UN Model Regulations 5.2.2.2.1.1.2). over: a second field, beneath the inner line.
+    The inner line has the symbol's colour in the upper half and the number's in the lower half (UN
+    Model Regulations 5.2.2.2.1.1.2).
+
+    Args:
+        field: Background colour.
+        ink: Colour of number and words.
+        body: SVG of the symbol.
+        number: Class number at the bottom corner.
+        hazard: Hazard in words.
+        over: SVG of a second field, drawn beneath the inner line.
+        symbol_ink: Colour of the symbol if it differs from `ink`.
     """
     text = caption(hazard, ink) if hazard else ""
     line = "M500 50 L950 500 L500 950 L50 500 Z"
@@ -290,7 +300,7 @@ def under_line(ink: str) -> str:
 
 
 def all_markers() -> dict[str, str]:
-    """SVG text of every class, in the order of fastgen.classes.MARKER_CLASSES."""
+    """Return the SVG of every class, in the order of fastgen.classes.MARKER_CLASSES."""
     half_bars = stripes(7, BLACK, upper_only=True)
     return {
         "C1.1": marker(ORANGE, BLACK, bomb() + words("1.1 D", 500, 640, 110, BLACK), "1"),
@@ -330,10 +340,10 @@ def all_markers() -> dict[str, str]:
 
 
 def bake(svg: str) -> np.ndarray:
-    """RGBA uint8 [SIZE, SIZE, 4]; the colour of the edge carries on into what is transparent."""
+    """Render an SVG to RGBA uint8 [SIZE, SIZE, 4]; edge colours extend into transparent pixels."""
     png = bytes(resvg_py.svg_to_bytes(svg_string=svg, width=SIZE, height=SIZE))
     image = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image.shape[:2] != (SIZE, SIZE):  # a drawing of another aspect is stretched to the square
+    if image.shape[:2] != (SIZE, SIZE):  # drawings with another aspect ratio are stretched
         image = cv2.resize(image, (SIZE, SIZE), interpolation=cv2.INTER_CUBIC)
     alpha = image[..., 3:].astype(np.float32) / 255
     color = image[..., :3].astype(np.float32)

@@ -1,11 +1,12 @@
-"""Bakes the port panoramas in hdri/port_*.exr: a port of our own, path traced. Run by hand:
+"""Render the port panoramas hdri/port_*.exr from our own Blender model of a port.
 
     python assets/build_panoramas.py                  # all that are missing, in hdri/
     python assets/build_panoramas.py --width 512 --out /tmp/look port_noon
 
-Needs Python 3.11, `bpy` 4.5 and `OpenEXR`. panoramas/ holds the port: shapes, materials, models,
-their layout, and the sky. Cycles traces what stands on the ground; haze, the sky and the sun's disc
-are then composed from exact maps, so that the disc keeps its energy and the sky has no noise.
+Run by hand. Needs Python 3.11, `bpy` 4.5 and `OpenEXR`. The package panoramas/ contains the port:
+shapes, materials, models, layout and sky. Cycles traces the objects on the ground. Haze, sky and
+the sun's disc are added from exact maps afterwards, so that the disc keeps its energy and the sky
+has no noise.
 """
 
 import argparse
@@ -27,16 +28,16 @@ HDRI = Path(__file__).parent / "hdri"
 Image = NDArray[np.float32]
 
 REC_709 = np.array((0.2126, 0.7152, 0.0722), np.float32)
-MEAN, PEAK = 0.7, 40000.0  # mean luminance by day; the sun stays a half float when compressed
+MEAN, PEAK = 0.7, 40000.0  # mean luminance by day; limit at which compression cannot overflow
 _MIST_M = 20000.0
-_DOWN_REACH = 1.52  # tangent to the edge of the view down: 45 degrees, 11.25 of blending, a margin
-_FAINT = 0.03  # irradiance below which the sun does not show through the clouds
+_DOWN_REACH = 1.52  # tangent of the view down: 45 degrees, 11.25 for blending, and a margin
+_FAINT = 0.03  # irradiance below which the sun is not visible through the clouds
 _TWILIGHT = np.array((0.67, 1.01, 1.91), np.float32)
-"""Light of a blue sky without the sun, of luminance 1: daylight of 25,000 K, the highest for which
-CIE 15:2004 (section 3.1) gives its chromaticity."""
+"""Blue sky without the sun, of luminance 1: daylight of 25,000 K, the highest temperature for which
+CIE 15:2004 (section 3.1) gives a chromaticity."""
 _DWA_LEVELS = (60.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 800.0)
 _MAX_BYTES = 1_100_000
-_MAX_CHANGE = 0.005  # of the light of the whole map, and of the brightest parts of it
+_MAX_CHANGE = 0.005  # relative, for the light of the whole map and of its brightest parts
 
 VARIANTS = (
     Variant("port_noon", ("day", "port", "waterside"), 1, (-6, 20, 7.5), (56, 200),
@@ -68,7 +69,7 @@ VARIANTS = (
 
 
 def read_exr(path: Path) -> dict[str, Image]:
-    """Channels by name, without the prefix of Blender's render layer."""
+    """Return the channels by name, without the prefix of Blender's render layer."""
     channels = OpenEXR.File(str(path), separate_channels=True).channels()
     layer = "ViewLayer."
     return {name.removeprefix(layer): c.pixels.astype(np.float32) for name, c in channels.items()}
@@ -77,7 +78,11 @@ def read_exr(path: Path) -> dict[str, Image]:
 def render(
     size: tuple[int, int], samples: int, mist: bool, rows: tuple[float, float] = (0.0, 1.0)
 ) -> dict[str, Image]:
-    """Trace what the camera sees, `size` wide and high: rows of it, as shares from the bottom."""
+    """Trace the view of the current camera.
+
+    size is (width, height). Only `rows` are rendered, as shares of the height from the bottom.
+    `mist` adds the mist pass, a transparent background and denoising.
+    """
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
@@ -107,8 +112,11 @@ def render(
 
 
 def trace(width: int, samples: int, eye: tuple[float, float, float]) -> dict[str, Image]:
-    """The whole panorama, from the camera that is there; what lies 45 degrees and more below the
-    horizon from a view straight down, for denoising rows around a pole leaves spokes."""
+    """Trace the whole panorama from the current camera.
+
+    The part more than 45 degrees below the horizon comes from a view straight down, because
+    denoising the rows around a pole leaves spokes.
+    """
     above = render((width, width // 2), samples, True, (0.25, 1.0))
     add_camera(eye, down=True)
     below = render((width // 4, width // 4), samples, True)
@@ -123,7 +131,7 @@ def trace(width: int, samples: int, eye: tuple[float, float, float]) -> dict[str
 
 
 def seen_below(view: Image, toward: NDArray[np.float64]) -> Image:
-    """What a view straight down [N, N] of the tangent _DOWN_REACH shows in directions [..., 3]."""
+    """Sample a view straight down [N, N] with the tangent _DOWN_REACH in directions [..., 3]."""
     side = view.shape[0]
     x, y = (toward[..., :2] / (_DOWN_REACH * -toward[..., 2:])).transpose(2, 0, 1)
     column, row = (x + 1) * side / 2 - 0.5, (1 - y) * side / 2 - 0.5
@@ -135,8 +143,10 @@ def seen_below(view: Image, toward: NDArray[np.float64]) -> Image:
 
 
 def add_camera(eye: tuple[float, float, float], down: bool = False) -> None:
-    """A camera that sees everything, its middle column along +x; or straight down, +x to the right
-    and +y up."""
+    """Add a panoramic camera with its middle column along +x.
+
+    With `down`, it looks straight down instead, +x to the right and +y up.
+    """
     camera = bpy.data.cameras.new("eye")
     camera.clip_start, camera.clip_end = 0.05, 1e5
     thing = bpy.data.objects.new("eye", camera)
@@ -151,13 +161,14 @@ def add_camera(eye: tuple[float, float, float], down: bool = False) -> None:
 
 
 def toward(elevation_deg: float, azimuth_deg: float) -> NDArray[np.float64]:
-    """Unit vector of angles in degrees."""
+    """Return the unit vector of angles in degrees."""
     e, a = np.radians((elevation_deg, azimuth_deg))
     return np.array((np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)))
 
 
 def bake_sky(v: Variant) -> tuple[Image, NDArray[np.float64]]:
-    """Clear sky [512, 1024, 3], black below the horizon, and the sun's irradiance [3]."""
+    """Return the clear sky [512, 1024, 3], black below the horizon, and the sun's irradiance
+    [3]."""
     tree = bpy.context.scene.world.node_tree
     node = tree.nodes.new("ShaderNodeTexSky")
     node.sky_type = "NISHITA"
@@ -171,7 +182,7 @@ def bake_sky(v: Variant) -> tuple[Image, NDArray[np.float64]]:
         maps.append(np.stack([planes[f"Combined.{c}"] for c in "RGB"], -1))
     tree.nodes.remove(node)
     clear, with_sun = maps
-    # Blender's sun at rotation 0 stands over +y, here turned to the azimuth asked for
+    # rotate Blender's sun, which is at +y for rotation 0, to the variant's azimuth
     shift = round((90.0 - v.sun_deg[1]) / 360 * 1024)
     clear = np.roll(clear, shift, axis=1)
     clear[256:] = 0
@@ -184,12 +195,13 @@ def bake_sky(v: Variant) -> tuple[Image, NDArray[np.float64]]:
 def compose_sky(
     v: Variant, clear: Image, sun: NDArray[np.float64], width: int
 ) -> tuple[Image, NDArray[np.float64]]:
-    """The sky with its clouds [width / 2, width, 3] without the disc, and the sun through them."""
+    """Return the cloudy sky [width / 2, width, 3] without the disc, and the sun's light through
+    it."""
     half = min(width, 1536) // 4
     down = sky.directions(2 * half)[:half]
     base = enlarge(clear[:256], (half, 4 * half))
     if v.sun_deg[0] <= 0:  # single scattering leaves the sky opposite the sun black
-        # by eye; the deeper the sun, the more of what light is left was scattered more than once
+        # chosen by eye; multiple scattering matters more the lower the sun is
         more = 0.3 - 0.12 * v.sun_deg[0]
         base = base + more * float((base @ REC_709).mean()) * _TWILIGHT
     mean_sky = (base * down[..., 2:]).mean((0, 1)) / down[..., 2].mean()
@@ -198,7 +210,7 @@ def compose_sky(
     if v.clouds.cover:
         through, lit, ambient = sky.cloud_layer(v.clouds, 2 * half, sun_way)
         light = sun
-        if v.sun_deg[0] <= 0:  # the afterglow reaches clouds that stand out of the earth's shadow
+        if v.sun_deg[0] <= 0:  # the afterglow reaches clouds above the earth's shadow
             shadow_km = sky.EARTH_KM * (1 / np.cos(np.radians(v.sun_deg[0])) - 1)
             glow = base[-12:, :].max((0, 1))
             light = 0.9 * glow * (v.clouds.base_km > shadow_km)
@@ -213,7 +225,7 @@ def compose_sky(
         near_sun = down @ sun_way > np.cos(np.radians(0.6))
         if near_sun.any():
             sun = sun * float(through[near_sun].mean())
-    if v.sun_deg[0] < -12:  # night: airglow, and the town's light on the haze
+    if v.sun_deg[0] < -12:  # night: airglow, and town light scattered by haze
         rise = down[..., 2:]
         base = np.array((0.10, 0.14, 0.22)) + np.exp(-rise / 0.12) * np.array((1.0, 0.72, 0.45))
     full = np.zeros((2 * half, 4 * half, 3), np.float32)
@@ -223,7 +235,7 @@ def compose_sky(
 
 
 def enlarge(image: Image, size: tuple[int, int]) -> Image:
-    """Bilinear, seamless in azimuth."""
+    """Resize bilinearly, seamless in azimuth."""
     (h, w), (high, wide) = image.shape[:2], size
     y = np.clip((np.arange(high) + 0.5) * h / high - 0.5, 0, h - 1)
     x = (np.arange(wide) + 0.5) * w / wide - 0.5
@@ -234,10 +246,10 @@ def enlarge(image: Image, size: tuple[int, int]) -> Image:
 
 
 def light_scene(v: Variant, around: Image, sun: NDArray[np.float64]) -> None:
-    """The world shines with the sky map; the sun is a lamp, so that it makes no noise."""
+    """Light the scene with the sky map, and with the sun as a lamp so that it makes no noise."""
     small = enlarge(around, (512, 1024)) if around.shape[1] > 1024 else around
     high, wide = small.shape[:2]
-    small[high // 2 :] = 0.5 * small[high // 2 - 2]  # never seen: the ground hides it
+    small[high // 2 :] = 0.5 * small[high // 2 - 2]  # invisible behind the ground
     image = bpy.data.images.new("sky", wide, high, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"
     image.pixels.foreach_set(np.dstack([small, np.ones((high, wide))])[::-1].ravel().astype("f4"))
@@ -257,7 +269,7 @@ def light_scene(v: Variant, around: Image, sun: NDArray[np.float64]) -> None:
 
 
 def sun_disc(width: int, sun: NDArray[np.float64], way: NDArray[np.float64]) -> Image:
-    """Radiance [width / 2, width, 3] of an even disc whose irradiance is `sun`."""
+    """Return the radiance [width / 2, width, 3] of a uniform disc with the irradiance `sun`."""
     disc = np.zeros((width // 2, width, 3), np.float32)
     row = int(np.arccos(way[2]) / np.pi * (width // 2))
     fine = 8 * (width // 2)
@@ -275,7 +287,7 @@ def sun_disc(width: int, sun: NDArray[np.float64], way: NDArray[np.float64]) -> 
 
 
 def check_sun(v: Variant) -> None:
-    """Stop when something hides the sun from the eye: a variant must be laid out better."""
+    """Exit if an object hides the sun from the camera, because the variant's layout must change."""
     graph = bpy.context.evaluated_depsgraph_get()
     hit = bpy.context.scene.ray_cast(graph, v.eye, toward(*v.sun_deg))
     if hit[0]:
@@ -283,7 +295,7 @@ def check_sun(v: Variant) -> None:
 
 
 def bake(v: Variant, width: int, samples: int) -> Image:
-    """The finished panorama of a variant, linear radiance [width / 2, width, 3]."""
+    """Return the finished panorama of a variant as linear radiance [width / 2, width, 3]."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.world = world = bpy.data.worlds.new("world")
     world.use_nodes = True
@@ -306,7 +318,7 @@ def bake(v: Variant, width: int, samples: int) -> Image:
     air = around[int(width / 4 - 7 * degree) : int(width / 4 - degree)].mean(0)[None]
     seen = seen * clear + air * alpha * (1 - clear)
     sky_part = around + (sun_disc(width, sun, toward(*v.sun_deg)) if sun.max() > _FAINT else 0)
-    # the denoised picture has smooth edges; coverage has the grain of its samples
+    # the denoised image has smooth edges, but the coverage is noisy
     bare = 1 - sky.smooth(alpha[..., 0])[..., None]
     radiance = np.maximum(seen + bare * sky_part, 0.0)
     solid = np.sin(np.pi * (np.arange(width // 2) + 0.5) / (width // 2))[:, None]
@@ -318,9 +330,9 @@ def bake(v: Variant, width: int, samples: int) -> Image:
 
 
 def write(radiance: Image, path: Path) -> None:
-    """A compact EXR of half floats, compressed as little as its size allows.
+    """Write an EXR of half floats with the weakest compression that fits its size limit.
 
-    Stops when compression changes the light of the whole, or of the sun and lamps, noticeably.
+    Exits if compression noticeably changes the light of the whole map, or of the sun and lamps.
     """
     height, width = radiance.shape[:2]
     solid = np.sin(np.pi * (np.arange(height) + 0.5) / height)[:, None]
@@ -342,13 +354,13 @@ def write(radiance: Image, path: Path) -> None:
     for part in (np.ones_like(bright), bright):
         change = abs(after[part].sum() / max(luminance[part].sum(), 1e-9) - 1) if part.any() else 0
         if not change < _MAX_CHANGE:
-            sys.exit(f"{path}: level {level} changes its light by {change:.2%}; allow more bytes")
+            sys.exit(f"{path}: level {level} changes its light by {change:.2%}; raise _MAX_BYTES")
     print(f"{path.name}: level {level:.0f}, {whole.stat().st_size} bytes", flush=True)
     whole.replace(path)
 
 
 def write_index(folder: Path) -> None:
-    """Enter the panoramas that the folder holds into its index.json and SOURCES.md."""
+    """Add the panoramas in the folder to its index.json and SOURCES.md."""
     listed, sources = folder / "index.json", folder / "SOURCES.md"
     index = json.loads(listed.read_text(encoding="utf-8"))
     text = sources.read_text(encoding="utf-8")
@@ -370,9 +382,11 @@ def write_index(folder: Path) -> None:
 
 
 def main() -> None:
-    """Bake what is asked for and missing; keep the index of the folder up to date."""
+    """Render the requested or missing panoramas, and update the folder's index."""
     options = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    options.add_argument("names", nargs="*", help="default: all that are missing in --out")
+    options.add_argument(
+        "names", nargs="*", help="panoramas to render; default: all that are missing in --out"
+    )
     options.add_argument("--out", type=Path, default=HDRI)
     options.add_argument("--width", type=int, default=4096)
     options.add_argument("--samples", type=int, default=6)

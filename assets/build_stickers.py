@@ -1,8 +1,9 @@
-"""Draws plates, stickers and made-up brand emblems as SVG and bakes them. Run by hand:
+"""Draw plates, stickers and invented brand emblems as SVG and convert them to PNG.
 
     python assets/build_stickers.py
 
-They stand beside the markers and bear no label. All drawings, names and owner codes are made up.
+Run by hand. They appear next to the markers and have no label. All drawings, names and owner codes
+are invented.
 """
 
 import json
@@ -131,7 +132,7 @@ SIDES = ["front", "back"]
 ENDS = ["door", "no_door"]
 
 STICKERS = {
-    # name: drawing, width and height in mm, faces, on every container
+    # name: (drawing, (width, height) in mm, faces, present on every container)
     "csc_safety_approval": (safety_plate(), (250, 150), ["door"], True),
     "owner_plate": (owner_plate(), (200, 140), ["door"], True),
     "customs_plate": (customs_plate(), (250, 100), ["door"], False),

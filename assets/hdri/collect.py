@@ -1,16 +1,19 @@
-"""Rebuild the .exr files and index.json of this folder from the packages that carry the originals.
+"""Rebuild the .exr files and index.json of this folder from the packages with the originals.
 
-Run by hand, in an empty folder, after fetching both packages:
+Run by hand, in an empty folder, after downloading both packages:
 
     pip download --no-deps bpy==4.5.15
     npm pack @pmndrs/assets@1.7.0
     python collect.py bpy-4.5.15-*.whl pmndrs-assets-1.7.0.tgz OUT
 
-Changes to the originals, none of which moves light over more than a few texels:
-  - a sun whose red and green overflowed before the original was resized takes its halo's colour;
-  - values below 0, left by the resizing filter around lights, are filled from their neighbours,
-    and the light beside them gives up what that adds;
-  - values are clamped to half-float range and saved as half floats, DWAB-compressed.
+Changes to the originals, none of which moves light by more than a few texels:
+
+A sun whose red and green overflowed before the original was resized gets the colour of its halo.
+
+Values below 0, left by the resizing filter around lights, are filled from their neighbours. The
+light next to them is reduced by the added amount.
+
+Values are clamped to the half-float range and saved as half floats with DWAB compression.
 """
 
 import base64
@@ -31,7 +34,7 @@ BPY = ("bpy 4.5.15 (PyPI)", "bpy/4.5/datafiles/studiolights/world/{}.exr")
 PMNDRS = ("@pmndrs/assets 1.7.0 (npm)", "package/hdri/{}.exr.js")
 LICENCE = "CC0-1.0"
 
-# name here: (package, name there, kinds); left out: hotel room, flats, studios, shopping halls
+# our name: (package, its name there, kinds); without hotel room, flats, studios, shopping halls
 CHOSEN = {
     "city": (BPY, "city", ("overcast", "urban")),
     "courtyard": (BPY, "courtyard", ("day", "interior")),
@@ -53,12 +56,12 @@ CHOSEN = {
     "workshop": (PMNDRS, "workshop", ("industrial", "interior")),
 }
 _HALF_MAX = 65504.0
-_NOISE = 0.01  # the compression alone leaves values down to a few thousandths below 0
-_DWA_LEVEL = 20.0  # the usual 45 shows blocks in night skies
+_NOISE = 0.01  # compression alone gives values down to a few thousandths below 0
+_DWA_LEVEL = 20.0  # the default of 45 shows blocks in night skies
 
 
 def decode(data: bytes) -> NDArray[np.float32]:
-    """Float32 [H, W, 3] of an EXR file's bytes."""
+    """Return the radiance float32 [H, W, 3] of an EXR file's bytes."""
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
         file.write(data)
         file.flush()
@@ -67,7 +70,10 @@ def decode(data: bytes) -> NDArray[np.float32]:
 
 
 def restore_lost_channels(radiance: NDArray[np.float32]) -> None:
-    """In place: texels whose red and green are lost beside a strong blue get them from the ring."""
+    """Restore red and green in place where they are lost next to a strong blue.
+
+    The colour comes from the ring of texels around the lost ones.
+    """
     size = np.abs(radiance)
     lost = (size[..., :2].max(-1) < 1e-3 * size[..., 2]) & (size[..., 2] > 1)
     if lost.any():
@@ -77,7 +83,7 @@ def restore_lost_channels(radiance: NDArray[np.float32]) -> None:
 
 
 def fill_undershoot(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The radiance without negative values, with nearly the same sum around each light."""
+    """Return the radiance without negative values, with nearly the same sum around each light."""
     bad = radiance.min(-1) < -_NOISE
     positive = np.maximum(radiance, 0.0)
     filled, known = positive.copy(), ~bad
@@ -101,7 +107,7 @@ def fill_undershoot(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def collect(wheel: Path, tarball: Path, out: Path) -> None:
-    """Write every chosen environment and index.json into out."""
+    """Write every chosen environment and index.json to `out`."""
     out.mkdir(parents=True, exist_ok=True)
     index = {}
     with zipfile.ZipFile(wheel) as bpy, tarfile.open(tarball) as pmndrs:

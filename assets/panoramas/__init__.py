@@ -1,1 +1,1 @@
-"""A container port in Blender, path traced to panoramas: see build_panoramas.py."""
+"""A container port in Blender, path-traced to panoramas by build_panoramas.py."""

@@ -24,9 +24,9 @@ PLAIN = {  # name: (albedo, roughness, metallic)
 
 
 def _material(name: str) -> tuple[Callable[..., Nodes], Callable[[str, Any], None]]:
-    """A new material, as two functions: add a node with its inputs and settings, set an input.
+    """Create a material; return functions that add a node and that set an input of its shader.
 
-    Where a node's socket is given as a value, it is linked.
+    Node sockets given as values are linked.
     """
     material = bpy.data.materials.new(name)
     material.use_nodes = True
@@ -82,7 +82,7 @@ def _plain() -> None:
 
 
 def _painted(name: str, dirt: float, scale: float) -> None:
-    """Paint in the object's own colour, blotched, streaked downward and dusty on top."""
+    """Paint in the object's own colour, with blotches, vertical streaks, and dust on top."""
     node, set_ = _material(name)
     info = node("ObjectInfo")
     where = node("TexCoord").outputs["Object"]
@@ -105,7 +105,7 @@ def _painted(name: str, dirt: float, scale: float) -> None:
 
 
 def _lit_windows(lit: bool) -> None:
-    """Window panes; by night every other one shines."""
+    """Window panes. At night about half of them are lit."""
     node, set_ = _material("window")
     set_("Base Color", (0.02, 0.03, 0.035, 1.0))
     set_("Roughness", 0.08)
@@ -129,7 +129,7 @@ def _lit_windows(lit: bool) -> None:
 
 
 def _lamp(name: str, color: tuple[float, float, float], strength: float) -> None:
-    """The face of a lamp, seen but not sampled: a spot lamp beside it gives the light."""
+    """The visible face of a lamp. It casts no light; a spot lamp next to it does."""
     _, set_ = _material(name)
     set_("Base Color", (0.6, 0.6, 0.6, 1.0))
     set_("Emission Color", (*color, 1.0))
@@ -137,7 +137,7 @@ def _lamp(name: str, color: tuple[float, float, float], strength: float) -> None
 
 
 def _ground(name: str, tint: tuple[float, float, float], slab_m: float, wet: float) -> None:
-    """Concrete slabs or asphalt: joints, stains, tyre marks; wet: share under a film of water."""
+    """Concrete slabs or asphalt with joints, stains and tyre marks; wet: share under water."""
     node, set_ = _material(name)
     where = node("NewGeometry").outputs["Position"]
     wide = _noise(node, where, 0.035, 3.0)
@@ -191,7 +191,7 @@ def _ramp_to(node: Any, value: Any, at_0: float, at_1: float) -> Any:
 
 
 def _water(swell: float, tint: tuple[float, float, float]) -> None:
-    """Waves of three lengths as bumps; what is too small to see far away becomes roughness."""
+    """Waves of three lengths as bumps; those too small to see far away become roughness."""
     node, set_ = _material("water")
     where = node("NewGeometry").outputs["Position"]
     distance = node("CameraData").outputs["View Distance"]
@@ -244,7 +244,13 @@ def _hills(tint: tuple[float, float, float]) -> None:
 
 
 def build_materials(lamp_strength: float, wet: float, swell: float) -> None:
-    """Make all materials. lamp_strength: radiance of lamps, 0 by day; wet, swell: 0 to 1."""
+    """Create all materials.
+
+    Args:
+        lamp_strength: Radiance of lamps, 0 by day.
+        wet: Share of wet ground, 0 to 1.
+        swell: Height of the waves, relative to normal.
+    """
     _plain()
     _painted("box", 0.5, 0.35)
     _painted("crane", 0.3, 0.12)

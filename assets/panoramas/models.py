@@ -1,4 +1,4 @@
-"""The port's moving stock and machines as meshes. Metres, z up, each standing on z = 0."""
+"""Meshes of the port's containers, vehicles and machines. Metres, z up, standing on z = 0."""
 
 from collections.abc import Callable
 
@@ -9,12 +9,17 @@ from panoramas.shapes import Shape
 
 WIDTH, HEIGHT = 2.44, 2.75
 LENGTHS = {20: 6.06, 40: 12.19}
-_WAVE = ((0.0, 0.0), (0.072, 0.0), (0.14, 0.036), (0.21, 0.036))  # along, inward: one rib
+_WAVE = (
+    (0.0, 0.0),
+    (0.072, 0.0),
+    (0.14, 0.036),
+    (0.21, 0.036),
+)  # one rib: (along the wall, inward)
 _PITCH = 0.278
 
 
 def container(feet: int, painted: bool, rng: np.random.Generator) -> bpy.types.Mesh:
-    """A box along x, its middle over the origin, doors at +x. painted: a line's livery on it."""
+    """Return a container along x, centred over the origin, doors at +x; painted: with a livery."""
     shape, long = Shape(), LENGTHS[feet]
     half, side = long / 2, WIDTH / 2
     ribs = int((long - 0.5) / _PITCH)
@@ -44,7 +49,7 @@ def container(feet: int, painted: bool, rng: np.random.Generator) -> bpy.types.M
             (half - 0.03, y, 0.1), (half - 0.03, y, HEIGHT - 0.1), (0.02, 0.02), "galvanized", 5
         )
     shape.box((half - 0.061, -0.01, 0.16), (half - 0.05, 0.01, HEIGHT - 0.12), "dark")
-    for y in (0.35, 0.55, 0.7):  # identifier and masses on the right door
+    for y in (0.35, 0.55, 0.7):  # identifier and weights on the right door
         shape.box((half - 0.062, y, HEIGHT - 0.5), (half - 0.052, y + 0.12, HEIGHT - 0.4), "livery")
     shape.box((half - 0.062, 0.3, 1.0), (half - 0.052, 0.8, 1.3), "livery")
     if painted:
@@ -67,7 +72,7 @@ def _strip(shape: Shape, wall: list[tuple[float, float, float]], outward: bool) 
 
 
 def _livery(shape: Shape, half: float, side: float, rng: np.random.Generator) -> None:
-    """A stripe and a mark of squares on both sides, with nothing to read."""
+    """Add a stripe, or a mark of squares, to both sides, without any text."""
     low, tall = rng.choice((0.55, 1.0, 1.75)), rng.choice((0.16, 0.3, 0.45))
     x, z = rng.uniform(-0.7, 0.4) * half, rng.uniform(0.8, 1.1)
     squares = {
@@ -87,7 +92,8 @@ def _livery(shape: Shape, half: float, side: float, rng: np.random.Generator) ->
 
 
 def quay_crane(boom_up: bool, trolley_y: float, hoist_z: float) -> bpy.types.Mesh:
-    """A ship-to-shore crane on rails at y = 0 and 30, its boom over the water at y < 0."""
+    """Return a ship-to-shore crane on rails at y = 0 and 30, with its boom over the water at y <
+    0."""
     s, top = Shape(), 43.0
     for x in (-9.0, 9.0):
         for y in (0.0, 30.0):
@@ -106,7 +112,7 @@ def quay_crane(boom_up: bool, trolley_y: float, hoist_z: float) -> bpy.types.Mes
         s.beam((-9, y, 15.0), (9, y, 15.0), 1.2, 2.0, "crane")
         s.beam((-9, y, 41.5), (9, y, 41.5), 1.0, 1.6, "crane")
     s.beam((-3.5, 5, 70), (3.5, 5, 70), 1.0, 1.0, "crane")
-    for x in (-3.0, 3.0):  # the girder over the quay and the boom
+    for x in (-3.0, 3.0):  # girder over the quay, and boom
         s.beam((x, 0, 44.5), (x, 50, 44.5), 0.9, 2.2, "crane")
         tip = (x, -12.0, 44.5 + 55.0) if boom_up else (x, -58.0, 44.5)
         s.beam((x, 0, 44.5), tip, 0.9, 2.0, "crane")
@@ -149,7 +155,10 @@ def quay_crane(boom_up: bool, trolley_y: float, hoist_z: float) -> bpy.types.Mes
 
 
 def yard_crane(trolley: float) -> bpy.types.Mesh:
-    """A rubber-tyred gantry across six rows and a lane: legs at y = 0 and 23.5, along x."""
+    """Return a rubber-tyred gantry crane over six rows and a lane, with legs at y = 0 and 23.5.
+
+    It drives along x.
+    """
     s = Shape()
     for y in (0.0, 23.5):
         for x in (-3.6, 3.6):
@@ -179,7 +188,7 @@ def yard_crane(trolley: float) -> bpy.types.Mesh:
 
 
 def light_mast(lamp: str) -> bpy.types.Mesh:
-    """A pole of 32 m with a ring of eight floodlights."""
+    """Return a 32 m mast with a ring of eight floodlights."""
     s = Shape()
     s.box((-0.9, -0.9, 0), (0.9, 0.9, 0.8), "galvanized")
     s.tube((0, 0, 0.8), (0, 0, 32), (0.38, 0.16), "galvanized", 12)
@@ -192,7 +201,7 @@ def light_mast(lamp: str) -> bpy.types.Mesh:
 
 
 def truck() -> bpy.types.Mesh:
-    """A terminal tractor with an empty chassis for 40 feet, heading to +x."""
+    """Return a terminal tractor with an empty 40-foot chassis, heading to +x."""
     s = Shape()
     s.box((6.6, -1.2, 0.9), (10.6, 1.2, 1.3), "dark")
     s.box((8.3, -1.2, 1.3), (10.3, 0.4, 3.2), "crane")
@@ -209,9 +218,9 @@ def truck() -> bpy.types.Mesh:
 
 
 def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], float]]:
-    """A container ship's hull and house, bow to +x; waterline at z = 0, deck at z = 13.
+    """Return the hull and house of a container ship, bow to +x, waterline at z = 0, deck at z = 13.
 
-    Also returns half of the deck's width at an x.
+    Also returns a function that gives half the width of the deck at x.
     """
     s = Shape()
     stations = np.linspace(-length / 2, length / 2, 41)
@@ -256,7 +265,7 @@ def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], 
     def half_deck(x: float) -> float:
         return float(np.interp(x, stations, rows[-1]))
 
-    for x in np.arange(-length / 2, 0.42 * length, 3.0):  # posts of the railing, along the deck
+    for x in np.arange(-length / 2, 0.42 * length, 3.0):  # railing posts
         edge = half_deck(x) - 0.3
         for y in (-edge, edge):
             s.beam((x, y, 13), (x, y, 14.1), 0.06, 0.06, "white")
@@ -264,7 +273,7 @@ def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], 
 
 
 def warehouse(length: float, depth: float, height: float) -> bpy.types.Mesh:
-    """A gabled hall along x, its front at y = 0."""
+    """Return a gabled warehouse along x, with its front at y = 0."""
     s = Shape()
     s.box((-length / 2, 0, 0), (length / 2, depth, height), "cladding")
     ridge = height + 0.12 * depth
@@ -287,7 +296,7 @@ def warehouse(length: float, depth: float, height: float) -> bpy.types.Mesh:
 
 
 def bollard() -> bpy.types.Mesh:
-    """A mooring bollard at the quay's edge."""
+    """Return a mooring bollard for the quay's edge."""
     s = Shape()
     s.tube((0, 0, 0), (0, 0, 0.08), (0.5, 0.5), "dark", 16)
     s.tube((0, 0, 0.08), (0, 0, 0.55), (0.26, 0.24), "yellow", 16)
@@ -296,7 +305,7 @@ def bollard() -> bpy.types.Mesh:
 
 
 def tower(height: float) -> bpy.types.Mesh:
-    """A harbour light at the end of a mole."""
+    """Return a harbour light for the end of a breakwater."""
     s = Shape()
     s.tube((0, 0, 0), (0, 0, height), (1.6, 1.1), "white", 24)
     s.tube((0, 0, 0.45 * height), (0, 0, 0.65 * height), (1.41, 1.31), "red", 24)
@@ -307,7 +316,7 @@ def tower(height: float) -> bpy.types.Mesh:
 
 
 def tank(radius: float, height: float) -> bpy.types.Mesh:
-    """A storage tank with a low conical roof."""
+    """Return a storage tank with a low conical roof."""
     s = Shape()
     s.tube((0, 0, 0), (0, 0, height), (radius, radius), "white", 48)
     s.tube((0, 0, height), (0, 0, height + 0.1 * radius), (radius, 0.1), "galvanized", 48)

@@ -1,4 +1,7 @@
-"""Lays out the port: x runs along the quay, its edge at y = 0; water at y < 0, paving at z = 0."""
+"""Layout of the port.
+
+x runs along the quay, whose edge is at y = 0. Water is at y < 0, and the paving at z = 0.
+"""
 
 from dataclasses import dataclass, field
 
@@ -10,8 +13,8 @@ from panoramas.shapes import Shape, place
 from panoramas.sky import Clouds
 
 SEA_M = -3.5
-QUAY_RAIL_M = 4.0  # the waterside crane rail, from the edge
-PALETTE = (  # linear albedo of the boxes in the yard
+QUAY_RAIL_M = 4.0  # distance of the waterside crane rail from the edge
+PALETTE = (  # linear albedo of the containers in the yard
     (0.14, 0.030, 0.022), (0.095, 0.02, 0.03), (0.15, 0.05, 0.025), (0.02, 0.075, 0.20),
     (0.014, 0.03, 0.075), (0.07, 0.22, 0.36), (0.025, 0.17, 0.18), (0.03, 0.13, 0.07),
     (0.05, 0.19, 0.07), (0.42, 0.13, 0.02), (0.50, 0.28, 0.03), (0.50, 0.46, 0.36),
@@ -22,12 +25,26 @@ CRANE_COLORS = ((0.03, 0.09, 0.28), (0.42, 0.06, 0.04), (0.50, 0.50, 0.48), (0.5
 
 @dataclass(frozen=True)
 class Variant:
-    """One panorama. eye: metres. Sun angles: degrees, azimuth counter-clockwise from +x.
+    """One panorama.
 
-    air, dust: densities of Blender's Nishita sky, 1 being a clear day. sky_level: mean luminance
-    of the sky, to which lamps are relative. haze_km: distance over which haze hides 63 %.
-    lamps: irradiance below a light mast, 0 by day. cranes: (x, boom up). end_m: where the quay
-    ends in x. ship_m: x of the middle of the ship alongside, or None.
+    Attributes:
+        name: Name of the file.
+        kind: Kinds in index.json.
+        seed: Seed of the layout.
+        eye: Position of the camera in metres.
+        sun_deg: Elevation and azimuth of the sun in degrees, azimuth counter-clockwise from +x.
+        clouds: The cloud layer.
+        air: Air density of Blender's Nishita sky, 1 for a clear day.
+        dust: Dust density of Blender's Nishita sky, 1 for a clear day.
+        sky_level: Mean luminance of the sky; lamps are relative to it.
+        haze_km: Distance at which haze hides 63 %.
+        lamps: Irradiance below a light mast, 0 by day.
+        lamp: Material of the lamps.
+        wet: Share of wet ground.
+        swell: Height of the waves, relative to normal.
+        cranes: x and raised boom of each quay crane.
+        ship_m: x of the middle of the ship at the quay, or None.
+        end_m: x of the end of the quay.
     """
 
     name: str
@@ -50,19 +67,19 @@ class Variant:
 
 
 class Builder:
-    """Fills the Blender scene with the port of a variant."""
+    """Builder of a variant's port in the current Blender scene."""
 
     def __init__(self, variant: Variant) -> None:
         self.v = variant
         self.rng = np.random.default_rng(variant.seed)
-        painter = np.random.default_rng(1)  # apart: other liveries leave everything in its place
+        painter = np.random.default_rng(1)  # separate, so that liveries do not affect the layout
         self.boxes = {
             feet: [models.container(feet, painted, painter) for painted in (0, 0, 1, 1, 1, 1)]
             for feet in (20, 40)
         }
 
     def build(self) -> None:
-        """Make everything; materials must exist already."""
+        """Create everything; the materials must already exist."""
         self._ground()
         self._quay()
         self._cranes()
@@ -86,7 +103,8 @@ class Builder:
         turn: float,
         has_room: bool = True,
     ) -> None:
-        """Where it has no room it is drawn by lot all the same: all else keeps its place."""
+        """Place a container, or only consume its random numbers so that the others stay in
+        place."""
         mesh = self.boxes[feet][int(self.rng.integers(6))]
         tone = self.rng.uniform(0.75, 1.15)
         if has_room:
@@ -96,7 +114,7 @@ class Builder:
         s, end = Shape(), self.v.end_m
         s.box((-9000, 0.4, -9), (end, 48, 0), "concrete")
         s.box((-9000, 48, -9), (end, 9000, 0), "asphalt")
-        s.box((-9000, 0, -9), (end, 0.4, 0.22), "galvanized")  # the coping
+        s.box((-9000, 0, -9), (end, 0.4, 0.22), "galvanized")  # coping
         if end < 2000:
             s.box((end, 0, -9), (end + 0.4, 9000, 0.22), "galvanized")
         for y in (QUAY_RAIL_M, QUAY_RAIL_M + 30):
@@ -150,7 +168,7 @@ class Builder:
         mesh, half_deck = models.ship(length, beam)
         color = ((0.02, 0.03, 0.07), (0.16, 0.02, 0.02), (0.02, 0.08, 0.06))[self.v.seed % 3]
         place(mesh, (x, y - beam / 2, SEA_M), turn, color)
-        if turn:  # far away: no load
+        if turn:  # the distant ship is empty
             return
         first = x - length / 2 + 8
         for bay in range(20):
@@ -223,7 +241,7 @@ class Builder:
         if not self.v.lamps:
             return
         lamp = bpy.data.lights.new("lamp", "SPOT")
-        # a spot of P watts has the intensity P / (4 pi); below a mast it is 30.5 m to the ground
+        # a spot lamp of P watts has the intensity P / (4 pi); those of a mast hang at 30.5 m
         lamp.energy = share * self.v.lamps * 4 * np.pi * 30.5**2
         lamp.color = (1.0, 0.93, 0.82) if self.v.lamp == "led" else (1.0, 0.52, 0.16)
         lamp.spot_size, lamp.spot_blend = np.radians(165), 0.6
@@ -244,7 +262,7 @@ class Builder:
             place(truck, (x, y, 0), turn, tint)
             if self.rng.random() < 0.65:
                 self._box(40, (x, y, 1.45), int(self.rng.integers(len(PALETTE))), turn)
-        for _ in range(14):  # boxes set down on the apron, hatch covers
+        for _ in range(14):  # containers on the apron
             x, y = self.rng.uniform(-200, min(200, self.v.end_m - 20)), self.rng.uniform(36.5, 40)
             if self._free(x, y, 14):
                 self._box(40, (x, y, 0), int(self.rng.integers(len(PALETTE))), 0.0)
@@ -256,7 +274,7 @@ class Builder:
         relief = sum(np.sin(k * turns + p) / k**0.8 for k, p in waves)
         relief = (relief - relief.min()) / (relief.max() - relief.min())
         for radius, height in ((5200.0, 110.0), (8800.0, 320.0)):
-            land = np.clip(np.sin(turns) + 0.55, 0.02, 1.0)  # low to seaward
+            land = np.clip(np.sin(turns) + 0.55, 0.02, 1.0)  # low towards the sea
             tops = height * land * (0.25 + 0.75 * np.roll(relief, int(radius) % 97))
             outer = [(radius * np.cos(t), radius * np.sin(t)) for t in turns]
             points = [
@@ -279,13 +297,13 @@ class Builder:
                 s.box(
                     (x - w - 1, y - w - 1, 0.4 * tall), (x + w + 1, y + w + 1, 0.43 * tall), "led"
                 )
-        s.box((-1400, -640, -8), (260, -622, -0.6), "rock")  # the mole and its light
+        s.box((-1400, -640, -8), (260, -622, -0.6), "rock")  # breakwater with its light
         place(s.mesh("far"), (0, 0, 0))
         place(models.tower(17), (250, -631, -0.6))
         place(models.tower(14), (620, -560, SEA_M))
         self._ship(900.0, -1500.0, 205.0)
         across = [c for c in CRANE_COLORS if c != CRANE_COLORS[self.v.seed % 4]]
-        for k in range(6):  # another terminal over the basin
+        for k in range(6):  # another terminal across the basin
             mesh = models.quay_crane(k % 3 == 1, -10.0, 20.0)
             place(mesh, (-1500 + 95 * k, -1000, 0.5), 180, across[k % 3])
         opposite = Shape()

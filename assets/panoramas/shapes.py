@@ -1,4 +1,4 @@
-"""Polygons gathered part by part into one Blender mesh. Metres, z up."""
+"""Construction of Blender meshes from simple parts. Metres, z up."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ Point = Sequence[float]
 
 
 class Shape:
-    """Vertices and faces, each face with a material by name."""
+    """Vertices and faces, with a material name for each face."""
 
     def __init__(self) -> None:
         self.points: list[tuple[float, float, float]] = []
@@ -17,14 +17,14 @@ class Shape:
         self.materials: list[str] = []
 
     def add(self, points: Sequence[Point], faces: Sequence[Sequence[int]], material: str) -> None:
-        """Faces by index into `points`, counter-clockwise seen from outside."""
+        """Add faces given by index into `points`, counter-clockwise seen from outside."""
         first = len(self.points)
         self.points += [(float(p[0]), float(p[1]), float(p[2])) for p in points]
         self.faces += [tuple(first + i for i in face) for face in faces]
         self.materials += [material] * len(faces)
 
     def box(self, low: Point, high: Point, material: str) -> None:
-        """A box along the axes, from corner to corner."""
+        """Add an axis-aligned box between two opposite corners."""
         corners = [
             (x, y, z)
             for z in (low[2], high[2])
@@ -34,7 +34,10 @@ class Shape:
         self.add(corners, _BOX, material)
 
     def beam(self, start: Point, end: Point, width: float, depth: float, material: str) -> None:
-        """A bar of rectangular section: `width` level, `depth` upright or along y if it stands."""
+        """Add a bar with a rectangular cross-section.
+
+        `width` is horizontal, and `depth` is vertical, or along y for an upright bar.
+        """
         a, b = np.array(start, float), np.array(end, float)
         along = (b - a) / np.linalg.norm(b - a)
         up = np.array([0.0, 0.0, 1.0]) if abs(along[2]) < 0.95 else np.array([0.0, 1.0, 0.0])
@@ -49,7 +52,7 @@ class Shape:
     def tube(
         self, start: Point, end: Point, radii: tuple[float, float], material: str, sides: int = 12
     ) -> None:
-        """A closed round bar, tapering from one radius to the other."""
+        """Add a closed round bar that tapers from one radius to the other."""
         a, b = np.array(start, float), np.array(end, float)
         along = (b - a) / np.linalg.norm(b - a)
         helper = np.array([1.0, 0.0, 0.0]) if abs(along[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
@@ -64,7 +67,7 @@ class Shape:
         self.add(points, faces, material)
 
     def mesh(self, name: str) -> bpy.types.Mesh:
-        """A Blender mesh with a slot for each material, which must exist in bpy.data."""
+        """Return a Blender mesh with a slot for each material, which must exist in bpy.data."""
         mesh = bpy.data.meshes.new(name)
         mesh.from_pydata(self.points, [], self.faces)
         used = sorted(set(self.materials))
@@ -86,7 +89,8 @@ def place(
     turn_deg: float = 0.0,
     color: Sequence[float] = (0.5, 0.5, 0.5),
 ) -> bpy.types.Object:
-    """An object of the mesh in the scene, turned about the vertical; color: linear RGB."""
+    """Add an object with this mesh to the scene, rotated about the vertical; color is linear
+    RGB."""
     thing = bpy.data.objects.new(mesh.name, mesh)
     thing.location = position
     thing.rotation_euler = (0.0, 0.0, np.deg2rad(turn_deg))

@@ -1,7 +1,8 @@
-"""Sky maps: Blender's Nishita sky, and clouds marched through a layer of noise.
+"""Sky maps: Blender's Nishita sky, and ray-marched clouds.
 
-Equirectangular, as fastgen takes them: the middle column looks along +x, +y is a quarter turn to
-the left. Radiance is linear Rec. 709 in Blender's units, where sunlight above the air is about 1e3.
+Maps are equirectangular in fastgen's convention: the middle column looks along +x, and +y is a
+quarter turn to the left. Radiance is linear Rec. 709 in Blender's units, where sunlight above the
+atmosphere is about 1e3.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,16 @@ _STEPS, _LIGHT_STEPS = 24, 3
 
 @dataclass(frozen=True)
 class Clouds:
-    """A layer of cloud. cover: share of the sky; the rest in kilometres and per kilometre."""
+    """A cloud layer.
+
+    Attributes:
+        cover: Share of the sky.
+        base_km: Height of the base.
+        thick_km: Thickness.
+        extinction: Extinction per kilometre.
+        size_km: Size of the noise pattern.
+        seed: Seed of the noise.
+    """
 
     cover: float = 0.0
     base_km: float = 1.2
@@ -31,7 +41,7 @@ class Clouds:
 
 
 def directions(height: int) -> NDArray[np.float64]:
-    """Unit directions [H, 2H, 3] of the texel centres."""
+    """Return the unit directions [H, 2H, 3] of the texel centres."""
     theta = np.pi * (np.arange(height) + 0.5)[:, None] / height
     phi = np.pi - np.pi * (np.arange(2 * height) + 0.5) / height
     z = np.broadcast_to(np.cos(theta), (height, 2 * height))
@@ -39,11 +49,11 @@ def directions(height: int) -> NDArray[np.float64]:
 
 
 def noise_tile(seed: int) -> NDArray[np.float32]:
-    """Cloud-like noise [N, N, N] that repeats, its values spread evenly over 0 to 1.
+    """Return tileable cloud-like noise [N, N, N], with values uniform in 0 to 1.
 
-    Gaussian noise with a spectrum near Kolmogorov's, of which the folded value 1 - |n| is taken at
-    two scales: it swells in rounded heaps as Worley noise does (Schneider 2015, The Real-time
-    Volumetric Cloudscapes of Horizon Zero Dawn).
+    Gaussian noise has a spectrum near Kolmogorov's. Folding it to 1 - |n| gives rounded heaps like
+    Worley noise (Schneider 2015, The Real-time Volumetric Cloudscapes of Horizon Zero Dawn). Two
+    scales are combined.
     """
     rng = np.random.default_rng(seed)
     f = np.fft.fftfreq(_TILE) * _TILE
@@ -80,14 +90,17 @@ def _sample(tile: NDArray[np.float32], p: NDArray[np.float32]) -> NDArray[np.flo
 def cloud_layer(
     clouds: Clouds, height: int, sun: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """March the layer for all texels above the horizon.
+    """March rays through the layer for all texels above the horizon.
 
-    Returns transmittance [H/2, 2H], and what reaches the eye of unit light: from the sun, and from
-    the sky around. The sun's part follows Henyey and Greenstein's phase function with two lobes.
+    The sun's part follows Henyey and Greenstein's phase function with two lobes.
+
+    Returns:
+        Transmittance [H/2, 2H], and the share of unit light that reaches the eye from the sun and
+            from the surrounding sky.
     """
     view = directions(height)[: height // 2].astype(np.float32)
     tile = noise_tile(clouds.seed)
-    # over a round earth even the horizon meets the layer: distance to a shell of radius R + h
+    # distance to a shell of radius R + h: on a round earth, rays at the horizon reach it, too
     rise = view[..., 2]
     near = -EARTH_KM * rise + np.sqrt((EARTH_KM * rise) ** 2 + 2 * EARTH_KM * clouds.base_km)
     top = clouds.base_km + clouds.thick_km
@@ -114,13 +127,13 @@ def cloud_layer(
     toward = sun.astype(np.float32).copy()
     toward[2] = max(toward[2], 0.12)
     middle = view * (near + 0.5 * (far - near))[..., None]
-    # thicker and thinner places, so that a closed sky is no even grey
+    # thicker and thinner places, so that an overcast sky is not uniformly grey
     vary = 0.5 + 1.0 * _sample(tile, middle * (0.45 * per_km))
     start = np.random.default_rng(0).random(near.shape, np.float32)
     for i in range(_STEPS):
         distance = near + (i + start) * step
         p = view * distance[..., None]
-        p[..., 2] += distance**2 / (2 * EARTH_KM) * (1 - rise**2)  # the ground falls away below
+        p[..., 2] += distance**2 / (2 * EARTH_KM) * (1 - rise**2)  # curvature of the earth
         d = density(p)
         shade = np.zeros_like(d)
         full = d > 0
@@ -128,7 +141,7 @@ def cloud_layer(
             reach = clouds.thick_km * 0.14 * (2.2**j)
             shade[full] += density(p[full] + toward * reach) * reach
         depth = clouds.extinction * shade
-        # a second, weaker order of scattering, as Wrenninge et al. 2013 approximate it
+        # approximation of second-order scattering by Wrenninge et al. 2013
         lit = np.exp(-depth) * phase + 0.5 * np.exp(-0.3 * depth) / (4 * np.pi)
         level = np.clip((p[..., 2] - clouds.base_km) / clouds.thick_km, 0, 1)
         here = 1 - np.exp(-clouds.extinction * d * step)
@@ -139,7 +152,7 @@ def cloud_layer(
 
 
 def smooth(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Binomial blur over 3 x 3 texels, which takes off the grain of few samples."""
+    """Apply a binomial blur over 3 x 3 texels, which removes the noise of few samples."""
     around = 0.5 * image + 0.25 * (np.roll(image, 1, 1) + np.roll(image, -1, 1))
     above = np.concatenate([around[:1], around[:-1]])
     below = np.concatenate([around[1:], around[-1:]])
