@@ -2,7 +2,7 @@
 // Reads the atlas position and zone, and the rest position if there is damage. Writes base colour,
 // roughness and metallic.
 #version 430 core
-#include "blocks.glsl"
+#include "variant.constants"
 #include "octahedral.glsl"
 #include "tone.glsl"
 #include "reflector.glsl"

@@ -3,7 +3,8 @@
 // Later instances draw it shifted, which fills a gutter of up to two texels around each part: texture
 // filtering at a part's border must not pick up the background.
 #version 430 core
-#include "blocks.glsl"
+#include "bake.constants"
+#include "variant.constants"
 
 #if DAMAGED
 layout(location = 0) in vec3 in_position_mm;

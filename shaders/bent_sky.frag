@@ -1,11 +1,10 @@
 // Fragment stage of the background, seen through a distorting lens or in a single-layer image.
 // Reads the environment map along the pixel's view ray. Writes display colour and coverage 0.
 #version 430 core
-#include "blocks.glsl"
 #include "shade.glsl"
 
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    out_color = vec4(developed(sky(view_ray(gl_FragCoord.xy)).color), 0.0);
+    out_color = vec4(displayed(sky(view_ray(gl_FragCoord.xy)).color), 0.0);
 }

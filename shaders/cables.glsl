@@ -2,6 +2,10 @@
 // pixel: Position of its centre. The share is computed analytically, because point samples would draw
 // a cable thinner than their spacing as dashes.
 
+#include "cables.constants"
+#include "samples.constants"
+#include "view.block"
+
 // Integral of the pixel filter up to x pixels from its centre: a tent for 2 samples per axis, else
 // a box, as in SampleLattice.filter.
 float filtered_below(float x) {

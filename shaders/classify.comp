@@ -3,7 +3,14 @@
 // pixel whose centre sees a surface. shade_listed.comp overwrites labels near decals and damages.
 // The lists replace branches: Mesa's CPU driver llvmpipe executes both sides of every branch.
 #version 430 core
-#include "blocks.glsl"
+#include "coarse.constants"
+#include "labels.constants"
+#include "pixel_list.constants"
+#include "samples.constants"
+#include "variant.constants"
+#include "zones.constants"
+#include "view.block"
+#include "damage.block"
 #include "octahedral.glsl"
 #include "decals_near.glsl"
 #include "samples.glsl"

@@ -5,6 +5,10 @@
 // Damage i displaces p along its inward axis. damage_law.py is the reference implementation in numpy;
 // section 3.3.2 of the SeaFront paper describes the four kinds.
 
+#include "damage.constants"
+#include "units.constants"
+#include "damage.block"
+
 // A smooth hill, (1 - t^2)^2 up to |t| = 1 and 0 beyond, and its derivative.
 float bump(float t) { float s = max(1.0 - t * t, 0.0); return s * s; }
 float bump_slope(float t) { return -4.0 * t * max(1.0 - t * t, 0.0); }

@@ -2,6 +2,8 @@
 // decals over the albedo `paint` at a point of the atlas: albedo, coverage and object id.
 // footprint_mm: width of the lookup on the surface.
 
+#include "decals.constants"
+
 uniform sampler2D decal_table;      // One row per decal; see DecalTables in decal_tables.py.
 uniform sampler2D glyph_table;      // One texel per letter; see GlyphRun in glyph_runs.py.
 uniform sampler2DArray art;         // Markers, stickers, emblems: sRGB, straight alpha.

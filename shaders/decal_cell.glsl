@@ -1,6 +1,9 @@
 // uvec4 cell_at(uint zone, vec2 sheet_mm): up to 8 decals that may cover a point of the atlas.
 // All bits are 0 on the spreader, which has no decals.
 
+#include "decals.constants"
+#include "zones.constants"
+
 // Decal numbers of each cell, 16 bits each, bottom decal first; 1-based, 0 for none.
 uniform usampler2D decal_grid;
 

@@ -1,6 +1,9 @@
 // bool near_decals(uint zone, vec2 sheet_mm): whether a material lookup at this atlas position may
 // touch a decal. It is false on the spreader, which has no decals.
 
+#include "decals.constants"
+#include "zones.constants"
+
 // Cells of decals_near.py, one byte each. Four are packed into a texel, the first in the lowest byte,
 // because llvmpipe fetches one-byte texels one by one.
 uniform usampler2D decal_cells;

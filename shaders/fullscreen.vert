@@ -1,6 +1,6 @@
 // Vertex stage: one triangle that covers the viewport at the depth of the sky. Reads no buffers.
 #version 430 core
-#include "blocks.glsl"
+#include "units.constants"
 
 void main() {
     vec2 corner = vec2((gl_VertexID << 1) & 2, gl_VertexID & 2);

@@ -2,7 +2,7 @@
 // Reads the interpolated atlas position, sky visibility and rest position. Writes surface id, atlas
 // position, depth, sky visibility and light, and the rest position if there is damage.
 #version 430 core
-#include "blocks.glsl"
+#include "variant.constants"
 #if HOLED
 #include "octahedral.glsl"
 #include "damage.glsl"

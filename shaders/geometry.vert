@@ -1,9 +1,12 @@
 // Vertex stage of the geometry pass: deforms the rest mesh by its damages and projects it.
 // Reads rest position, normal, atlas position, zone and sky visibility of each vertex. Writes the
 // surface id and what geometry.frag stores in the visibility buffer.
-// programs.py generates blocks.glsl: the constants and the uniform blocks.
+// constants.py and blocks.py generate the .constants and .block includes.
 #version 430 core
-#include "blocks.glsl"
+#include "sky_visibility.constants"
+#include "units.constants"
+#include "variant.constants"
+#include "view.block"
 #include "octahedral.glsl"
 #include "lens.glsl"
 #if DAMAGED

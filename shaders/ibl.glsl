@@ -3,6 +3,11 @@
 // vec3 background(vec3 direction): radiance of the environment from a direction of any length.
 // Directions are in the world frame. prefilter.py makes the maps.
 
+#include "environment.constants"
+#include "materials.constants"
+#include "scene.block"
+#include "view.block"
+
 uniform sampler2DArray specular_light;   // GGX-prefiltered radiance, one layer per roughness.
 uniform sampler2D irradiance_light;      // Irradiance / pi by surface normal.
 uniform sampler2D background_light;      // Radiance; +x is the middle of the map.
@@ -20,7 +25,7 @@ vec2 bordered(vec2 uv, float size) {
 
 vec3 prefiltered(vec3 direction, float roughness) {
     vec2 uv = bordered(octahedral(to_environment(direction)), SPECULAR_SIZE);
-    float layer = specular_layer(roughness);
+    float layer = SPECULAR_LAYER(roughness);
     float below = floor(layer);
     vec3 a = textureLod(specular_light, vec3(uv, below), 0.0).rgb;
     vec3 b = textureLod(specular_light, vec3(uv, min(below + 1.0, SPECULAR_LAYERS - 1.0)), 0.0).rgb;

@@ -3,6 +3,8 @@
 // Little light enters, so the radiance is a small share of the mean irradiance outside. Its variation
 // by normal is an artistic choice that makes the sides distinguishable.
 
+#include "inside.constants"
+
 // The floor is made of boards 140 mm wide, with dark joints.
 vec3 inside_albedo(vec3 normal, vec3 rest_mm) {
     if (normal.z > 0.7) return INSIDE_WOOD * (0.85 + 0.15 * step(0.04, fract(rest_mm.y / 140.0)));

@@ -3,6 +3,8 @@
 // uint[] keys_around(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
 // middle: Texel of the sample at the pixel's centre.
 
+#include "samples.constants"
+
 uniform usampler2D surface_keys;
 
 uint key_at(ivec2 middle) { return texelFetch(surface_keys, middle, 0).r; }

@@ -6,6 +6,9 @@
 // See noise.py for the channels. Both kinds of noise follow the idea of LEAN mapping (Olano and Baker
 // 2010): variance that filtering removes returns as softness of the threshold.
 
+#include "noise.constants"
+#include "scene.block"
+
 uniform sampler2DArray noise_tiles;
 
 struct NoiseSample {

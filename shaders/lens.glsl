@@ -3,6 +3,8 @@
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
 // the radial polynomial continues as a straight line; see lens.py.
 
+#include "view.block"
+
 // Tangential distortion of the Brown-Conrady model.
 vec2 tangential(vec2 p) {
     float q = dot(p, p);

@@ -4,7 +4,9 @@
 // surface, if samples there or at adjacent pixels see one. Cells alternate between the first and the
 // last such surface.
 #version 430 core
-#include "blocks.glsl"
+#include "samples.constants"
+#include "variant.constants"
+#include "view.block"
 #include "shade.glsl"
 
 uniform int point_rows;     // Rows of cells over the image.

@@ -3,6 +3,12 @@
 // damage, 0..1. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
 // artistic choices.
 
+#include "reflectance.constants"
+#include "rust.constants"
+#include "variant.constants"
+#include "zones.constants"
+#include "scene.block"
+
 struct SurfacePoint {
     Material material;
     uint decal_id;

@@ -4,6 +4,8 @@
 // There is one unordered list per pixel class. Compute shaders work through a list without idle lanes.
 // Fragment shaders run on blocks of pixels, and an edge fills few pixels of a block.
 
+#include "pixel_list.constants"
+
 layout(std430, binding = LIST_BINDING) buffer PixelLists {
     uint list_heads[LIST_HEADER * LISTS];   // Per list: the three numbers of its indirect
                                             // dispatch, then its length.

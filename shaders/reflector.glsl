@@ -2,6 +2,8 @@
 // float fresnel_climb(float cosine): Fresnel reflectance, rescaled from F0..1 to 0..1.
 // Split sum of Karis 2013, Real Shading in Unreal Engine 4. Directions are in the world frame.
 
+#include "reflectance.constants"
+
 uniform sampler2D dfg_table;   // By n_dot_v and roughness: scale and bias of F0.
 
 struct Material {

@@ -2,6 +2,9 @@
 // vec3 stained(vec3 albedo, float share): albedo of paint with `share` under a thin stain of rust.
 // The constants are in rust.py, which also computes mean albedos.
 
+#include "rust.constants"
+#include "scene.block"
+
 struct Rust {
     float all;     // Share of the footprint with paint gone to rust.
     float old;     // Share that rusted first and has darkened.

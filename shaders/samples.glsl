@@ -3,6 +3,8 @@
 // vec2 place_of(ivec2 sample_at): position of a sample in the image, in pixels.
 // Twin of sample_lattice.py, which explains the slanted lattice of samples.
 
+#include "samples.constants"
+
 ivec2 middle_of(ivec2 pixel) {
     return pixel * SAMPLES_PER_AXIS + SAMPLES_PER_AXIS / 2 + ivec2(SAMPLE_SLANT * pixel.y + SAMPLE_PAD, 0);
 }

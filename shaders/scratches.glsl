@@ -1,6 +1,9 @@
 // float scratches(NoiseSample streaks): share of the footprint scraped to bare steel, 0..1.
 // SeaFront paper, section 3.2.
 
+#include "noise.constants"
+#include "scene.block"
+
 float scratches(NoiseSample streaks) {
     // The tile's lines show only in the most worn paint, so that they cover scratch_coverage of the
     // surface. They cover SCRATCHED_SHARE of the tile.

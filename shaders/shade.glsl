@@ -3,7 +3,19 @@
 // Part part_at(ivec2 sample_at, uint key, vec3 view): the material that a part of a pixel shares.
 // vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view): its light toward the eye.
 // Shaded through_hole(ivec2 sample_at, uint key, vec3 ray): the view through a hole.
-// vec3 developed(vec3 color): tone-mapped and encoded colour.
+// vec3 displayed(vec3 color): tone-mapped and encoded colour, or `color` itself in a radiance image.
+
+#include "labels.constants"
+#include "lookups.constants"
+#include "materials.constants"
+#include "samples.constants"
+#include "sky_visibility.constants"
+#include "units.constants"
+#include "variant.constants"
+#include "zones.constants"
+#include "scene.block"
+#include "view.block"
+#include "damage.block"
 
 #include "octahedral.glsl"
 #include "samples.glsl"
@@ -93,8 +105,8 @@ Openness openness_at(ivec2 sample_at, uint zone) {
 }
 
 // Must run after the pixel filter, because a pixel averages light, not encoded values.
-vec3 developed(vec3 color) {
-#if LAYER == LAYER_NORMALS
+vec3 displayed(vec3 color) {
+#if RADIANCE || LAYER == LAYER_NORMALS
     return color;
 #elif LAYER == LAYER_ALL
     color = neutral_tone(color);

@@ -1,8 +1,15 @@
 // Compute stage that shades the listed pixels of one pixel class.
-// Reads the list, the visibility buffer, material tables and lights. Writes display colour and
+// Reads the list, the visibility buffer, material tables and lights. Writes colour and
 // coverage, labels near decals and damages, and depth near holes.
 #version 430 core
-#include "blocks.glsl"
+#include "lookups.constants"
+#include "materials.constants"
+#include "pixel_list.constants"
+#include "samples.constants"
+#include "variant.constants"
+#include "zones.constants"
+#include "scene.block"
+#include "view.block"
 #include "shade.glsl"
 #include "images.glsl"
 #include "pixel_list.glsl"
@@ -143,7 +150,11 @@ void main() {
     Shaded s = single_surface(pixel);
     vec3 color = s.color;
 #endif
-    uvec4 shown = uvec4(packUnorm4x8(vec4(developed(color), s.cover)));
+#if RADIANCE
+    vec4 shown = vec4(color, s.cover);
+#else
+    uvec4 shown = uvec4(packUnorm4x8(vec4(displayed(color), s.cover)));
+#endif
 #if WITH_COARSE
     for (int i = 0; i < 4; ++i)
         if ((group & 1u << i) != 0u) imageStore(color_image, block + in_group(i), shown);

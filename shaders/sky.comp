@@ -2,7 +2,8 @@
 // that see a surface. Reads the environment map. Writes display colour, coverage 0, and the sky's label
 // and depth.
 #version 430 core
-#include "blocks.glsl"
+#include "pixel_list.constants"
+#include "variant.constants"
 #include "shade.glsl"
 #include "images.glsl"
 
@@ -12,7 +13,11 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= imageSize(color_image).x) return;
     Shaded s = sky(view_ray(vec2(pixel) + 0.5));
-    imageStore(color_image, pixel, uvec4(packUnorm4x8(vec4(developed(s.color), s.cover))));
+#if RADIANCE
+    imageStore(color_image, pixel, vec4(s.color, s.cover));
+#else
+    imageStore(color_image, pixel, uvec4(packUnorm4x8(vec4(displayed(s.color), s.cover))));
+#endif
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
     imageStore(depth_image, pixel, vec4(s.depth));
 }

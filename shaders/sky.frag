@@ -1,7 +1,8 @@
 // Fragment stage of the background without lens distortion.
 // Reads the environment map at the interpolated coordinates. Writes display colour and coverage 0.
 #version 430 core
-#include "blocks.glsl"
+#include "variant.constants"
+#include "view.block"
 #include "tone.glsl"
 
 uniform sampler2D background_light;   // As in ibl.glsl.
@@ -12,5 +13,9 @@ layout(location = 0) out vec4 out_color;
 
 void main() {
     vec3 radiance = textureLod(background_light, map_uv, 0.0).rgb;
+#if RADIANCE
+    out_color = vec4(exposure * radiance, 0.0);
+#else
     out_color = vec4(srgb_encode(neutral_tone(exposure * radiance)), 0.0);
+#endif
 }

@@ -2,7 +2,9 @@
 // around the camera. Reads no buffers; writes the map coordinates. They are linear on each face, so
 // interpolation is exact and cheap.
 #version 430 core
-#include "blocks.glsl"
+#include "units.constants"
+#include "scene.block"
+#include "view.block"
 
 out vec2 map_uv;   // Inside the map's border.
 

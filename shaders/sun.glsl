@@ -5,6 +5,11 @@
 // pixel. vec3 sun_thrown(...): irradiance / pi of light i on the occluders of a point.
 // from_eye: Vector from the eye to the point in m.
 
+#include "reflectance.constants"
+#include "shadow.constants"
+#include "units.constants"
+#include "view.block"
+
 uniform sampler2DShadow sun_shadow;   // One tile per light, and light 0's end tile.
 
 // Texture coordinates and depth of a point in the tile of light i.

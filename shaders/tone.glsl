@@ -1,6 +1,8 @@
 // vec3 neutral_tone(vec3 c): exposed linear radiance to linear display colour.
 // vec3 srgb_encode(vec3 c), vec3 srgb_decode(vec3 c): sRGB transfer function and its inverse.
 
+#include "tone.constants"
+
 // Khronos PBR Neutral (Khronos Group 2024, specification section 2; constants in tone.py): subtracts
 // the Fresnel offset, then compresses highlights toward white.
 vec3 neutral_tone(vec3 c) {

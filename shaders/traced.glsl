@@ -2,6 +2,9 @@
 // of light_points.frag near `place`, a position in the image in pixels.
 // key: Surface id. from_eye: Vector from the eye to the surface in m.
 
+#include "variant.constants"
+#include "view.block"
+
 uniform usampler2D point_keys;
 uniform sampler2D point_places;
 uniform sampler2DArray point_light;   // Layers in the order of traced_light.py.

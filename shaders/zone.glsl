@@ -3,6 +3,8 @@
 // float to_upper_side(vec2 from_low, vec2 size, int code): distance in mm to a zone's upper side.
 // A zone is a part of the atlas that weathers on its own, such as one side of a beam.
 
+#include "zones.constants"
+
 // One column per zone, made by gpu_mesh.py. Row 0: x0, y0, width, height in mm. Row 1: code, and the
 // outward axis of the face for panels and door gear, else 0. The code holds the material, the quarter
 // turns clockwise from +y to up, and bits for door gear, small pieces and level zones.

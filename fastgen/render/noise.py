@@ -23,6 +23,9 @@ from fastgen.files import disk_cache
 
 NOISE_SIZE = 1024
 
+NOISE_LEVELS = NOISE_SIZE.bit_length()
+"""Levels of the mip chain of a tile."""
+
 NORMAL_REACH = 3.2
 """Deviations from the mean that a normal channel holds; one value in 600 lies beyond."""
 

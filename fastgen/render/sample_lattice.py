@@ -12,6 +12,7 @@ one with S = 3, a fifth with S = 5. What lies beside the slanted image is cleare
 nobody.
 """
 
+import itertools
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +20,18 @@ from numpy.typing import NDArray
 
 Offset = tuple[int, int]
 """Texels to the right and down."""
+
+LOOKUP_PX = {1: 0.92, 2: 0.6, 25: 0.2}
+"""Width of each of a pixel's lookups of the layers, by how many there are, where the pixel is
+filtered as a square; a wider filter asks for wider ones. Found by the distance to path-traced
+references."""
+
+LOOKUP_PLACES = {
+    1: ((0.0, 0.0),),
+    2: ((0.25, 0.1), (-0.25, -0.1)),
+    25: tuple(itertools.product((-0.4, -0.2, 0.0, 0.2, 0.4), repeat=2)),
+}
+"""Where in a pixel that sees one surface they are, in pixels from its centre."""
 
 _PER_AXIS = (5, 3, 2, 1)
 

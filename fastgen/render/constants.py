@@ -1,0 +1,258 @@
+"""Constants that shaders share with Python, in groups that a shader includes by name.
+
+A shader declares what it needs with `#include "GROUP.constants"`. `constants_text` turns a group
+into `#define` lines. Values belong to the Python module that owns them; this module only names
+them for GLSL, and owns the few that no other module uses.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from fastgen.camera import tone_curve
+from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
+from fastgen.decals.artwork import ART_SIZE
+from fastgen.geometry import damage_law
+from fastgen.geometry.mesh import MATERIALS
+from fastgen.geometry.spreader_parts import CABLE_LENGTH_MM, CABLE_SIDE_MM, CABLES
+from fastgen.light import environment
+from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
+from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
+from fastgen.render import glyph_runs, rust
+from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_tiles
+from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattice
+from fastgen.render.variant import LAYERS, PIXEL_TRAITS, ShaderVariant, listed_classes
+from fastgen.render.zone_codes import (
+    PORTAL_ZONE,
+    SPREADER_ZONE,
+    ZONE_GEAR,
+    ZONE_LEVEL,
+    ZONE_SMALL,
+    ZONE_TURN,
+)
+from fastgen.scene.limits import DECAL_KINDS, MIN_ROUGHNESS
+
+LIST_GROUP = 64
+"""Pixels that one compute work group shades."""
+
+LIST_HEADER = 4
+"""Numbers at the start of a pixel list: three of its indirect dispatch, then its length."""
+
+LIST_BINDING = 0
+"""Binding point of the storage buffer that holds the pixel lists."""
+
+LOBE_CELLS = 32
+"""Cells along each side of the octahedral maps of sky_visibility.lobe_masks."""
+
+REACH_MARGIN_MM = 40.0
+"""A pixel this near to a damage is shaded with it, because its filter reaches neighbours."""
+
+DECAL_CELL_MM = 64.0
+"""Side of a cell of the grid that names the decals covering a spot of the atlas."""
+
+NEAR_CELL_MM = 16.0
+"""Side of a cell of decals_near.decals_near."""
+
+GUTTER_STEPS = 17
+"""Instances of a part in a baked atlas: the part, then 16 shifts that fill two rings of texels."""
+
+INSIDE_ALBEDO = {"wood": (0.22, 0.14, 0.08), "primer": (0.30, 0.31, 0.29)}
+"""Linear albedo of the container's interior: the floor, and all other sides."""
+
+_INSIDE_LIGHT = 0.1
+"""Share of the light outside that reaches the interior through a hole; an artistic choice."""
+
+_COARSE_STEP_PX = 4.0
+"""Largest distance on the sheet, in pixel widths, between pixels that are shaded together. Larger
+steps are surfaces at a grazing angle, or two surfaces with a gap between them."""
+
+_SKY_DEPTH = 1 - 2**-18
+"""Clip-space depth of the background over w: below 1 because clipping may round, and behind
+everything nearer than 198 m."""
+
+_SHADOW_TEXELS = 1.0
+"""Least distance in texels between shadow lookups for the first directional light; closer lookups
+give slanted edges teeth."""
+
+Defines = Mapping[str, object]
+
+
+class _Array(NamedTuple):
+    """A constant GLSL array: the type of its items, and the text of each."""
+
+    kind: str
+    items: Sequence[str]
+
+    def declaration(self, name: str) -> str:
+        """Return the GLSL declaration of the array."""
+        items = ", ".join(f"{self.kind}({item})" for item in self.items)
+        whole = f"{self.kind}[{len(self.items)}]"
+        return f"const {whole} {name} = {whole}({items});\n"
+
+
+def _variant(v: ShaderVariant) -> Defines:
+    shown = {name: int(v.layer in ("all", "normals", "reflection", name)) for name in LAYERS}
+    return {
+        **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
+        **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},
+        **{f"WITH_{trait}": int(trait in v.traits) for trait in PIXEL_TRAITS},
+        "LAYER": LAYERS.index(v.layer),
+        "DAMAGED": int(v.damage != "sound"),
+        "HOLED": int(v.damage == "holed"),
+        "SUNS": v.lights,
+        "TRACED": int(v.traced),
+        "COARSE": int(v.coarse),
+        "CABLES_NEAR": int(v.cables),
+        "OF_CABLES": int(v.pixel_class == "cable"),
+        "RADIANCE": int(v.radiance),
+    }
+
+
+def _lists(v: ShaderVariant) -> Defines:
+    lists = listed_classes(v.samples_per_axis)
+    return {
+        **{f"LIST_{name.upper()}": f"{i}u" for i, name in enumerate(lists)},
+        "LIST": f"LIST_{v.pixel_class.upper()}",
+        "NO_LIST": f"{len(lists)}u",
+        "LISTS": f"{len(lists)}u",
+        "LIST_HEADER": f"{LIST_HEADER}u",
+        "LIST_GROUP": f"{LIST_GROUP}u",
+        "LIST_BINDING": LIST_BINDING,
+    }
+
+
+def _samples(v: ShaderVariant) -> Defines:
+    lattice = SampleLattice(v.samples_per_axis)
+    return {
+        "SAMPLES_PER_AXIS": v.samples_per_axis,
+        "SAMPLE_SLANT": lattice.slant,
+        "SAMPLE_PAD": lattice.pad,
+        "FILTER_STEP": lattice.step,
+        "FILTER_NEAR": lattice.near,
+        "FILTER_SAMPLES": len(lattice.filter),
+        "FILTER_OFFSET": _Array("ivec2", [f"{x}, {y}" for x, y in lattice.filter]),
+        "FILTER_WEIGHT": _Array("float", [f"{weight:.8f}" for weight in lattice.filter.values()]),
+    }
+
+
+def _lookups(v: ShaderVariant) -> Defines:
+    # decals are filtered analytically and dominate the cost, so a second lookup gains little there
+    count = 1 if v.lookups == 2 and "DECALS" in v.traits else v.lookups
+    spread = SampleLattice(v.samples_per_axis).spread
+    places = [f"{spread * x:.8f}, {spread * y:.8f}" for x, y in LOOKUP_PLACES[count]]
+    return {
+        "LOOKUPS": count,
+        "LOOKUP_PX": LOOKUP_PX[count] * spread,
+        "LOOKUP_PLACE": _Array("vec2", places),
+        # surfaces beyond these numbers look like the rest of their pixel
+        "MAX_PARTS": 3,
+        "MAX_SIDES": 4,
+    }
+
+
+def _environment(_: ShaderVariant) -> Defines:
+    levels = environment.ROUGHNESS_LEVELS
+    steps = "".join(
+        f" + clamp(((roughness) - {a:.6f}) / {b - a:.6f}, 0.0, 1.0)"
+        for a, b in itertools.pairwise(levels)
+    )
+    return {
+        "SPECULAR_SIZE": f"{environment.SPECULAR_SIZE:.1f}",
+        "SPECULAR_LAYERS": f"{len(levels):.1f}",
+        "SPECULAR_LAYER(roughness)": f"(0.0{steps})",
+        "IRRADIANCE_SIZE": f"{environment.IRRADIANCE_SIZE:.1f}",
+    }
+
+
+CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
+    "variant": _variant,
+    "pixel_list": _lists,
+    "samples": _samples,
+    "lookups": _lookups,
+    "environment": _environment,
+    "units": lambda _: {
+        "MM": "0.001",
+        "PI": f"{math.pi:.8f}",
+        "VOID_DEPTH": "uintBitsToFloat(0x7f800000u)",
+        "SKY_DEPTH": _SKY_DEPTH,
+    },
+    "labels": lambda _: {
+        "SOUND_CONTAINER": f"{SOUND_CONTAINER}u",
+        "CONTAINER_ID": f"{CONTAINER_ID}u",
+        "SPREADER_ID": f"{SPREADER_ID}u",
+    },
+    "materials": lambda _: {
+        "CABLE_MATERIAL": MATERIALS.index("cable"),
+        "SHEET_MATERIAL": MATERIALS.index("paint_sheet"),
+    },
+    "zones": lambda _: {
+        "SPREADER_ZONE": f"{SPREADER_ZONE}u",
+        "PORTAL_ZONE": f"{PORTAL_ZONE}u",
+        "ZONE_MATERIAL": ZONE_TURN - 1,
+        "ZONE_TURN": ZONE_TURN,
+        "ZONE_GEAR": ZONE_GEAR,
+        "ZONE_SMALL": ZONE_SMALL,
+        "ZONE_LEVEL": ZONE_LEVEL,
+    },
+    "cables": lambda _: {
+        "CABLES": CABLES,
+        "CABLE_LENGTH_M": f"{CABLE_LENGTH_MM / 1000:.6f}",
+        "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
+    },
+    "damage": lambda _: {
+        "DAMAGE_FADE_START_MM": f"{damage_law.FADE_START_MM:.1f}",
+        "DAMAGE_FADE_END_MM": f"{damage_law.FADE_END_MM:.1f}",
+        "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
+        "HOLE_REACH": f"{damage_law.HOLE_REACH:g}",
+    },
+    "inside": lambda _: {
+        "INSIDE_LIGHT": _INSIDE_LIGHT,
+        **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
+    },
+    "decals": lambda _: {
+        "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
+        "NEAR_CELL_MM": f"{NEAR_CELL_MM:.1f}",
+        "ART_SIZE": f"{ART_SIZE:.1f}",
+        **glyph_runs.DEFINES,
+        **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
+    },
+    "noise": lambda _: {
+        "NOISE_SIZE": f"{NOISE_SIZE:.1f}",
+        "NOISE_LEVELS": f"{NOISE_LEVELS:.1f}",
+        "NORMAL_REACH": f"{NORMAL_REACH}",
+        "SCRATCHED_SHARE": f"{noise_tiles().scratched:.6f}",
+    },
+    "rust": lambda _: rust.DEFINES,
+    "reflectance": lambda _: {
+        "MIN_ROUGHNESS": MIN_ROUGHNESS,
+        "DIELECTRIC_F0": DIELECTRIC_F0,
+        "DIELECTRIC_INDEX": DIELECTRIC_INDEX,
+    },
+    "sky_visibility": lambda _: {
+        "LIGHT_STEPS": f"{LIGHT_STEPS:.1f}",
+        "LIGHT_TIMES": f"{LIGHT_TIMES:.1f}",
+        "LOBE_CELLS": LOBE_CELLS,
+    },
+    "shadow": lambda _: {"SHADOW_TEXELS": _SHADOW_TEXELS},
+    "tone": lambda _: {
+        "TONE_FRESNEL": tone_curve.FRESNEL,
+        "TONE_SHOULDER": tone_curve.SHOULDER,
+        "TONE_DESATURATION": tone_curve.DESATURATION,
+    },
+    "coarse": lambda _: {"COARSE_STEP_PX": _COARSE_STEP_PX},
+    "bake": lambda _: {"GUTTER_STEPS": GUTTER_STEPS},
+}
+"""Groups of constants by name: from a variant to GLSL macros and their text."""
+
+
+def constants_text(group: str, variant: ShaderVariant) -> str:
+    """Return the GLSL text of a group of constants.
+
+    Raises:
+        KeyError: There is no such group.
+    """
+    return "".join(
+        value.declaration(name) if isinstance(value, _Array) else f"#define {name} {value}\n"
+        for name, value in CONSTANTS[group](variant).items()
+    )

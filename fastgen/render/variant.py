@@ -1,0 +1,69 @@
+"""ShaderVariant: the choices that a shader program is compiled for."""
+
+from dataclasses import dataclass
+
+LAYERS = (
+    *("all", "base", "tone", "ageing", "dirt", "rust", "scratches", "decals", "reflection"),
+    "normals",
+)
+"""Material layers that can be rendered. `ids` and `damage` of `fastgen show` are label targets."""
+
+DAMAGE_VARIANTS = ("sound", "damaged", "holed")
+"""Programs for scenes without damage, with damage, and with at least one perforation."""
+
+PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
+    "plain": (),
+    "decal": ("DECALS",),
+    "coarse": ("COARSE",),
+    "mixed": ("MIXED",),
+    "mixed_decal": ("MIXED", "DECALS"),
+    "damaged": ("DECALS", "DAMAGE"),
+    "mixed_damaged": ("MIXED", "DECALS", "DAMAGE"),
+    "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
+    "cable": (),
+}
+"""Classes of pixels that see more than sky, with the traits of each: MIXED pixels filter several
+surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block;
+"cable" pixels are partly covered by thin cables. Each class has its list, see classify.comp."""
+
+PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
+
+
+@dataclass(frozen=True)
+class ShaderVariant:
+    """Everything that a shader program is compiled for.
+
+    Attributes:
+        samples_per_axis: Samples per pixel along each axis.
+        lookups: Lookups of the material layers per pixel: 1, 2 or 25.
+        layer: One of LAYERS.
+        pixel_class: A key of PIXEL_CLASSES.
+        damage: One of DAMAGE_VARIANTS.
+        lights: Directional lights that the program can shade: 0, 1 or MOST_SUNS.
+        traced: Read indirect light that rays found instead of the vertices' light.
+        coarse: Classify pixels for 2x2 coarse shading.
+        cables: Classify pixels that thin cables may cover in part.
+        radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
+    """
+
+    samples_per_axis: int = 1
+    lookups: int = 1
+    layer: str = "all"
+    pixel_class: str = "plain"
+    damage: str = "sound"
+    lights: int = 0
+    traced: bool = False
+    coarse: bool = False
+    cables: bool = False
+    radiance: bool = False
+
+    @property
+    def traits(self) -> tuple[str, ...]:
+        """Traits of the pixel class."""
+        return PIXEL_CLASSES[self.pixel_class]
+
+
+def listed_classes(samples_per_axis: int) -> tuple[str, ...]:
+    """Return the pixel classes that images with so many samples use, in the order of their lists."""
+    unused = ("mixed",) if samples_per_axis == 1 else ("coarse",)
+    return tuple(name for name in PIXEL_CLASSES if not name.startswith(unused))

@@ -1,0 +1,13 @@
+"""Numbers by which shaders recognise the zones of container and spreader."""
+
+from fastgen.geometry.mesh import MAX_ZONES
+
+SPREADER_ZONE = MAX_ZONES
+"""First zone number of the spreader. The container's zones have smaller numbers."""
+
+PORTAL_ZONE = 1000
+"""Zone number of sheet that a perforation tore away. Real zones have smaller numbers."""
+
+ZONE_TURN, ZONE_GEAR, ZONE_SMALL, ZONE_LEVEL = 16, 64, 128, 256
+"""Parts of a zone's code, see shaders/zone.glsl: the step of one quarter turn, above the material's
+number; and the bits of door gear, of small pieces and of horizontal surfaces."""
