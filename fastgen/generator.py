@@ -32,13 +32,13 @@ from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.shadow_map import shader_suns
 from fastgen.render.shapes import shadow_casters, spreader_outline
 from fastgen.sample import Sample
-from fastgen.sampling.scene import (
-    one_container_each,
-    one_damage_each,
+from fastgen.sampling.coverage import (
+    damage_variant_configs,
+    extreme_lenses,
     possible_shapes,
-    sample_scene,
+    single_container_configs,
 )
-from fastgen.sampling.sensor import extreme_lenses
+from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Camera, Color, EnvironmentView, Scene
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
@@ -285,8 +285,8 @@ class Generator:
                 renderer.preload(each, lens)
             lights = {shader_suns(renderer.ambient(name).suns): name for name in names}
         # programs and targets: every way to draw, every container
-        ways = list(product(one_damage_each(self.config), lights.values()))
-        boxes = list(one_container_each(self.config.container))
+        ways = list(product(damage_variant_configs(self.config), lights.values()))
+        boxes = list(single_container_configs(self.config.container))
         for i in range(max(len(ways), len(boxes))):
             (config, name), box = ways[i % len(ways)], boxes[i % len(boxes)]
             shown = sample_scene(replace(config, container=box), self.seed, 0, self.environments)

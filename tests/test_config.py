@@ -12,7 +12,8 @@ from fastgen.config.cameras import CameraConfig
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import deform
-from fastgen.sampling.scene import possible_shapes, sample_scene
+from fastgen.sampling.coverage import possible_shapes
+from fastgen.sampling.scene import sample_scene
 from fastgen.validation import Range
 
 NASTY = (

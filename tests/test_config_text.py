@@ -53,7 +53,7 @@ def test_the_command_prints_a_preset_changed_by_a_file(tmp_path, capsys):
             "cameras: {x: {face: door, focal_mm: 3, distance_mm: 5000, lens: {k1: 0}}}",
             "cameras.x.lens: the image's corners look",
         ),
-        ("environment: {names: [quay]}", "environment.names: no HDRI 'quay' here"),
+        ("environment: {names: [quay]}", "environment.names: HDRI 'quay' is not available"),
     ],
 )
 def test_the_command_refuses_a_file_that_a_run_would_refuse(tmp_path, capsys, text, words):

@@ -1,1 +1,1 @@
-"""Drawing a scene: (config, seed, index) -> Scene, each property from its own random stream."""
+"""Sampling of scenes: (config, seed, index) -> Scene, one random stream per property."""

@@ -1,4 +1,4 @@
-"""Draws the damages of a scene: which kinds, where on the container, how large and how deep."""
+"""Sampling of container damages: kind, place, size and depth."""
 
 import math
 from collections.abc import Callable
@@ -12,16 +12,25 @@ from fastgen.scene.limits import LOBES
 from fastgen.validation import Range
 
 _FRAME_MM = 190.0
-"""Posts and rails take this much of a face's border; damage of the sheet stays clear of it."""
+"""Width of the posts and rails around a face, which sheet damages stay clear of."""
 
 _SHEET_MM = 15.0
-"""The sheet's outer flats lie about this deep behind the outermost plane of the castings."""
+"""Approximate depth of the sheet's outer flats behind the outermost plane of the castings."""
 
 
 @dataclass(frozen=True)
 class _Plane:
-    """A face seen from outside: corner and axes such that x runs right and y up; extent in mm."""
+    """Sheet plane of one face seen from outside.
 
+    Attributes:
+        face: Name of the face.
+        corner: Lower left corner in the container frame, float64 [3], mm.
+        right: Unit vector to the right, float64 [3].
+        up: Unit vector upward, float64 [3].
+        size: Width and height, mm.
+    """
+
+    face: str
     corner: np.ndarray
     right: np.ndarray
     up: np.ndarray
@@ -32,14 +41,39 @@ class _Plane:
         return -np.cross(self.right, self.up)
 
 
+@dataclass(frozen=True)
+class _Form:
+    """A sheet damage before it is placed.
+
+    Attributes:
+        size_mm: Full length along and width across.
+        depth_mm: Largest displacement, positive inward.
+        shape: Further parameters of the kind, see `scene.Damage`.
+        turn_deg: Angle of its length against the face's horizontal.
+        reach: Extent of the displaced sheet divided by `size_mm`.
+    """
+
+    size_mm: tuple[float, float]
+    depth_mm: float
+    shape: tuple[float, ...] = ()
+    turn_deg: float = 0.0
+    reach: float = 1.0
+
+
 def sample_damages(
     config: DamageConfig,
     size_mm: Vec3,
     streams: Callable[[str], np.random.Generator],
 ) -> tuple[Damage, ...]:
-    """The damages of one container of outer size (length, width, height), often none.
+    """Sample the damages of one container.
 
-    streams: an independent generator for each name.
+    Args:
+        config: Probabilities and ranges.
+        size_mm: Outer length, width and height of the container.
+        streams: Function from the name of a property to its independent random generator.
+
+    Returns:
+        Damages in the container frame; an empty tuple for an undamaged container.
     """
     if streams("damage.any").random() >= config.probability or not config.kinds:
         return ()
@@ -53,8 +87,9 @@ def sample_damages(
         if kind == "axis":
             damages.append(_axis(config, size_mm, rng))
             continue
-        face = str(rng.choice(config.faces))
-        damages.append(_SHEET_KINDS[str(kind)](config, face, planes[face], rng))
+        plane = planes[str(rng.choice(config.faces))]
+        form = _FORMS[str(kind)](config, plane, rng)
+        damages.append(_on_sheet(str(kind), form, plane, rng))
     return tuple(damages)
 
 
@@ -62,13 +97,14 @@ def _planes(size_mm: Vec3) -> dict[str, _Plane]:
     length, width, height = size_mm
     x, y = length / 2 - _SHEET_MM, width / 2 - _SHEET_MM
     ex, ey, ez = np.eye(3)
-    return {
-        "front": _Plane(np.array([-x, -y, 0]), ex, ez, (2 * x, height)),
-        "back": _Plane(np.array([x, y, 0]), -ex, ez, (2 * x, height)),
-        "door": _Plane(np.array([x, -y, 0]), ey, ez, (2 * y, height)),
-        "no_door": _Plane(np.array([-x, y, 0]), -ey, ez, (2 * y, height)),
-        "roof": _Plane(np.array([-x, -y, height - _SHEET_MM]), ex, ey, (2 * x, 2 * y)),
-    }
+    planes = (
+        _Plane("front", np.array([-x, -y, 0]), ex, ez, (2 * x, height)),
+        _Plane("back", np.array([x, y, 0]), -ex, ez, (2 * x, height)),
+        _Plane("door", np.array([x, -y, 0]), ey, ez, (2 * y, height)),
+        _Plane("no_door", np.array([-x, y, 0]), -ey, ez, (2 * y, height)),
+        _Plane("roof", np.array([-x, -y, height - _SHEET_MM]), ex, ey, (2 * x, 2 * y)),
+    )
+    return {plane.face: plane for plane in planes}
 
 
 def _draw(rng: np.random.Generator, values: Range, most: float = math.inf) -> float:
@@ -78,7 +114,7 @@ def _draw(rng: np.random.Generator, values: Range, most: float = math.inf) -> fl
 def _place(
     plane: _Plane, half: tuple[float, float], rng: np.random.Generator
 ) -> tuple[float, float]:
-    """A centre on the sheet such that a box of these half extents stays within the frame."""
+    """Sample a center that keeps a box with these half extents inside the frame of the face."""
     at = []
     for side, reach in zip(plane.size, half, strict=True):
         room = max(side / 2 - _FRAME_MM - reach, 0.0)
@@ -91,50 +127,41 @@ def _vector(v: np.ndarray, digits: int = 6) -> Vec3:
     return x, y, z
 
 
-def _on_sheet(
-    kind: str,
-    face: str,
-    plane: _Plane,
-    size: tuple[float, float],
-    depth: float,
-    rng: np.random.Generator,
-    turn_deg: float = 0.0,
-    shape: tuple[float, ...] = (),
-    reach: float = 1.0,
-) -> Damage:
-    turn = math.radians(turn_deg)
+def _on_sheet(kind: str, form: _Form, plane: _Plane, rng: np.random.Generator) -> Damage:
+    """Place a damage at a random position of the sheet."""
+    size, turn = form.size_mm, math.radians(form.turn_deg)
     along = math.cos(turn) * plane.right + math.sin(turn) * plane.up
     across = math.cos(turn) * plane.up - math.sin(turn) * plane.right
     cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
     half = (
-        reach * (cos * size[0] + sin * size[1]) / 2,
-        reach * (sin * size[0] + cos * size[1]) / 2,
+        form.reach * (cos * size[0] + sin * size[1]) / 2,
+        form.reach * (sin * size[0] + cos * size[1]) / 2,
     )
     x, y = _place(plane, half, rng)
     origin = plane.corner + x * plane.right + y * plane.up
     return Damage(
         kind=kind,
-        face=face,
+        face=plane.face,
         origin_mm=_vector(origin, 1),
         along=_vector(along),
         across=_vector(across),
         inward=_vector(plane.inward),
         size_mm=size,
-        depth_mm=depth,
-        shape=shape,
+        depth_mm=form.depth_mm,
+        shape=form.shape,
     )
 
 
-def _concave(config: DamageConfig, face: str, plane: _Plane, rng: np.random.Generator) -> Damage:
+def _concave(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.concave
     length = _draw(rng, c.length_mm, plane.size[0] - 2 * _FRAME_MM)
     width = _draw(rng, c.width_mm, plane.size[1] - 2 * _FRAME_MM)
     depth = _draw(rng, c.depth_mm)
     sign = -1.0 if rng.random() < c.outward else 1.0
-    return _on_sheet("concave", face, plane, (length, width), sign * depth, rng)
+    return _Form((length, width), sign * depth)
 
 
-def _dented(config: DamageConfig, face: str, plane: _Plane, rng: np.random.Generator) -> Damage:
+def _dented(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.dented
     length = _draw(rng, c.length_mm, min(plane.size) - 2 * _FRAME_MM)
     shape = (
@@ -145,15 +172,13 @@ def _dented(config: DamageConfig, face: str, plane: _Plane, rng: np.random.Gener
         round(float(rng.uniform(0, 2 * math.pi)), 4),
         _draw(rng, c.stretch_mm),
     )
-    # the path swings about its axis, so that the field reaches that much farther across
+    # The fold swings by its amplitude to both sides of its axis, which widens the damage.
     width = round(_draw(rng, c.width_mm) + 2 * shape[2], 2)
     depth, turn = _draw(rng, c.depth_mm), _draw(rng, c.turn_deg)
-    return _on_sheet("dented", face, plane, (length, width), depth, rng, turn, shape)
+    return _Form((length, width), depth, shape, turn)
 
 
-def _perforation(
-    config: DamageConfig, face: str, plane: _Plane, rng: np.random.Generator
-) -> Damage:
+def _perforation(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.perforation
     diameter = _draw(rng, c.diameter_mm)
     shape = [_draw(rng, c.rim_mm)]
@@ -161,13 +186,10 @@ def _perforation(
         shape.append(round(_draw(rng, c.lobes) * float(rng.choice([-1, 1])), 4))
         shape.append(round(float(rng.uniform(0, 2 * math.pi)), 4))
     reach = 1 + LOBES * c.lobes.hi + 2 * shape[0] / diameter
-    return _on_sheet(
-        "perforation", face, plane, (diameter, diameter), _draw(rng, c.depth_mm), rng,
-        shape=tuple(shape), reach=reach,
-    )  # fmt: skip
+    return _Form((diameter, diameter), _draw(rng, c.depth_mm), tuple(shape), reach=reach)
 
 
-_SHEET_KINDS: dict[str, Callable[[DamageConfig, str, _Plane, np.random.Generator], Damage]] = {
+_FORMS: dict[str, Callable[[DamageConfig, _Plane, np.random.Generator], _Form]] = {
     "concave": _concave,
     "dented": _dented,
     "perforation": _perforation,
@@ -175,7 +197,7 @@ _SHEET_KINDS: dict[str, Callable[[DamageConfig, str, _Plane, np.random.Generator
 
 
 def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
-    """One of the twelve edges pushed in along its diagonal, between the castings."""
+    """Sample a dent of one of the twelve edges, pushed in diagonally and clear of the castings."""
     c = config.axis
     half = np.array(size_mm) / 2
     axis = int(rng.integers(3))
@@ -203,6 +225,6 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
 
 
 def _edge_name(others: list[int], signs: np.ndarray) -> str:
-    """The two faces that meet at an edge, such as 'front.door'."""
+    """Return the two faces that meet at an edge, for example 'front.door'."""
     names = (("no_door", "door"), ("front", "back"), ("underside", "roof"))
     return ".".join(names[i][int(sign > 0)] for i, sign in zip(others, signs, strict=True))

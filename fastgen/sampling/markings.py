@@ -1,8 +1,8 @@
-"""What is printed and stuck on a container: brands, identifiers, plates, stickers and markers."""
+"""Sampling of a container's decals: brands, identifiers, plates, stickers and markers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,18 +12,13 @@ from fastgen.decals.artwork import Brand, Font, brands, glyph_tiles, stickers
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import layout
 from fastgen.decals.weights import parts, weight_lines
+from fastgen.sampling.sheet import EDGE_MM, GAP_MM, Sheet, tenth
 from fastgen.scene import REC_709, Color, Decal, Vec2
 from fastgen.scene.container_kinds import KINDS
 from fastgen.validation import Range
 
 Streams = Callable[[str], np.random.Generator]
 Flats = Mapping[str, Sequence[tuple[float, float]]]
-
-_EDGE_MM = 110.0
-"""Sheets reach a little under the posts and rails; nothing is printed there."""
-
-_TRIES = 40
-_GAP_MM = 25.0
 
 _LIGHT: Color = (0.76, 0.76, 0.74)
 _DARK: Color = (0.018, 0.018, 0.02)
@@ -33,44 +28,9 @@ _YELLOW: Color = (0.72, 0.47, 0.01)
 _HIGH_CUBE_SIGNS = ("height_sign", "height_triangle")
 
 
-@dataclass
-class _Sheet:
-    """One face while it fills up: size in mm, and the rectangles already taken."""
-
-    face: str
-    size: Vec2
-    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
-
-    def claim(self, center: Vec2, size: Vec2) -> bool:
-        """Take a rectangle if it lies on the sheet and touches nothing; else False."""
-        x0, y0 = center[0] - size[0] / 2, center[1] - size[1] / 2
-        x1, y1 = center[0] + size[0] / 2, center[1] + size[1] / 2
-        if min(x0, y0) < _EDGE_MM or x1 > self.size[0] - _EDGE_MM or y1 > self.size[1] - _EDGE_MM:
-            return False
-        for a0, b0, a1, b1 in self.taken:
-            if x0 < a1 + _GAP_MM and a0 < x1 + _GAP_MM and y0 < b1 + _GAP_MM and b0 < y1 + _GAP_MM:
-                return False
-        self.taken.append((x0, y0, x1, y1))
-        return True
-
-    def place(self, size: Vec2, rng: np.random.Generator, x: Range, y: Range) -> Vec2 | None:
-        """A free centre for a rectangle, drawn from shares x and y of the room; None if none."""
-        room = [
-            max(side - 2 * _EDGE_MM - want, 0.0) for side, want in zip(self.size, size, strict=True)
-        ]
-        for _ in range(_TRIES):
-            center = (
-                _tenth(_EDGE_MM + size[0] / 2 + room[0] * rng.uniform(x.lo, x.hi)),
-                _tenth(_EDGE_MM + size[1] / 2 + room[1] * rng.uniform(y.lo, y.hi)),
-            )
-            if self.claim(center, size):
-                return center
-        return None
-
-
 @dataclass(frozen=True)
 class _Style:
-    """What all texts of one container share."""
+    """Properties that all texts of one container share."""
 
     font: Font
     albedo: Color
@@ -86,12 +46,20 @@ def sample_decals(
     streams: Streams,
     flats: Flats | None = None,
 ) -> tuple[Decal, ...]:
-    """All decals of one container in the order of painting.
+    """Sample all decals of one container.
 
-    sheets: width and height in mm of each face's sheet. flats: sheet intervals (x0, x1) of the
-    outer flats of corrugated faces. streams: an independent generator for each name.
+    Args:
+        config: Probabilities and ranges.
+        kind: Container kind, a key of `KINDS`.
+        sheets: Width and height of the sheet by face, mm.
+        paint_albedo: Linear colour of the paint; it decides between light and dark lettering.
+        streams: Function from the name of a property to its independent random generator.
+        flats: Outer flats of the corrugation by face: intervals (x0, x1) of the sheet, mm.
+
+    Returns:
+        Decals in painting order.
     """
-    faces = {name: _Sheet(name, size) for name, size in sheets.items()}
+    faces = {name: Sheet(name, size) for name, size in sheets.items()}
     style = _style(config, kind, paint_albedo, streams)
     drawn: list[Decal] = []
     drawn += _height_marks(config, kind, faces, streams)
@@ -107,12 +75,8 @@ def sample_decals(
     return (*drawn, *markers)
 
 
-def _tenth(value: float) -> float:
-    return round(float(value), 1)
-
-
 def _between(rng: np.random.Generator, values: Range) -> float:
-    return _tenth(values.draw(rng))
+    return tenth(values.draw(rng))
 
 
 def _style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) -> _Style:
@@ -133,7 +97,7 @@ def _style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) ->
 def _text(
     lines: tuple[str, ...], cap_mm: float, style: _Style, wear: float, vertical: bool = False
 ) -> Decal:
-    """A text without a place: size and ink are settled, face and centre are not."""
+    """Return a text decal with its size and ink; its face and centre are not set yet."""
     size = layout(lines, style.font, cap_mm, vertical).size_mm
     return Decal(
         kind="text",
@@ -150,7 +114,7 @@ def _text(
     )
 
 
-def _placed(decal: Decal, sheet: _Sheet, center: Vec2, class_name: str = "") -> Decal:
+def _placed(decal: Decal, sheet: Sheet, center: Vec2, class_name: str = "") -> Decal:
     return replace(decal, face=sheet.face, center_mm=center, class_name=class_name)
 
 
@@ -165,13 +129,15 @@ def _identifier_lines(identifier: Identifier, form: int) -> tuple[str, ...]:
 
 def _identifiers(
     config: MarkingsConfig,
-    sheet: _Sheet,
+    sheet: Sheet,
     style: _Style,
     streams: Streams,
     flats: Sequence[tuple[float, float]],
 ) -> list[Decal]:
-    """One identifier a face, at the upper right as ISO 6346 section 7 has it; long sides may bear
-    another at the far end. On a steeply corrugated end wall a column stands on an outer flat."""
+    """Sample one identifier at the upper right (ISO 6346, section 7), on long sides maybe two.
+
+    The second one is at the left end. Columns on a corrugated end wall are centred on outer flats.
+    """
     rng = streams(f"identifier.{sheet.face}")
     long_side = sheet.face in ("front", "back")
     count = 1 + int(long_side and rng.random() < config.second_identifier)
@@ -183,12 +149,13 @@ def _identifiers(
         cap = _between(rng, config.cap_mm)
         upright = upright or (on_flat and rng.random() < 0.6)
         if upright:
-            tallest = _tenth((sheet.size[1] - 2 * _EDGE_MM) / 15.5)  # 11 letters take 14.5 caps
+            tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / 15.5)  # 11 letters are 14.5 caps high
             cap = config.cap_mm.lo if slim else max(min(cap, tallest), config.cap_mm.lo)
         i = style.identifier
         lines = _identifier_lines(i, int(rng.integers(3)))
         if upright:
-            # a flat, or a door leaf beside its weights, has room for one column: the code is below
+            # An outer flat, or a door leaf beside the weights, has room for one column only. The
+            # size-type code then follows below.
             column = f"{i.owner}{i.serial}{i.check}"
             lines = (f"{column} {i.size_type}",) if slim else (column, i.size_type)
         decal = _text(lines, cap, style, round(float(rng.uniform(*config.text_wear)), 3), upright)
@@ -204,31 +171,31 @@ def _identifiers(
 
 
 def _on_flat(
-    sheet: _Sheet, size: Vec2, flats: Sequence[tuple[float, float]], rng: np.random.Generator
+    sheet: Sheet, size: Vec2, flats: Sequence[tuple[float, float]], rng: np.random.Generator
 ) -> Vec2 | None:
     for x0, x1 in [flats[i] for i in rng.permutation(len(flats))]:
-        y = sheet.size[1] - _EDGE_MM - size[1] / 2 - 1
-        center = (_tenth((x0 + x1) / 2), _tenth(y))
+        y = sheet.size[1] - EDGE_MM - size[1] / 2 - 1
+        center = (tenth((x0 + x1) / 2), tenth(y))
         if sheet.claim(center, size):
             return center
     return None
 
 
 def _weights(
-    config: MarkingsConfig, kind: str, door: _Sheet, style: _Style, streams: Streams
+    config: MarkingsConfig, kind: str, door: Sheet, style: _Style, streams: Streams
 ) -> list[Decal]:
     rng = streams("weights")
     lines = weight_lines(kind, rng)
     wear = round(float(rng.uniform(*config.text_wear)), 3)
-    # beside an upright identifier a leaf holds it in two or three lines an entry
+    # Beside a vertical identifier the panel only fits with two or three lines per entry.
     halves, thirds = (tuple(p for line in lines for p in parts(line, n)) for n in (2, 3))
     cap = _between(rng, config.weights_cap_mm)
-    leaf = door.size[0] / 2 + _GAP_MM
+    leaf = door.size[0] / 2 + GAP_MM
     least = config.weights_cap_mm.lo
     for rows, height in ((lines, cap), (halves, cap), (halves, least), (thirds, least)):
         decal = _text(rows, height, style, wear)
-        room = door.size[0] - 2 * _EDGE_MM - decal.size_mm[0]
-        start = (leaf - _EDGE_MM) / room if room > 0 else 1.0
+        room = door.size[0] - 2 * EDGE_MM - decal.size_mm[0]
+        start = (leaf - EDGE_MM) / room if room > 0 else 1.0
         if start < 1.0:
             center = door.place(decal.size_mm, rng, Range(start, 1.0), Range(0.25, 0.75))
             if center:
@@ -237,16 +204,16 @@ def _weights(
 
 
 def _brand(
-    config: MarkingsConfig, sheet: _Sheet, style: _Style, rng: np.random.Generator
+    config: MarkingsConfig, sheet: Sheet, style: _Style, rng: np.random.Generator
 ) -> list[Decal]:
-    """Brand and main text with the probabilities of Algorithm A1."""
+    """Sample brand and main text with the probabilities of Algorithm A1 (SeaFront paper)."""
     made = []
     small = sheet.face in ("door", "no_door")
     cap = _between(rng, config.brand_cap_mm) * (0.45 if small else 1.0)
     if rng.random() < config.brand.get(sheet.face, 0.0):
-        word = _text((style.brand.wordmark,), _tenth(cap), style, 0.1)
-        emblem = _tenth(1.9 * cap)
-        size = (max(word.size_mm[0], emblem), word.size_mm[1] + emblem + _tenth(0.3 * cap))
+        word = _text((style.brand.wordmark,), tenth(cap), style, 0.1)
+        emblem = tenth(1.9 * cap)
+        size = (max(word.size_mm[0], emblem), word.size_mm[1] + emblem + tenth(0.3 * cap))
         center = sheet.place(size, rng, Range(0.15, 0.85), Range(0.2, 0.8))
         if center:
             top = center[1] + size[1] / 2
@@ -254,13 +221,13 @@ def _brand(
                 kind="emblem",
                 class_name="",
                 face=sheet.face,
-                center_mm=(center[0], _tenth(top - emblem / 2)),
+                center_mm=(center[0], tenth(top - emblem / 2)),
                 size_mm=(emblem, emblem),
                 art=style.brand.emblem,
                 albedo=style.albedo,
                 wear=0.1,
             )
-            low = _tenth(center[1] - size[1] / 2 + word.size_mm[1] / 2)
+            low = tenth(center[1] - size[1] / 2 + word.size_mm[1] / 2)
             made += [mark, _placed(word, sheet, (center[0], low))]
     if rng.random() < config.main_text.get(sheet.face, 0.0):
         line = str(rng.choice(style.brand.main_texts))
@@ -272,9 +239,9 @@ def _brand(
 
 
 def _stickers(
-    config: MarkingsConfig, kind: str, sheet: _Sheet, rng: np.random.Generator
+    config: MarkingsConfig, kind: str, sheet: Sheet, rng: np.random.Generator
 ) -> list[Decal]:
-    """Plates and stickers that are no markers, none of them labelled."""
+    """Sample plates and stickers other than markers; they have no label."""
     if sheet.face == "roof":
         return []
     known = {n: s for n, s in stickers().items() if not s.where or sheet.face in s.where}
@@ -300,9 +267,9 @@ def _stickers(
 
 
 def _height_marks(
-    config: MarkingsConfig, kind: str, faces: Mapping[str, _Sheet], streams: Streams
+    config: MarkingsConfig, kind: str, faces: Mapping[str, Sheet], streams: Streams
 ) -> list[Decal]:
-    """Striped bands at the upper corners of high cubes (ISO 6346, mandatory marks)."""
+    """Sample the striped bands at the upper corners of high cubes (ISO 6346, mandatory marks)."""
     rng = streams("height_marks")
     if not kind.endswith("HC") or rng.random() >= config.height_marks:
         return []
@@ -310,22 +277,30 @@ def _height_marks(
     length = _between(rng, Range(300, 900))
     for face in ("front", "back", "no_door"):
         sheet = faces[face]
-        band = (min(length, _tenth(sheet.size[0] / 4)), 60.0)
-        y = _tenth(sheet.size[1] - _EDGE_MM - band[1] / 2 - 1)
-        for x in (_EDGE_MM + band[0] / 2 + 1, sheet.size[0] - _EDGE_MM - band[0] / 2 - 1):
-            if sheet.claim((_tenth(x), y), band):
+        band = (min(length, tenth(sheet.size[0] / 4)), 60.0)
+        y = tenth(sheet.size[1] - EDGE_MM - band[1] / 2 - 1)
+        for x in (EDGE_MM + band[0] / 2 + 1, sheet.size[0] - EDGE_MM - band[0] / 2 - 1):
+            if sheet.claim((tenth(x), y), band):
                 made.append(
-                    Decal("sticker", "", face, (_tenth(x), y), band, art="stripes", albedo=_YELLOW)
+                    Decal("sticker", "", face, (tenth(x), y), band, art="stripes", albedo=_YELLOW)
                 )
     return made
 
 
 def rhombus_offsets(count: int, width_mm: float, height_mm: float) -> list[Vec2]:
-    """Centres of `count` markers in the two-row rhombus pattern, mm from the anchor.
+    """Return the marker centres of the two-row rhombus pattern (SeaFront paper, section 3.3.3).
 
-    SeaFront paper, 3.3.3: i runs from i_b = i_e - N up to i_e = N / 2 + 1, x_i = ceil(x + i w / 2)
-    and y_i = y for even |i|, else y + h / 2. The text counts N + 1 values of i for N markers; the
-    last is left out. Algorithm A2 differs (its y_i does not depend on y), the text is followed.
+    The paper lets i run from i_b = i_e - N to i_e = N / 2 + 1. It sets x_i = ceil(x + i w / 2);
+    y_i is y for even i and y + h / 2 for odd i. The range has N + 1 values for N markers; this
+    function skips the last. It follows the paper's text, not Algorithm A2, whose y_i ignores y.
+
+    Args:
+        count: Number of markers N.
+        width_mm: Width w of a marker and its gap.
+        height_mm: Height h of a marker and its gap.
+
+    Returns:
+        Offsets (x, y) from the pattern's anchor, mm.
     """
     last = count // 2 + 1
     return [
@@ -334,18 +309,18 @@ def rhombus_offsets(count: int, width_mm: float, height_mm: float) -> list[Vec2]
     ]
 
 
-def _markers(config: MarkingsConfig, sheet: _Sheet, rng: np.random.Generator) -> list[Decal]:
-    """The face's markers: fewer than drawn where the pattern finds no room."""
+def _markers(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> list[Decal]:
+    """Sample the markers of a face; drop markers until the pattern fits."""
     low, high = config.markers_per_face
     count = int(rng.integers(low, high + 1))
     side = _between(rng, config.marker_side_mm)
     gap = _between(rng, config.marker_gap_mm)
-    diagonal = _tenth(side * math.sqrt(2))
+    diagonal = tenth(side * math.sqrt(2))
     classes = rng.choice(MARKER_CLASSES, size=count)
     tilts = rng.uniform(*config.marker_tilt_deg, size=count)
     wears = rng.uniform(*config.marker_wear, size=count)
     while count > 0:
-        # a square turned by t reaches side / 2 * (cos t + sin t) toward its neighbour
+        # A square turned by t extends side / 2 * (cos t + sin t) toward its neighbour.
         tilt = math.radians(float(np.abs(tilts).max()))
         step = diagonal * (math.cos(tilt) + math.sin(tilt)) + math.sqrt(2) * gap
         offsets = np.array(rhombus_offsets(count, step, step))
@@ -359,7 +334,7 @@ def _markers(config: MarkingsConfig, sheet: _Sheet, rng: np.random.Generator) ->
                     kind="marker",
                     class_name=str(classes[i]),
                     face=sheet.face,
-                    center_mm=(_tenth(x), _tenth(y)),
+                    center_mm=(tenth(x), tenth(y)),
                     size_mm=(diagonal, diagonal),
                     rotation_deg=round(float(tilts[i]), 2),
                     art=str(classes[i]),

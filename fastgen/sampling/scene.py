@@ -1,21 +1,20 @@
-"""(config, seed, index) -> Scene: pure, the same on every machine and in every process.
+"""Sampling of a scene from (config, seed, index), with the same result on every machine.
 
-Every property draws from a stream of its own, named after it, so that adding a property or
-drawing one value more does not change the others in any scene.
+Each property has its own random stream, named after the property. New properties and additional
+draws therefore leave all other properties of a scene unchanged.
 """
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import datetime
-from itertools import product
 
 import numpy as np
 
 from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
-from fastgen.config.config import Config, ContainerConfig, SpreaderConfig, linear_color
+from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
 from fastgen.geometry.container import build_container
 from fastgen.geometry.mesh import Mesh
@@ -48,16 +47,35 @@ SPLITS = ("train", "val", "test")
 
 
 def stream(seed: int, index: int, name: str) -> np.random.Generator:
-    """The random generator of one property of one scene; depends on nothing but its arguments."""
+    """Return the random generator of one property of one scene.
+
+    Args:
+        seed: Seed of the dataset.
+        index: Index of the scene.
+        name: Name of the property.
+
+    Returns:
+        PCG64 generator seeded with a hash of the arguments, independent of all other generators.
+    """
     key = hashlib.blake2b(f"{seed}/{index}/{name}".encode(), digest_size=16).digest()
     return np.random.Generator(np.random.PCG64(int.from_bytes(key, "little")))
 
 
 def sample_scene(config: Config, seed: int, index: int, environments: Mapping[str, float]) -> Scene:
-    """The scene number `index` of the dataset that `config` and `seed` describe.
+    """Sample one scene of the dataset that `config` and `seed` describe.
 
-    environments: name -> weight in the draw of the HDRIs at hand; config.environment.names chooses
-    among them, all alike. Raises ConfigError when it names one that is not there.
+    Args:
+        config: Distribution of scenes.
+        seed: Seed of the dataset.
+        index: Index of the scene.
+        environments: Weight of each available HDRI by name. If `config.environment.names` is not
+            empty, the HDRIs listed there are equally likely and the weights are ignored.
+
+    Returns:
+        The sampled scene.
+
+    Raises:
+        ConfigError: `config.environment.names` lists an HDRI that is not available.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -99,14 +117,30 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
 
 
 def split_of(config: Config, seed: int, index: int) -> str:
-    """'train', 'val' or 'test': all views of a scene fall in the same split, whatever the count."""
+    """Return the split of a scene.
+
+    Args:
+        config: Distribution of scenes with the shares of the splits.
+        seed: Seed of the dataset.
+        index: Index of the scene.
+
+    Returns:
+        'train', 'val' or 'test'; the number of scenes has no influence.
+    """
     shares = np.array([config.split.train, config.split.val, config.split.test])
     edges = np.cumsum(shares / shares.sum())
     return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
 
 
 def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
-    """Width and height in mm of the unfolded sheet of each face that carries decals."""
+    """Return the size of the unfolded sheet of each face that carries decals.
+
+    Args:
+        mesh: Container mesh.
+
+    Returns:
+        Width and height in mm by face.
+    """
     rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
     return {face: (rect[2], rect[3]) for face, rect in rects.items()}
 
@@ -116,7 +150,7 @@ def _surface(config: Config, streams: Streams) -> Surface:
     name = str(streams("paint.color").choice(list(c.colors)))
     rust = streams("rust")
     rust_color = str(streams("rust.color").choice(c.rust_colors))
-    # squaring keeps most containers presentable and a few bad
+    # The square makes heavily rusted containers rare.
     low, high = c.rust_coverage
     coverage = low + (high - low) * float(rust.random()) ** 2
     return Surface(
@@ -160,7 +194,7 @@ def _environment(
     for name in wanted:
         if name not in environments:
             raise ConfigError(
-                f"environment.names: no HDRI {name!r} here{nearest(name, environments)}"
+                f"environment.names: HDRI {name!r} is not available{nearest(name, environments)}"
             )
     weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
     share = np.array(list(weights.values())) / sum(weights.values())
@@ -168,46 +202,9 @@ def _environment(
     return EnvironmentView(name, config.environment.yaw_deg.draw(streams("environment.yaw")))
 
 
-def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
-    """Every container with every spreader that scenes of `config` may hold it by, up to colours."""
-    c = config.spreader
-    lowered = [v for v, p in ((True, c.flippers_down), (False, 1 - c.flippers_down)) if p > 0]
-    low, high = c.gap_mm
-    gaps = {_whole_gap(c, gap) for gap in (*np.arange(low, high, 5).tolist(), high)}
-    spreaders = [
-        Spreader(True, linear_color(c.colors[0]), (front, back), gap)
-        for front, back in product(lowered, repeat=2)
-        for gap in sorted(gaps)
-    ]
-    bare = replace(spreaders[0], present=False)
-    held = spreaders * (c.probability > 0) + [bare] * (c.probability < 1)
-    for one in one_container_each(config.container):
-        (kind,), (scale,) = one.kinds, one.depth_scale
-        container = Container(kind, config.container.profiles.deepened(scale))
-        yield from ((container, spreader) for spreader in held)
-
-
-def one_container_each(c: ContainerConfig) -> Iterator[ContainerConfig]:
-    """For every container of a distribution one that has only that."""
-    for kind, weight in c.kinds.items():
-        for scale in c.depth_scale * (weight > 0):
-            yield replace(c, kinds={kind: 1.0}, depth_scale=(scale,))
-
-
-def one_damage_each(config: Config) -> Iterator[Config]:
-    """`config` without damage, with bent steel for certain, and with a hole, as far as it has
-    them: a renderer draws the three in different ways."""
-    damage = config.damage
-    yield replace(config, damage=replace(damage, probability=0.0))
-    holes = ("perforation",)
-    for kinds in (tuple(k for k in damage.kinds if k not in holes), holes):
-        if damage.probability > 0 and set(kinds) & set(damage.kinds):
-            yield replace(config, damage=replace(damage, probability=1.0, kinds=kinds))
-
-
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     lowered = streams("spreader.flippers").random(2) < c.flippers_down
-    gap = _whole_gap(c, c.gap_mm.draw(streams("spreader.gap")))
+    gap = rounded_gap_mm(c, c.gap_mm.draw(streams("spreader.gap")))
     return Spreader(
         present=bool(streams("spreader").random() < c.probability),
         albedo=linear_color(str(streams("spreader.color").choice(c.colors))),
@@ -216,14 +213,17 @@ def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:
     )
 
 
-def _whole_gap(c: SpreaderConfig, gap_mm: float) -> float:
-    """Few different gaps, so that few shapes are built."""
-    low, high = c.gap_mm
+def rounded_gap_mm(config: SpreaderConfig, gap_mm: float) -> float:
+    """Round the gap between spreader and container to 10 mm, within the range of `config`.
+
+    Few different gaps mean few shapes to build and cache.
+    """
+    low, high = config.gap_mm
     return min(max(10.0 * round(gap_mm / 10), low), high)
 
 
 def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera:
-    """A camera before the middle of its face, turned and shifted within the rig's ranges."""
+    """Sample a camera that looks at the middle of its face, within the ranges of the rig."""
     rng = streams(f"camera.{name}")
     frame = face_frame(rig.face, kind)
     azimuth_deg, elevation_deg = rig.azimuth_deg.draw(rng), rig.elevation_deg.draw(rng)
@@ -244,7 +244,7 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     )
     if frame.outward[2] == 0:
         return camera
-    # near the vertical "up" means nothing: there the face's own right stays the image's
+    # A view along the vertical has no defined up. The face's right is the image's right there.
     rows = view_of(replace(camera, roll_deg=0.0, lens=None), (1, 1)).rotation
     level = math.degrees(math.atan2(-rows[1] @ frame.right, rows[0] @ frame.right))
     return replace(camera, roll_deg=round((roll + level + 180) % 360 - 180, 3))

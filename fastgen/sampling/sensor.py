@@ -1,7 +1,6 @@
-"""Draws what a camera and its weather do to an image; each part from a stream of its own."""
+"""Sampling of lenses, sensor effects and weather, each part from its own random stream."""
 
-import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -12,15 +11,17 @@ from fastgen.validation import Range
 
 
 def sample_lens(config: LensConfig, rng: np.random.Generator) -> Lens:
-    """One lens of the kind that `config` describes; coefficients to a millionth."""
+    """Sample a lens.
+
+    Args:
+        config: Lens model and ranges of its coefficients.
+        rng: Random generator.
+
+    Returns:
+        Lens with coefficients rounded to six decimals.
+    """
     drawn = {name: getattr(config, name).draw(rng) for name in sorted(config.names)}
     return Lens(config.model, tuple(round(drawn[name], 6) for name in config.names))
-
-
-def extreme_lenses(config: LensConfig) -> Iterator[Lens]:
-    """The lenses at the ends of all ranges."""
-    ends = [sorted({*getattr(config, name)}) for name in config.names]
-    return (Lens(config.model, values) for values in itertools.product(*ends))
 
 
 def sample_sensor(
@@ -29,11 +30,18 @@ def sample_sensor(
     moment: datetime,
     streams: Callable[[str], np.random.Generator],
 ) -> Sensor | None:
-    """What a camera `distance_mm` before its target does to an image, None where it is nothing.
+    """Sample the sensor effects of one image.
 
-    moment: when it takes it. streams: gives the random stream of each part by its name.
+    Args:
+        config: Probabilities and ranges.
+        distance_mm: Distance from the camera to its target.
+        moment: Date and time of the stamp.
+        streams: Function from the name of a part to its independent random generator.
+
+    Returns:
+        Sensor effects, or None for an image without any.
     """
-    if config == SensorConfig():  # all is off: seeding streams takes longer than all they draw
+    if config == SensorConfig():  # Seeding the streams would take longer than all draws.
         return None
     sensor = Sensor(
         defocus=_defocus(config, distance_mm, streams("defocus")),
@@ -51,8 +59,16 @@ def sample_sensor(
 def sample_moment(
     years: tuple[int, int], hours: tuple[int, int], rng: np.random.Generator
 ) -> datetime:
-    """When a scene is, to the second: in one of `years`, within `hours` of the day, past 24 after
-    midnight."""
+    """Sample the date and time of a scene.
+
+    Args:
+        years: First and last year, both included.
+        hours: Start and end of the period within the day; hours above 24 are after midnight.
+        rng: Random generator.
+
+    Returns:
+        Date and time to the second.
+    """
     first, last = years
     day = datetime(int(rng.integers(first, last, endpoint=True)), 1, 1)
     seconds = int(rng.integers(3600 * hours[0], 3600 * hours[1]))
@@ -60,7 +76,15 @@ def sample_moment(
 
 
 def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
-    """The weather of a scene; streams: as for `sample_sensor`."""
+    """Sample the weather of a scene.
+
+    Args:
+        config: Probabilities and ranges.
+        streams: Function from the name of a part to its independent random generator.
+
+    Returns:
+        Fog, rain and wetness; surfaces are always wet in rain.
+    """
     if config == WeatherConfig():
         return Weather()
     fog, rain, wet = streams("fog"), streams("rain"), streams("wet")
@@ -73,7 +97,7 @@ def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Gen
         visibility_mm=round(config.visibility_mm.draw(fog)) if foggy else 0.0,
         rain=Rain(
             rate_mm_h=_drawn(rain, config.rate_mm_h),
-            # to four digits, as four decimals would make 0 of the shortest
+            # Four significant digits: four decimals would round the shortest times to 0.
             shutter_s=float(f"{config.shutter_s.draw(rain):.4g}"),
             wind=_drawn(rain, config.wind),
             seed=_seed(rain),
@@ -106,7 +130,7 @@ def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
 def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
     if rng.random() >= config.noise.probability:
         return None
-    # so that halving the light is as likely at any level
+    # Log-uniform: each doubling of the full well is equally likely.
     low, high = np.log(config.noise.full_well_e)
     full_well = round(float(np.exp(rng.uniform(low, high))))
     return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))

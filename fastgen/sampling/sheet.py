@@ -1,0 +1,81 @@
+"""Free rectangles on the sheet of a container face while decals are placed on it."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fastgen.scene import Vec2
+from fastgen.validation import Range
+
+EDGE_MM = 110.0
+"""Width of the strip without decals along each sheet edge, mostly under posts and rails."""
+
+_TRIES = 40
+"""Random positions tried per call of `Sheet.place`."""
+
+GAP_MM = 25.0
+"""Smallest distance between two decals, in x or in y."""
+
+
+def tenth(value: float) -> float:
+    """Round a length in mm to 0.1 mm."""
+    return round(float(value), 1)
+
+
+@dataclass
+class Sheet:
+    """Sheet of one face while decals are placed on it.
+
+    Attributes:
+        face: Name of the face.
+        size: Width and height, mm.
+        taken: Occupied rectangles (x0, y0, x1, y1), mm from the lower left corner.
+    """
+
+    face: str
+    size: Vec2
+    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
+
+    def claim(self, center: Vec2, size: Vec2) -> bool:
+        """Reserve a rectangle if it is free and on the sheet.
+
+        Args:
+            center: Centre of the rectangle, mm from the sheet's lower left corner.
+            size: Width and height, mm.
+
+        Returns:
+            True if the rectangle was reserved.
+        """
+        x0, y0 = center[0] - size[0] / 2, center[1] - size[1] / 2
+        x1, y1 = center[0] + size[0] / 2, center[1] + size[1] / 2
+        if min(x0, y0) < EDGE_MM or x1 > self.size[0] - EDGE_MM or y1 > self.size[1] - EDGE_MM:
+            return False
+        for a0, b0, a1, b1 in self.taken:
+            if x0 < a1 + GAP_MM and a0 < x1 + GAP_MM and y0 < b1 + GAP_MM and b0 < y1 + GAP_MM:
+                return False
+        self.taken.append((x0, y0, x1, y1))
+        return True
+
+    def place(self, size: Vec2, rng: np.random.Generator, x: Range, y: Range) -> Vec2 | None:
+        """Reserve a rectangle at a random free position and return its centre.
+
+        Args:
+            size: Width and height, mm.
+            rng: Random generator of the decal.
+            x: Allowed positions from left (0) to right (1).
+            y: Allowed positions from bottom (0) to top (1).
+
+        Returns:
+            Centre in mm from the lower left corner, or None if no free position was found.
+        """
+        room = [
+            max(side - 2 * EDGE_MM - want, 0.0) for side, want in zip(self.size, size, strict=True)
+        ]
+        for _ in range(_TRIES):
+            center = (
+                tenth(EDGE_MM + size[0] / 2 + room[0] * rng.uniform(x.lo, x.hi)),
+                tenth(EDGE_MM + size[1] / 2 + room[1] * rng.uniform(y.lo, y.hi)),
+            )
+            if self.claim(center, size):
+                return center
+        return None
