@@ -6,7 +6,7 @@ import pytest
 from PIL import Image, ImageDraw, ImageFont
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.decals.artwork import ART_SIZE, art_images, brands, glyph_tiles, smaller, stickers
+from fastgen.decals.artwork import ART_SIZE, art_images, brands, glyph_tiles, mip_levels, stickers
 from fastgen.render.gl import open_context
 from fastgen.render.textures import art_texture
 from fastgen.resources import asset_path
@@ -126,7 +126,7 @@ def test_mip_levels_average_linear_light_and_not_srgb_codes():
     image = rng.integers(0, 256, (16, 16, 4), np.uint8)
     image[:4, :4, :3], image[:4, :2, 3], image[:4, 2:4, 3] = 200, 255, 0
     image[:4, 2:4, :3] = 0  # transparent, so its black does not count
-    levels = smaller(image)
+    levels = mip_levels(image)
     assert [len(level) for level in levels] == [8, 4, 2, 1]
     for step, level in zip((2, 4, 8, 16), levels, strict=True):
         for y, x in np.ndindex(level.shape[:2]):
@@ -155,5 +155,5 @@ def test_the_gpu_samples_the_computed_mip_levels():
         found.bind_to_storage_buffer(0)
         gl.ctx.compute_shader(code).run(4)
         corners = np.frombuffer(found.read(), np.float32).reshape(4, 4) * 255
-    wanted = [images[2], *smaller(images[2])]
+    wanted = [images[2], *mip_levels(images[2])]
     assert np.abs(corners - [level[0, 0] for level in wanted]).max() < 0.5

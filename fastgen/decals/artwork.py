@@ -1,4 +1,4 @@
-"""Markers, stickers, emblems and glyphs as arrays, read from the packaged assets; no GL."""
+"""Markers, stickers, emblems and glyphs as arrays, read from the packaged assets."""
 
 import json
 from collections.abc import Mapping
@@ -18,15 +18,25 @@ from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
 
 ART_SIZE = 512
+"""Width and height of an artwork image, texels."""
+
 GLYPH_TILE_SIZE = 64
+"""Width and height of a glyph tile, texels."""
 
 _INK_SAMPLES = 8
+"""Samples per texel and axis from which ink coverage is computed."""
 
 
 @dataclass(frozen=True)
 class Glyph:
-    """tile: its number in the tile array. ink_left, ink_right, advance: in cap heights, from the
-    pen's origin."""
+    """Tile and metrics of one character; lengths are in cap heights from the pen position.
+
+    Attributes:
+        tile: Index into the tiles of `glyph_tiles`.
+        ink_left: Left end of the ink.
+        ink_right: Right end of the ink.
+        advance: Distance to the next pen position.
+    """
 
     tile: int
     ink_left: float
@@ -36,7 +46,7 @@ class Glyph:
 
 @dataclass(frozen=True, eq=False)
 class Font:
-    """A font's glyphs by character; fonts are told apart by identity."""
+    """Glyphs of a font by character; two fonts are equal only if they are the same object."""
 
     name: str
     glyphs: Mapping[str, Glyph]
@@ -44,7 +54,14 @@ class Font:
 
 @dataclass(frozen=True)
 class Sticker:
-    """A plate or sticker: true size in mm, faces it comes on, whether every container has it."""
+    """Plate or sticker without a label.
+
+    Attributes:
+        name: Name of its artwork.
+        size_mm: Width and height.
+        where: Faces that may carry it; empty for all faces.
+        always: True if every container carries it on these faces.
+    """
 
     name: str
     size_mm: tuple[float, float]
@@ -54,7 +71,15 @@ class Sticker:
 
 @dataclass(frozen=True)
 class Brand:
-    """A made-up shipping line. emblem: art name. owner_codes: four letters, the last a U."""
+    """Invented shipping line.
+
+    Attributes:
+        name: Name of the line.
+        emblem: Name of its artwork.
+        owner_codes: Owner codes of its containers, four letters each, the last a U.
+        wordmark: Text below the emblem.
+        main_texts: Further large texts on its containers.
+    """
 
     name: str
     emblem: str
@@ -65,10 +90,14 @@ class Brand:
 
 @lru_cache(maxsize=1)
 def art_images() -> tuple[NDArray[np.uint8], Mapping[str, int]]:
-    """All artwork, uint8 [K, ART_SIZE, ART_SIZE, 4] sRGB with straight alpha, row 0 at the top,
-    and the layer of each name: the markers in class order, then stickers and emblems.
+    """Return all artwork.
 
-    Raises AssetError for a missing or broken file.
+    Returns:
+        Images, uint8 [K, ART_SIZE, ART_SIZE, 4], sRGB with straight alpha, row 0 at the top; and
+        the layer of each name. Markers come first, in class order, then stickers and emblems.
+
+    Raises:
+        AssetError: A file is missing or broken.
     """
     paths = {name: asset_path("markers", f"{name}.png") for name in MARKER_CLASSES}
     paths |= {name: asset_path("stickers", f"{name}.png") for name in sorted(_index())}
@@ -77,11 +106,17 @@ def art_images() -> tuple[NDArray[np.uint8], Mapping[str, int]]:
     return images, MappingProxyType({name: i for i, name in enumerate(paths)})
 
 
-def smaller(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
-    """An image [N, N, 4] of `art_images` at half its side, a quarter, and so on to one texel.
+def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+    """Return the mip levels of an image, without the image.
 
-    A texel is the mean of light that it covers, each part by its alpha: what is transparent has no
-    colour to give.
+    Each level averages linear light weighted by alpha, so that the colour of transparent texels
+    has no influence.
+
+    Args:
+        image: uint8 [N, N, 4], sRGB with straight alpha; N is a power of two.
+
+    Returns:
+        Levels with N / 2, N / 4, ... 1 texels per side, encoded as the image.
     """
     rgba: np.ndarray = cv2.LUT(image, _LIGHT_AND_ALPHA)
     for channel in range(3):
@@ -104,9 +139,16 @@ _LIGHT_AND_ALPHA = np.stack([DECODED] * 3 + [np.linspace(0, 1, 256)], axis=1)[No
 
 @lru_cache(maxsize=1)
 def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
-    """Signed-distance tiles, uint8 [G, 64, 64], row 0 at the top, and the fonts by name.
+    """Return the glyphs of all fonts as signed-distance tiles.
 
-    assets/build_fonts.py says what a tile covers. Raises AssetError for a missing or broken file.
+    `lettering.TILE_CAPS` and its neighbours define the area and the value range of a tile.
+
+    Returns:
+        Tiles, uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], row 0 at the top, above 127 inside the
+        outline; and the fonts by name.
+
+    Raises:
+        AssetError: A file is missing or broken.
     """
     data = _json("fonts", "glyphs.json")
     mosaic = _image(asset_path("fonts", "glyphs.png"), 1, None)
@@ -129,9 +171,15 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
 
 
 def glyph_coverage(tiles: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Share of ink, uint8 [G, 64, 64], in each texel of signed-distance tiles [G, 64, 64].
+    """Return the share of ink in each texel of signed-distance tiles.
 
-    Mip levels of it keep the ink that those of distances lose where strokes are thin.
+    Mip levels of coverage keep the ink of thin strokes, which mip levels of distances lose.
+
+    Args:
+        tiles: uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE] from `glyph_tiles`.
+
+    Returns:
+        Coverage, uint8 of the same shape, 255 for full ink.
     """
     return np.stack([_ink(tile) for tile in tiles])
 
@@ -145,7 +193,7 @@ def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=1)
 def stickers() -> Mapping[str, Sticker]:
-    """Plates and stickers that are no markers, by name."""
+    """Return all plates and stickers by name; markers and emblems are not included."""
     return MappingProxyType(
         {
             name: Sticker(name, tuple(s["size_mm"]), tuple(s["where"]), s["always"])
@@ -157,7 +205,7 @@ def stickers() -> Mapping[str, Sticker]:
 
 @lru_cache(maxsize=1)
 def brands() -> tuple[Brand, ...]:
-    """The made-up shipping lines."""
+    """Return the invented shipping lines."""
     return tuple(
         Brand(name, b["emblem"], tuple(b["owner_codes"]), b["wordmark"], tuple(b["main_texts"]))
         for name, b in _json("stickers", "brands.json").items()
@@ -179,7 +227,7 @@ def _json(*parts: str) -> dict[str, Any]:
 
 
 def _image(path: Path, channels: int, size: int | None) -> NDArray[np.uint8]:
-    # by its bytes: OpenCV takes no path that is not UTF-8
+    # cv2.imread cannot open every path that Python can, so decode the bytes instead.
     data = np.frombuffer(path.read_bytes() if path.exists() else b"", np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     found = 0 if image is None else image.shape[2] if image.ndim == 3 else 1

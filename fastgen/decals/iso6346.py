@@ -1,4 +1,4 @@
-"""Container identifiers after ISO 6346: owner code, serial number, check digit, size-type code."""
+"""Container identifiers (ISO 6346): owner code, serial number, check digit, size-type code."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,14 @@ _LETTER_VALUES = dict(
 
 @dataclass(frozen=True)
 class Identifier:
-    """owner: four letters, the last a U for freight containers. serial: six digits. check: one."""
+    """Identifier of one container.
+
+    Attributes:
+        owner: Owner code, four letters; the last is U for freight containers.
+        serial: Serial number, six digits.
+        check: Check digit.
+        size_type: Size-type code, for example '22G1'.
+    """
 
     owner: str
     serial: str
@@ -23,10 +30,19 @@ class Identifier:
 
 
 def check_digit(owner_and_serial: str) -> int:
-    """Check digit of ten characters such as 'CSQU305438'. ISO 6346:1995, annex A.
+    """Return the check digit of an owner code and serial number (ISO 6346:1995, annex A).
 
-    Letters count up from A = 10 and leave out multiples of 11; the i-th character from the left
-    weighs 2 ** i; the sum modulo 11, where 10 counts as 0. Raises ConfigError for other text.
+    Letter values count up from A = 10 and skip multiples of 11. Character i from the left, counted
+    from 0, has weight 2 ** i. The check digit is the weighted sum modulo 11; 10 becomes 0.
+
+    Args:
+        owner_and_serial: Four capital letters and six digits, for example 'CSQU305438'.
+
+    Returns:
+        Check digit, 0 to 9.
+
+    Raises:
+        ConfigError: The text has another form.
     """
     text = owner_and_serial
     if len(text) != 10 or not text[:4].isalpha() or not text[4:].isdigit() or not text.isupper():
@@ -37,8 +53,19 @@ def check_digit(owner_and_serial: str) -> int:
 def sample_identifier(
     rng: np.random.Generator, owner_codes: Sequence[str], size_type: str
 ) -> Identifier:
-    """A random identifier. Serials whose remainder is 10 are left out, as annex A recommends:
-    their check digit 0 would not tell them from those whose remainder is 0."""
+    """Sample an identifier.
+
+    Serial numbers with remainder 10 are never sampled, as annex A recommends: they share check
+    digit 0 with remainder 0.
+
+    Args:
+        rng: Random generator.
+        owner_codes: Owner codes to choose from, all equally likely.
+        size_type: Size-type code of the container.
+
+    Returns:
+        Identifier with a valid check digit.
+    """
     owner = str(rng.choice(owner_codes))
     while True:
         serial = f"{int(rng.integers(1_000_000)):06d}"

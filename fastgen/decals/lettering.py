@@ -1,4 +1,4 @@
-"""Where the letters of a text stand: the one layout that markings, labels and renderer share."""
+"""Text layout, shared by sampling, labels and renderer: the position of each letter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,21 +9,35 @@ from fastgen.decals.artwork import Font
 from fastgen.errors import AssetError
 
 TILE_CAPS = 1.6
-"""A glyph's tile covers a square of this many cap heights, its ink centred across it."""
+"""Side of the square that a glyph's tile covers, in cap heights; ink is centred horizontally."""
 
 TILE_BASELINE_CAPS = 0.3
-"""The baseline lies this far above the tile's bottom, in cap heights."""
+"""Height of the baseline above the tile's bottom, in cap heights."""
 
 TILE_RANGE_CAPS = 0.3
-"""Distance in cap heights over which a tile's values go from 0 to 1."""
+"""Distance across the outline over which tile values go from 0 to 255, in cap heights."""
 
 LINE_PITCH_CAPS = 1.5
+"""Distance between the baselines of horizontal lines, in cap heights."""
+
 COLUMN_PITCH_CAPS = 1.6
+"""Distance between the centres of vertical columns, in cap heights."""
+
 GLYPH_PITCH_CAPS = 1.35
+"""Distance between the baselines of the glyphs of a column, in cap heights."""
 
 
 class PlacedGlyph(NamedTuple):
-    """A glyph's tile rectangle in mm; origin at the lower left corner of the text's ink box."""
+    """Tile rectangle of one glyph, in mm from the lower left corner of the text's ink box.
+
+    Attributes:
+        char: The character.
+        tile: Index into the tiles of `glyph_tiles`.
+        x0: Left edge.
+        y0: Bottom edge.
+        x1: Right edge.
+        y1: Top edge.
+    """
 
     char: str
     tile: int
@@ -35,19 +49,33 @@ class PlacedGlyph(NamedTuple):
 
 @dataclass(frozen=True)
 class Lettering:
-    """size_mm: width and height of the box around the ink. glyphs: all that leave ink."""
+    """Layout of one text.
+
+    Attributes:
+        size_mm: Width of the ink, and height from the lowest baseline to the capitals' tops.
+        glyphs: Glyphs of all characters except spaces.
+    """
 
     size_mm: tuple[float, float]
     glyphs: tuple[PlacedGlyph, ...]
 
 
-@lru_cache(maxsize=64)  # who chooses a text, who draws it and who crops it ask alike
+@lru_cache(maxsize=64)  # Sampling, renderer and labels lay out the same texts.
 def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = False) -> Lettering:
-    """Set `lines` in `font` with capitals `cap_mm` high.
+    """Lay out a text.
 
-    Horizontal lines run to the right, one below the other, all starting at the left. Vertical
-    lines are columns from left to right, their glyphs upright, one below the other, centred.
-    Raises AssetError for a character that the font does not have.
+    Args:
+        lines: The text, one string per line.
+        font: Font of all letters.
+        cap_mm: Height of the capitals.
+        vertical: False for left-aligned lines, the first at the top. True for columns from left to
+            right: upright glyphs one below the other, centred in their column.
+
+    Returns:
+        Size of the text and position of each glyph.
+
+    Raises:
+        AssetError: The font has no glyph for a character.
     """
     for char in "".join(lines):
         if char not in font.glyphs and char != " ":
@@ -68,7 +96,8 @@ def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = F
     return Lettering(size, tuple(glyphs))
 
 
-_Ink = tuple[str, float, float, float]  # char, left and baseline in cap heights, width
+_Ink = tuple[str, float, float, float]
+"""Character, left end of the ink, baseline and ink width, in cap heights."""
 
 
 def _rows(lines: Sequence[str], font: Font) -> list[_Ink]:

@@ -1,8 +1,8 @@
-"""The weights panel of a container's door, as made-up but plausible figures."""
+"""Weights panel of a container door, with invented but plausible figures."""
 
 import numpy as np
 
-# common makers' values for each kind, not a standard
+# Typical manufacturers' values for each container kind; they are not from a standard.
 _TARE_KG = {"20": 2200, "40": 3740, "40HC": 3900, "45HC": 4820}
 _GROSS_KG = {"20": 30480, "40": 30480, "40HC": 32500, "45HC": 34000}
 _CUBE_M3 = {"20": 33.2, "40": 67.7, "40HC": 76.3, "45HC": 86.0}
@@ -11,7 +11,16 @@ _CUBIC_FEET_PER_M3 = 35.3146667
 
 
 def weight_lines(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
-    """The weights panel: gross, tare, net and capacity, in kilograms and pounds, cubic measures."""
+    """Sample the lines of a weights panel.
+
+    Args:
+        kind: Container kind: 20, 40, 40HC or 45HC.
+        rng: Random generator.
+
+    Returns:
+        Gross weight, tare and net weight in kilograms and pounds, and capacity in cubic metres and
+        cubic feet, one line each.
+    """
     gross = _GROSS_KG[kind] + int(rng.integers(-2, 3)) * 10
     tare = _TARE_KG[kind] + int(rng.integers(-20, 21)) * 10
     rows = [("MAX GROSS", gross), ("TARE", tare), ("NET", gross - tare)]
@@ -21,8 +30,16 @@ def weight_lines(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def parts(line: str, count: int) -> tuple[str, ...]:
-    """An entry broken into 2 (name and metric, imperial) or 3 (name, metric, imperial) lines."""
+def split_entry(line: str, count: int) -> tuple[str, ...]:
+    """Split one line of the weights panel into shorter lines.
+
+    Args:
+        line: A line from `weight_lines`.
+        count: 2 to put name and metric value before the imperial value, 3 for a line each.
+
+    Returns:
+        The shorter lines.
+    """
     words = line.split(" ")
     name, metric, imperial = words[:-4], words[-4:-2], words[-2:]
     rows = (name + metric, imperial) if count == 2 else (name, metric, imperial)

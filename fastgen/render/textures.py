@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 import moderngl
 import numpy as np
 
-from fastgen.decals.artwork import smaller
+from fastgen.decals.artwork import mip_levels
 from fastgen.render.gl import GLContext
 from fastgen.render.noise import noise_tiles
 
@@ -16,8 +16,8 @@ _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 def art_texture(gl: GLContext, images: np.ndarray) -> moderngl.TextureArray:
     """Artwork uint8 [K, N, N, 4] as a mip-mapped texture array, clamped at the borders. The driver
-    would average sRGB as if it were light, so the levels are `smaller`'s."""
-    levels = zip(*map(smaller, images), strict=True)
+    would average sRGB as if it were light, so the levels are `mip_levels`'s."""
+    levels = zip(*map(mip_levels, images), strict=True)
     return _clamped(_levelled(gl, [images, *map(np.stack, levels)]))
 
 

@@ -11,7 +11,7 @@ from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import Brand, Font, brands, glyph_tiles, stickers
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import layout
-from fastgen.decals.weights import parts, weight_lines
+from fastgen.decals.weights import split_entry, weight_lines
 from fastgen.sampling.sheet import EDGE_MM, GAP_MM, Sheet, tenth
 from fastgen.scene import REC_709, Color, Decal, Vec2
 from fastgen.scene.container_kinds import KINDS
@@ -188,7 +188,7 @@ def _weights(
     lines = weight_lines(kind, rng)
     wear = round(float(rng.uniform(*config.text_wear)), 3)
     # Beside a vertical identifier the panel only fits with two or three lines per entry.
-    halves, thirds = (tuple(p for line in lines for p in parts(line, n)) for n in (2, 3))
+    halves, thirds = (tuple(p for line in lines for p in split_entry(line, n)) for n in (2, 3))
     cap = _between(rng, config.weights_cap_mm)
     leaf = door.size[0] / 2 + GAP_MM
     least = config.weights_cap_mm.lo
