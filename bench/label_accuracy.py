@@ -64,7 +64,7 @@ def differences(generator: Generator, scene: Scene, camera: Camera, mesh: Mesh) 
 
     Returns:
         Counts of compared pixels, pixels with different labels or depth, and differences that no
-            edge explains.
+        edge explains.
     """
     sample = generator.render(scene=scene, camera=camera)
     threshold = generator.config.damage.mask_threshold_mm

@@ -3,10 +3,10 @@
     python bench/passes.py [--scenes 6] [--repeats 3] [--size 640x640] [--damage 0.4]
         [--quality balanced]
 
-Prints CPU ms and thousands of pixels of each pass by camera, from one process. Values are means
-over scenes, times the fastest of `repeats` draws. CPU time of the process is hardly affected by
-other load on the machine. The timer waits for each pass to finish, which does not happen in a real
-frame. A 2x2 block that `draft` shades once counts as one pixel.
+Prints CPU ms and thousands of pixels of each pass by camera, measured in one process. Each time is
+the fastest of `repeats` draws, averaged over the scenes. CPU time of the process is hardly affected
+by other load on the machine. The timer waits for each pass to finish, which does not happen in a
+real frame. A 2x2 block that `draft` shades once counts as one pixel.
 
 On a GPU, times come from the GPU's own clock and pixels are not counted, because reading a list
 back makes it slow from then on.

@@ -172,7 +172,7 @@ def measured(texts: Sequence[str], read: Sequence[str]) -> dict[str, float]:
 
     Returns:
         Percentages: exact matches, character error rate, reads with a correct check digit, and
-            exact matches among these. nan where there is nothing to divide by.
+        exact matches among these. nan where there is nothing to divide by.
     """
     pairs = [(joined(text), got) for text, got in zip(texts, read, strict=True)]
     exact = [wanted == got for wanted, got in pairs]

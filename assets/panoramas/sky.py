@@ -96,7 +96,7 @@ def cloud_layer(
 
     Returns:
         Transmittance [H/2, 2H], and the share of unit light that reaches the eye from the sun and
-            from the surrounding sky.
+        from the surrounding sky.
     """
     view = directions(height)[: height // 2].astype(np.float32)
     tile = noise_tile(clouds.seed)

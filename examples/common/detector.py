@@ -76,11 +76,12 @@ class Detector(Learner):
         nn.init.constant_(self.heat.bias, -math.log(1 / _RARE - 1))
 
     def forward(self, pixels: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Return maps at a quarter of the size of images [B, 3, H, W] in -1..1.
+        """Run the network on images [B, 3, H, W] in -1..1.
 
         Returns:
-            Heat logits [B, classes, h, w]. Logarithms of the distances to the four sides in cells,
-                for both groups [B, 2, 4, h, w]. Mask logits [B, 2, h, w] if the detector has masks.
+            Maps at a quarter of the image size: heat logits [B, classes, h, w], logarithms of the
+            distances to the four sides in cells for both groups [B, 2, 4, h, w], and mask
+            logits [B, 2, h, w] if the detector has masks.
         """
         x = self.stem(pixels)
         seen = [x]
@@ -126,8 +127,8 @@ class Detector(Learner):
 
         Returns:
             For each image, best first and on the CPU: boxes float32 [N, 4] in pixels, labels int64
-                [N] from 1, and scores float32 [N]. Also masks bool [N, H, W] if the detector has
-                masks.
+            [N] from 1, and scores float32 [N]. Also masks bool [N, H, W] if the detector has
+            masks.
         """
         maps = [m.float() for m in self(self._pixels(images))]
         heat = maps[0].sigmoid()

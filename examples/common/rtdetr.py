@@ -56,7 +56,7 @@ class RtDetr(Learner):
 
         Returns:
             For each image, best first and on the CPU: boxes float32 [N, 4] in pixels, labels int64
-                [N] from 1, and scores float32 [N].
+            [N] from 1, and scores float32 [N].
         """
         pixels = self._pixels(images)
         height, width = pixels.shape[2:]
