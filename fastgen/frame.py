@@ -19,6 +19,8 @@ class Frame:
         depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
         radiance: float32 [H, W, 3], linear Rec. 709 after exposure and before the tone curve;
             None unless requested.
+        normals: float32 [H, W, 3], unit normals in view space (x right, y down, z forward), mean
+            over the surfaces in a pixel, 0 for the surroundings; None unless requested.
     """
 
     image: NDArray[np.uint8]
@@ -27,3 +29,4 @@ class Frame:
     damage: NDArray[np.uint16]
     depth: NDArray[np.float32]
     radiance: NDArray[np.float32] | None = field(default=None, kw_only=True)
+    normals: NDArray[np.float32] | None = field(default=None, kw_only=True)

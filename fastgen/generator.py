@@ -8,29 +8,24 @@ from itertools import chain, product
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fastgen.camera.projection import View, view_of
-from fastgen.camera.sensor import develop, is_needed
+from fastgen.camera.projection import view_of
+from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
 from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import ConfigError
-from fastgen.frame import Frame
-from fastgen.geometry.container import build_container
 from fastgen.geometry.damage_law import seen_damages, variant
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
 from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
-from fastgen.render.bake import Atlas
 from fastgen.render.cuda import CudaFrame, cuda_reason
 from fastgen.render.gl import open_context
-from fastgen.render.programs import LAYERS
+from fastgen.render.passes.bake import Atlas
 from fastgen.render.renderer import Renderer
 from fastgen.render.session import Opened
 from fastgen.render.settings import QUALITY, RenderSettings
-from fastgen.render.shadow_map import shader_suns
-from fastgen.render.shapes import shadow_casters, spreader_outline
+from fastgen.render.shadow_map import shader_lights
+from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
 from fastgen.sampling.coverage import (
     damage_variant_configs,
@@ -100,15 +95,15 @@ class Generator:
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
-        # a scene's cameras are mostly rendered one after the other
-        self._latest: tuple[tuple[Config, int, int], Scene] | None = None
-        self._checked: Scene | None = None
+        # the cameras of a scene are usually rendered one after the other
+        self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
+        self._given: PreparedScene | None = None
         self._gpu = Opened(
             partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
                 Renderer,
                 light=partial(_load_light, self._hdris),
-                **QUALITY[quality]._asdict(),
+                quality=QUALITY[quality],
                 mask_threshold_mm=self.config.damage.mask_threshold_mm,
             ),
         )
@@ -149,10 +144,11 @@ class Generator:
     def scene(self, index: int) -> Scene:
         """Scene number `index`: plain data, no GL needed, the same on every machine."""
         key = (self.config, self.seed, whole("index", index))
-        latest = self._latest  # another thread may replace it
-        if latest is None or latest[0] != key:
-            self._latest = latest = key, sample_scene(*key, self.environments)
-        return latest[1]
+        sampled = self._sampled  # another thread may replace it
+        if sampled is None or sampled[0] != key:
+            scene = sample_scene(*key, self.environments)
+            self._sampled = sampled = key, PreparedScene(scene)
+        return sampled[1].scene
 
     def render(
         self,
@@ -167,25 +163,25 @@ class Generator:
 
         camera: the name of one of the scene's cameras, or a Camera of your own; by default the
         scene's first. layer: 'all', or one material layer by itself, of programs.LAYERS.
-        normals: give Sample.normals too, which costs another draw. labels: what becomes of
+        normals: give Sample.normals too. labels: what becomes of
         objects that are hard to see, in place of config.labels.
         Raises ConfigError for what cannot be drawn, by its name.
         """
         if labels is not None:
             check_fields(labels, LabelConfig, "labels")
         check_known("layer", layer, LAYERS)
-        scene, camera = self._chosen(index, camera, scene)
-        view = view_of(camera, self.size)
+        prepared, camera = self._chosen(index, camera, scene)
+        scene, view = prepared.scene, view_of(camera, self.size)
         with self._gpu.drawing() as renderer:
-            frame = renderer.render(scene, camera, self.size, layer)
-            if layer == "all" and is_needed(camera, scene.weather):
+            modelled = layer == "all" and is_needed(camera, scene.weather)
+            radiance = modelled and needs_radiance(camera, scene.weather)
+            frame = renderer.render(prepared, camera, self.size, layer, radiance, normals)
+            if modelled:
                 airlight = self._airlight(renderer, scene, camera)
-                frame = develop(frame, view, camera, scene.weather, airlight)
-            mesh = renderer.mesh(scene.container)
-            seen_normals = self._normals(renderer, frame, scene, camera, view) if normals else None
+                image = apply_camera_model(frame, view, camera, scene.weather, airlight)
+                frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)
-        spreader = spreader_outline(scene, camera.lens is not None)
-        objects = label(Shot(frame, scene, view, mesh, spreader, config))
+        objects = label(Shot(frame, prepared, view, config))
         return Sample(
             image=frame.image,
             cover=frame.cover,
@@ -196,7 +192,7 @@ class Generator:
             camera=camera,
             view=view,
             objects=objects,
-            normals=seen_normals,
+            normals=frame.normals,
         )
 
     def _airlight(self, renderer: Renderer, scene: Scene, camera: Camera) -> Color:
@@ -207,17 +203,6 @@ class Generator:
         mean = mean * renderer.exposure(scene, camera, self.size)
         red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
         return red, green, blue
-
-    def _normals(
-        self, renderer: Renderer, frame: Frame, scene: Scene, camera: Camera, view: View
-    ) -> NDArray[np.float32]:
-        """From the layer that shows them, where 0..255 stands for -1..1 along the world's axes."""
-        shown = renderer.render(scene, camera, self.size, "normals").image
-        world = shown.astype(np.float32) / 127.5 - 1
-        normals = (world @ view.rotation.T.astype(np.float32)).astype(np.float32)
-        normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-6)
-        normals[frame.ids == 0] = 0
-        return normals
 
     def render_cuda(
         self,
@@ -231,11 +216,11 @@ class Generator:
 
         Raises ContextError where `cuda_reason` gives one.
         """
-        scene, camera = self._chosen(index, camera, scene)
+        prepared, camera = self._chosen(index, camera, scene)
         with self._gpu.drawing() as renderer:
             frames = self._gpu.frames(self.size)
-            image, labels, depth = frames.take(renderer.draw(scene, camera, self.size))
-        return CudaFrame(image, labels, depth, scene, camera, view_of(camera, self.size))
+            image, labels, depth = frames.take(renderer.draw(prepared, camera, self.size))
+        return CudaFrame(image, labels, depth, prepared.scene, camera, view_of(camera, self.size))
 
     def cuda_reason(self) -> str:
         """Why `render_cuda` cannot work here, in one line; '' where it can."""
@@ -248,17 +233,17 @@ class Generator:
         Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
         """
         with self._gpu.drawing() as renderer:
-            return renderer.bake(self._check(scene), texel_mm)
+            return renderer.bake(self._prepared(scene), texel_mm)
 
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
         """As `bake`, of the spreader; None where the scene has none."""
         with self._gpu.drawing() as renderer:
-            return renderer.bake_spreader(self._check(scene), texel_mm)
+            return renderer.bake_spreader(self._prepared(scene), texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
         with self._gpu.drawing() as renderer:
-            checked = self._check(scene)
+            checked = self._prepared(scene).scene
             return renderer.exposure(checked, check_camera(camera, checked.container), self.size)
 
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
@@ -268,22 +253,22 @@ class Generator:
         scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
         names = self.config.environment.names or drawn
-        lit = (replace(scene, environment=EnvironmentView(name, 0.0)) for name in names)
+        lit = (
+            PreparedScene(replace(scene, environment=EnvironmentView(name, 0.0))) for name in names
+        )
         shaped = [
-            replace(scene, container=container, spreader=spreader, damages=())
+            PreparedScene(replace(scene, container=container, spreader=spreader, damages=()))
             for container, spreader in possible_shapes(self.config)
         ]
         for shape in shaped:  # what shadows and labels ask of meshes
             on_step()
-            shadow_casters(shape)
-            container = build_container(shape.container.kind, shape.container.profiles)
-            container.preload(damages=self.config.damage.probability > 0)
+            shape.prepare_shapes(damages=self.config.damage.probability > 0)
         lens = any(camera.lens is not None for camera in scene.cameras)
         with self._gpu.drawing() as renderer:
             for each in chain(lit, shaped):
                 on_step()
                 renderer.preload(each, lens)
-            lights = {shader_suns(renderer.ambient(name).suns): name for name in names}
+            lights = {shader_lights(renderer.ambient(name).lights): name for name in names}
         # programs and targets: every way to draw, every container
         ways = list(product(damage_variant_configs(self.config), lights.values()))
         boxes = list(single_container_configs(self.config.container))
@@ -321,25 +306,26 @@ class Generator:
 
     def _chosen(
         self, index: int | None, camera: str | Camera | None, scene: Scene | None
-    ) -> tuple[Scene, Camera]:
-        """The scene and camera that the arguments of a render name."""
+    ) -> tuple[PreparedScene, Camera]:
+        """Return the scene and camera that the arguments of a render name."""
         if (index is None) == (scene is None):
             raise ConfigError("render: give either index or scene")
         if scene is None:
             assert index is not None
             scene = self.scene(index)
-        else:
-            self._check(scene)
+        prepared = self._prepared(scene)
         if camera is None or isinstance(camera, str):
-            return scene, find_camera(scene, camera)
-        return scene, check_camera(camera, scene.container)
+            return prepared, find_camera(scene, camera)
+        return prepared, check_camera(camera, scene.container)
 
-    def _check(self, scene: Scene) -> Scene:
-        """`check_scene`, once for all cameras of a scene, and never for what was made here."""
-        ours = self._latest is not None and scene is self._latest[1]
-        if not ours and scene is not self._checked:
-            self._checked = check_scene(scene)
-        return scene
+    def _prepared(self, scene: Scene) -> PreparedScene:
+        """Return the geometry of a scene; check and prepare it once for all its cameras."""
+        sampled, given = self._sampled, self._given  # another thread may replace them
+        if sampled is not None and scene is sampled[1].scene:
+            return sampled[1]
+        if given is None or scene is not given.scene:
+            self._given = given = PreparedScene(check_scene(scene))
+        return given
 
 
 def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:

@@ -1,4 +1,4 @@
-"""Shader programs: source text with its includes expanded, and the textures that a program reads."""
+"""Shader programs: expanded source text, and the textures that a program reads."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -45,7 +45,7 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     needed: dict[str, None] = {}  # in order, each once
 
     def included(match: re.Match[str]) -> str:
-        name, _, kind = match[1].rpartition(".")
+        kind = match[1].rpartition(".")[2]
         if kind not in ("constants", "block"):
             return _INCLUDE.sub(included, read(match[1]))
         needed[match[1]] = None
@@ -128,6 +128,16 @@ class ShaderProgram:
         if self._empty is None:
             self._empty = self._ctx.vertex_array(self.linked, [])
         self._empty.render(moderngl.TRIANGLES, vertices=count)
+
+    def dispatch(self, across: int, down: int = 1) -> None:
+        """Run a compute shader on a grid of work groups."""
+        assert isinstance(self.linked, moderngl.ComputeShader)
+        self.linked.run(across, down)
+
+    def dispatch_indirect(self, buffer: moderngl.Buffer, offset: int) -> None:
+        """Run a compute shader on the work groups that a buffer names at a byte offset."""
+        assert isinstance(self.linked, moderngl.ComputeShader)
+        self.linked.run_indirect(buffer, offset)
 
     def release(self) -> None:
         """Free the GL objects."""

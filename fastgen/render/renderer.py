@@ -1,15 +1,13 @@
-"""Renderer: Scene -> Frame, the owner of all GL objects that this takes.
+"""Renderer: Scene -> Frame, the owner of all GL objects.
 
-Indirect draws, of the spreader, of what of the container no damage touches and of the rest, write
-for each sample which surface it sees and where on the unfolded sheet; one more a hole, what shows
-through it. Then the sky is drawn, pixels that see more are listed by what is to be done there, and
-each list is shaded: a pixel once for each different surface among its samples. Colour, ids, damage
-and depth come of it, the last three at the pixel centre. Traced, points of what the samples see are
-read back in between, and the light that rays find there goes to the shaders. Ids are never
-filtered: a sample lies exactly on each pixel centre.
+A draw is a list of passes (fastgen/render/passes). The geometry pass writes the visibility buffer:
+which surface each sample sees, and where on its sheet. Later passes draw the sky, sort the pixels
+that see surfaces into classes, and shade each class. Colour, ids, damage and depth come out of one
+draw. Labels are taken at the pixel centre and never filtered: a sample lies exactly on each centre.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Self
 
 import moderngl
@@ -20,297 +18,278 @@ from fastgen.camera.projection import View, view_of
 from fastgen.decals.artwork import art_images, glyph_coverage, glyph_tiles
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import corners_mm, seen_damages, variant
-from fastgen.geometry.mesh import Mesh
-from fastgen.geometry.spreader import tier_bounds_mm
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.light.exposure import metered_exposure
 from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import dfg_table
-from fastgen.light.sky_visibility import lobe_masks
-from fastgen.light.traced_light import traced_light
-from fastgen.render.bake import Atlas, bake_atlas
+from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
+from fastgen.render.depth_map import occluder_program
+from fastgen.render.draw_inputs import DrawInputs, Regions
 from fastgen.render.environment_textures import GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
-from fastgen.render.light_points import LightPoints, point_step
-from fastgen.render.programs import (
-    DAMAGE_BLOCK,
-    DAMAGE_VARIANTS,
-    LAYERS,
-    LOBE_CELLS,
-    REACH_MARGIN_MM,
-    SCENE_BLOCK,
-    SPREADER_ZONE,
-    VIEW_BLOCK,
-    link,
-)
+from fastgen.render.image_targets import ImageTargets
+from fastgen.render.passes.background import BackgroundPass
+from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
+from fastgen.render.passes.geometry import GeometryPass
+from fastgen.render.passes.normals import NormalsPass
+from fastgen.render.passes.ray_points import RayPass, point_step
+from fastgen.render.passes.shading import ShadingPass
+from fastgen.render.program import Programs
 from fastgen.render.recent_cache import Kept, Recent
-from fastgen.render.regions import Region, bands, box_corners, merged, region_of
+from fastgen.render.regions import bands, box_corners, merged, region_of
 from fastgen.render.sample_lattice import fitting
-from fastgen.render.sample_targets import SampleTargets
-from fastgen.render.scene_decals import SceneDecals
-from fastgen.render.shading import UNITS, Shading
-from fastgen.render.shadow_map import ShadowMap, shader_suns, sun_values
-from fastgen.render.shapes import Shapes, ray_bodies, shadow_casters
-from fastgen.render.surface_values import cable_values, damage_values, scene_values
-from fastgen.render.targets import Targets
+from fastgen.render.scene_resources import SceneResources
+from fastgen.render.settings import Quality
+from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
+from fastgen.render.shapes import Shapes, ray_bodies
+from fastgen.render.surface_values import SceneMaterials, cable_values, damage_values, scene_values
 from fastgen.render.textures import art_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
-from fastgen.scene import Camera, Container, Damage, Scene
+from fastgen.render.variant import ShaderVariant
+from fastgen.render.visibility_buffer import VisibilityBuffer
+from fastgen.render.zone_codes import SPREADER_ZONE
+from fastgen.scene import Camera, Damage, Scene
+
+_Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 
 
 class Renderer:
-    """Draws scenes on one GL context. A context manager: leaving it frees all that it made.
-
-    gl: a current context; it stays the caller's. samples_per_axis: 1 (no antialiasing), 2, 3 or 5;
-    fewer for images whose samples the driver's textures have no room for. lookups: of the material
-    layers in a pixel, 1, 2 or 25; 1 of one sample.
-    mask_threshold_mm: what moved by more counts as damaged. traced: whether light is found by rays
-    at points of the image, and not at vertices alone; ask ray_bodies.check_rays first.
-    shadow_detail: as of sun_shadow.ShadowMap. coarse: whether those of two by two pixels that see
-    one facet, without prints or damage near, are shaded at once, as Vaidyanathan et al. 2014,
-    Coarse Pixel Shading, do; of one sample a pixel only.
-    light: gives the prefiltered environment of a name, for example from `load_environment`.
-    """
+    """Draws scenes on one GL context. A context manager: leaving it frees everything it made."""
 
     def __init__(
         self,
         gl: GLContext,
         light: Callable[[str], EnvironmentLight],
-        samples_per_axis: int = 3,
-        lookups: int = 2,
+        quality: Quality,
         mask_threshold_mm: float = 5.0,
-        traced: bool = False,
-        shadow_detail: float = 1.0,
-        coarse: bool = False,
     ) -> None:
+        """Prepare a renderer.
+
+        Args:
+            gl: Current context, which stays the caller's.
+            light: Returns the prefiltered environment of a name, such as `load_environment`.
+            quality: Samples, lookups and light. Images whose samples do not fit the driver's
+                textures get fewer samples. A traced quality needs `ray_bodies.check_rays`.
+            mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
+        """
         self._gl = gl
         self._ctx = gl.ctx
         self._light_of = light
-        self._samples_per_axis = samples_per_axis
-        self._lookups = lookups
+        self._quality = quality
         self._mask_threshold_mm = mask_threshold_mm
-        self._traced = traced
-        self._coarse = coarse
-        self._geometry = {
-            damage: link(self._ctx, "geometry.vert", "geometry.frag", UNITS, damage=damage)
-            for damage in DAMAGE_VARIANTS
-        }
-        self._shading: Kept[Shading] = Kept(len(LAYERS))
-        self._targets: Kept[Targets] = Kept(2)
-        self._points: Kept[LightPoints] = Kept(2)
+        self._programs = programs = Programs(self._ctx)
+        self._geometry = GeometryPass(self._ctx, programs)
+        self._background = BackgroundPass(self._ctx, programs, by_compute=not gl.software)
+        self._shading = ShadingPass(self._ctx, programs)
+        self._normals = NormalsPass(self._ctx, programs)
+        self._rays: Kept[RayPass] = Kept(2)
+        self._targets: Kept[ImageTargets] = Kept(2)
         self._bodies: Recent[RayBodies] = Recent(2)
-        self._shapes = Shapes(self._ctx, self._geometry)
+        self._shapes = Shapes(self._ctx, self._geometry.programs)
         self._lights: Kept[GpuLight] = Kept(24)
-        self._scenes: Kept[SceneDecals] = Kept(2)
-        self._occluder = link(self._ctx, "occluder.vert", "occluder.frag", {})
-        self._sun_shadow = ShadowMap(self._ctx, self._occluder, shadow_detail)
+        self._scenes: Kept[SceneResources] = Kept(2)
+        self._occluder = occluder_program(self._ctx)
+        self._shadow_map = ShadowMap(self._ctx, self._occluder, quality.shadow_detail)
         self._blocks = {
             block.name: self._ctx.buffer(reserve=block.size)
             for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
         }
+        for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
+            self._blocks[block.name].bind_to_uniform_block(block.binding)
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
-        self._art = art_texture(gl, art)
-        texels = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
-        self._tiles = mipmapped_array(self._ctx, texels)
-        self._noise = noise_texture(gl)
         table = dfg_table()
-        self._dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
-        self._dfg.repeat_x = self._dfg.repeat_y = False
-        masks = lobe_masks(LOBE_CELLS)
-        self._lobes = self._ctx.texture(masks.shape[1::-1], 4, masks.tobytes(), dtype="u4")
-        self._lobes.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
+        dfg.repeat_x = dfg.repeat_y = False
+        glyphs = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
+        self._tables: _Textures = {
+            "noise_tiles": noise_texture(gl),
+            "art": art_texture(gl, art),
+            "glyph_tiles": mipmapped_array(self._ctx, glyphs),
+            "dfg_table": dfg,
+        }
 
     def render(
-        self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
+        self,
+        prepared: PreparedScene,
+        camera: Camera,
+        size: tuple[int, int],
+        layer: str = "all",
+        radiance: bool = False,
+        normals: bool = False,
     ) -> Frame:
-        """Draw `scene` as `camera` sees it, (width, height) = size pixels, and read it back.
+        """Draw a scene as a camera sees it, and copy the image to the CPU.
 
-        layer: 'all', or one of programs.LAYERS to see a single material layer unlit.
+        Args:
+            prepared: A scene that `check_scene` accepts.
+            camera: Any camera outside the container.
+            size: (width, height) in pixels.
+            layer: "all", or one of LAYERS to see a single material layer unlit.
+            radiance: Return exposed linear radiance in `Frame.radiance`, and a black image.
+            normals: Return surface normals in `Frame.normals`.
         """
-        return self.draw(scene, camera, size, layer).read()
+        inputs = self._draw(prepared, camera, size, layer, radiance)
+        frame = inputs.targets.read()
+        return replace(frame, normals=self._normals.run(inputs)) if normals else frame
 
-    def draw(
-        self, scene: Scene, camera: Camera, size: tuple[int, int], layer: str = "all"
-    ) -> Targets:
-        """As `render`, without reading back: the targets keep the image until the next draw."""
-        view = view_of(camera, size)
+    def draw(self, prepared: PreparedScene, camera: Camera, size: tuple[int, int]) -> ImageTargets:
+        """Draw a scene and leave the image on the GPU until the next draw."""
+        return self._draw(prepared, camera, size).targets
+
+    def _draw(
+        self,
+        prepared: PreparedScene,
+        camera: Camera,
+        size: tuple[int, int],
+        layer: str = "all",
+        radiance: bool = False,
+    ) -> DrawInputs:
+        environment = prepared.scene.environment
+        light = self._light(environment.name)
+        inputs = self._inputs(prepared, camera, view_of(camera, size), layer, radiance)
+        self._cast_shadows(prepared, inputs)
+        self._set_view(prepared, camera, inputs)
+        self._geometry.run(inputs)
+        if inputs.variant.traced and light.sky_rays is not None:
+            rays = self._rays.get(size, lambda: RayPass(self._gl, self._programs, size))
+            bodies = self._ray_bodies(prepared, camera, inputs)
+            rays.run(inputs, bodies, light.sky_rays, environment.yaw_deg)
+        self._background.run(inputs)
+        self._shading.run(inputs)
+        return inputs
+
+    def _inputs(
+        self, prepared: PreparedScene, camera: Camera, view: View, layer: str, radiance: bool
+    ) -> DrawInputs:
+        """Collect what the passes share, and fill the uniform blocks of scene and damages."""
+        scene, size, lens = prepared.scene, view.size, camera.lens is not None
         damages = seen_damages(scene.damages, camera.position_mm)
         damage = variant(damages)
         limit = self._ctx.info["GL_MAX_TEXTURE_SIZE"]
-        per_axis = fitting(self._samples_per_axis, size, limit)
-        targets = self._targets.get(size, lambda: Targets(self._gl, size, per_axis))
-        samples = targets.samples
+        per_axis = fitting(self._quality.samples_per_axis, size, limit)
+        targets = self._targets.get(
+            (size, per_axis, radiance), lambda: ImageTargets(self._gl, size, per_axis, radiance)
+        )
         light = self._light(scene.environment.name)
-        mesh, spreader, lit = self._shapes.of(scene, camera.lens is not None, light.ambient)
-        rays = light.sky_rays if layer == "all" else None
-        shading = self._shading.get(
-            (layer, per_axis),
-            lambda: Shading(
-                self._ctx,
-                per_axis,
-                self._lookups,
-                layer,
-                traced=rays is not None,
-                coarse=self._coarse and per_axis == 1,
-                compute_sky=not self._gl.software,
-            ),
+        resources = self._resources(prepared)
+        container, spreader, lit = self._shapes.of(
+            prepared, resources.materials, lens, light.ambient
         )
-        shadow = self._shadow(scene)
-        seen = _view_values(scene, view, samples, self._exposure(scene, camera, view))
-        sunny = sun_values(light.ambient.suns, shadow, view.position_m)
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
-        hung = cable_values(scene, spreader.mesh if spreader else None, view)
-        self._set(VIEW_BLOCK, {**seen, **sunny, **hung})
         if damage != "sound":
-            shapes = damage_values(scene, damages, self._mask_threshold_mm, samples.inner_row)
-            self._set(DAMAGE_BLOCK, shapes)
-        touched = [region_of(view, corners_mm(item)) for item in damages]
-        boxes = [box_corners(mesh.mesh.bounds_mm, damages)]
-        cables: list[Region | None] = []
-        if spreader is not None:
-            frame, *above = map(box_corners, tier_bounds_mm(spreader.mesh))
-            boxes = [np.concatenate([*boxes, frame]), *above]
-            cables = [region_of(view, above[-1])]
-        regions = bands([region_of(view, box) for box in boxes])
-        near = merged(touched)
-        holes = merged(
-            [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
+            threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
+            self._set(DAMAGE_BLOCK, damage_values(scene, damages, threshold_mm, row))
+        return DrawInputs(
+            view=view,
+            damages=damages,
+            container=container,
+            spreader=spreader,
+            lit=lit,
+            regions=_regions(view, prepared, damages),
+            targets=targets,
+            variant=ShaderVariant(
+                samples_per_axis=per_axis,
+                lookups=self._quality.lookups,
+                layer=layer,
+                damage=damage,
+                lights=shader_lights(light.ambient.lights),
+                traced=light.sky_rays is not None and layer == "all",
+                coarse=self._quality.coarse and per_axis == 1,
+                radiance=radiance,
+            ),
+            textures={
+                **self._material_textures(resources, container, spreader),
+                "specular_light": light.specular,
+                "irradiance_light": light.irradiance,
+                "background_light": light.background,
+            },
         )
-        drawn = bands([*regions, *near])
-        # where shaders ask for rest positions, whatever was drawn there before
-        asked = [*near, *cables] if rays is None else drawn
-        samples.begin(damage, drawn, asked, holes)
-        self._bind_surface(scene, mesh, spreader)
-        self._sample(samples, holes, view, camera, damages, mesh, spreader)
-        self._bind_light(samples, light, shadow)
-        if rays is not None:
-            bodies = self._bodies.get(
-                (scene, camera.lens is not None),
-                lambda: ray_bodies(
-                    scene, mesh.mesh, spreader.mesh if spreader else None, lit, light.ambient
-                ),
-            )
-            points = self._points.get(
-                (size, per_axis), lambda: LightPoints(self._gl, size, per_axis)
-            )
-            found = points.read(damage, drawn, view.position_m)
-            yaw_deg = scene.environment.yaw_deg
-            points.light(found, traced_light(found, bodies, rays, yaw_deg))
-        shading.draw(
-            targets,
-            regions,
-            damage,
-            near,
-            cables,
-            suns=shader_suns(light.ambient.suns),
-            bent=camera.lens is not None,
-        )
-        return targets
 
-    def _sample(
-        self,
-        samples: SampleTargets,
-        holes: Sequence[Region | None],
-        view: View,
-        camera: Camera,
-        damages: tuple[Damage, ...],
-        mesh: GpuMesh,
-        spreader: GpuMesh | None,
-    ) -> None:
-        """Draw the geometry into the empty sample targets; holes: pixels that they may touch."""
-        self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        self._lobes.use(UNITS["lobe_masks"])
-        self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
-        # a dent may tilt a face into view that the rest mesh turns away
-        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
-        bent = {face for place in tilted for face in place.split(".")}
-        if spreader is not None:
-            spreader.draw("sound", spreader.seen_from(camera.position_mm))
-        seen = mesh.seen_from(camera.position_mm, bent)
-        if damages:
-            boxes = [corners_mm(item) for item in damages]
-            seen, touched = mesh.clusters.parted(seen, boxes, REACH_MARGIN_MM)
-            mesh.draw("sound", seen)
-            samples.begin_damaged()
-            mesh.draw("damaged", touched)
-        else:
-            mesh.draw("sound", seen)
-        moved_mm = sum(abs(d.depth_mm) for d in damages)
-        for region in holes:
-            samples.limit_inside(region)
-            mesh.draw("holed", mesh.clusters.seen_in(view, region, moved_mm))
-        samples.end()
+    def _cast_shadows(self, prepared: PreparedScene, inputs: DrawInputs) -> None:
+        """Draw what the directional lights leave in the shade, if there are any."""
+        scene, spreader = prepared.scene, prepared.spreader
+        lights = self.ambient(scene.environment.name).lights
+        if not lights:
+            return
+        toward = to_map_frame([each.direction for each in lights], -scene.environment.yaw_deg)
+        outline = prepared.container_outline
+        container = prepared.container if scene.damages else outline  # only fine triangles bend
+        solid = None if spreader is None else spreader.solid
+        self._shadow_map.cast(container, solid, toward, scene.damages, outline)
+        inputs.textures["sun_shadow"] = self._shadow_map.depth
 
-    def _bind_light(
-        self, samples: SampleTargets, light: GpuLight, shadow: ShadowMap | None
-    ) -> None:
-        """Bind the samples and what lights them."""
-        textures: dict[str, Any] = {
-            "surface_keys": samples.keys,
-            "sheet_points": samples.points,
-            "sheet_depths": samples.depths,
-            "openness_points": samples.openness,
-            "light_points": samples.light,
-            "specular_light": light.specular,
-            "irradiance_light": light.irradiance,
-            "background_light": light.background,
-            "dfg_table": self._dfg,
+    def _set_view(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> None:
+        """Fill the uniform block of the view."""
+        scene, view, spreader = prepared.scene, inputs.view, inputs.spreader
+        lights = self.ambient(scene.environment.name).lights
+        shadow = self._shadow_map if lights else None
+        materials = self._resources(prepared).materials
+        exposure = self._exposure(scene, camera, view)
+        values = {
+            **_view_values(scene, view, inputs.targets.samples, exposure),
+            **light_values(lights, shadow, view.position_m),
+            **cable_values(prepared, materials, spreader.mesh if spreader else None, view),
         }
-        textures |= zip(("rest_x", "rest_y", "rest_z"), samples.rest, strict=False)
-        if shadow is not None:
-            textures["sun_shadow"] = shadow.depth
-        for name, texture in textures.items():
-            texture.use(UNITS[name])
+        self._set(VIEW_BLOCK, values)
 
-    def _shadow(self, scene: Scene) -> ShadowMap | None:
-        """What the suns of a scene leave in the shade, None without any."""
-        suns = self.ambient(scene.environment.name).suns
-        if not suns:
-            return None
-        toward = to_map_frame([sun.direction for sun in suns], -scene.environment.yaw_deg)
-        container, outline, spreader = shadow_casters(scene)
-        self._sun_shadow.cast(container, spreader, toward, scene.damages, outline)
-        return self._sun_shadow
+    def _ray_bodies(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> RayBodies:
+        """Return what rays hit in a scene; its cameras share it."""
+        ambient = self.ambient(prepared.scene.environment.name)
+        materials, lens = self._resources(prepared).materials, camera.lens is not None
+        return self._bodies.get(
+            (prepared, lens), lambda: ray_bodies(prepared, materials, lens, inputs.lit, ambient)
+        )
 
-    def preload(self, scene: Scene, lens: bool) -> None:
-        """Make the light and the shapes of a scene, so that drawing it takes neither time nor
-        memory for that; lens: whether one bends what is drawn."""
-        light = self.ambient(scene.environment.name)
-        self._shapes.zone_table(*self._shapes.of(scene, lens, light)[:2])
+    def preload(self, prepared: PreparedScene, lens: bool) -> None:
+        """Prepare light and shapes of a scene, so that drawing it takes no more time or memory.
+
+        Args:
+            prepared: The scene.
+            lens: Whether a lens distorts the images.
+        """
+        light = self.ambient(prepared.scene.environment.name)
+        materials = SceneMaterials(prepared)
+        self._shapes.zone_table(*self._shapes.of(prepared, materials, lens, light)[:2])
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(
-            environment, lambda: GpuLight(self._gl, self._light_of(environment), self._traced)
+            environment,
+            lambda: GpuLight(self._gl, self._light_of(environment), self._quality.traced),
         )
 
     def ambient(self, environment: str) -> Ambient:
-        """The light of an environment as the CPU asks for it."""
+        """Return the light of an environment as the CPU uses it."""
         return self._light(environment).ambient
 
-    def bake(self, scene: Scene, texel_mm: float) -> Atlas:
-        """The material of the whole container of `scene` as textures, see bake.Atlas."""
-        mesh = self._shapes.container(scene.container)
+    def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
+        """Bake the material of a scene's container, damage included, see bake.Atlas."""
+        scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
-        self._set(SCENE_BLOCK, scene_values(scene, 0))
         if damage != "sound":
             values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
-        self._bind_surface(scene, mesh, None)
-        return bake_atlas(self._ctx, mesh.mesh, texel_mm, damage)
+        self._set(SCENE_BLOCK, scene_values(scene, 0))
+        textures = self._material_textures(self._resources(prepared), mesh, None)
+        program = bake_program(self._programs, damage)
+        return bake_atlas(self._ctx, program, textures, mesh.mesh, texel_mm)
 
-    def bake_spreader(self, scene: Scene, texel_mm: float) -> Atlas | None:
-        """The spreader's material as textures, None where the scene has none."""
-        spreader = self._shapes.spreader(scene, False)
+    def bake_spreader(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
+        """Bake the material of a scene's spreader; None where the scene has none."""
+        spreader = self._shapes.spreader(prepared)
         if spreader is None:
             return None
-        self._set(SCENE_BLOCK, scene_values(scene, 0))
-        self._bind_surface(scene, self._shapes.container(scene.container), spreader)
-        return bake_atlas(self._ctx, spreader.mesh, texel_mm, "sound", SPREADER_ZONE)
+        self._set(SCENE_BLOCK, scene_values(prepared.scene, 0))
+        container = self._shapes.container(prepared)
+        textures = self._material_textures(self._resources(prepared), container, spreader)
+        program = bake_program(self._programs, "sound")
+        return bake_atlas(
+            self._ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
+        )
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
-        """Factor on radiance, ahead of the tone curve, with which `camera` takes `scene`."""
+        """Return the factor on radiance, before the tone curve, that a camera applies."""
         return self._exposure(scene, camera, view_of(camera, size))
 
     def _exposure(self, scene: Scene, camera: Camera, view: View) -> float:
@@ -318,42 +297,36 @@ class Renderer:
         paint = scene.surface.paint.albedo
         return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
 
-    def _bind_surface(self, scene: Scene, mesh: GpuMesh, spreader: GpuMesh | None) -> None:
-        """Bind what the material layers read."""
-        decals = self._scenes.get(
-            scene,
-            lambda: SceneDecals(self._ctx, scene, mesh.mesh, self._art_layers, self._fonts),
+    def _resources(self, prepared: PreparedScene) -> SceneResources:
+        return self._scenes.get(
+            prepared, lambda: SceneResources(self._ctx, prepared, self._art_layers, self._fonts)
         )
-        textures: dict[str, Any] = {
-            "noise_tiles": self._noise,
-            "art": self._art,
-            "glyph_tiles": self._tiles,
-            "zone_table": self._shapes.zone_table(mesh, spreader),
-            **decals.textures,
-        }
-        for name, texture in textures.items():
-            texture.use(UNITS[name])
+
+    def _material_textures(
+        self, resources: SceneResources, mesh: GpuMesh, spreader: GpuMesh | None
+    ) -> _Textures:
+        """Return the textures that the material layers read."""
+        zones = self._shapes.zone_table(mesh, spreader)
+        return {**self._tables, "zone_table": zones, **resources.textures}
 
     def _set(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
-        """Fill a uniform block for the draws to come."""
+        """Fill a uniform block for the draws that follow, and bind it."""
         buffer = self._blocks[block.name]
         buffer.write(block.pack(values))
         buffer.bind_to_uniform_block(block.binding)
 
-    def mesh(self, container: Container) -> Mesh:
-        """The rest mesh of a container, as it is drawn."""
-        return self._shapes.container(container).mesh
-
     def release(self) -> None:
-        """Free every GL object that this renderer made."""
-        caches: list[Any] = [self._shading, self._targets, self._points, self._shapes]
-        for kept in (*caches, self._lights, self._scenes, self._sun_shadow):
-            kept.release()
-        blocks: list[Any] = [*self._blocks.values()]
-        for item in (*blocks, *self._geometry.values(), self._occluder):
+        """Free every GL object of this renderer."""
+        owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
+        owners += [
+            self._shadow_map,
+            self._geometry,
+            self._programs,
+            self._occluder,
+            *self._blocks.values(),
+        ]
+        for item in [*owners, *self._tables.values()]:
             item.release()
-        for texture in (self._art, self._tiles, self._noise, self._dfg, self._lobes):
-            texture.release()
 
     def __enter__(self) -> Self:
         return self
@@ -362,10 +335,24 @@ class Renderer:
         self.release()
 
 
+def _regions(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
+    """Return where in an image container, spreader, damages and cables may be seen."""
+    touched = [region_of(view, corners_mm(item)) for item in damages]
+    torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
+    boxes = [box_corners(prepared.container.bounds_mm, damages)]
+    cables = []
+    if prepared.spreader is not None:
+        frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
+        boxes = [np.concatenate([*boxes, frame]), *above]
+        cables = [region_of(view, above[-1])]
+    surfaces = bands([region_of(view, box) for box in boxes])
+    return Regions(surfaces, merged(touched), merged(torn), cables)
+
+
 def _view_values(
-    scene: Scene, view: View, samples: SampleTargets, exposure: float
+    scene: Scene, view: View, samples: VisibilityBuffer, exposure: float
 ) -> dict[str, ArrayLike]:
-    """All members of VIEW_BLOCK."""
+    """Return the members of VIEW_BLOCK about the camera."""
     to_samples = np.eye(4)
     to_samples[:2, :2] = samples.to_clip
     right, down, forward = view.rotation

@@ -39,7 +39,7 @@ class ShaderVariant:
         layer: One of LAYERS.
         pixel_class: A key of PIXEL_CLASSES.
         damage: One of DAMAGE_VARIANTS.
-        lights: Directional lights that the program can shade: 0, 1 or MOST_SUNS.
+        lights: Directional lights that the program can shade: 0, 1 or MAX_LIGHTS.
         traced: Read indirect light that rays found instead of the vertices' light.
         coarse: Classify pixels for 2x2 coarse shading.
         cables: Classify pixels that thin cables may cover in part.
@@ -64,6 +64,6 @@ class ShaderVariant:
 
 
 def listed_classes(samples_per_axis: int) -> tuple[str, ...]:
-    """Return the pixel classes that images with so many samples use, in the order of their lists."""
+    """Return the pixel classes of images with so many samples, in the order of their lists."""
     unused = ("mixed",) if samples_per_axis == 1 else ("coarse",)
     return tuple(name for name in PIXEL_CLASSES if not name.startswith(unused))

@@ -1,4 +1,4 @@
-"""Material layers of a container or a spreader as textures, baked by the shading GLSL itself."""
+"""Bake pass: the material layers of a mesh as textures, evaluated by the shading GLSL."""
 
 import numbers
 from dataclasses import dataclass
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.unfold import GUTTER_MM
-from fastgen.render.programs import GUTTER_STEPS, link
-from fastgen.render.shading import UNITS
+from fastgen.render.constants import GUTTER_STEPS
+from fastgen.render.program import Programs, ShaderProgram, Textures
+from fastgen.render.variant import ShaderVariant
 
 MAX_ATLAS = 8192
-"""Texels along a side that viewers can be trusted to take."""
+"""Texels along a side that viewers accept reliably."""
 
 _TILE = 1024
 _COARSEST_MM = 1000.0
@@ -23,10 +24,12 @@ _COARSEST_MM = 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Baked textures of one mesh; row 0 holds the highest atlas y, so lettering is upright.
+    """Baked textures of one mesh. Row 0 holds the highest atlas y, so lettering is upright.
 
-    base_color: uint8 [H, W, 3], sRGB-encoded albedo. surface: uint8 [H, W, 3], as glTF 2.0 orders
-    it: 255, roughness, metallic (linear). texel_mm: width of a texel on the sheet.
+    Attributes:
+        base_color: uint8 [H, W, 3], sRGB-encoded albedo.
+        surface: uint8 [H, W, 3], linear, in the order of glTF 2.0: 255, roughness, metallic.
+        texel_mm: Width of a texel on the sheet.
     """
 
     base_color: NDArray[np.uint8]
@@ -34,19 +37,23 @@ class Atlas:
     texel_mm: float
 
     def uv(self, atlas_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Atlas points [..., 2] in mm as texture coordinates, v counted down from row 0."""
+        """Return texture coordinates of atlas points [..., 2] in mm; v counts down from row 0."""
         height, width = self.base_color.shape[:2]
         u, v = np.moveaxis(np.asarray(atlas_mm, np.float64) / self.texel_mm, -1, 0)
         return np.stack([u / width, 1 - v / height], axis=-1)
 
 
 def least_texel_mm(mesh: Mesh) -> float:
-    """The finest texel, in hundredths of a millimetre, with which `mesh`'s atlas fits."""
+    """Return the smallest texel width with which a mesh's atlas fits, rounded up to 0.01 mm."""
     return float(np.ceil(max(mesh.atlas_size_mm) / MAX_ATLAS * 100) / 100)
 
 
 def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
-    """(width, height) in texels of `mesh`'s atlas. Raises ConfigError where that is too large."""
+    """Return (width, height) in texels of a mesh's atlas.
+
+    Raises:
+        ConfigError: `texel_mm` is out of range, or makes the atlas larger than MAX_ATLAS.
+    """
     if not isinstance(texel_mm, numbers.Real) or not 0 < texel_mm <= _COARSEST_MM:
         raise ConfigError(
             f"texel_mm: {texel_mm} is not a size; give millimetres above 0, "
@@ -63,32 +70,39 @@ def atlas_size(mesh: Mesh, texel_mm: float) -> tuple[int, int]:
 
 
 def bake_atlas(
-    ctx: moderngl.Context, mesh: Mesh, texel_mm: float, damage: str, first_zone: int = 0
+    ctx: moderngl.Context,
+    program: ShaderProgram,
+    textures: Textures,
+    mesh: Mesh,
+    texel_mm: float,
+    first_zone: int = 0,
 ) -> Atlas:
-    """Bake all texels of `mesh`. The scene's textures and uniform blocks are bound already.
+    """Bake all texels of a mesh. The uniform blocks of its scene are filled already.
 
-    damage: one of programs.DAMAGE_VARIANTS. first_zone: what the numbers of the mesh's zones
-    begin with in the table of zones. Raises ConfigError where texel_mm does not fit.
+    Args:
+        ctx: Current context.
+        program: What `bake_program` returns.
+        textures: Textures of the scene's material.
+        mesh: Container or spreader at rest.
+        texel_mm: Width of a texel on the sheet.
+        first_zone: Number of the mesh's first zone in the zone table.
+
+    Raises:
+        ConfigError: `texel_mm` is out of range, or makes the atlas larger than MAX_ATLAS.
     """
     width, height = atlas_size(mesh, texel_mm)
-    program = link(
-        ctx,
-        "bake.vert",
-        "bake.frag",
-        UNITS,
-        damage="sound" if damage == "sound" else "damaged",
-        pixel_class="decal" if damage == "sound" else "damaged",
-    )
+    linked = program.linked
+    assert isinstance(linked, moderngl.Program)
     layout = np.dtype([("p", "f4", 3), ("a", "f4", 2), ("c", "u4")])
     vertices = np.empty(len(mesh.positions_mm), layout)
     vertices["p"], vertices["a"], vertices["c"] = mesh.positions_mm, mesh.atlas_mm, mesh.zone
     vertices["c"] += first_zone
     vertex_buffer = ctx.buffer(vertices.tobytes())
     index_buffer = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
-    # without damage no texel asks for its rest position
-    rest = ["in_position_mm"] if damage != "sound" else []
+    # without damage the program reads no rest position
+    rest = ["in_position_mm"] if "in_position_mm" in linked else []
     content = (vertex_buffer, "3f 2f 1u" if rest else "12x 2f 1u", *rest, "in_atlas_mm", "in_zone")
-    array = ctx.vertex_array(program, [content], index_buffer)
+    array = ctx.vertex_array(linked, [content], index_buffer)
     targets = [ctx.renderbuffer((_TILE, _TILE), 4) for _ in range(2)]
     depth = ctx.depth_renderbuffer((_TILE, _TILE))
     tile = ctx.framebuffer(targets, depth)
@@ -97,6 +111,7 @@ def bake_atlas(
     program["texel_mm"] = texel_mm
     program["gutter_clip"] = [tuple(shift) for shift in _gutter_texels(texel_mm) * 2 / _TILE]
     images = [np.zeros((height, width, 4), np.uint8) for _ in targets]
+    program.bind(textures)
     tile.use()
     ctx.enable_only(moderngl.DEPTH_TEST)
     ctx.scissor = None
@@ -110,11 +125,11 @@ def bake_atlas(
                 texels = np.frombuffer(data, np.uint8).reshape(_TILE, _TILE, 4)
                 part = image[y : y + _TILE, x : x + _TILE]
                 part[:] = texels[: part.shape[0], : part.shape[1]]
-    items: list[Any] = [tile, *targets, depth, array, vertex_buffer, index_buffer, program]
+    items: list[Any] = [tile, *targets, depth, array, vertex_buffer, index_buffer]
     for item in items:
         item.release()
 
-    # what no part covers is seen in coarse mip levels only
+    # texels outside all parts show only in coarse mip levels
     empty = images[0][..., 3] == 0
     for image in images:
         image[empty] = np.median(image[~empty], axis=0)
@@ -122,8 +137,17 @@ def bake_atlas(
     return Atlas(base_color, surface, texel_mm)
 
 
+def bake_program(programs: Programs, damage: str) -> ShaderProgram:
+    """Return the program that bakes a mesh of one of DAMAGE_VARIANTS; holes are not cut out."""
+    if damage == "sound":
+        variant = ShaderVariant(damage="sound", pixel_class="decal")
+    else:
+        variant = ShaderVariant(damage="damaged", pixel_class="damaged")
+    return programs.get(("bake.vert", "bake.frag"), variant)
+
+
 def _gutter_texels(texel_mm: float) -> NDArray[np.float64]:
-    """Shifts [GUTTER_STEPS, 2] in texels, within half the gap between parts, nearer ones first."""
+    """Return shifts [GUTTER_STEPS, 2] in texels, within half the gap of parts, nearest first."""
     reach = GUTTER_MM / 2 / texel_mm
     around = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]
     near, far = min(1.0, reach), min(2.0, reach)

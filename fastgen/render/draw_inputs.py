@@ -1,0 +1,69 @@
+"""DrawInputs: what the passes over one image share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+
+from fastgen.camera.projection import View
+from fastgen.render.gpu_mesh import GpuMesh
+from fastgen.render.image_targets import ImageTargets
+from fastgen.render.regions import Region, bands
+from fastgen.render.sky_visibility_probe import Lit
+from fastgen.render.variant import ShaderVariant
+from fastgen.scene import Damage
+from fastgen.scene.limits import MM
+
+
+@dataclass(frozen=True)
+class Regions:
+    """Parts of an image in which the passes have work. None stands for the whole image.
+
+    Attributes:
+        surfaces: Disjoint rectangles; outside them the image shows only sky.
+        near_damage: Disjoint rectangles that damages may touch.
+        holes: Disjoint rectangles that perforations may touch.
+        cables: Rectangles that bundles of cables may touch.
+    """
+
+    surfaces: Sequence[Region | None]
+    near_damage: Sequence[Region | None] = ()
+    holes: Sequence[Region | None] = ()
+    cables: Sequence[Region | None] = ()
+
+    @property
+    def drawn(self) -> list[Region | None]:
+        """Disjoint rectangles that geometry may touch."""
+        return bands([*self.surfaces, *self.near_damage])
+
+
+@dataclass(frozen=True, eq=False)
+class DrawInputs:
+    """One image to draw, as the passes need it. The uniform blocks are filled already.
+
+    Attributes:
+        view: Projection of the camera.
+        damages: Damages that this view may show.
+        container, spreader: Meshes with the sky visibility of the scene; no spreader is None.
+        lit: Light at the vertices of container and spreader.
+        regions: Where the passes have work.
+        targets: Where the image goes.
+        variant: What all shaders of the image have in common.
+        textures: Textures by sampler name. A pass adds what it writes for later passes.
+    """
+
+    view: View
+    damages: tuple[Damage, ...]
+    container: GpuMesh
+    spreader: GpuMesh | None
+    lit: tuple[Lit, ...]
+    regions: Regions
+    targets: ImageTargets
+    variant: ShaderVariant
+    textures: dict[str, moderngl.Texture | moderngl.TextureArray]
+
+    @property
+    def eye_mm(self) -> tuple[float, float, float]:
+        """Position of the camera in the container's frame."""
+        x, y, z = (self.view.position_m / MM).tolist()
+        return x, y, z

@@ -1,0 +1,136 @@
+"""Targets of one image size: the shaded image, and the visibility buffer behind it."""
+
+import ctypes
+from typing import Any
+
+import cv2
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.frame import Frame
+from fastgen.render.gl import GLContext
+from fastgen.render.pixel_lists import PixelLists
+from fastgen.render.textures import FLOATS, NUMBERS, texture_clearing
+from fastgen.render.variant import listed_classes
+from fastgen.render.visibility_buffer import VisibilityBuffer
+
+_GL_R32UI = 0x8236
+_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D = 0x8D40, 0x8D00, 0x0DE1
+
+
+class ImageTargets:
+    """Colour, labels and depth of an image, and the buffers that the passes work in.
+
+    Attributes:
+        size: (width, height) in pixels.
+        radiance: The colour is exposed linear radiance in float32 instead of display colour.
+        samples: The visibility buffer.
+        lists: Pixel lists of the compute passes.
+        image: Framebuffer of colour, labels and depth.
+    """
+
+    def __init__(
+        self, gl: GLContext, size: tuple[int, int], samples_per_axis: int, radiance: bool = False
+    ) -> None:
+        self.size = size
+        self.radiance = radiance
+        self._ctx = ctx = gl.ctx
+        self.samples = VisibilityBuffer(gl, size, samples_per_axis)
+        self._image = [
+            ctx.texture(size, 4, dtype="f4" if radiance else "f1"),
+            ctx.texture(size, 1, dtype="u4"),
+            ctx.texture(size, 1, dtype="f4"),
+        ]
+        self.image = ctx.framebuffer(self._image)
+        self._color = ctx.framebuffer(self._image[:1])
+        self._normals: moderngl.Texture | None = None
+        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis))
+        self._attach = gl.function(
+            "glFramebufferTexture2D", None, *[ctypes.c_uint] * 4, ctypes.c_int
+        )
+        self._clear = texture_clearing(gl)
+
+    def begin(self) -> bool:
+        """Clear labels and depth, and bind the colour alone.
+
+        Returns:
+            Whether a depth of 1 in the bound depth buffer marks the pixels that see only sky.
+        """
+        _, labels, depth = self._image
+        self._clear(labels, (0, 0, *self.size), NUMBERS, 0)
+        self._clear(depth, (0, 0, *self.size), FLOATS, np.inf)
+        self._color.use()
+        if self.samples.per_axis > 1:
+            return False
+        # moderngl requires attachments of one size; the depth of holed scenes has more rows
+        tested = self.samples.depth_buffer.glo
+        self._attach(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D, tested, 0)
+        return True
+
+    def bind_images(self) -> None:
+        """Let compute shaders write colour, labels and depth as images 0 to 2."""
+        color, labels, depth = self._image
+        if self.radiance:
+            color.bind_to_image(0, read=False, write=True)
+        else:  # four bytes of display colour are stored as one number
+            color.bind_to_image(0, read=False, write=True, format=_GL_R32UI)
+        labels.bind_to_image(1, read=False, write=True)
+        depth.bind_to_image(2, read=False, write=True)
+
+    def bind_normals(self) -> None:
+        """Clear the normals, and let compute shaders write them as image 0."""
+        if self._normals is None:
+            self._normals = self._ctx.texture(self.size, 4, dtype="f4")
+        self._normals.write(np.zeros((*self.size[::-1], 4), np.float32))
+        self._normals.bind_to_image(0, read=False, write=True)
+
+    def read(self) -> Frame:
+        """Copy the image to the CPU. `Frame.image` is black where the colour is radiance."""
+        width, height = self.size
+        color = np.empty((height, width, 4), np.float32 if self.radiance else np.uint8)
+        labels = np.empty((height, width), np.uint32)
+        depth = np.empty((height, width), np.float32)
+        self.copy_to(color, labels, depth)
+        pairs = labels.view(np.uint16).reshape(height, width, 2)
+        # NumPy takes 20 times as long as OpenCV to drop a channel
+        rgb, cover = cv2.cvtColor(color, cv2.COLOR_RGBA2RGB), cv2.extractChannel(color, 3)
+        if self.radiance:
+            image = np.zeros((height, width, 3), np.uint8)
+            cover = np.rint(255 * np.clip(cover, 0, 1))
+        else:
+            image = np.asarray(rgb, np.uint8)
+        return Frame(
+            image=image,
+            cover=np.asarray(cover, np.uint8),
+            ids=np.ascontiguousarray(pairs[..., 0]),
+            damage=np.ascontiguousarray(pairs[..., 1]),
+            depth=depth,
+            radiance=np.asarray(rgb, np.float32) if self.radiance else None,
+        )
+
+    def read_normals(self) -> NDArray[np.float32]:
+        """Copy the sum of the normals in each pixel, float32 [H, W, 3], in the world frame."""
+        assert self._normals is not None
+        width, height = self.size
+        read = np.frombuffer(self._normals.read(), np.float32)
+        return read.reshape(height, width, 4)[..., :3]
+
+    def copy_to(self, color: Any, labels: Any, depth: Any) -> None:
+        """Copy the image into writable memory or, without leaving the GPU, moderngl buffers.
+
+        Args:
+            color: uint8 [H, W, 4], or float32 for radiance: colour and coverage.
+            labels: uint32 [H, W], id | damage << 16.
+            depth: float32 [H, W] in metres.
+        """
+        kind = "f4" if self.radiance else "f1"
+        self.image.read_into(color, components=4, attachment=0, dtype=kind, alignment=1)
+        self.image.read_into(labels, components=1, attachment=1, dtype="u4", alignment=1)
+        self.image.read_into(depth, components=1, attachment=2, dtype="f4", alignment=1)
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        items: list[Any] = [self.samples, self._color, self.image, *self._image, self.lists]
+        for item in [*items, *filter(None, [self._normals])]:
+            item.release()

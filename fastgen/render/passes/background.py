@@ -1,0 +1,63 @@
+"""Background pass: the sky, ahead of all surfaces."""
+
+from dataclasses import replace
+
+import moderngl
+
+from fastgen.render.constants import LIST_GROUP
+from fastgen.render.draw_inputs import DrawInputs
+from fastgen.render.program import Programs
+
+_OCTAHEDRON = 24
+"""Corners of the eight triangles of an octahedron."""
+
+
+class BackgroundPass:
+    """Shades at least the pixels that see only sky, and clears labels and depth.
+
+    Reads: the background map, and with single samples the depth of the visibility buffer. Writes:
+    colour, labels and depth of the image.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs, by_compute: bool) -> None:
+        """Choose how the sky is drawn.
+
+        Args:
+            ctx: Current context.
+            programs: Programs of the renderer.
+            by_compute: Use a compute shader. Data-centre GPUs have few multiprocessors that run
+                fragment shaders; llvmpipe takes twice as long this way.
+        """
+        self._ctx = ctx
+        self._programs = programs
+        self._by_compute = by_compute
+
+    def run(self, inputs: DrawInputs) -> None:
+        """Draw the sky and leave the image's targets bound for compute shaders."""
+        if self._by_compute:
+            self._ctx.memory_barrier()  # the last image has been read
+            inputs.targets.bind_images()
+            self._store(inputs)
+        else:
+            self._draw(inputs)
+            inputs.targets.bind_images()
+
+    def _draw(self, inputs: DrawInputs) -> None:
+        single_layer = inputs.variant.layer != "all"
+        per_pixel = single_layer or inputs.view.distortion is not None
+        stages = ("fullscreen.vert", "bent_sky.frag") if per_pixel else ("sky.vert", "sky.frag")
+        program = self._programs.get(stages, replace(inputs.variant, damage="sound", lights=0))
+        self._ctx.scissor = None
+        only_sky = inputs.targets.begin()
+        self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
+        program.bind(inputs.textures)
+        program.draw_vertices(3 if per_pixel else _OCTAHEDRON)
+
+    def _store(self, inputs: DrawInputs) -> None:
+        """Shade all pixels as sky, and store their labels and depth."""
+        program = self._programs.get(
+            ("sky.comp",), replace(inputs.variant, damage="sound", lights=0)
+        )
+        program.bind(inputs.textures)
+        width, height = inputs.targets.size
+        program.dispatch(-(-width // LIST_GROUP), height)

@@ -1,0 +1,75 @@
+"""Geometry pass: meshes -> visibility buffer."""
+
+from collections.abc import Mapping
+
+import moderngl
+
+from fastgen.geometry.damage_law import corners_mm
+from fastgen.light.sky_visibility import lobe_masks
+from fastgen.render.constants import LOBE_CELLS, REACH_MARGIN_MM
+from fastgen.render.draw_inputs import DrawInputs
+from fastgen.render.program import Programs, ShaderProgram
+from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
+
+
+class GeometryPass:
+    """Draws container and spreader into the visibility buffer.
+
+    Spreader and undamaged parts of the container, parts that damages touch, and the interior that
+    each hole reveals have a program of their own.
+
+    Reads: the lobe masks of sky_visibility.py, which it owns. Writes: the visibility buffer.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self._ctx = ctx
+        stages = ("geometry.vert", "geometry.frag")
+        self._programs: dict[str, ShaderProgram] = {
+            damage: programs.get(stages, ShaderVariant(damage=damage)) for damage in DAMAGE_VARIANTS
+        }
+        masks = lobe_masks(LOBE_CELLS)
+        self._lobes = ctx.texture(masks.shape[1::-1], 4, masks.tobytes(), dtype="u4")
+        self._lobes.filter = (moderngl.NEAREST, moderngl.NEAREST)
+
+    @property
+    def programs(self) -> Mapping[str, moderngl.Program]:
+        """The linked program of each damage variant; GpuMesh lays out its vertices for them."""
+        linked = ((name, program.linked) for name, program in self._programs.items())
+        return {name: item for name, item in linked if isinstance(item, moderngl.Program)}
+
+    def run(self, inputs: DrawInputs) -> None:
+        """Draw the meshes, and add the buffer's textures to `inputs.textures`."""
+        samples, damages = inputs.targets.samples, inputs.damages
+        regions, damage = inputs.regions, inputs.variant.damage
+        drawn = regions.drawn
+        # other parts may keep an earlier image's rest positions: only rays read them everywhere
+        rest = drawn if inputs.variant.traced else [*regions.near_damage, *regions.cables]
+        samples.begin(damage, drawn, rest, regions.holes)
+        self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
+        self._programs["sound"].bind({"lobe_masks": self._lobes})  # all three read it from unit 0
+        if inputs.spreader is not None:
+            inputs.spreader.draw("sound", inputs.spreader.seen_from(inputs.eye_mm))
+        # a dent may tilt a face into view that the rest mesh turns away
+        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
+        bent = {face for place in tilted for face in place.split(".")}
+        container = inputs.container
+        seen = container.seen_from(inputs.eye_mm, bent)
+        if damages:
+            boxes = [corners_mm(item) for item in damages]
+            seen, touched = container.clusters.parted(seen, boxes, REACH_MARGIN_MM)
+            container.draw("sound", seen)
+            samples.begin_damaged()
+            container.draw("damaged", touched)
+        else:
+            container.draw("sound", seen)
+        moved_mm = sum(abs(d.depth_mm) for d in damages)
+        for region in regions.holes:
+            samples.limit_inside(region)
+            container.draw("holed", container.clusters.seen_in(inputs.view, region, moved_mm))
+        samples.end()
+        inputs.textures.update(samples.textures)
+
+    def release(self) -> None:
+        """Free the lobe masks."""
+        self._lobes.release()

@@ -1,0 +1,89 @@
+"""Shading passes: pixels that see surfaces are sorted into classes, and each class is shaded."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import moderngl
+
+from fastgen.render.constants import LIST_GROUP
+from fastgen.render.draw_inputs import DrawInputs
+from fastgen.render.program import Programs
+from fastgen.render.regions import Region, outside, within
+from fastgen.render.variant import PIXEL_CLASSES, ShaderVariant, listed_classes
+
+
+class ShadingPass:
+    """Shades all pixels that see a surface.
+
+    Reads: the visibility buffer, material and decal tables, environment maps, the shadow map of
+    the directional lights, and with `traced` the light that rays found. Writes: colour, labels and
+    depth of the image. In between, a list per pixel class (PIXEL_CLASSES) holds the pixels, so that
+    a compute shader without branches shades each class.
+    """
+
+    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+        self._ctx = ctx
+        self._programs = programs
+
+    def run(self, inputs: DrawInputs) -> None:
+        """Classify and shade the pixels, in bands of as many rows as the lists have room for."""
+        targets, regions = inputs.targets, inputs.regions
+        width, height = targets.size
+        rows = targets.lists.rows
+        for top in range(0, height, rows):
+            band = (0, top, width, min(rows, height - top))
+            seen, near, cables = (
+                within(each, band)
+                for each in (regions.surfaces, regions.near_damage, regions.cables)
+            )
+            self._ctx.memory_barrier()  # earlier clears, stores and lists are complete
+            targets.lists.begin()
+            self._classify(inputs, outside(seen, [*near, *cables]), damaged=False, cables=False)
+            self._classify(inputs, outside(near, cables), damaged=True, cables=False)
+            self._classify(inputs, cables, damaged=True, cables=True)
+            self._ctx.memory_barrier()
+            self._shade(inputs, bool(cables))
+        self._ctx.memory_barrier()
+
+    def _classify(
+        self, inputs: DrawInputs, regions: Sequence[Region], damaged: bool, cables: bool
+    ) -> None:
+        """List the pixels of regions whose first column and row are even."""
+        if not regions:
+            return
+        variant = replace(
+            inputs.variant,
+            damage=inputs.variant.damage if damaged else "sound",
+            cables=cables,
+            lights=0,
+        )
+        program = self._programs.get(("classify.comp",), variant)
+        program.bind(inputs.textures)
+        side = 2 if variant.coarse else 1
+        for region in regions:
+            program["region"] = region
+            across, down = (-(-length // side) for length in region[2:])
+            program.dispatch(-(-across * down // LIST_GROUP))
+
+    def _shade(self, inputs: DrawInputs, cables: bool) -> None:
+        """Shade the listed pixels of each class."""
+        for name in listed_classes(inputs.variant.samples_per_axis):
+            if _occurs(name, inputs.variant, cables):
+                # scenes with and without damage share the programs
+                damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "sound"
+                variant = replace(inputs.variant, pixel_class=name, damage=damage)
+                program = self._programs.get(("shade_listed.comp",), variant)
+                program.bind(inputs.textures)
+                inputs.targets.lists.dispatch(name, program)
+
+
+def _occurs(name: str, variant: ShaderVariant, cables: bool) -> bool:
+    """Return whether an image of a variant can have pixels of a class."""
+    if name == "cable":
+        return cables
+    if name in ("plain", "coarse"):
+        return variant.coarse == (name == "coarse")
+    traits = PIXEL_CLASSES[name]
+    if "HOLES" in traits:
+        return variant.damage == "holed"
+    return variant.damage != "sound" or "DAMAGE" not in traits

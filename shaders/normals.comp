@@ -1,0 +1,53 @@
+// Compute stage of the normals: sums the world normals of each pixel's samples by the pixel filter.
+// Reads the visibility buffer. Writes the sum, whose length is below 1 where samples differ or see sky.
+#version 430 core
+#include "pixel_list.constants"
+#include "samples.constants"
+#include "variant.constants"
+#include "zones.constants"
+#include "damage.block"
+#include "octahedral.glsl"
+#include "samples.glsl"
+#include "keys_around.glsl"
+#include "zone.glsl"
+#if WITH_DAMAGE
+#include "damage.glsl"
+#include "rest.glsl"
+#endif
+
+layout(local_size_x = LIST_GROUP) in;   // Pixels of one row.
+
+layout(rgba32f, binding = 0) writeonly uniform image2D normal_image;
+
+uniform ivec4 region;   // Corner x, y, width and height in pixels.
+
+vec3 normal_of(ivec2 sample_at) {
+    uint key = key_at(sample_at);
+    if (key == 0u) return vec3(0.0);
+    vec3 normal = key_normal(key);
+#if WITH_DAMAGE
+    vec3 rest_mm = rest_at(sample_at);
+#if WITH_HOLES
+    if (hole_at(rest_mm) >= 0 && !before_sheet(key_zone(key))) {
+        // The interior, seen from behind; the sky through another hole has no normal.
+        ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
+        key = key_at(inner_at);
+        if (key == 0u) return vec3(0.0);
+        normal = -key_normal(key);
+        rest_mm = rest_at(inner_at);
+    }
+#endif
+    normal = bent_normal(damage_at(rest_mm).bend, normal);
+#endif
+    return normal;
+}
+
+void main() {
+    ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
+    if (in_region.x >= region.z) return;
+    ivec2 pixel = region.xy + in_region;
+    ivec2 middle = middle_of(pixel);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < FILTER_SAMPLES; ++i) sum += FILTER_WEIGHT[i] * normal_of(middle + FILTER_OFFSET[i]);
+    imageStore(normal_image, pixel, vec4(sum, 0.0));
+}
