@@ -1,18 +1,18 @@
 """ISO freight containers as meshes: kind and corrugation in, triangles with one atlas out.
 
-How fine the parts are follows from what a camera resolves. At 640 pixels across a 36 mm sensor one
-pixel is 36 / f * distance / 640: 12.5 mm for f = 45 mm at 10 m (the ends), 20 mm for f = 28 mm and
-39 mm for f = 14.5 mm, both also at 10 m (the sides).
+Parts are as fine as a camera resolves. At 640 pixels across a 36 mm sensor, a pixel at 10 m covers
+36 / f * 10 m / 640: 12.5 mm for f = 45 mm (the ends), 20 mm for f = 28 mm and 39 mm for
+f = 14.5 mm (the sides).
 
-- The door's leaves: cells of 50 mm across the locking bars, whose shade changes over that.
-- Corrugation: every facet of 13 mm and more is real geometry, since the waves shade a wall at any
-  distance; ridges are cut by max_edge_mm only to bend later.
-- Locking bars, 34 mm, under 3 px: 8 sides. Hinge knuckles, 28 mm: 6. Casting apertures, 51 to
+- Door leaves: cells of 50 mm across the locking bars, because their shade changes over that.
+- Corrugation: each facet of 13 mm or more is geometry, because the waves shade a wall at any
+  distance. Ridges are cut by max_edge_mm only so that they can bend.
+- Locking bars, 34 mm, under 3 px: 8 sides. Hinge knuckles, 28 mm: 6 sides. Casting apertures, 51 to
   124 mm, 4 to 10 px: 12 points. Cams, jaws, brackets, handles, lugs: blocks, 2 to 8 px.
-- Members under the floor are seen from far below or not at all: C sections cut every 400 mm,
-  for a lens bends corners only.
+- Members under the floor are seen from far below or not at all: C sections, cut every 400 mm,
+  because a lens distorts corners only.
 
-With the usual profiles and max_edge_mm = 150:
+With the default profiles and max_edge_mm = 150:
 
     kind   triangles  vertices  charts  atlas in m    filled
     20        26,036    29,656     118  11.6 x 11.2     84 %
@@ -20,8 +20,6 @@ With the usual profiles and max_edge_mm = 150:
     40HC      44,246    48,746     138  14.9 x 14.6     92 %
     45HC      48,406    53,116     143  15.8 x 15.4     91 %
 """
-
-from functools import lru_cache
 
 from fastgen.errors import ConfigError
 from fastgen.geometry.container_castings import castings
@@ -36,38 +34,44 @@ from fastgen.geometry.unfold import assemble
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.validation import check_known
 
-_USUAL = WallProfiles()
+NOMINAL_PROFILES = WallProfiles()
 
 _EDGE_LIMITS_MM = (25.0, 2000.0)
 
 
-def build_container(kind: str, profiles: WallProfiles = _USUAL, max_edge_mm: float = 150.0) -> Mesh:
-    """The mesh of a closed container, see Mesh for its arrays and frame.
+def build_container(
+    kind: str, profiles: WallProfiles = NOMINAL_PROFILES, max_edge_mm: float = 150.0
+) -> Mesh:
+    """Build the mesh of a closed container, or read it from the disk cache.
 
-    kind: one of KINDS. profiles: corrugation of the walls. max_edge_mm: no edge on the corrugated
-    walls and the door leaves is longer, diagonals included. Calls with equal arguments return the
-    same object. Raises ConfigError for an unknown kind, an edge length out of range, or a wave
-    that does not fit its wall.
+    `shape_library.SHAPES` keeps the meshes that scenes use.
+
+    Args:
+        kind: One of KINDS.
+        profiles: Corrugation of the walls.
+        max_edge_mm: Longest edge on corrugated walls and door leaves, diagonals included.
+
+    Returns:
+        A new Mesh with read-only arrays.
+
+    Raises:
+        ConfigError: The kind is unknown, max_edge_mm is out of range, or a wave does not fit its
+            wall.
     """
     check_known("container kind", kind, KINDS)
     low, high = _EDGE_LIMITS_MM
     if not low <= max_edge_mm <= high:
         raise ConfigError(f"max_edge_mm: {max_edge_mm:g} is outside {low:g} to {high:g} mm")
-    return _built(kind, profiles, max_edge_mm)
-
-
-def container_outline(kind: str, profiles: WallProfiles = _USUAL) -> Mesh:
-    """The same surface of as few triangles as can be, for what asks where it is at rest."""
-    return build_container(kind, profiles, _EDGE_LIMITS_MM[1])
-
-
-@lru_cache(maxsize=64)
-def _built(kind: str, profiles: WallProfiles, max_edge_mm: float) -> Mesh:
     return stored(
         "container",
         (kind, profiles, max_edge_mm),
         lambda: _assembled(Layout(KINDS[kind], profiles, max_edge_mm)),
     )
+
+
+def container_outline(kind: str, profiles: WallProfiles = NOMINAL_PROFILES) -> Mesh:
+    """Build the same surface with as few triangles as possible; see build_container."""
+    return build_container(kind, profiles, _EDGE_LIMITS_MM[1])
 
 
 def _assembled(layout: Layout) -> Mesh:

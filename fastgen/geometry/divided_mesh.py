@@ -1,30 +1,25 @@
-"""A mesh with smaller triangles, the same surface: what a lens bends needs corners to bend."""
+"""The same surface with smaller triangles, for images with lens distortion.
+
+A lens bends only the corners of triangles; their edges stay straight.
+"""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from fastgen.geometry.mesh import Mesh
 
-_LENS_EDGE_MM = 400.0
-"""Longest edge of the spreader where a lens bends it; containers are built with shorter ones. A
-triangle's corners are bent, its edges stay straight: with 100 pixels to a metre and a radius of
-curvature of 600 pixels, as in a wide fisheye, this is a third of a pixel off."""
+LENS_EDGE_MM = 400.0
+"""Longest edge of a spreader that is drawn with lens distortion; containers have shorter edges.
+With 100 pixels per metre and a radius of curvature of 600 pixels, as in a wide fisheye, the error
+is a third of a pixel."""
 
 
-def as_drawn(mesh: Mesh, bent: bool) -> Mesh:
-    """The triangles that stand for `mesh` in an image; bent: whether a lens bends that."""
-    return divided(mesh, _LENS_EDGE_MM) if bent else mesh
-
-
-@lru_cache(maxsize=32)
 def divided(mesh: Mesh, edge_mm: float) -> Mesh:
-    """`mesh` with no edge longer than edge_mm; zones and groups stay.
+    """Divide a mesh until no edge is longer than edge_mm; zones and groups stay.
 
-    Triangles are cut in two at the middle of their longest edge (Rivara 1984, "Algorithms for
+    Triangles are bisected at the middle of their longest edge (Rivara 1984, "Algorithms for
     refining triangular grids"). Neighbours cut a shared edge at the same point, so no gaps open.
-    Calls with the same mesh return the same object.
     """
     values = np.concatenate(
         [mesh.positions_mm, mesh.normals, mesh.atlas_mm, mesh.zone[:, None]], axis=1

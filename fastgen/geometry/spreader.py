@@ -1,12 +1,11 @@
-"""A ship-to-shore crane's spreader as a mesh: which container it holds in, triangles out.
+"""A ship-to-shore crane's spreader as a mesh, in the frame of the container that it holds.
 
-It hangs in the container's frame on the upper castings, drawn out to their distance, headblock and
-the beginning of the hoist cables included. 3,100 to 3,900 triangles: box sections and prisms only,
-for at 10 m a pixel is 12 mm or more and no bolt is seen.
+It rests on the upper castings, extended to their distance, and includes the headblock and the lower
+part of the hoist cables. 3,100 to 3,900 triangles: box sections and prisms only, because a pixel
+at 10 m covers 12 mm or more and shows no bolts.
 """
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,47 +31,62 @@ from fastgen.validation import check_known
 
 CABLE_TIER = TIERS.index("cables")
 
+USUAL_GAP_MM = 15.0
+"""Gap of spreaders for which none is given."""
+
 Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def build_spreader(
     kind: str,
     flippers_down: tuple[bool, bool] = (True, True),
-    gap_mm: float = 15.0,
+    gap_mm: float = USUAL_GAP_MM,
     cut_mm: float = CUT_MM,
 ) -> Mesh:
-    """The mesh of a spreader that holds a container, in the container's frame; see Mesh.
+    """Build the mesh of a spreader, or read it from the disk cache.
 
-    kind: one of KINDS. flippers_down: whether the gather guides of the front (-y) and of the back
-    (+y) side hang beside the container or are swung up. gap_mm: from the castings' upper plane to
-    the spreader's lower one. cut_mm: how often members are cut across, for what light the vertices
-    bear; the surface stays the same. All triangles are in the group "frame". Calls with equal
-    arguments return the same object. Raises ConfigError for an unknown kind or a gap out of range.
+    `shape_library.SHAPES` keeps the meshes that scenes use. All triangles are in the group "frame".
+
+    Args:
+        kind: Kind of the container that it holds, one of KINDS.
+        flippers_down: True where the flippers of the front (-y) and of the back (+y) side hang
+            beside the container; False where they are swung up.
+        gap_mm: Distance from the castings' upper plane to the spreader's lower plane.
+        cut_mm: Longest piece of a member between two cuts across it. Cuts add vertices, which
+            carry indirect light; the surface stays the same.
+
+    Returns:
+        A new Mesh with read-only arrays.
+
+    Raises:
+        ConfigError: The kind is unknown or the gap is out of range.
+    """
+    check_gap(gap_mm)
+    return lifted(touching_spreader(kind, flippers_down, cut_mm), gap_mm)
+
+
+def touching_spreader(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:
+    """Build a spreader without a gap below it, or read it from the disk cache.
+
+    See build_spreader for arguments and errors.
     """
     check_known("container kind", kind, KINDS)
+    inputs = kind, flippers_down, cut_mm
+    return stored("spreader", inputs, lambda: _built(*inputs))
+
+
+def check_gap(gap_mm: float) -> None:
+    """Raise ConfigError for a gap outside of GAP_LIMITS_MM."""
     low, high = GAP_LIMITS_MM
     if not low <= gap_mm <= high:
         raise ConfigError(f"spreader gap_mm: {gap_mm:g} is outside {low:g} to {high:g} mm")
-    return _lifted(kind, flippers_down, gap_mm, cut_mm)
 
 
-def tier_of_vertices(mesh: Mesh) -> NDArray[np.intp]:
-    """Which of TIERS each vertex of a spreader belongs to, [V]."""
-    return np.array([TIERS.index(chart.name.split(".")[1]) for chart in mesh.charts])[mesh.chart]
+def lifted(touching: Mesh, gap_mm: float) -> Mesh:
+    """Return a spreader that rests on its container, lifted by a gap.
 
-
-@lru_cache(maxsize=128)
-def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
-    """Lowest and highest coordinates [3] in mm of each of TIERS of a spreader."""
-    tiers = tier_of_vertices(mesh)
-    parts = [mesh.positions_mm[tiers == tier] for tier in range(len(TIERS))]
-    return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
-
-
-@lru_cache(maxsize=256)  # all of the preset, cut and uncut
-def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: float) -> Mesh:
-    """The same at any gap but for where it is: only the twistlocks stay in their castings."""
-    touching = _touching(kind, flippers_down, cut_mm)
+    Only the twistlocks stay in their castings. All arrays except positions_mm are shared.
+    """
     locks = [touching.chart_index(name) for name in LOCKS_CHARTS.values()]
     positions = touching.positions_mm.copy()
     positions[~np.isin(touching.chart, locks), 2] += gap_mm
@@ -80,11 +94,16 @@ def _lifted(kind: str, flippers_down: tuple[bool, bool], gap_mm: float, cut_mm: 
     return replace(touching, positions_mm=positions)
 
 
-@lru_cache(maxsize=64)  # all there are: the lifted ones share all but their positions
-def _touching(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:
-    """A spreader without a gap below it."""
-    inputs = kind, flippers_down, cut_mm
-    return stored("spreader", inputs, lambda: _built(*inputs))
+def tier_of_vertices(mesh: Mesh) -> NDArray[np.intp]:
+    """Return the index into TIERS of each vertex [V] of a spreader."""
+    return np.array([TIERS.index(chart.name.split(".")[1]) for chart in mesh.charts])[mesh.chart]
+
+
+def tier_bounds_mm(mesh: Mesh) -> tuple[Bounds, ...]:
+    """Return the lowest and highest coordinates [3] in mm of each of a spreader's TIERS."""
+    tiers = tier_of_vertices(mesh)
+    parts = [mesh.positions_mm[tiers == tier] for tier in range(len(TIERS))]
+    return tuple((points.min(axis=0), points.max(axis=0)) for points in parts)
 
 
 def _built(kind: str, flippers_down: tuple[bool, bool], cut_mm: float) -> Mesh:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
-from fastgen.geometry.container import build_container
 from fastgen.geometry.damage_law import deform
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
 from fastgen.sample import Object, Sample
 from fastgen.scene import Decal
@@ -73,9 +73,8 @@ def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
         letters.append(center + grid * decal.cap_mm * (ink.ink_right - ink.ink_left, 1.0))
     sheet = np.concatenate(letters) @ decal.turn.T + np.array(decal.center_mm)
     container = sample.scene.container
-    rest, _ = build_container(container.kind, container.profiles).sheet_to_surface(
-        decal.face, sheet
-    )
+    mesh = SHAPES.container(container.kind, container.profiles)
+    rest, _ = mesh.sheet_to_surface(decal.face, sheet)
     pixels, _ = sample.view.project(deform(sample.scene.damages, rest))
     columns, rows = np.clip(np.floor(pixels).astype(int), 0, np.array(sample.view.size) - 1).T
     seen = sample.ids[rows, columns] == item.id

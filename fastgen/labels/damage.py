@@ -1,31 +1,28 @@
-"""Labels of damages: where each would be seen alone, and how much of that the image shows."""
-
-from functools import lru_cache
+"""Labels of damages: the pixels that each damage covers alone, and how many of them are visible."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES, SOUND_CONTAINER
 from fastgen.geometry.damage_law import amount_mm, in_hole, may_be_seen
-from fastgen.geometry.facets import Facets, damage_facets
-from fastgen.geometry.mesh import Mesh
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
 from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Box, Object
-from fastgen.scene import Damage, Scene
+from fastgen.scene import Damage
 from fastgen.scene.limits import MM
 from fastgen.scene.object_ids import mask_values
 
 _DEPTH_SLACK = 1e-3
-"""A point this share of its depth behind the depth target's still is the one that is seen."""
+"""A point counts as visible up to this fraction of its depth behind the depth target."""
 
 
 def damage_objects(shot: Shot) -> list[Object]:
-    """Damages by their mask value, which is also their id; it marks the damage target, not the ids.
+    """Return the damages of a scene; their ids are their values in the damage target.
 
-    A damage is where it alone would have moved the sheet beyond the threshold, or torn it away. Its
-    amodal box is that of the pixels there; None where a camera so placed cannot see it.
+    A damage covers the places where it alone moves the sheet farther than the mask threshold, or
+    tears it away. Its amodal box is that of the pixels there, None if the damage faces away from
+    the camera.
     """
     damages = shot.scene.damages
     if not damages:
@@ -34,14 +31,14 @@ def damage_objects(shot: Shot) -> list[Object]:
         shot.frame.damage, DAMAGE_VALUES.start, DAMAGE_VALUES.stop
     )
     objects = []
-    for damage, value in zip(damages, mask_values(damages), strict=True):
+    for number, value in enumerate(mask_values(damages)):
         bbox, area = seen_boxes[value - DAMAGE_VALUES.start], areas[value - DAMAGE_VALUES.start]
-        hidden, beyond, bounds = _alone(shot, damage, value, bbox)
+        hidden, beyond, bounds = _alone(shot, number, value, bbox)
         (amodal_bbox,) = float_boxes(bounds[None])
         objects.append(
             Object(
                 id=value,
-                class_name=damage.kind,
+                class_name=damages[number].kind,
                 instance=value % 100,
                 bbox=bbox,
                 amodal_bbox=amodal_bbox,
@@ -53,21 +50,30 @@ def damage_objects(shot: Shot) -> list[Object]:
 
 
 def _alone(
-    shot: Shot, damage: Damage, value: int, bbox: Box | None
+    shot: Shot, number: int, value: int, bbox: Box | None
 ) -> tuple[int, int, NDArray[np.float64]]:
-    """Of what the damage would cover alone: pixels of the image that are not shown, how many lie
-    outside it, and the bounds of all, infinite where it is nothing. value: the damage's in the
-    damage target; bbox: of what is shown."""
+    """Compare the pixels that one damage covers alone with the image.
+
+    Args:
+        shot: The image.
+        number: Index of the damage in Scene.damages.
+        value: Its value in the damage target.
+        bbox: Box of its visible pixels.
+
+    Returns:
+        Number of covered pixels in the image that do not show the damage, number of covered pixels
+        outside the image, and bounds float64 [4] of all covered pixels, infinite if there are none.
+    """
+    damage = shot.scene.damages[number]
     unbounded = np.array([np.inf, np.inf, -np.inf, -np.inf])
     x, y, z = shot.view.position_m / MM
-    # where a hole is in view all damages are drawn, and more of them are seen than one might think
+    # an image that shows a hole draws all damages, so one that faces away may be visible inside
     if not may_be_seen(damage, (x, y, z), shot.scene.damages) and bbox is None:
         return 0, 0, unbounded
     bounds = unbounded if bbox is None else np.array(bbox, np.float64)
     places, beyond = [np.zeros((2, 0), np.int64)], 0
-    for points in surface_points(
-        project(_facets(shot.scene, shot.mesh, damage), shot.view), shot.view.size
-    ):
+    seen = project(shot.prepared.damage_facets(number), shot.view)
+    for points in surface_points(seen, shot.view.size):
         part, hidden = _damaged(shot, damage, points, value)
         column, row, within = (a.take(part) for a in (points.column, points.row, points.within))
         if not len(part):
@@ -85,13 +91,17 @@ def _alone(
 def _damaged(
     shot: Shot, damage: Damage, points: Points, value: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Which of the points damage has reached, int [D], but for those where the image shows it or
-    that the sheet is sound; and which of these lie in the image, that does not show it, bool [D].
+    """Find the points that the damage has moved or torn away and that the image does not settle.
+
+    Returns:
+        Indices int [D] of these points. Points whose sheet is visible are left out if the image
+        shows there this damage or undamaged sheet. And bool [D]: the point lies in the image, which
+        does not show the damage there.
     """
     width = shot.view.size[0]
     place = np.where(points.within, points.row * width + points.column, 0)
     depth, drawn = shot.frame.depth.ravel().take(place), shot.frame.damage.ravel().take(place)
-    # where the sheet itself is seen, the damage target knows the answer already
+    # where the sheet is visible, the damage target has the answer
     known = points.within & (points.depth_m <= depth * (1 + _DEPTH_SLACK))
     known &= (drawn == SOUND_CONTAINER) | (drawn == value)
     asked = np.flatnonzero(~known)
@@ -103,25 +113,13 @@ def _damaged(
 
 
 def _distinct(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> int:
-    """How many cells [P] of a grid differ: surface_points.py bounds their number, and sorting them
-    takes ten times as long."""
+    """Count the distinct cells [P] of a grid.
+
+    surface_points.py bounds the grid's size; sorting the cells takes ten times as long.
+    """
     if not len(columns):
         return 0
     columns, rows = columns - columns.min(), rows - rows.min()
     met = np.zeros((rows.max() + 1, columns.max() + 1), bool)
     met[rows, columns] = True
     return int(np.count_nonzero(met))
-
-
-def _facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
-    """The cameras of a scene share them."""
-    kept = _kept_facets(scene, mesh)
-    if damage not in kept:
-        kept[damage] = damage_facets(scene, mesh, damage)
-    return kept[damage]
-
-
-@lru_cache(maxsize=2)
-def _kept_facets(scene: Scene, mesh: Mesh) -> dict[Damage, Facets]:
-    """Of this scene's damages, those that were asked for."""
-    return {}

@@ -1,30 +1,25 @@
-"""Frame + Scene -> Objects: boxes, areas and visibility of everything labelled, vectorised."""
+"""Labels of one image: boxes, areas and visibility of all labelled objects."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.geometry.damage_law import deform
-from fastgen.geometry.decal_facets import decal_facets, decal_outlines
 from fastgen.geometry.decal_outlines import EDGE_POINTS
-from fastgen.geometry.divided_mesh import as_drawn
-from fastgen.geometry.facets import Facets, in_fours, mesh_facets
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.facets import Facets, mesh_facets
+from fastgen.geometry.prepared_scene import CORNER_SIGNS
 from fastgen.labels.coverage import boxes, covered, facing, project
 from fastgen.labels.damage import damage_objects
 from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Keypoint, Object
 from fastgen.scene import Decal, Scene
-from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.limits import MM, NEAR_M
 from fastgen.scene.object_ids import object_ids
 
 _PIECES = 24
-"""Along each side of the container's outer box, where a lens bends it."""
+"""Pieces along each edge of the container's outer box in images with lens distortion."""
 
 CASTINGS = tuple(
     f"{end}_{side}_{level}"
@@ -32,11 +27,23 @@ CASTINGS = tuple(
     for side in ("front", "back")
     for level in ("bottom", "top")
 )
-"""Names of a container's keypoints: the outer corners of its eight corner castings."""
+"""Names of a container's keypoints, the outer corners of its eight corner castings, in the order of
+CORNER_SIGNS."""
+
+_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+"""Sides of the outer box as indices into CORNER_SIGNS, counter-clockwise from outside."""
 
 
 def decal_of(scene: Scene, object_id: int) -> Decal:
-    """The decal that bears `object_id` in the id target. Raises KeyError where none does."""
+    """Return the decal with an id.
+
+    Args:
+        scene: The scene.
+        object_id: Value in the id target, 2 or more.
+
+    Raises:
+        KeyError: No decal has this id.
+    """
     ids = object_ids(scene)
     if object_id < 2 or object_id not in ids:
         raise KeyError(f"no decal has id {object_id} in scene {scene.index}")
@@ -44,22 +51,23 @@ def decal_of(scene: Scene, object_id: int) -> Decal:
 
 
 def label(shot: Shot) -> list[Object]:
-    """All labelled objects of one image, those of which nothing is visible included."""
+    """Return all labelled objects of one image, including those that are not visible."""
     return [_container(shot), *_spreader(shot), *damage_objects(shot), *_decals(shot)]
 
 
 def _decals(shot: Shot) -> list[Object]:
-    frame, scene, view, mesh = shot.frame, shot.scene, shot.view, shot.mesh
+    frame, scene, view = shot.frame, shot.scene, shot.view
+    surface = shot.prepared.decals
+    if not surface.decals:
+        return []
     ids = np.array(object_ids(scene), np.int64)
     labelled = np.flatnonzero(ids)
-    if not labelled.size:
-        return []
     count, own = len(labelled), ids[labelled]
     least = CONTAINER_ID + 1
     seen_boxes, areas = shot.boxes_on_container(frame.ids, least, int(own.max()) + 1)
-    seen = project(decal_facets(scene, mesh), view)
+    seen = project(surface.facets, view)
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
-    # of what is not seen, what it would cover does not matter
+    # only visible decals need their unoccluded area
     owner = seen.facets.owner.take(seen.facets.corners[:, 0])
     asked = np.flatnonzero((areas[own - least] > 0)[owner])
     polygons = seen.pixels.take(seen.facets.corners.take(asked, axis=0), axis=0)
@@ -67,11 +75,11 @@ def _decals(shot: Shot) -> list[Object]:
     pixel, whose = alone.pixels()
     lost = whose[frame.ids.ravel().take(pixel) != own.take(whose)]
     hidden = np.bincount(lost, minlength=count).tolist()
-    pixels, depth = view.project(outlines_mm(scene, mesh))
+    pixels, depth = view.project(surface.outlines_mm)
     before = np.asarray((depth > 0).all(axis=1))
     edges = np.round(pixels, 2)
     outlines = edges.reshape(count, -1).tolist()
-    # from the outline's corners in the order in which the eye finds them
+    # the outline's corners, clockwise from the upper left in reading direction
     quads = edges[:, ::EDGE_POINTS][:, ::-1].reshape(count, -1).tolist()
     counts: dict[str, int] = {}
     objects = []
@@ -97,31 +105,27 @@ def _decals(shot: Shot) -> list[Object]:
     return objects
 
 
-@lru_cache(maxsize=4)
-def outlines_mm(scene: Scene, mesh: Mesh) -> NDArray[np.float64]:
-    """Outlines [N, points, 3] of the labelled decals after damage; a scene's cameras share them."""
-    return decal_outlines(scene, mesh)
-
-
 def _container(shot: Shot) -> Object:
-    """The container's pixels are also those of its decals: what lies on it is part of it.
+    """Return the container, whose pixels include those of its decals.
 
-    Where the spreader hides it, or the image ends, its outer box stands for it, a few millimetres
-    larger than rails and sheets: its visible fraction is true to one percent of the whole.
+    Its outer box replaces it where the spreader hides it and outside the image. The box is a few
+    millimetres larger than rails and sheets, which makes the visible fraction accurate to one
+    percent.
     """
-    frame, view = shot.frame, shot.view
+    frame, view, prepared = shot.frame, shot.view, shot.prepared
     area = cv2.countNonZero(frame.damage)
-    corners = _corners_mm(shot.scene)
-    points = _container_points(shot.scene, shot.mesh, view.distortion is not None)
+    corners = prepared.corners_mm
+    # with lens distortion, points inside the convex hull may be outermost in the image
+    points = prepared.points_mm if shot.lens else prepared.hull_points_mm
     pixels, depth = view.project(points)
     if depth.min() < NEAR_M:
-        pixels = project(mesh_facets(shot.mesh, shot.scene.damages), view).pixels
+        pixels = project(mesh_facets(prepared.container, shot.scene.damages), view).pixels
     (bounds,) = boxes(pixels, np.zeros(len(pixels), np.int64), 1)
     sides = corners[list(_SIDES)]
-    if view.distortion:
+    if shot.lens:
         sides = _pieces(sides)
     polygons = project(Facets.of(sides, np.zeros(len(sides), np.int64)), view).polygons
-    # what is void within the box is known: nothing hides there
+    # void pixels within the box are not hidden; only the spreader hides any
     asked = shot.spreader_box or (0, 0, 0, 0)
     alone = covered(polygons, np.zeros(len(polygons), np.int64), 1, view.size, asked)
     hidden = int(alone.shown(shot.spreader_shown)[0]) if shot.spreader_box else 0
@@ -144,12 +148,12 @@ def _container(shot: Shot) -> Object:
 
 
 def _spreader(shot: Shot) -> list[Object]:
-    """The spreader with its headblock and the cables as far as they are modelled."""
-    if shot.spreader is None:
+    """Return the spreader with its headblock and the modelled part of the cables, if present."""
+    shape = shot.prepared.spreader
+    if shape is None:
         return []
     area = cv2.countNonZero(shot.spreader_shown.view(np.uint8))
-    mesh = as_drawn(shot.spreader, shot.view.distortion is not None)
-    seen = project(_all_facets(mesh), shot.view)
+    seen = project(shape.facets(shot.lens), shot.view)
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, 1))
     polygons = seen.polygons
     polygons = polygons[facing(polygons)]
@@ -168,33 +172,8 @@ def _spreader(shot: Shot) -> list[Object]:
     ]
 
 
-@lru_cache(maxsize=32)
-def _all_facets(mesh: Mesh) -> Facets:
-    """Of a mesh that nothing damages."""
-    return in_fours(mesh_facets(mesh))
-
-
-@lru_cache(maxsize=4)
-def _container_points(scene: Scene, mesh: Mesh, bent: bool) -> NDArray[np.float64]:
-    """Points [P, 3] in mm after damage: from any side the container's outermost are among them.
-
-    bent: whether a lens bends what is seen, so that others than corners of the hull may be.
-    """
-    if not scene.damages:
-        return mesh.points_mm if bent else mesh.points_mm[mesh.hull]
-    moved = deform(scene.damages, mesh.points_mm)
-    if bent:
-        return moved
-    # a box that no corner has been pushed into: all in it lies within their convex hull
-    corners = _corners_mm(scene)
-    least = np.where(_SIGNS > 0, -np.inf, corners).max(axis=0)
-    most = np.where(_SIGNS > 0, corners, np.inf).min(axis=0)
-    inner = [(along > a) & (along < b) for along, a, b in zip(moved.T, least, most, strict=True)]
-    return moved.compress(~np.logical_and.reduce(inner), axis=0)
-
-
 def _pieces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Four-sided `sides` [K, 4, 3] cut into smaller ones of the same winding, [K * n * n, 4, 3]."""
+    """Cut quadrilaterals [K, 4, 3] into a grid of smaller ones [K * n * n, 4, 3], same winding."""
     across, up = np.meshgrid(*[np.linspace(0, 1, _PIECES + 1)] * 2, indexing="ij")
     weights = np.stack([(1 - across) * (1 - up), across * (1 - up), across * up, (1 - across) * up])
     grid = np.einsum("wxy,kwc->kxyc", weights, sides)
@@ -202,33 +181,22 @@ def _pieces(sides: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack(corners, axis=3).reshape(-1, 4, 3)
 
 
-_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
-_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-"""Corners of the outer box in the order of CASTINGS, and its sides."""
-
-
-def _corners_mm(scene: Scene) -> NDArray[np.float64]:
-    """The castings' outer corners [8, 3] after damage."""
-    kind = KINDS[scene.container.kind]
-    rest = _SIGNS * np.array([kind.length_mm / 2, kind.width_mm / 2, kind.height_mm])
-    return deform(scene.damages, rest)
-
-
 def _castings(
     shot: Shot, corners: NDArray[np.float64]
 ) -> tuple[tuple[Keypoint, ...], tuple[float, ...]]:
-    """The castings' outer corners in the order of CASTINGS, and the polygon around them.
+    """Return the castings' outer corners as keypoints, and the polygon around them.
 
-    A convex body's corner is seen where any of the planes that meet in it faces the camera, and
-    the spreader is not before it.
+    A corner of a convex body is visible if any of the planes that meet in it faces the camera and
+    the spreader does not hide it.
     """
+    spreader, eye_mm = shot.prepared.spreader, shot.view.position_m / MM
     pixels, depth = shot.view.project(corners)
-    outward = np.where(_SIGNS == 0, -1, _SIGNS)
-    faces = np.any((shot.view.position_m / MM - corners) * outward > 0, axis=1)
+    outward = np.where(CORNER_SIGNS == 0, -1, CORNER_SIGNS)
+    faces = np.any((eye_mm - corners) * outward > 0, axis=1)
     inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
-    if shot.spreader is not None:
+    if spreader is not None:
         asked = np.flatnonzero(faces & inside)
-        faces[asked] = ~_behind(shot.spreader, shot.view.position_m / MM, corners[asked])
+        faces[asked] = ~spreader.ray_triangles.hide(eye_mm, corners[asked])
     found: list[Keypoint] = [
         (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
         for (x, y), face, within in zip(
@@ -238,43 +206,12 @@ def _castings(
     if depth.min() <= 0:
         return tuple(found), ()
     straight = pixels
-    if shot.view.distortion:
+    if shot.lens:
         straight, _ = replace(shot.view, distortion=None).project(corners)
     hull = cv2.convexHull(straight.astype(np.float32), returnPoints=False).ravel()
     outline = pixels[hull]
-    if shot.view.distortion:  # lines of the world are curves in the image
+    if shot.lens:  # straight edges are curves in the image
         along = np.arange(EDGE_POINTS)[:, None] / EDGE_POINTS
         lines = zip(corners[hull], corners[np.roll(hull, -1)], strict=True)
         outline, _ = shot.view.project(np.concatenate([a + along * (b - a) for a, b in lines]))
     return tuple(found), tuple(np.round(outline.reshape(-1), 2).tolist())
-
-
-def _behind(
-    mesh: Mesh, eye_mm: NDArray[np.float64], points: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """Which of points [N, 3] the mesh hides from the eye, bool [N]; Moeller and Trumbore 1997."""
-    a, b_a, c_a, normal = _spanned(mesh)
-    ray, offset = points - eye_mm, eye_mm[:, None] - a
-    # their triple products, turned so that nothing is crossed for each ray anew
-    q = _cross(offset, b_a)
-    scale = ray @ normal
-    scale[np.abs(scale) < 1e-9] = np.inf
-    u = ray @ _cross(c_a, offset) / scale
-    v = ray @ q / scale
-    along = (q * c_a).sum(axis=0) / scale
-    met = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0) & (along < 1)
-    return np.asarray(met.any(axis=1), bool)
-
-
-@lru_cache(maxsize=32)
-def _spanned(mesh: Mesh) -> tuple[NDArray[np.float64], ...]:
-    """Of each triangle [3, T]: its first corner, the edges to the others, and their product."""
-    corners = mesh.positions_mm.take(mesh.triangles, axis=0).astype(np.float64)
-    a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
-    return a, b - a, c - a, _cross(c - a, b - a)
-
-
-def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cross products of vectors [3, T]; NumPy's own takes five times as long."""
-    (ax, ay, az), (bx, by, bz) = a, b
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

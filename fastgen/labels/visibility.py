@@ -1,4 +1,4 @@
-"""How much of an object is seen: what every kind of object's label has in common."""
+"""Visibility of labelled objects: boxes, fractions and flags that all kinds of labels share."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from fastgen.camera.projection import View
 from fastgen.classes import SPREADER_ID
 from fastgen.config.config import Config
 from fastgen.frame import Frame
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.sample import Box
 from fastgen.scene import Scene
 
@@ -19,49 +19,63 @@ FloatBox = tuple[float, float, float, float]
 
 _EDGE_SHARE = 0.01
 _EDGE_PX = 2
-"""Up to this much of an object may be missing along its edges, where rasterizers differ by a
-rounding, before something is said to hide it."""
+"""An object counts as occluded when more than this many of its pixels, or more than _EDGE_SHARE of
+them, are hidden. Rasterizers differ by fewer pixels along edges."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """One image and all that explains it. mesh: the scene's container at rest; spreader: as of
-    shapes.spreader_outline."""
+    """One image with its camera and the geometry that it shows.
+
+    Attributes:
+        frame: The rendered image and its per-pixel labels.
+        prepared: The scene.
+        view: Projection of the camera.
+        config: Configuration whose label rules apply.
+    """
 
     frame: Frame
-    scene: Scene
+    prepared: PreparedScene
     view: View
-    mesh: Mesh
-    spreader: Mesh | None
     config: Config
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as plain data."""
+        return self.prepared.scene
+
+    @property
+    def lens(self) -> bool:
+        """True if the view has lens distortion."""
+        return self.view.distortion is not None
 
     @cached_property
     def container_box(self) -> Box | None:
-        """Tight box of all that is the container's, what is printed on it and done to it."""
-        # what is seen through two holes is the container's, though void
+        """Tight box of the container with its decals and damages."""
+        # the ids have no container where two aligned holes show the surroundings
         return mask_box(self.frame.damage > 0)
 
     def boxes_on_container(
         self, target: NDArray[np.uint16], least: int, limit: int
     ) -> tuple[list[Box | None], NDArray[np.int64]]:
-        """`value_boxes` of one of the frame's targets, for values that only the container has."""
+        """Return `value_boxes` of a target for values that occur only on the container."""
         x0, y0, x1, y1 = self.container_box or (0, 0, 0, 0)
         found, areas = value_boxes(target[y0:y1, x0:x1], least, limit)
         return [b and (b[0] + x0, b[1] + y0, b[2] + x0, b[3] + y0) for b in found], areas
 
     @cached_property
     def spreader_shown(self) -> NDArray[np.bool_]:
-        """Pixels [H, W] that see the spreader."""
+        """Pixels [H, W] that show the spreader."""
         return self.frame.ids == SPREADER_ID
 
     @cached_property
     def spreader_box(self) -> Box | None:
-        """Tight box of those."""
-        return mask_box(self.spreader_shown) if self.spreader else None
+        """Tight box of the visible spreader."""
+        return mask_box(self.spreader_shown) if self.prepared.spreader else None
 
 
 class Visibility(TypedDict):
-    """The members of Object that tell how much of a thing is seen."""
+    """The members of Object that describe how much of it is visible."""
 
     visible_fraction: float
     truncated: bool
@@ -70,8 +84,14 @@ class Visibility(TypedDict):
 
 
 def visibility(config: Config, area: int, hidden: int, beyond: int) -> Visibility:
-    """area: the object's visible pixels; hidden: those that it would cover alone as well; beyond:
-    likewise outside the image."""
+    """Return the visibility members of an object.
+
+    Args:
+        config: Configuration with the label rules.
+        area: Visible pixels of the object.
+        hidden: Other pixels of the image that the object would cover alone.
+        beyond: Pixels outside the image that the object would cover alone.
+    """
     whole = area + hidden + beyond
     fraction = area / whole if whole else 0.0
     rules = config.labels
@@ -84,7 +104,7 @@ def visibility(config: Config, area: int, hidden: int, beyond: int) -> Visibilit
 
 
 def mask_box(mask: NDArray[np.bool_]) -> Box | None:
-    """Tight box of a mask [H, W], None where it is empty."""
+    """Return the tight box of a mask [H, W], None if it is empty."""
     rows = np.flatnonzero(mask.any(axis=1))
     if not len(rows):
         return None
@@ -96,16 +116,22 @@ def mask_box(mask: NDArray[np.bool_]) -> Box | None:
 def value_boxes(
     target: NDArray[np.uint16], least: int, limit: int
 ) -> tuple[list[Box | None], NDArray[np.int64]]:
-    """Tight boxes and areas of all values from `least` to below `limit` in one pass over them.
+    """Return the tight boxes and areas of a range of values, in one pass over their pixels.
 
-    target: uint16 [H, W]. Returns a list of limit - least boxes, None where a value is not seen,
-    and int64 [limit - least] areas in pixels.
+    Args:
+        target: uint16 [H, W].
+        least: First value.
+        limit: One more than the last value.
+
+    Returns:
+        A list of limit - least boxes, None for values that do not occur, and areas in pixels,
+        int64 [limit - least].
     """
     count = limit - least
-    above = target - np.uint16(least)  # lower values wrap round to the greatest
+    above = target - np.uint16(least)  # smaller values wrap around
     at = np.flatnonzero(above < count)
     found = above.ravel().take(at)
-    # runs of one value in the target's one long line, which may go on from one row to the next
+    # runs of equal values in the flattened target; a run may continue in the next row
     last = np.ones(len(at), bool)
     last[:-1] = (at[1:] - at[:-1] != 1) | (found[1:] != found[:-1])
     end = np.flatnonzero(last)
@@ -117,7 +143,7 @@ def value_boxes(
     areas = np.bincount(found, length, count).astype(np.int64)
     x0, y0 = np.full((2, count), max(target.shape))
     x1, y1 = np.zeros((2, count), np.int64)
-    # runs come row by row, and of those that write to one place the last stays
+    # NumPy keeps the last value that is assigned to an index, so reversed runs keep the first row
     y0[found[::-1]] = row[::-1]
     y1[found] = until + 1
     np.minimum.at(x0, found, np.where(goes_on, 0, left))
@@ -129,7 +155,7 @@ def value_boxes(
 
 
 def float_boxes(bounds: NDArray[np.float64]) -> list[FloatBox | None]:
-    """Bounds (x0, y0, x1, y1) [N, 4] to a thousandth of a pixel; None where they are not finite."""
+    """Round bounds (x0, y0, x1, y1) [N, 4] to 0.001 pixels; None for bounds that are not finite."""
     finite = np.asarray(np.isfinite(bounds).all(axis=1))
     return [
         (x0, y0, x1, y1) if known else None
@@ -138,6 +164,6 @@ def float_boxes(bounds: NDArray[np.float64]) -> list[FloatBox | None]:
 
 
 def window(target: NDArray[Any], box: Box) -> NDArray[Any]:
-    """The part of `target` [H, W] within a box, as a view."""
+    """Return the part of `target` [H, W] within a box, as a view."""
     x0, y0, x1, y1 = box
     return target[y0:y1, x0:x1]

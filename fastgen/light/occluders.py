@@ -1,57 +1,26 @@
-"""What stands in the way of light, as depth maps that light from far away in one direction sees.
+"""Occluders of light from one distant direction, and the view of a depth map along it.
 
-Maps keep back faces (those turned away from the light) rather than front ones: a lit surface is
-then no occluder of itself. Of thick bodies they keep front faces as well, sunk into them.
+Depth maps hold back faces, which are turned away from the light, so that a lit surface does not
+shadow itself. Thick bodies also add their front faces, moved a little into the body.
 """
-
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
-from fastgen.geometry.spreader import CABLE_TIER, tier_of_vertices
+from fastgen.geometry.solids import Body
 
 _CORE_MM = 200.0
-"""So far behind a container's sides its core begins."""
+"""Distance from a container's sides to its core."""
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Body:
-    """What stands in the way. positions_mm: float32 [V, 3]. triangles: uint32 [T, 3],
-    counter-clockwise from outside."""
-
-    positions_mm: NDArray[np.float32]
-    triangles: NDArray[np.uint32]
-
-    @cached_property
-    def bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Lowest and highest coordinates [3] of all vertices."""
-        columns = np.ascontiguousarray(self.positions_mm.T)  # rows take ten times as long
-        return columns.min(axis=1), columns.max(axis=1)
-
-
-Solid = Body | Mesh
-"""A mesh stands in the way as it is."""
-
-
-@lru_cache(maxsize=256)  # as many as there are spreaders
-def without_cables(spreader: Mesh) -> Body:
-    """What of a spreader throws shade; its cables are too thin for the maps."""
-    solid = tier_of_vertices(spreader) != CABLE_TIER
-    triangles = spreader.triangles[solid[spreader.triangles[:, 0]]]
-    used, numbers = np.unique(triangles, return_inverse=True)
-    return Body(spreader.positions_mm[used], numbers.reshape(-1, 3).astype(np.uint32))
-
-
 def core_of(container: Mesh) -> Body:
-    """A box within a container.
+    """Return a box inside a container that blocks light which leaks through the thin walls.
 
-    It stands in the way as well: maps that keep back faces lack the side that the light meets, and
-    through the far one, thin as it is, light leaks along creases, within a texel and the bias.
+    Depth maps of back faces lack the wall on the lit side. At the far wall, light would leak along
+    creases within one texel and the depth bias.
     """
     low, high = container.bounds_mm
     inset = np.minimum(_CORE_MM, (high - low) / 3)
@@ -60,10 +29,18 @@ def core_of(container: Mesh) -> Body:
 
 
 def map_matrix(toward: Array, low: Array, high: Array) -> Array:
-    """From mm to clip space [4, 4] of a parallel view of the box low..high from direction `toward`;
-    the box's x axis lies along the view's."""
+    """Return the matrix [4, 4] from mm to clip space of a parallel view of a box.
+
+    Args:
+        toward: Unit vector [3] from the box to the light.
+        low: Lowest corner [3] of the box in mm.
+        high: Highest corner [3] of the box in mm.
+
+    Returns:
+        Matrix whose view contains the whole box. The box's x axis lies along the view's x axis.
+    """
     along = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
-    if np.linalg.norm(along) < 1e-6:  # the view is along x itself
+    if np.linalg.norm(along) < 1e-6:  # the view is along x
         along = np.array([0.0, 1.0, 0.0])
     along /= np.linalg.norm(along)
     axes = np.stack([along, np.cross(toward, along), -toward])

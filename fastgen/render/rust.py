@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from statistics import NormalDist
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,17 +73,12 @@ def _spread(share: Array, reach: float, softness: float) -> Array:
     return np.asarray(_normal_cdf((_normal_quantile(share) + reach) / np.hypot(1.0, softness)))
 
 
-_SUMS: WeakKeyDictionary[Mesh, Array] = WeakKeyDictionary()
-
-
 def _edges(meshes: Iterable[Mesh]) -> Array:
     """Means over each of MATERIALS, [3, M, 1]: how near it is to an edge, and to one above it where
     it is not level, as the shader falls off with either; what share is level."""
     sums = np.zeros((4, len(MATERIALS)))
     for mesh in meshes:
-        if mesh not in _SUMS:
-            _SUMS[mesh] = _edge_sums(mesh)
-        sums += _SUMS[mesh]
+        sums += _edge_sums(mesh)
     area, near, below, level = sums[..., None]
     area = np.maximum(area, 1e-9)
     level[MATERIALS.index("paint_sheet")] = area[MATERIALS.index("paint_sheet")]
@@ -105,9 +99,7 @@ def _edge_sums(mesh: Mesh) -> Array:
     near[small] = np.exp(-SMALL_EDGE_MM / (EDGE_SHARE * SMALL_WIDE_MM))
     below[small] = np.exp(-SMALL_EDGE_MM / DEFINES["RUN_REACH_MM"])
     level = np.array([zone.level for zone in mesh.zones], float)
-    corners = mesh.atlas_mm[mesh.triangles].astype(float)
-    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
-    area = np.bincount(mesh.zone[mesh.triangles[:, 0]], area, len(small))
+    area = mesh.zone_areas_mm2
     material = [mesh.charts[zone.chart].material_index for zone in mesh.zones]
     parts = (np.ones_like(level), near, below * (1 - level), level)
     return np.array([np.bincount(material, area * part, len(MATERIALS)) for part in parts])

@@ -16,7 +16,7 @@ from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
 from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
-from fastgen.geometry.container import build_container
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.geometry.mesh import Mesh
 from fastgen.light.hdri import hours_of
 from fastgen.sampling.damage import sample_damages
@@ -86,7 +86,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
     scale = float(streams("corrugation").choice(config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
-    mesh = build_container(container.kind, container.profiles)
+    mesh = SHAPES.container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
     environment = _environment(config, streams, environments)

@@ -225,10 +225,6 @@ class Scene:
     spreader: Spreader = field(default_factory=Spreader)
     weather: Weather = field(default_factory=Weather)
 
-    def __hash__(self) -> int:
-        """By what names a scene alone: hashing a hundred decals would cost more than it finds."""
-        return hash((self.seed, self.index))
-
     def camera(self, name: str) -> Camera:
         """The camera of that name. Raises KeyError naming those that exist."""
         for camera in self.cameras:

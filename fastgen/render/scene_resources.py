@@ -1,34 +1,42 @@
-"""What the shaders read of a scene's decals, as textures."""
+"""Everything that the renderer keeps for one scene."""
 
 from collections.abc import Mapping
 
 import moderngl
 
 from fastgen.decals.artwork import Font
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.decal_tables import pack_decals
 from fastgen.render.decals_near import decals_near
+from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.textures import data_texture
-from fastgen.scene import Scene
 
 
-class SceneDecals:
-    """Tables of the decals of one scene on its container's mesh, by the names of their samplers.
-    Owned by the renderer, which releases them.
+class SceneResources:
+    """Decal textures and material colours of one scene. Owned by the renderer, which releases them.
 
-    art_layers, fonts: as for decal_tables.pack_decals.
+    Attributes:
+        textures: Tables of the decals by the names of their samplers.
+        materials: Mean colours of the materials.
+
+    Args:
+        ctx: The context that draws.
+        prepared: The scene.
+        art_layers: Texture layer of each artwork, see decal_tables.pack_decals.
+        fonts: Fonts by name.
     """
 
     def __init__(
         self,
         ctx: moderngl.Context,
-        scene: Scene,
-        mesh: Mesh,
+        prepared: PreparedScene,
         art_layers: Mapping[str, int],
         fonts: Mapping[str, Font],
     ) -> None:
+        scene, mesh = prepared.scene, prepared.container
         tables = pack_decals(scene, mesh, art_layers, fonts)
         near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm)
+        self.materials = SceneMaterials(prepared)
         self.textures = {
             "decal_grid": data_texture(ctx, tables.grid),
             "decal_table": data_texture(ctx, tables.table),

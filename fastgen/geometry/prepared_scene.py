@@ -1,0 +1,132 @@
+"""The geometry of one scene that all its cameras share."""
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.geometry.damage_law import deform
+from fastgen.geometry.decal_facets import DecalSurface
+from fastgen.geometry.facets import Facets, damage_facets
+from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
+from fastgen.scene import Scene
+from fastgen.scene.container_kinds import KINDS
+
+CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
+"""Corners of a container's outer box, int [8, 3]: -1 or 1 along x and y, 0 or 1 along z."""
+
+Array = NDArray[np.float64]
+
+
+class PreparedScene:
+    """A scene with its meshes and the geometry that labels need, shared by its cameras.
+
+    A Generator makes one for each scene and drops it with the scene. Meshes come from the shape
+    library. All members except `scene` are computed on first use and kept, so a camera after the
+    first finds them ready. Instances are compared by identity and may be keys of caches.
+
+    Args:
+        scene: A checked scene.
+        shapes: Library of the meshes.
+    """
+
+    def __init__(self, scene: Scene, shapes: ShapeLibrary = SHAPES) -> None:
+        self.scene = scene
+        self._shapes = shapes
+        self._damage_facets: list[Facets | None] = [None] * len(scene.damages)
+
+    @cached_property
+    def container(self) -> Mesh:
+        """The container at rest, as it is drawn."""
+        box = self.scene.container
+        return self._shapes.container(box.kind, box.profiles)
+
+    @cached_property
+    def container_outline(self) -> Mesh:
+        """The container at rest with as few triangles as possible, for shadows."""
+        box = self.scene.container
+        return self._shapes.container_outline(box.kind, box.profiles)
+
+    @cached_property
+    def nominal_outline(self) -> Mesh:
+        """A container of this kind with nominal corrugation, for the light on the spreader."""
+        return self._shapes.container_outline(self.scene.container.kind)
+
+    @cached_property
+    def spreader(self) -> SpreaderShape | None:
+        """The spreader at its gap, None if the scene has none."""
+        held = self.scene.spreader
+        if not held.present:
+            return None
+        kind = self.scene.container.kind
+        return self._shapes.spreader(kind, held.flippers_down, held.gap_mm)
+
+    @cached_property
+    def usual_spreader(self) -> SpreaderShape | None:
+        """The spreader at the usual gap, for sky visibility; None if the scene has none.
+
+        A few centimetres hardly change the shade, and each new shape costs a second once.
+        """
+        held = self.scene.spreader
+        if not held.present:
+            return None
+        return self._shapes.spreader(self.scene.container.kind, held.flippers_down)
+
+    def prepare_shapes(self, damages: bool) -> None:
+        """Load the meshes, so that later scenes with these shapes take no longer than others.
+
+        Args:
+            damages: Prepare for damaged scenes too.
+        """
+        self.container.prepare(damages)
+        _ = self.container_outline, self.nominal_outline
+        for shape in (self.spreader, self.usual_spreader):
+            if shape is not None:
+                _ = shape.solid
+
+    @cached_property
+    def decals(self) -> DecalSurface:
+        """The labelled decals on the damaged container."""
+        return DecalSurface(self.scene, self.container)
+
+    def damage_facets(self, number: int) -> Facets:
+        """Return the triangles that one damage may have moved.
+
+        Args:
+            number: Index into Scene.damages.
+        """
+        facets = self._damage_facets[number]
+        if facets is None:
+            damage = self.scene.damages[number]
+            facets = self._damage_facets[number] = damage_facets(self.scene, self.container, damage)
+        return facets
+
+    @cached_property
+    def corners_mm(self) -> Array:
+        """Outer corners float64 [8, 3] of the corner castings after damage, see CORNER_SIGNS."""
+        kind = KINDS[self.scene.container.kind]
+        rest = CORNER_SIGNS * np.array([kind.length_mm / 2, kind.width_mm / 2, kind.height_mm])
+        return deform(self.scene.damages, rest)
+
+    @cached_property
+    def points_mm(self) -> Array:
+        """All distinct vertices float64 [P, 3] of the container after damage."""
+        if not self.scene.damages:
+            return self.container.points_mm
+        return deform(self.scene.damages, self.container.points_mm)
+
+    @cached_property
+    def hull_points_mm(self) -> Array:
+        """Vertices float64 [P, 3] after damage that include the corners of the convex hull."""
+        if not self.scene.damages:
+            return self.container.points_mm[self.container.hull]
+        # everything in a box within the damaged corners lies within their convex hull
+        corners = self.corners_mm
+        least = np.where(CORNER_SIGNS > 0, -np.inf, corners).max(axis=0)
+        most = np.where(CORNER_SIGNS > 0, corners, np.inf).min(axis=0)
+        moved = self.points_mm
+        inner = [
+            (along > a) & (along < b) for along, a, b in zip(moved.T, least, most, strict=True)
+        ]
+        return moved.compress(~np.logical_and.reduce(inner), axis=0)
