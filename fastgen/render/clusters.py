@@ -1,4 +1,4 @@
-"""Which triangles of a mesh may be seen in a part of an image, by boxes around runs of them."""
+"""Culling of mesh triangles by bounding boxes around runs of consecutive triangles."""
 
 import math
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ from fastgen.render.regions import Region
 from fastgen.scene.limits import NEAR_M
 
 _SIZE = 64
-"""Triangles in a run. Neighbours in the order of a mesh mostly are neighbours on its sheets."""
+"""Triangles in a run. Consecutive triangles of a mesh mostly lie near each other."""
 
 _MARGIN_PX = 2.0
-"""Filters read samples beyond a region's border."""
+"""Margin around a region, because filters read samples beyond its border."""
 
 
 class Clusters:
-    """Runs of a mesh's triangles, each with the box around it."""
+    """Runs of consecutive triangles of a mesh, each with its bounding box."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._count = len(mesh.triangles)
@@ -30,15 +30,23 @@ class Clusters:
 
     @staticmethod
     def most_runs(mesh: Mesh) -> int:
-        """The longest list that `seen_in` may give, and each of those that `parted` cuts a run of
-        triangles into."""
+        """Return the largest number of slices in a list of `seen_in`.
+
+        The same limit holds for each list that `parted` returns for one slice of triangles.
+        """
         return (math.ceil(len(mesh.triangles) / _SIZE) + 1) // 2
 
     def seen_in(self, view: View, region: Region | None, moved_mm: float) -> list[slice]:
-        """Triangles, as slices of their array, among them all that `region` of the image shows.
+        """Return triangles that include all that are visible in a region of the image.
 
-        None is the whole image. moved_mm: by how much damage may have moved a vertex. With a lens,
-        and for the whole image, that is all triangles.
+        Args:
+            view: Projection of the image.
+            region: Part of the image, or None for the whole image.
+            moved_mm: Largest distance that damage moves a vertex.
+
+        Returns:
+            Disjoint slices of the mesh's triangles, in ascending order. They cover all triangles
+            for the whole image and for views with lens distortion.
         """
         if view.distortion or region is None:
             return [slice(0, self._count)]
@@ -53,8 +61,17 @@ class Clusters:
     def parted(
         self, triangles: Sequence[slice], boxes_mm: Sequence[NDArray[np.float64]], margin_mm: float
     ) -> tuple[list[slice], list[slice]]:
-        """Those of `triangles` that are far from some boxes, and the others. boxes_mm: corners
-        [8, 3] each; margin_mm: how near to one of them is far."""
+        """Split triangles into those far from all boxes and those that may be near one.
+
+        Args:
+            triangles: Slices of the mesh's triangles.
+            boxes_mm: Corners [8, 3] of each box in the container frame.
+            margin_mm: Triangles at most this far from a box count as near.
+
+        Returns:
+            Slices of the far triangles and slices of the near triangles. Together they hold each
+            of the given triangles once.
+        """
         met = np.zeros(len(self._low), bool)
         for box in boxes_mm:
             low, high = box.min(axis=0) - margin_mm, box.max(axis=0) + margin_mm
@@ -72,6 +89,6 @@ class Clusters:
 
 
 def _slices(chosen: NDArray[np.bool_]) -> list[slice]:
-    """Where `chosen` holds."""
+    """Return the runs of True values in `chosen`."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]))).tolist()
     return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,7 +1,7 @@
-"""Decals of a scene as the small tables that the shader reads; nothing is painted per sample.
+"""Tables from which the shader evaluates the decals of a scene at any point of the atlas.
 
-A coarse grid over the atlas names the decals that may cover a spot; a table row holds each decal's
-placement and ink; a glyph table holds the letters. A few hundred bytes a decal.
+A coarse grid over the atlas lists the decals that may cover each cell. Each decal has a table row
+with its placement and ink. A glyph table holds the letters of all texts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,32 +14,48 @@ from fastgen.decals.artwork import Font
 from fastgen.decals.lettering import layout
 from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import Mesh
+from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.glyph_runs import GlyphRun, glyph_run
-from fastgen.render.programs import DECAL_CELL_MM
 from fastgen.scene import Decal, Scene
 from fastgen.scene.limits import DECAL_KINDS
 from fastgen.scene.object_ids import object_ids
 
 DECAL_TEXELS = 5
+"""Texels of one row of the decal table."""
+
 CELL_SLOTS = 8
+"""Most decals that one cell of the grid can list."""
+
 GLYPH_COLUMNS = 256
+"""Width of the glyph table."""
 
 MARGIN_MM = 26.0
-"""Antialiasing reaches this far beyond a decal's edge: half a lookup, of programs.LOOKUP_PX, in the
-coarsest usual view, which has 39 mm a pixel at 640 pixels across; beyond it edges are cut."""
+"""Margin around a decal within which antialiasing blends its edge.
+
+It is half the width of a lookup (sample_lattice.LOOKUP_PX) in the coarsest usual view, which has
+39 mm per pixel in an image 640 pixels wide. Coarser views cut edges off at this margin."""
 
 
 class SceneError(FastgenError):
-    """A scene that cannot be drawn as described."""
+    """The renderer cannot draw a scene; the message names the part to change."""
 
 
 @dataclass(frozen=True, eq=False)
 class DecalTables:
-    """grid: uint32 [rows, columns, 4], two 1-based decal numbers a word, bottom decal first.
-    table: float32 [N, DECAL_TEXELS, 4]: (cos, sin, -sin, cos); (centre x, y in atlas mm, half
-    width, half height); (albedo rgb, wear); (kind, object id, art layer, 0); (cap height mm,
-    first glyph, glyph count, parts a mm). glyphs: float32 [rows, GLYPH_COLUMNS, 4], one run after
-    the other; see GlyphRun."""
+    """Decals of one scene in the form that the shader reads.
+
+    Attributes:
+        grid: uint32 [rows, columns, CELL_SLOTS / 2]. Each number packs two 1-based decal numbers of
+            a cell, the first in the lower 16 bits. Lower decals come first; 0 is an empty slot.
+        table: float32 [N, DECAL_TEXELS, 4], one row per decal with the texels below. A scene
+            without decals has one row of zeros.
+            0. Rotation: cos, sin, -sin, cos.
+            1. Placement in the atlas: centre x, centre y, half width, half height, mm.
+            2. Albedo r, g, b; wear.
+            3. Kind, object id, art layer, 0.
+            4. Texts only: cap height in mm, first glyph, number of glyphs, parts per mm.
+        glyphs: float32 [rows, GLYPH_COLUMNS, 4], the glyphs of all texts in order, see GlyphRun.
+    """
 
     grid: NDArray[np.uint32]
     table: NDArray[np.float32]
@@ -49,8 +65,20 @@ class DecalTables:
 def pack_decals(
     scene: Scene, mesh: Mesh, art_layers: Mapping[str, int], fonts: Mapping[str, Font]
 ) -> DecalTables:
-    """Tables for `scene` on `mesh`. Raises SceneError where one lies off its sheet or
-    more than CELL_SLOTS meet."""
+    """Compute the decal tables of a scene.
+
+    Args:
+        scene: Scene with the decals.
+        mesh: Mesh of the scene's container.
+        art_layers: Texture layer of each artwork by name.
+        fonts: Fonts by name.
+
+    Returns:
+        Tables for the shader.
+
+    Raises:
+        SceneError: A decal lies outside its sheet, or a cell has more than CELL_SLOTS decals.
+    """
     decals, count = scene.decals, len(scene.decals)
     rects = [mesh.charts[mesh.chart_index(decal.face)].rect_mm for decal in decals]
     corner, sheet = np.split(np.array(rects).reshape(count, 4), 2, axis=1)
@@ -91,19 +119,18 @@ def pack_decals(
 def _grid(
     decals: Sequence[Decal], mesh: Mesh, low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> NDArray[np.uint32]:
-    """As of DecalTables. low, high: where each decal begins and ends, [N, 2] (x, y) in cells of the
-    atlas. Raises SceneError as pack_decals does."""
+    """Return the grid of DecalTables; `low` and `high` bound each decal, [N, 2] (x, y) in cells."""
     size = np.ceil(np.array(mesh.atlas_size_mm) / DECAL_CELL_MM).astype(int)
     off = (low[:, 0] > high[:, 0]) | (low[:, 1] > high[:, 1])
     first = low.astype(int)
     wide, tall = np.maximum(np.minimum(high.astype(int), size - 1) - first + 1, 0).T
     touched = np.where(off, 0, wide * tall)
-    # each decal's cells, a row after the other
+    # Decal number and cell of every pair of a decal and a cell that it touches.
     number = np.repeat(np.arange(len(decals)), touched)
     step = np.arange(len(number)) - np.repeat(np.cumsum(touched) - touched, touched)
     row, column = np.divmod(step, wide[number])
     cell = (first[number, 1] + row) * size[0] + first[number, 0] + column
-    # how many decals lie in the cell already
+    # Slot of each pair: the number of pairs with the same cell before it.
     order = np.argsort(cell, kind="stable")
     begins = np.diff(cell[order], prepend=-1) != 0
     place = np.arange(len(cell))
@@ -119,8 +146,7 @@ def _grid(
 def _check(
     decals: Sequence[Decal], mesh: Mesh, off: NDArray[np.bool_], crowded: NDArray[np.intp]
 ) -> None:
-    """Raise SceneError for the first decal that is `off` its sheet [N], or of the numbers [K] of
-    those that find no slot."""
+    """Raise SceneError for the first decal that is `off` its sheet [N] or in `crowded` [K]."""
     wrong = np.union1d(np.flatnonzero(off), crowded).tolist()
     if not wrong:
         return
@@ -130,9 +156,9 @@ def _check(
         *_, width, height = mesh.charts[mesh.chart_index(decal.face)].rect_mm
         raise SceneError(
             f"decals[{i}] ({decal.kind} on {decal.face}): center_mm {decal.center_mm} lies off "
-            f"its sheet, which is {width:.0f} by {height:.0f} mm"
+            f"its sheet of {width:.0f} x {height:.0f} mm; move it onto the sheet"
         )
     raise SceneError(
         f"decals[{i}] ({decal.kind} on {decal.face} at {decal.center_mm}): more than "
-        f"{CELL_SLOTS} decals meet within {DECAL_CELL_MM:g} mm; spread them"
+        f"{CELL_SLOTS} decals within {DECAL_CELL_MM:g} mm; spread them"
     )

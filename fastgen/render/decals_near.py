@@ -1,29 +1,36 @@
-"""Where on the atlas a lookup of the material layers may meet a decal; elsewhere it is plain."""
+"""Map of the atlas cells in which a lookup of the material layers may touch a decal."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.render.constants import NEAR_CELL_MM
 from fastgen.render.decal_tables import MARGIN_MM
-from fastgen.render.programs import NEAR_CELL_MM
 from fastgen.scene.limits import DECAL_KINDS
 
 
 def decals_near(
     table: NDArray[np.float32], atlas_size_mm: tuple[float, float]
 ) -> NDArray[np.uint32]:
-    """Cells of NEAR_CELL_MM of the atlas, a byte each: 1 where any point of a cell is no farther
-    from a decal than antialiasing reaches, decal_tables.MARGIN_MM; some beside those too. As the
-    shader reads them, uint32 [rows, columns / 4]: four a number, the first in its lowest byte.
+    """Return the cells of the atlas that lie near a decal.
 
-    table: as of decal_tables.DecalTables, without rows that are no decal's.
+    A cell is 1 if any point in the cell lies within MARGIN_MM of a decal. A few more cells around
+    it may be 1 as well.
+
+    Args:
+        table: Rows of DecalTables.table that hold decals, float32 [N, DECAL_TEXELS, 4].
+        atlas_size_mm: Width and height of the atlas.
+
+    Returns:
+        uint32 [rows, columns / 4], one byte per cell of side NEAR_CELL_MM. Each number holds four
+        neighbouring cells, the first in the lowest byte.
     """
     columns, rows = (int(np.ceil(side / NEAR_CELL_MM)) for side in atlas_size_mm)
     found = np.zeros((rows, -(-columns // 4) * 4), np.uint8)
-    # from the middle of a cell; no point of it is farther from there
+    # Distances are measured from a cell's centre; its farthest point is half a diagonal away.
     margin = MARGIN_MM / NEAR_CELL_MM + 0.5**0.5
     for turn, place, _, (kind, *_), _ in table.tolist():
         (cos, sin), (x, y, *half) = turn[:2], (value / NEAR_CELL_MM for value in place)
-        # the four sides of a marker, on its point, lie aslant
+        # A marker is a diamond. Its sides are diagonal, so its corners move out farther.
         is_marker = kind == DECAL_KINDS["marker"]
         reach = [side + margin * (2**0.5 if is_marker else 1.0) for side in half]
         wide = abs(cos) * reach[0] + abs(sin) * reach[1]

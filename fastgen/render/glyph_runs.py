@@ -1,4 +1,4 @@
-"""The letters of a text as the shader finds them: those that reach into a part of its length."""
+"""Letters of a text in an order that lets the shader test only the letters near a point."""
 
 from typing import NamedTuple
 
@@ -15,19 +15,23 @@ DEFINES = {
     "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
     "GLYPH_RANGE": f"{GLYPH_RANGE}u",
 }
-"""For shaders/decal.glsl."""
+"""Constants of shaders/decal.glsl."""
 
 _SLACK = 0.01
-"""Of a tile's side, for points that a rounding puts into the part beside their own."""
+"""Tolerance, as a share of a tile's side, for points that rounding moves to the next part."""
 
 
 class GlyphRun(NamedTuple):
-    """The G letters of a text along its longer side, which has as many equal parts; the first and
-    the last part go on beyond its ends.
+    """Letters of a text, and the letters that reach into each part of the text.
 
-    glyphs: float32 [G, 4]. Row i: centre x, y in mm from the middle of the text; tile; and first *
-    GLYPH_RANGE + end of the rows whose tiles reach into part i. parts_per_mm: parts a mm, below 0
-    where they follow along y.
+    A text of G letters is divided into G equal parts along its longer side. The first and the last
+    part continue beyond the ends of the text.
+
+    Attributes:
+        glyphs: float32 [G, 4], sorted along the longer side. Row i holds the centre (x, y) of
+            letter i in mm from the centre of the text, its tile, and first * GLYPH_RANGE + end.
+            Tiles of the letters from `first` up to, but not including, `end` reach into part i.
+        parts_per_mm: Parts per mm of the longer side; negative if that is the vertical side.
     """
 
     glyphs: NDArray[np.float32]
@@ -35,7 +39,14 @@ class GlyphRun(NamedTuple):
 
 
 def glyph_run(lettering: Lettering) -> GlyphRun:
-    """The glyphs of a text, at least one and fewer than GLYPH_RANGE."""
+    """Return the letters of a text in the order of the shader's glyph table.
+
+    Args:
+        lettering: Layout of a text with at least 1 and fewer than GLYPH_RANGE glyphs.
+
+    Returns:
+        Letters and parts of the text.
+    """
     count = len(lettering.glyphs)
     rows = np.array([(*glyph[2:], glyph.tile) for glyph in lettering.glyphs])
     width, height = lettering.size_mm
@@ -44,7 +55,7 @@ def glyph_run(lettering: Lettering) -> GlyphRun:
     center_x = (rows[:, 0] + rows[:, 2] - width) / 2
     center_y = (rows[:, 1] + rows[:, 3] - height) / 2
     side = rows[0, 2] - rows[0, 0]
-    # sizes are rounded, so that those of tiny letters may be nothing
+    # Sizes are rounded to 0.1 mm, so the size of a tiny text may be 0.
     length = max(width, height, side)
     along = center_y if axis else center_x
     borders = length * (np.arange(count + 1) / count - 0.5)

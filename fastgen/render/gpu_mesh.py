@@ -1,4 +1,4 @@
-"""Meshes on the GPU, each drawn with one indirect call that leaves out faces turned away."""
+"""Meshes on the GPU, drawn with one indirect call that skips faces turned away from the camera."""
 
 import weakref
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -13,16 +13,26 @@ from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
 from fastgen.light.sky_visibility import open_sky
 from fastgen.render.clusters import Clusters
-from fastgen.render.programs import ZONE_GEAR, ZONE_LEVEL, ZONE_SMALL, ZONE_TURN
 from fastgen.render.textures import data_texture
+from fastgen.render.zone_codes import ZONE_GEAR, ZONE_LEVEL, ZONE_SMALL, ZONE_TURN
 from fastgen.scene.faces import FACE_AXES, FACES
 
 _SLACK_MM = 120.0
-"""Frames stand back from the castings' plane (mesh.GROUP_SLACK_MM), and sheets may sag a little."""
+"""Distance that a camera may be behind the plane of a face's castings and still see the face.
+
+Frames and sheets lie behind that plane, see mesh.GROUP_SLACK_MM."""
 
 
 def facing_groups(mesh: Mesh, position_mm: Iterable[float]) -> list[str]:
-    """Names of the triangle groups that a camera at `position_mm` may see."""
+    """Return the triangle groups that a camera may see.
+
+    Args:
+        mesh: Container or spreader mesh.
+        position_mm: Position of the camera in the container frame.
+
+    Returns:
+        Names from `mesh.groups`.
+    """
     low, high = mesh.bounds_mm
     x, y, z = position_mm
     ahead = {
@@ -43,11 +53,16 @@ _COMMAND = np.dtype(
 
 
 class GpuMesh:
-    """Vertex and index data of one Mesh. Owned by the renderer, which releases it.
+    """Vertex and index buffers of one mesh. The renderer owns and releases them.
 
-    programs: the geometry program of each of programs.DAMAGE_VARIANTS; that of 'holed' draws what
-    shows through holes. first_zone: what the numbers of the mesh's zones begin with in the table of
-    zones.
+    Attributes:
+        mesh: The mesh.
+
+    Args:
+        ctx: Current OpenGL context.
+        mesh: Mesh to upload.
+        programs: Geometry program of each damage variant; 'holed' draws the view through holes.
+        first_zone: Number of the mesh's first zone in the zone table.
     """
 
     def __init__(
@@ -64,14 +79,14 @@ class GpuMesh:
         vertices["a"], vertices["c"] = mesh.atlas_mm, mesh.zone + first_zone
         self._vertices = ctx.buffer(vertices.tobytes())
         self._indices = ctx.buffer(np.ascontiguousarray(mesh.triangles, np.uint32).tobytes())
-        self._openness = ctx.buffer(open_sky(mesh.normals).tobytes())
+        self._sky_visibility = ctx.buffer(open_sky(mesh.normals).tobytes())
         self._shown: weakref.ref[NDArray[np.uint8]] | None = None
         most = len(mesh.groups) + 2 * Clusters.most_runs(mesh)
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_zone")
         content = (self._vertices, "3f 3f 2f 1u", *names)
         seen = ("in_cone", "in_light", "in_open_to")
-        contents = [content, (self._openness, "3f1 1x 4f1 3u", *seen)]
+        contents = [content, (self._sky_visibility, "3f1 1x 4f1 3u", *seen)]
         self._arrays = {
             damage: ctx.vertex_array(program, contents, self._indices)
             for damage, program in programs.items()
@@ -79,26 +94,39 @@ class GpuMesh:
 
     @cached_property
     def clusters(self) -> Clusters:
-        """What of the mesh damages touch, and what may be behind a hole: asked of containers."""
+        """Bounding boxes of triangle runs; only containers need them, for damages and holes."""
         return Clusters(self.mesh)
 
-    def set_openness(self, values: NDArray[np.uint8]) -> None:
-        """Let the next draws have `values`, of sky_probe.SkyProbe; until then all sky is open."""
+    def set_sky_visibility(self, values: NDArray[np.uint8]) -> None:
+        """Set the sky visibility of the vertices; before, every vertex sees the whole sky.
+
+        Args:
+            values: uint8 [V, VERTEX_BYTES] in the format of `sky_visibility`.
+        """
         if self._shown is None or self._shown() is not values:
-            self._openness.write(values)
-            self._shown = weakref.ref(values)  # many meshes wait for their turn
+            self._sky_visibility.write(values)
+            self._shown = weakref.ref(values)  # Does not keep the values of cached meshes alive.
 
     def seen_from(self, position_mm: Iterable[float], bent: Collection[str] = ()) -> list[slice]:
-        """Triangles that a camera at `position_mm` may see from outside; bent: faces to count in
-        even if turned away."""
+        """Return the triangles that a camera outside the mesh may see.
+
+        Args:
+            position_mm: Position of the camera in the container frame.
+            bent: Faces to include even if they are turned away.
+
+        Returns:
+            Slices of the mesh's triangles.
+        """
         names = {*facing_groups(self.mesh, position_mm), *bent}
         return [triangles for name, triangles in self.mesh.groups.items() if name in names]
 
     def draw(self, program: str, triangles: Sequence[slice]) -> None:
-        """Draw some triangles in one call.
+        """Draw triangles in one call.
 
-        program: one of programs.DAMAGE_VARIANTS; 'holed' draws insides into the inner view, but for
-        what holes tore away.
+        Args:
+            program: Damage variant of the geometry program. 'holed' draws the interior into the
+                inner view, without the sheet that perforations tore away.
+            triangles: Slices of the mesh's triangles.
         """
         if not triangles:
             return
@@ -111,16 +139,21 @@ class GpuMesh:
 
     def release(self) -> None:
         """Free all GL objects."""
-        buffers = (self._vertices, self._indices, self._openness, self._commands)
+        buffers = (self._vertices, self._indices, self._sky_visibility, self._commands)
         items: list[Any] = [*self._arrays.values(), *buffers]
         for item in items:
             item.release()
 
 
 def zone_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Texture:
-    """What is known of each zone, as the shader reads it (shaders/zone.glsl).
+    """Return the table of zones that shaders/zone.glsl reads.
 
-    meshes: by the number that each one's zones begin with. The caller releases the texture.
+    Args:
+        ctx: Current OpenGL context.
+        meshes: Meshes by the number of their first zone.
+
+    Returns:
+        Texture with two rows, which the caller releases.
     """
     count = max(first + len(mesh.zones) for first, mesh in meshes.items())
     table = np.zeros((2, count, 4), np.float32)

@@ -1,13 +1,15 @@
-"""Tileable noise for the material layers, baked once per process and mip-mapped.
+"""Tileable mip-mapped noise for the material layers.
 
-Channels hold values whose distribution is uniform on 0..1, so that `noise > 1 - c` covers the
-fraction c of the surface. That of rust and run-off is normal instead: NORMAL_REACH deviations to
-either side of its mean fill 0..1. Scratches are 0 or 1. Averaging in a mip level narrows those
-distributions; `lost_deviation` says by how much, and the shader widens its thresholds accordingly,
-so that near and far views agree on how much is rusty and nothing shimmers (the idea of Olano and
-Baker 2010, LEAN mapping: variance that filtering removes comes back as softness). Of a normal field
-that is exact: where its mean over a footprint is m and deviates by s within it, Phi((m - t) / s) of
-that lies above t. What is read as a sum of two lookups (shaders/layers.glsl) is uniform no longer.
+Most channels are uniformly distributed on 0..1, so that `noise > 1 - c` covers the fraction c of a
+surface. Rust and run-off are normally distributed: 0..1 spans NORMAL_REACH standard deviations to
+either side of the mean. Scratches are 0 or 1.
+
+Averaging in a mip level narrows a distribution, by `lost_deviation`. The shader softens its
+thresholds by the same amount, so that near and far views show the same share of rust and nothing
+shimmers. Olano and Baker 2010, LEAN mapping, have this idea: variance that filtering removes
+returns as softness. It is exact for a normal field: if its mean over a footprint is m and its
+deviation within the footprint is s, the share Phi((m - t) / s) of the footprint exceeds t. Channels
+that the shader reads as the sum of two lookups (shaders/layers.glsl) are no longer uniform.
 """
 
 from dataclasses import dataclass
@@ -22,28 +24,36 @@ from numpy.typing import NDArray
 from fastgen.files import disk_cache
 
 NOISE_SIZE = 1024
+"""Width and height of a tile in texels."""
 
 NOISE_LEVELS = NOISE_SIZE.bit_length()
-"""Levels of the mip chain of a tile."""
+"""Number of mip levels of a tile."""
 
 NORMAL_REACH = 3.2
-"""Deviations from the mean that a normal channel holds; one value in 600 lies beyond."""
+"""Largest deviation from the mean in a normal channel, in standard deviations. About one value in
+600 is clipped."""
 
 _RUN_TEXELS = 110.0
-"""Length over which run-off below a spot of rust fades to 1 / e."""
+"""Length in texels over which run-off below a rust spot fades to 1 / e."""
 
 _SEED = 20262
+
 _BINS = 8191
+"""Resolution of ranks."""
 
 
 @dataclass(frozen=True, eq=False)
 class NoiseTiles:
-    """levels: uint8 [2, S, S, 4] for S = NOISE_SIZE, NOISE_SIZE / 2, ... 1; row 0 is v = 0.
+    """Two layers of noise with four channels each.
 
-    Layer 0: tone, rust, run-off, grain. Layer 1: scratches, wear, dirt, fine grain.
-    scratched: share of the tile that scratches cover.
-    lost_deviation: float32 [2, levels, 4], standard deviation that bilinear lookups in a level have
-    lost against those in level 0.
+    Layer 0 holds tone, rust, run-off and grain; layer 1 holds scratches, wear, dirt and fine grain.
+
+    Attributes:
+        levels: Mip levels, uint8 [2, S, S, 4] with S = NOISE_SIZE, NOISE_SIZE / 2, ... 1. Row 0 is
+            at texture coordinate v = 0.
+        scratched: Share of the tile that scratches cover.
+        lost_deviation: float32 [2, NOISE_LEVELS, 4], the standard deviation that bilinear lookups
+            in a level lose compared with level 0.
     """
 
     levels: tuple[NDArray[np.uint8], ...]
@@ -52,7 +62,7 @@ class NoiseTiles:
 
 
 def _uniform(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Replace values [S, S] by their ranks, scaled to 0..1."""
+    """Return the ranks of values [S, S], scaled to 0..1."""
     low, high = values.min(), values.max()
     bins = ((values - low) * (_BINS / (high - low))).astype(np.int32)
     share = np.cumsum(np.bincount(bins.ravel(), minlength=_BINS + 1), dtype=np.float64)
@@ -60,9 +70,9 @@ def _uniform(values: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def _looked_up_variance(channel: NDArray[np.floating]) -> float:
-    """Variance of bilinear lookups anywhere in texels [S, S], which repeat."""
+    """Return the variance of bilinear lookups at random places of a tile [S, S]."""
     apart = channel - channel.mean(dtype=np.float64)
-    # between two texels the mean of a weight's square is 1/3, that of both weights' product 1/6
+    # Along an axis the two weights are t and 1 - t. The mean of t^2 is 1/3, of t (1 - t) 1/6.
     smooth = apart
     for axis in (0, 1):
         smooth = 2 / 3 * smooth + 1 / 3 * np.roll(smooth, 1, axis=axis)
@@ -70,9 +80,8 @@ def _looked_up_variance(channel: NDArray[np.floating]) -> float:
 
 
 def _normal(ranks: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Ranks [S, S] in 0..1 as values that are normal where they are looked up, about a mean of 0.5;
-    see NORMAL_REACH."""
-    from scipy.special import ndtri  # takes 0.1 s, and noise is kept on disk
+    """Turn ranks [S, S] in 0..1 into values with normally distributed lookups and mean 0.5."""
+    from scipy.special import ndtri  # Slow to import, and only needed if the noise is not cached.
 
     deviations = np.clip(ndtri(ranks.astype(np.float64)), -NORMAL_REACH, NORMAL_REACH)
     deviations /= np.sqrt(_looked_up_variance(deviations))
@@ -82,10 +91,10 @@ def _normal(ranks: NDArray[np.float32]) -> NDArray[np.float32]:
 def _spectral(
     rng: np.random.Generator, slope: float, low: float, high: float, stretch: float = 1.0
 ) -> NDArray[np.float32]:
-    """Periodic Gaussian noise with power falling as frequency ** -slope between two cut-offs.
+    """Return periodic Gaussian noise [S, S] with power frequency ** -slope between two cut-offs.
 
-    low, high: cycles a tile. stretch above 1 draws the pattern out along y.
-    Ebert et al. 2002, Texturing and Modeling, ch. 2 (spectral synthesis).
+    The cut-offs `low` and `high` are in cycles per tile; `stretch` above 1 elongates the pattern
+    along y. Ebert et al. 2002, Texturing and Modeling, chapter 2 (spectral synthesis).
     """
     fx = np.fft.rfftfreq(NOISE_SIZE, 1 / NOISE_SIZE)[None, :]
     fy = np.fft.fftfreq(NOISE_SIZE, 1 / NOISE_SIZE)[:, None] * stretch
@@ -98,8 +107,10 @@ def _spectral(
 
 
 def _run_off(rust: NDArray[np.float32], streaks: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Where most water comes down from rust, as ranks: the rustiest fifth dragged toward -y (down a
-    wall), in streaks. Both are ranks [S, S]."""
+    """Return ranks [S, S] of the rusty water that runs down a wall, toward -y, in streaks.
+
+    It starts at the rustiest fifth. `rust` and `streaks` are ranks [S, S].
+    """
     spots = np.clip((rust - 0.8) / 0.2, 0, 1)
     drag = np.exp(-np.arange(NOISE_SIZE) / _RUN_TEXELS)
     dragged = np.fft.irfft(
@@ -109,7 +120,7 @@ def _run_off(rust: NDArray[np.float32], streaks: NDArray[np.float32]) -> NDArray
 
 
 def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
-    """Straight thin lines of 1 on 0, mostly along x, as scrapes run."""
+    """Return a tile [S, S] with straight thin lines of 1 on 0, mostly along x like real scrapes."""
     tile = np.zeros((NOISE_SIZE, NOISE_SIZE), np.float32)
     count = 900
     angles = rng.normal(0.0, 0.35, count) + np.where(rng.random(count) < 0.2, np.pi / 2, 0.0)
@@ -125,14 +136,20 @@ def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
 
 
 def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The next mip level: 2x2 box average of [2, S, S, 4]."""
+    """Return the next mip level of [2, S, S, 4], the mean of 2x2 texels."""
     quads = level.reshape(2, level.shape[1] // 2, 2, level.shape[2] // 2, 2, 4)
     return quads.mean(axis=(2, 4), dtype=np.float32)
 
 
 @lru_cache(maxsize=1)
 def noise_tiles() -> NoiseTiles:
-    """Both layers and their mip chain; always the same. Baking them takes a second or two, once."""
+    """Return the noise, which is always the same.
+
+    Computing it takes one or two seconds; later processes read it from the disk cache.
+
+    Returns:
+        Both layers with their mip levels.
+    """
     arrays = disk_cache.computed("noise", _SEED, _baked)
     levels = tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1))
     return NoiseTiles(levels, float((levels[0][1, ..., 0] > 0).mean()), arrays["lost_deviation"])

@@ -1,4 +1,4 @@
-"""Caches of what was used last."""
+"""Caches of the most recently used values."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -14,14 +14,23 @@ R = TypeVar("R", bound=_Releasable)
 
 
 class Recent(Generic[T]):
-    """The most recently used values by key."""
+    """Cache that drops the least recently used value when it is full.
+
+    Args:
+        capacity: Largest number of values.
+    """
 
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
         self._items: OrderedDict[object, T] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], T]) -> T:
-        """The value of `key`, made if need be."""
+        """Return the value of a key.
+
+        Args:
+            key: Hashable key of the value.
+            make: Returns the value; called if the key is not cached.
+        """
         if key not in self._items:
             self._items[key] = make()
             if len(self._items) > self._capacity:
@@ -30,16 +39,16 @@ class Recent(Generic[T]):
         return self._items[key]
 
     def _dropped(self, value: T) -> None:
-        """Called with what falls out."""
+        """Handle a value that was dropped."""
 
 
 class Kept(Recent[R]):
-    """GL objects; what falls out is released."""
+    """Cache of GL objects that releases an object when it drops it."""
 
     def _dropped(self, value: R) -> None:
         value.release()
 
     def release(self) -> None:
-        """Free them all."""
+        """Free all cached GL objects."""
         while self._items:
             self._items.popitem()[1].release()

@@ -1,4 +1,4 @@
-"""Rectangles of an image: where something may be seen."""
+"""Rectangular regions of an image, set operations on them, and regions that objects project to."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -11,16 +11,21 @@ from fastgen.scene import Damage
 from fastgen.scene.limits import NEAR_M
 
 Region = tuple[int, int, int, int]
-"""x, y, width and height in pixels."""
+"""Left column, top row, width and height in pixels."""
 
 _BOW_STEPS = 17
-"""Points along a line that a lens may bend, where bounds of it are asked for."""
+"""Points on a straight edge whose image is curved by lens distortion."""
 
 
 def bands(regions: Sequence[Region | None]) -> list[Region | None]:
-    """Disjoint regions, the upper first, that hold all of `regions`; None is the whole image.
+    """Return disjoint regions that cover all given regions, with one interval in each row.
 
-    Each row is held from the leftmost to the rightmost column of the regions that it crosses.
+    Args:
+        regions: Regions that may overlap; None is the whole image.
+
+    Returns:
+        Regions from top to bottom. Each row is covered from the leftmost to the rightmost column
+        of the given regions that cross it. A single None if a given region is the whole image.
     """
     known = [region for region in regions if region is not None]
     if len(known) < len(regions):
@@ -40,8 +45,15 @@ def bands(regions: Sequence[Region | None]) -> list[Region | None]:
 
 
 def merged(regions: Sequence[Region | None]) -> list[Region | None]:
-    """Disjoint regions that hold all of `regions`, those that overlap within the least rectangle
-    about them; None is the whole image."""
+    """Return disjoint regions that cover all given regions, with overlapping regions joined.
+
+    Args:
+        regions: Regions that may overlap; None is the whole image.
+
+    Returns:
+        Regions without overlap; overlapping ones are replaced by their bounding rectangle. A single
+        None if a given region is the whole image.
+    """
     found: list[Region] = []
     for region in regions:
         if region is None:
@@ -62,12 +74,20 @@ def merged(regions: Sequence[Region | None]) -> list[Region | None]:
 
 
 def outside(regions: Sequence[Region], others: Sequence[Region]) -> list[Region]:
-    """Disjoint regions that hold all of `regions`, disjoint ones, but what lies in `others`."""
+    """Return the parts of regions that lie outside all other regions.
+
+    Args:
+        regions: Disjoint regions.
+        others: Regions to subtract; they may overlap.
+
+    Returns:
+        Disjoint regions.
+    """
     left = list(regions)
     for x, y, width, height in others:
         found = []
         for a, b, w, h in left:
-            # above and below whole, beside it what is left of the rows between
+            # Full-width strips above and below, then the parts to the left and right.
             top, bottom = (min(max(row, b), b + h) for row in (y, y + height))
             first, last = (min(max(column, a), a + w) for column in (x, x + width))
             found += [(a, b, w, top - b), (a, bottom, w, b + h - bottom)]
@@ -77,7 +97,15 @@ def outside(regions: Sequence[Region], others: Sequence[Region]) -> list[Region]
 
 
 def within(regions: Sequence[Region | None], other: Region) -> list[Region]:
-    """What of each of `regions`, None for the whole image, lies in `other`."""
+    """Return the intersections of regions with another region.
+
+    Args:
+        regions: Regions; None is the whole image.
+        other: Region to intersect them with.
+
+    Returns:
+        All intersections that are not empty.
+    """
     x, y, width, height = other
     found = []
     for left, top, across, down in (region or other for region in regions):
@@ -89,18 +117,26 @@ def within(regions: Sequence[Region | None], other: Region) -> list[Region]:
 
 
 def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
-    """The pixels that the hull of corners [N, 3] may touch; None if it reaches behind us."""
-    if view.distortion:  # what lies between two corners may bow out farther than both
+    """Return the region that the convex hull of some points may cover.
+
+    Args:
+        view: Projection of the image.
+        corners_mm: Points [N, 3] in the container frame.
+
+    Returns:
+        Region aligned to 2x2 pixel blocks, which classify.comp needs; None if a point lies nearer
+        than the near plane.
+    """
+    if view.distortion:  # A curved edge may extend beyond both of its corners.
         a, b = corners_mm[:, None, None], corners_mm[:, None]
         corners_mm = a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)
     pixels, depth = view.project(corners_mm)
     if depth.min() <= NEAR_M:
         return None
     margin = 1.0
-    if view.distortion:  # an arc leaves its chord by an eighth of the second difference
+    if view.distortion:  # An arc deviates from its chord by an eighth of the second difference.
         margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
     pixels = pixels.reshape(-1, 2)
-    # of whole blocks of two by two pixels, see classify.comp
     x0, y0 = np.clip(2 * np.floor((pixels.min(axis=0) - margin) / 2), 0, view.size)
     x1, y1 = np.clip(2 * np.ceil((pixels.max(axis=0) + margin) / 2), 0, view.size)
     return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
@@ -109,8 +145,17 @@ def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
 def box_corners(
     bounds_mm: tuple[np.ndarray, np.ndarray], damages: tuple[Damage, ...] = ()
 ) -> np.ndarray:
-    """Corners [8, 3] of the box between two opposite corners [3], bulges of damage included, and
-    dents so deep that they come out on the other side."""
+    """Return the corners of a box that contains a damaged object.
+
+    The box grows by the bulges, and by dents deep enough to come out on the opposite side.
+
+    Args:
+        bounds_mm: Lowest and highest corner [3] of the undamaged object.
+        damages: Damages of the object.
+
+    Returns:
+        Corners [8, 3], mm.
+    """
     low, high = bounds_mm
     inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
     bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))

@@ -1,15 +1,13 @@
-"""Where the samples of a frame lie on its image, and with what weight they count.
+"""Sample positions of an image, and the weights of the samples in the pixel filter.
 
-Samples are texels of targets that are finer than the image by S along each axis. With more than one
-a pixel the image is drawn into them slanted: each row of pixels begins a texel further right than
-the one above. Samples of one pixel are then all in columns of their own, S^2 across it instead of
-S, which is what upright edges ask for, and those of a container are nearly all upright; with S = 2
-they interlock almost like a honeycomb's cells. One sample lies exactly on each pixel's centre.
-shaders/samples.glsl is the twin of this.
+A sample is a texel of the render targets, which have S times the image's resolution along each
+axis. For S > 1 the image is drawn slanted: each row of pixels starts one texel further right than
+the row above. The S^2 samples of a pixel then have S^2 different horizontal positions instead of
+S. This antialiases nearly vertical edges best, and most edges of a container are nearly vertical.
+One sample lies exactly at each pixel's centre. shaders/samples.glsl is the GLSL twin.
 
-Targets are wider by as many texels as the image has rows: a third as many texels again for a square
-one with S = 3, a fifth with S = 5. What lies beside the slanted image is cleared, and seen by
-nobody.
+The slant adds one texel of width per image row. For a square image this is a third more texels
+with S = 3 and a fifth more with S = 5. The area beside the slanted image is cleared and never read.
 """
 
 import itertools
@@ -19,31 +17,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 Offset = tuple[int, int]
-"""Texels to the right and down."""
+"""Distance in texels to the right and down."""
 
 LOOKUP_PX = {1: 0.92, 2: 0.6, 25: 0.2}
-"""Width of each of a pixel's lookups of the layers, by how many there are, where the pixel is
-filtered as a square; a wider filter asks for wider ones. Found by the distance to path-traced
-references."""
+"""Width in pixels of one lookup of the material layers, by the number of lookups per pixel.
+
+For a box filter; `SampleLattice.spread` scales it for wider filters. These widths come closest to
+path-traced references."""
 
 LOOKUP_PLACES = {
     1: ((0.0, 0.0),),
     2: ((0.25, 0.1), (-0.25, -0.1)),
     25: tuple(itertools.product((-0.4, -0.2, 0.0, 0.2, 0.4), repeat=2)),
 }
-"""Where in a pixel that sees one surface they are, in pixels from its centre."""
+"""Position of each lookup in pixels from the pixel's centre, for pixels that see one surface."""
 
 _PER_AXIS = (5, 3, 2, 1)
+"""Supported numbers of samples along each axis of a pixel."""
 
 _MOST_OF_25 = 1 << 26
-"""Texels of targets with 25 samples a pixel, at most: they take 40 bytes each."""
+"""Most texels of render targets with 25 samples per pixel; each texel takes 40 bytes."""
 
 
 def fitting(most: int, size: tuple[int, int], limit: int) -> int:
-    """Samples along each axis of a pixel, no more than `most`, with which targets of images of
-    `size` are no longer than `limit` texels along either side; those of scenes with holes, which
-    are twice as high, included, so that all images of a size are as fine. 1 at least, and 5 only
-    where memory allows."""
+    """Return the largest supported number of samples per axis whose render targets fit.
+
+    Scenes with holes need targets of twice the height. They always have to fit, so that all images
+    of one size have the same number of samples.
+
+    Args:
+        most: Upper limit of the result.
+        size: Width and height of the image, pixels.
+        limit: Largest width and height of a texture, texels.
+
+    Returns:
+        Samples along each axis of a pixel: 1, 2, 3 or 5. It is 1 if nothing fits, and 5 only if the
+        targets also fit in memory.
+    """
 
     def fits(n: int) -> bool:
         across, down = SampleLattice(n).texels(size)
@@ -54,35 +64,61 @@ def fitting(most: int, size: tuple[int, int], limit: int) -> int:
 
 
 class SampleLattice:
-    """The samples of images of which each pixel has `per_axis` squared; 1, 2, 3 or 5.
+    """Sample positions and filter for one number of samples per pixel.
 
-    slant: texels that a pixel begins to the right of the one above it. pad: columns on either side
-    for what a filter asks for beyond the image.
+    Attributes:
+        per_axis: Samples along each axis of a pixel: 1, 2, 3 or 5.
+        slant: Texels by which each row of pixels is shifted right relative to the row above.
+        pad: Additional columns on either side that the filter reads beyond the image.
     """
 
     def __init__(self, per_axis: int) -> None:
         self.per_axis = per_axis
         self.slant = int(per_axis > 1)
-        # an even number of samples has none at the pixel centre unless shifted by half a sample
+        # An even number of samples only has one at the centre if shifted by half a sample.
         self.pad = int(per_axis == 2)
         self._border = int(per_axis == 2)
 
     def texels(self, size: tuple[int, int]) -> tuple[int, int]:
-        """Width and height of the targets of an image of `size`."""
+        """Return the size of the render targets.
+
+        Args:
+            size: Width and height of the image, pixels.
+
+        Returns:
+            Width and height, texels.
+        """
         width, height = size
         across = self.per_axis * width + self.slant * (height - 1) + self._border + 2 * self.pad
         return across, self.per_axis * height + self._border
 
     def inner_row(self, size: tuple[int, int], limit: int) -> int | None:
-        """Where below an image's targets those of a second one can begin, None where both are
-        higher than `limit` together. They may share two rows, as at 4096 rows with S = 2 they must;
-        what a hole at the top of the image shows may then be wrong in its last."""
+        """Return the first target row of a second view of the same size, below the first view.
+
+        With 2 samples per axis, the views share two rows if the limit requires it, for example
+        with 4096 image rows and a limit of 16384. The last row of the image, and holes in its first
+        row, may then be wrong.
+
+        Args:
+            size: Width and height of the image, pixels.
+            limit: Largest height of a texture, texels.
+
+        Returns:
+            Row, or None if both views together do not fit.
+        """
         rows = self.texels(size)[1]
         spare = max(2 * rows - limit, 0)
         return rows - spare if spare <= 2 * self._border else None
 
     def to_clip(self, size: tuple[int, int]) -> NDArray[np.float64]:
-        """Clip space of an image of `size` to that of its targets: x and y times this, [2, 2]."""
+        """Return the matrix from the clip space of the image to that of its targets.
+
+        Args:
+            size: Width and height of the image, pixels.
+
+        Returns:
+            float64 [2, 2], to be multiplied with the column vector (x, y).
+        """
         width, height = size
         across, down = self.texels(size)
         n = self.per_axis
@@ -91,14 +127,27 @@ class SampleLattice:
         )
 
     def from_center(self, offset: Offset) -> tuple[float, float]:
-        """Where the sample `offset` texels from a pixel's centre lies, in pixels from there."""
+        """Return the position of a sample relative to a pixel's centre.
+
+        Args:
+            offset: Distance to the sample at the centre, texels.
+
+        Returns:
+            Distance to the centre to the right and down, pixels.
+        """
         right, down = offset
         y = down / self.per_axis
         return (right - self.slant * y) / self.per_axis, y
 
     def columns(self, region: tuple[int, int, int, int]) -> tuple[int, int]:
-        """First column of the targets, and the one after the last, that pixels of `region` and
-        those beside it ask for; region: x, y, width and height."""
+        """Return the target columns that the filter reads for a region and its neighbour pixels.
+
+        Args:
+            region: Left column, top row, width and height in the image, pixels.
+
+        Returns:
+            First column and the column after the last; they may lie outside the targets.
+        """
         x, y, w, h = region
         n, slant = self.per_axis, self.slant
         start = self.pad + (self._border - slant) / 2
@@ -107,15 +156,23 @@ class SampleLattice:
         return int(np.floor(left)), int(np.ceil(right))
 
     def rows(self, region: tuple[int, int, int, int]) -> tuple[int, int]:
-        """As `columns`, none above the first."""
+        """Return the target rows that the filter reads for a region and its neighbour pixels.
+
+        Args:
+            region: Left column, top row, width and height in the image, pixels.
+
+        Returns:
+            First row, at least 0, and the row after the last.
+        """
         _, y, _, h = region
         return max(self.per_axis * (y - 1), 0), self.per_axis * (y + h + 1) + self._border
 
     @cached_property
     def filter(self) -> dict[Offset, float]:
-        """Weights of the samples about a pixel's centre, which comes first; they add up to one.
+        """Weight of each sample by its offset from the pixel's centre; the weights add up to 1.
 
-        2 per axis: a tent that falls to nothing one pixel to each side. Others: the pixel's square.
+        The centre comes first, and the `near` samples come before the others. With 2 samples per
+        axis the filter is a tent that reaches 0 one pixel from the centre, else a box of one pixel.
         """
         reach = range(-self.per_axis, self.per_axis + 1)
         found: dict[Offset, float] = {}
@@ -136,7 +193,7 @@ class SampleLattice:
 
     @property
     def step(self) -> int:
-        """Texels between the nine samples that are `near`."""
+        """Distance in texels between the nine `near` samples."""
         return max(self.per_axis // 2, 1)
 
     def _is_near(self, offset: Offset) -> bool:
@@ -144,13 +201,16 @@ class SampleLattice:
 
     @property
     def near(self) -> int:
-        """So many samples of `filter`, the first ones, decide whether a pixel sees a single
-        surface: nine about its centre, or the centre alone. The others are asked where these
-        differ: of a tent two that count for a thirty-second each, and of 25 those between them,
-        which in a pixel of some 20,000 see what no near one does."""
+        """Number of samples, the first of `filter`, that decide if a pixel sees a single surface.
+
+        They are nine around the centre, or the centre alone with one sample per pixel. The shader
+        reads the other samples only if these differ. With 2 per axis the others are two samples
+        with a weight of 1/32 each. With 5 per axis they are the 16 samples in between. In about one
+        pixel in 20,000, such a sample sees a surface that no near sample sees.
+        """
         return sum(map(self._is_near, self.filter))
 
     @property
     def spread(self) -> float:
-        """The filter's standard deviation, in those of the pixel's square."""
+        """Standard deviation of the filter relative to that of a box of one pixel."""
         return 2**0.5 if self.per_axis == 2 else 1.0
