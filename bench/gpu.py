@@ -36,8 +36,9 @@ from throughput import whole_run
 import fastgen
 from fastgen import Config, Generator
 from fastgen.errors import FastgenError
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.settings import QUALITY
-from fastgen.torch import ContainerDataset, Loader
+from fastgen.torch import ContainerDataset, Loader, RenderSettings
 from fastgen.validation import check_known
 
 CAMERAS = tuple(Config.preset().cameras)
@@ -121,14 +122,15 @@ def draw_ms(generator: Generator, images: int) -> tuple[float, float]:
         GPU time between first and last command, and time on the CPU until all commands are issued.
     """
     gpu, cpu = [], []
-    with generator._gpu.drawing() as renderer:
-        query = renderer._ctx.query(time=True)
+    with generator.gpu.drawing() as renderer:
+        query = renderer.ctx.query(time=True)
         for number in range(images):
             index, name = shown(number)
             scene = generator.scene(index)
+            prepared = PreparedScene(scene)
             began = time.perf_counter()
             with query:
-                renderer.draw(scene, scene.camera(name), generator.size)
+                renderer.draw(prepared, scene.camera(name), generator.size)
             cpu.append(time.perf_counter() - began)
             gpu.append(query.elapsed / 1e6)  # waits for the GPU
     return statistics.fmean(gpu), statistics.fmean(cpu) * 1e3
@@ -179,11 +181,10 @@ def loader_rate(options: argparse.Namespace, quality: str) -> float:
     data = ContainerDataset(
         "damage",
         seed=SEED,
-        size=parse_size(options.size),
         length=length,
-        backend="egl",
-        quality=quality,
-        device_index=options.device_index,
+        render=RenderSettings(
+            parse_size(options.size), quality, "egl", device_index=options.device_index
+        ),
     )
     loader = Loader(
         data, SHARD, num_workers=workers, pin_memory=True, multiprocessing_context="spawn"

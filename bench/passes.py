@@ -28,11 +28,11 @@ import moderngl
 from results import parse_size
 
 from fastgen import Config, Generator
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
+from fastgen.render.passes.shading import Shading
 from fastgen.render.pixel_lists import PixelLists
-from fastgen.render.sample_targets import SampleTargets
 from fastgen.render.settings import QUALITY
-from fastgen.render.shading import Shading
 
 
 class PassTimer:
@@ -52,7 +52,7 @@ class PassTimer:
         self.pixels: dict[str, int] = {}
 
     def __enter__(self) -> "PassTimer":
-        self._wrap(SampleTargets, "begin", lambda *_: "clear")
+        self._wrap(VisibilityBuffer, "begin", lambda *_: "clear")
         self._wrap(
             GpuMesh, "draw", lambda program, _: "inside" if program == "holed" else "geometry"
         )
@@ -110,13 +110,14 @@ def measure(
     spent: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     drawn: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     with Generator(config, seed=7, size=size, backend="egl", quality=quality) as generator:
-        renderer = generator._gpu.renderer()
-        ctx, on_gpu = renderer._ctx, not generator._gpu.context().software
+        renderer = generator.gpu.renderer()
+        ctx, on_gpu = renderer.ctx, not generator.gpu.context().software
         for index in range(scenes):
             scene = generator.scene(index)
+            prepared = PreparedScene(scene)
             for camera in scene.cameras:
                 timer = PassTimer(ctx, on_gpu)
-                draw = partial(renderer.draw, scene, camera, size)
+                draw = partial(renderer.draw, prepared, camera, size)
                 draw()
                 spent[camera.name]["draw"].append(
                     min(timer.spent(draw) for _ in range(repeats)) * 1e3

@@ -38,9 +38,9 @@ from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.dataset.storage import Folder
 from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
-from fastgen.render.shapes import spreader_outline
 from fastgen.sample import Sample
 
 STAGES = ("sample", "draw", "read", "label", "encode", "write")
@@ -67,25 +67,24 @@ def stages(
             for name in config.cameras:  # prepare meshes, lights and programs
                 generator.render(index=index, camera=name)
         driver = generator.renderer_name
-        renderer = generator._gpu.renderer()
-        finish = renderer._ctx.finish
+        renderer = generator.gpu.renderer()
+        finish = renderer.ctx.finish
         clock = time.process_time  # CPU time of all threads: other programs do not count
         for index in range(scenes):
             began = clock()
             scene = generator.scene(index)
             times["sample"].append((clock() - began) / len(scene.cameras))
+            prepared = PreparedScene(scene)
             together: Files = {}
             for camera in scene.cameras:
                 t0 = clock()
-                targets = renderer.draw(scene, camera, size)
+                targets = renderer.draw(prepared, camera, size)
                 finish()
                 t1 = clock()
                 frame = targets.read()
                 t2 = clock()
                 view = view_of(camera, size)
-                mesh = renderer.mesh(scene.container)
-                held = spreader_outline(scene, camera.lens is not None)
-                objects = label(Shot(frame, scene, view, mesh, held, config))
+                objects = label(Shot(frame, prepared, view, config))
                 t3 = clock()
                 sample = Sample(
                     **vars(frame), scene=scene, camera=camera, view=view, objects=objects

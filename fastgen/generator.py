@@ -22,7 +22,7 @@ from fastgen.render.cuda import CudaFrame, cuda_reason
 from fastgen.render.gl import open_context
 from fastgen.render.passes.bake import Atlas
 from fastgen.render.renderer import Renderer
-from fastgen.render.session import Opened
+from fastgen.render.session import GpuSession
 from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.shadow_map import shader_lights
 from fastgen.render.variant import LAYERS
@@ -39,13 +39,14 @@ from fastgen.scene.check import check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
 
 _BRIGHTEST_AIR = 0.65
-"""Light of fog that an exposure meter lets through: short of the tone curve's shoulder."""
+"""Largest exposed radiance of fog: a light meter keeps fog below the tone curve's shoulder."""
 
 
 def find_camera(scene: Scene, name: str | None = None) -> Camera:
-    """The camera of `scene` called `name`, by default the first.
+    """Return a camera of a scene by its name, or the first one without a name.
 
-    Raises ConfigError that names the nearest one.
+    Raises:
+        ConfigError: The scene has no such camera; the message names the nearest one.
     """
     names = [camera.name for camera in scene.cameras]
     if not names:
@@ -57,24 +58,17 @@ def find_camera(scene: Scene, name: str | None = None) -> Camera:
 
 
 class Generator:
-    """Makes scenes and renders them. A context manager; GL is opened at the first render.
+    """Samples scenes and renders them with labels.
 
-    config: the distribution. seed: whole number of 0 or more. size: (width, height) in pixels,
-    64 to 4096 each. backend: auto, egl or osmesa. hdri_dir: folder of .hdr and .exr files to use
-    in place of the bundled ones. quality: draft (one sample a pixel, shaded once for those of two
-    by two that see one facet, in a coarser shadow of the sun), balanced (nine, materials looked up
-    twice), fine (25, and as often), or high (as fine, and light found by rays, which Embree casts
-    on the CPU whatever draws). Fine and high take nine samples of images of more than about a
-    megapixel or 1638 rows, as 25 of a scene with holes take 2 kB a pixel. Where textures end at
-    16384 texels, as Mesa's do, all but draft take four of images of more than 2730 rows.
-    device_index: which of EGL's devices draws, as `fastgen doctor` numbers them; None takes the
-    first that works. Threads may share it, and draw in turn; make one in each process. An image
-    much taller than wide takes more memory than one lying, see sample_lattice.py.
+    A context manager; the GL context opens at the first render. Threads may share a generator and
+    draw in turn. A process that is forked off, or that receives a pickled generator, opens its own
+    context. What a generator held that was dropped unclosed is freed when the next one opens.
 
-    A process that is forked off, or that gets it pickled, opens a context of its own. What one that
-    was dropped unclosed held is freed when the next opens one.
-    Raises ConfigError for a bad argument, and for high where there is no Embree; AssetError for a
-    bad HDRI, ContextError without OpenGL.
+    Attributes:
+        config: Distribution of the scenes.
+        seed: Seed of the scenes.
+        settings: Size, quality, backend, device and HDRI folder.
+        gpu: Access to the GL context and the renderer.
     """
 
     def __init__(
@@ -87,6 +81,17 @@ class Generator:
         quality: str = "balanced",
         device_index: int | None = None,
     ) -> None:
+        """Check the arguments; nothing is rendered yet.
+
+        Args:
+            config: Distribution of the scenes, by default the preset "seafront".
+            seed: Whole number of 0 or more.
+            size, backend, hdri_dir, quality, device_index: See RenderSettings.
+
+        Raises:
+            ConfigError: An argument is not valid, or "high" is chosen without Embree.
+            AssetError: An HDRI cannot be read.
+        """
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.settings = RenderSettings(size, quality, backend, device_index, hdri_dir)
@@ -98,7 +103,7 @@ class Generator:
         # the cameras of a scene are usually rendered one after the other
         self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
         self._given: PreparedScene | None = None
-        self._gpu = Opened(
+        self.gpu = GpuSession(
             partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
                 Renderer,
@@ -120,29 +125,29 @@ class Generator:
 
     @property
     def environments(self) -> dict[str, float]:
-        """Name -> weight in the draw of the HDRIs at hand, sorted; those of a folder weigh 1."""
+        """Weight of each available HDRI in the draw, by name; 1 for the HDRIs of a folder."""
         return dict(self._weights)
 
     @property
     def environment_record(self) -> dict[str, dict[str, Any]]:
-        """What decides scenes' light: by name, an HDRI's SHA-256 and its weight in the draw."""
+        """SHA-256 and weight of each available HDRI, by name: what decides the light of scenes."""
         sha256 = {n: hashlib.sha256(p.read_bytes()).hexdigest() for n, p in self._hdris.items()}
         return {n: {"sha256": sha256[n], "weight": w} for n, w in self._weights.items()}
 
     @property
     def renderer_name(self) -> str:
-        """The driver's name for what renders, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
-        with self._gpu.drawing():
-            return self._gpu.context().renderer
+        """Renderer string of the GL driver, such as 'llvmpipe (LLVM 15.0.6, 256 bits)'."""
+        with self.gpu.drawing():
+            return self.gpu.context().renderer
 
     @property
     def used_backend(self) -> str:
-        """Which backend 'auto' came to: egl or osmesa."""
-        with self._gpu.drawing():
-            return self._gpu.context().backend
+        """Backend in use, "egl" or "osmesa"; "auto" resolves to one of them."""
+        with self.gpu.drawing():
+            return self.gpu.context().backend
 
     def scene(self, index: int) -> Scene:
-        """Scene number `index`: plain data, no GL needed, the same on every machine."""
+        """Return scene number `index`: plain data, equal on every machine. Needs no GL."""
         key = (self.config, self.seed, whole("index", index))
         sampled = self._sampled  # another thread may replace it
         if sampled is None or sampled[0] != key:
@@ -159,20 +164,26 @@ class Generator:
         normals: bool = False,
         labels: LabelConfig | None = None,
     ) -> Sample:
-        """One labelled image of scene `index`, or of `scene` when that is given.
+        """Render one labelled image.
 
-        camera: the name of one of the scene's cameras, or a Camera of your own; by default the
-        scene's first. layer: 'all', or one material layer by itself, of programs.LAYERS.
-        normals: give Sample.normals too. labels: what becomes of
-        objects that are hard to see, in place of config.labels.
-        Raises ConfigError for what cannot be drawn, by its name.
+        Args:
+            index: Number of the scene to sample and render. Give either this or `scene`.
+            camera: Name of one of the scene's cameras, or a Camera; by default the first camera.
+            scene: Scene to render.
+            layer: "all", or one of LAYERS to see a single material layer unlit.
+            normals: Fill `Sample.normals`.
+            labels: Replaces `config.labels`, which says which objects are marked ignored.
+
+        Raises:
+            ConfigError: An argument is not valid or the scene cannot be drawn.
+            ContextError: There is no OpenGL.
         """
         if labels is not None:
             check_fields(labels, LabelConfig, "labels")
         check_known("layer", layer, LAYERS)
         prepared, camera = self._chosen(index, camera, scene)
         scene, view = prepared.scene, view_of(camera, self.size)
-        with self._gpu.drawing() as renderer:
+        with self.gpu.drawing() as renderer:
             modelled = layer == "all" and is_needed(camera, scene.weather)
             radiance = modelled and needs_radiance(camera, scene.weather)
             frame = renderer.render(prepared, camera, self.size, layer, radiance, normals)
@@ -196,7 +207,7 @@ class Generator:
         )
 
     def _airlight(self, renderer: Renderer, scene: Scene, camera: Camera) -> Color:
-        """Mean light from around in the camera's exposure, no more than its meter would admit."""
+        """Return the exposed radiance of fog and rain: the mean of the light from all around."""
         light = renderer.ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
@@ -210,46 +221,57 @@ class Generator:
         camera: str | Camera | None = None,
         scene: Scene | None = None,
     ) -> CudaFrame:
-        """As `render`, but the frame stays on the GPU, without objects; good until the next call.
+        """Render one frame into CUDA memory, without objects. The next call overwrites it.
 
-        The sensor's part and fog and rain, which the CPU adds, are left out.
+        Sensor effects, fog and rain are computed on the CPU and therefore missing here.
 
-        Raises ContextError where `cuda_reason` gives one.
+        Raises:
+            ConfigError: An argument is not valid or the scene cannot be drawn.
+            ContextError: CUDA cannot take the frame, see `cuda_reason`.
         """
         prepared, camera = self._chosen(index, camera, scene)
-        with self._gpu.drawing() as renderer:
-            frames = self._gpu.frames(self.size)
+        with self.gpu.drawing() as renderer:
+            frames = self.gpu.frames(self.size)
             image, labels, depth = frames.take(renderer.draw(prepared, camera, self.size))
         return CudaFrame(image, labels, depth, prepared.scene, camera, view_of(camera, self.size))
 
     def cuda_reason(self) -> str:
-        """Why `render_cuda` cannot work here, in one line; '' where it can."""
-        with self._gpu.drawing():
-            return cuda_reason(self._gpu.context())
+        """Return in one line why `render_cuda` cannot work here; "" if it can."""
+        with self.gpu.drawing():
+            return cuda_reason(self.gpu.context())
 
     def bake(self, scene: Scene, texel_mm: float = 4.0) -> Atlas:
-        """All material layers of a scene's container as textures; texel_mm: width of a texel.
+        """Bake the material layers of a scene's container into textures.
 
-        Raises ConfigError for a texel so small that the atlas would pass bake.MAX_ATLAS.
+        Args:
+            scene: The scene; damage is included except for the cut of holes.
+            texel_mm: Width of a texel on the sheet.
+
+        Raises:
+            ConfigError: The texel is too small for the largest atlas, or the scene is not valid.
         """
-        with self._gpu.drawing() as renderer:
+        with self.gpu.drawing() as renderer:
             return renderer.bake(self._prepared(scene), texel_mm)
 
     def bake_spreader(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
-        """As `bake`, of the spreader; None where the scene has none."""
-        with self._gpu.drawing() as renderer:
+        """Bake the material layers of a scene's spreader; None if it has none. See `bake`."""
+        with self.gpu.drawing() as renderer:
             return renderer.bake_spreader(self._prepared(scene), texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
-        """Factor on linear radiance, ahead of the tone curve, with which `camera` takes `scene`."""
-        with self._gpu.drawing() as renderer:
+        """Return the factor on linear radiance that a camera applies before the tone curve."""
+        with self.gpu.drawing() as renderer:
             checked = self._prepared(scene).scene
             return renderer.exposure(checked, check_camera(camera, checked.container), self.size)
 
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
-        """Make every light and shape that scenes may have, so that neither time nor memory grows
-        later. on_step: called before each of them and each way to draw, which take seconds the
-        first time."""
+        """Prepare every light, shape and program that scenes may need.
+
+        Afterwards neither the time nor the memory of a render grows.
+
+        Args:
+            on_step: Called before each step; a step takes seconds the first time.
+        """
         scene = self.scene(0)
         drawn = [name for name, weight in self._weights.items() if weight > 0]
         names = self.config.environment.names or drawn
@@ -264,7 +286,7 @@ class Generator:
             on_step()
             shape.prepare_shapes(damages=self.config.damage.probability > 0)
         lens = any(camera.lens is not None for camera in scene.cameras)
-        with self._gpu.drawing() as renderer:
+        with self.gpu.drawing() as renderer:
             for each in chain(lit, shaped):
                 on_step()
                 renderer.preload(each, lens)
@@ -289,8 +311,8 @@ class Generator:
                 self.render(scene=shown, camera=camera)
 
     def close(self) -> None:
-        """Free the renderer and its GL context; a later render opens them again."""
-        self._gpu.close()
+        """Free the renderer and its GL context. A later render opens them again."""
+        self.gpu.close()
 
     def __enter__(self) -> Self:
         return self

@@ -2,10 +2,15 @@
 
 import numpy as np
 
-from fastgen.render.programs import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK, expand
-from fastgen.resources import shader_path
+from fastgen.render.blocks import BLOCKS
+from fastgen.render.constants import CONSTANTS
+from fastgen.render.program import expand, shader_text
+from fastgen.render.variant import ShaderVariant
 
-HEAD = '#version 430 core\n#include "blocks.glsl"\n#include "octahedral.glsl"\n'
+NEEDS = [f"{name}.constants" for name in CONSTANTS] + [f"{name}.block" for name in BLOCKS]
+HEAD = "#version 430 core\n" + "".join(
+    f'#include "{name}"\n' for name in (*NEEDS, "octahedral.glsl")
+)
 
 
 def run(gl, body, inputs, textures=None, damage="sound"):
@@ -16,8 +21,8 @@ def run(gl, body, inputs, textures=None, damage="sound"):
         "void main() { answer = f(texelFetch(inputs, ivec2(gl_FragCoord.xy), 0)); }\n"
     )
     program = ctx.program(
-        vertex_shader=expand(shader_path("fullscreen.vert").read_text()),
-        fragment_shader=expand(HEAD + body + main, damage=damage),
+        vertex_shader=expand(shader_text("fullscreen.vert"), ShaderVariant()),
+        fragment_shader=expand(HEAD + body + main, ShaderVariant(damage=damage)),
     )
     rows = np.ascontiguousarray(inputs, np.float32)
     held = {
@@ -42,7 +47,7 @@ def blocks(gl, **changed):
     They stay valid as long as the caller keeps the returned buffers.
     """
     kept = []
-    for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):
+    for block in BLOCKS.values():
         values = {}
         for member in block.members:
             size = {"vec2": 2, "vec3": 3, "vec4": 4, "mat4": 16}.get(member[0], 1)

@@ -159,8 +159,8 @@ def generator():
 def driver(generator, monkeypatch):
     """Fake driver, with `generator` treated as if it ran on an NVIDIA GPU."""
     assert generator.renderer_name  # opens its context
-    fake = FakeDriver(generator._gpu.context())
-    monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
+    fake = FakeDriver(generator.gpu.context())
+    monkeypatch.setattr(cuda, "_VENDOR", generator.gpu.context().vendor)
     monkeypatch.setattr(cuda, "_load_library", lambda: fake)
     return fake
 
@@ -252,7 +252,7 @@ def test_the_reason_names_what_the_driver_lacks(generator, driver, monkeypatch):
 
 def test_the_reason_names_a_missing_library(generator, monkeypatch):
     assert generator.renderer_name
-    monkeypatch.setattr(cuda, "_VENDOR", generator._gpu.context().vendor)
+    monkeypatch.setattr(cuda, "_VENDOR", generator.gpu.context().vendor)
     monkeypatch.setattr(cuda, "_LIBRARY", "libcuda-of-no-machine.so.1")
     assert "libcuda-of-no-machine.so.1: cannot open" in generator.cuda_reason()
 

@@ -15,8 +15,8 @@ from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
-from fastgen.render.sample_targets import SampleTargets
 from fastgen.render.settings import QUALITY, Quality
+from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Scene, Spreader
 from tests import oracle
 
@@ -178,9 +178,9 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
             return getattr(self._ctx, name)
 
     def made(gl, *rest):
-        return SampleTargets(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
+        return VisibilityBuffer(SimpleNamespace(ctx=Shorter(gl.ctx), function=gl.function), *rest)
 
-    monkeypatch.setattr("fastgen.render.targets.SampleTargets", made)
+    monkeypatch.setattr("fastgen.render.image_targets.VisibilityBuffer", made)
     with Generator(DAMAGED, seed=21, size=SIZE) as other:
         short = other.render(scene=scene, camera="close")
     assert (usual.depth > 3.5).sum() > 50

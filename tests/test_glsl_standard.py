@@ -5,45 +5,45 @@ Vertex shaders are linked with their fragment shaders.
 
 import hashlib
 import itertools
+import re
 import shutil
 import subprocess
-from unittest.mock import MagicMock
+from dataclasses import replace
 
 import pytest
 
-from fastgen.light.directional_lights import MOST_SUNS
+from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render import settings
-from fastgen.render.programs import DAMAGE_VARIANTS, LAYERS, link, listed_classes
-from fastgen.render.shading import Shading
+from fastgen.render.blocks import BLOCKS
+from fastgen.render.constants import CONSTANTS
+from fastgen.render.program import expand, shader_text
+from fastgen.render.variant import DAMAGE_VARIANTS, LAYERS, ShaderVariant, listed_classes
+from fastgen.resources import shader_path
 
 COMPILER = "glslangValidator"
-SUNS = (0, 1, MOST_SUNS)
+LIGHTS = (0, 1, MAX_LIGHTS)
 
 
-class Recorder(MagicMock):
-    """Fake moderngl.Context that writes the shaders it gets into `folder`."""
+class Programs:
+    """Folder of shader texts for the compiler, one subfolder per program."""
 
-    def program(self, vertex_shader, fragment_shader):
-        self.keep(vert=vertex_shader, frag=fragment_shader)
-        return MagicMock()
+    def __init__(self, folder):
+        self.folder = folder
 
-    def compute_shader(self, text):
-        self.keep(comp=text)
-        return MagicMock()
+    def add(self, stages, variant):
+        self.keep({name.rpartition(".")[2]: expand(shader_text(name), variant) for name in stages})
 
-    def keep(self, **stages):
-        program = self.folder / hashlib.sha256(repr(stages).encode()).hexdigest()[:16]
+    def keep(self, texts):
+        program = self.folder / hashlib.sha256(repr(texts).encode()).hexdigest()[:16]
         program.mkdir(exist_ok=True)
-        for stage, text in stages.items():
+        for stage, text in texts.items():
             (program / f"shader.{stage}").write_text(text, encoding="utf-8")
 
 
 @pytest.fixture
-def recorder(tmp_path):
+def programs(tmp_path):
     assert shutil.which(COMPILER), "glslangValidator is missing; run make glslang"
-    made = Recorder()
-    made.folder = tmp_path
-    return made
+    return Programs(tmp_path)
 
 
 def refused(folder):
@@ -62,56 +62,79 @@ def refused(folder):
 
 
 @pytest.mark.parametrize("quality", settings.QUALITY)
-def test_shading_is_standard_glsl(recorder, quality):
+def test_shading_is_standard_glsl(programs, quality):
     chosen = settings.QUALITY[quality]
     # large images have fewer samples than their quality specifies
     for samples in [n for n in (1, 2, 3, 5) if n == 1 == chosen[0] or 1 < n <= chosen[0]]:
         for layer in LAYERS if quality in ("draft", "balanced") and samples != 2 else ("all",):
-            shading = Shading(
-                recorder,
-                samples,
-                chosen.lookups,
-                layer,
-                chosen.traced,
-                chosen.coarse,
-                compute_sky=True,
-            )
-            link_all(shading, samples)
-    assert refused(recorder.folder) == ""
+            for radiance in (False, True) if layer == "all" else (False,):
+                variant = ShaderVariant(
+                    samples,
+                    chosen.lookups,
+                    layer,
+                    traced=chosen.traced and layer == "all",
+                    coarse=chosen.coarse,
+                    radiance=radiance,
+                )
+                add_all(programs, variant)
+    assert refused(programs.folder) == ""
 
 
-def link_all(shading, samples):
-    shading._store_sky((1, 1))
-    for bent, damage, cables in itertools.product((False, True), DAMAGE_VARIANTS, (False, True)):
-        shading._draw_sky(MagicMock(), bent)
-        shading._classify([(0, 0, 2, 2)], damage, cables)
-        for name in listed_classes(samples):
-            if shading._comes(name, damage, cables):
-                for suns in SUNS:
-                    shading._shader(name, suns)
+def add_all(programs, variant):
+    programs.add(("sky.comp",), variant)
+    programs.add(("sky.vert", "sky.frag"), variant)
+    programs.add(("fullscreen.vert", "bent_sky.frag"), variant)
+    for damage, cables in itertools.product(DAMAGE_VARIANTS, (False, True)):
+        programs.add(("classify.comp",), replace(variant, damage=damage, cables=cables))
+    for name, lights in itertools.product(listed_classes(variant.samples_per_axis), LIGHTS):
+        damage = "holed" if "damaged" in name or name == "holed" else "sound"
+        shaded = replace(variant, pixel_class=name, damage=damage, lights=lights)
+        programs.add(("shade_listed.comp",), shaded)
 
 
-def test_all_other_shaders_are_standard_glsl(recorder):
+def test_all_other_shaders_are_standard_glsl(programs):
     for damage in DAMAGE_VARIANTS:
-        link(recorder, "geometry.vert", "geometry.frag", {}, damage=damage)
-        of_points = {"pixel_class": "decal" if damage == "sound" else "damaged", "damage": damage}
-        for samples in (2, 3, 5):
-            variant = {**of_points, "samples_per_axis": samples}
-            link(recorder, "fullscreen.vert", "light_points.frag", {}, **variant)
+        programs.add(("geometry.vert", "geometry.frag"), ShaderVariant(damage=damage))
+        of_points = ShaderVariant(
+            pixel_class="decal" if damage == "sound" else "damaged", damage=damage
+        )
+        for samples in (1, 2, 3, 5):
+            variant = replace(of_points, samples_per_axis=samples)
+            programs.add(("fullscreen.vert", "light_points.frag"), variant)
+            traits = {"sound": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
+            if samples > 1 or damage == "holed":
+                normals = replace(variant, pixel_class=traits[damage])
+                programs.add(("normals.comp",), normals)
         if damage != "holed":
-            link(recorder, "bake.vert", "bake.frag", {}, **of_points)
-    link(recorder, "occluder.vert", "occluder.frag", {})
-    assert refused(recorder.folder) == ""
+            programs.add(("bake.vert", "bake.frag"), of_points)
+    programs.add(("occluder.vert", "occluder.frag"), ShaderVariant())
+    assert refused(programs.folder) == ""
 
 
-def test_code_that_only_drivers_accept_is_rejected(recorder):
+@pytest.mark.parametrize("path", sorted(shader_path().iterdir()), ids=lambda path: path.name)
+def test_a_shader_file_includes_the_constants_and_blocks_that_it_uses(path):
+    # a macro without a definition counts as 0 in #if, so a missing include changes the image
+    text = path.read_text()
+    included = set(re.findall(r'#include "(\w+\.(?:constants|block))"', text))
+    used = set(re.findall(r"\b[A-Za-z_]\w*\b", re.sub(r"//.*", "", text)))
+    everything = [ShaderVariant(samples_per_axis=n) for n in (1, 3)]
+    for group, constants in CONSTANTS.items():
+        names = {name.split("(")[0] for variant in everything for name in constants(variant)}
+        assert bool(names & used) == (f"{group}.constants" in included), group
+    for name, block in BLOCKS.items():
+        members = {member[1] for member in block.members}
+        assert bool(members & used) == (f"{name}.block" in included), name
+
+
+def test_code_that_only_drivers_accept_is_rejected(programs):
     pasted = "#define ONE(name) name##_1\n#define A_1 1\n#if ONE(A)\n#endif\n"
-    recorder.compute_shader(f"#version 430 core\n{pasted}void main() {{}}\n")
-    assert "'#if' : unexpected tokens" in refused(recorder.folder)
+    programs.keep({"comp": f"#version 430 core\n{pasted}void main() {{}}\n"})
+    assert "'#if' : unexpected tokens" in refused(programs.folder)
 
 
-def test_shaders_with_mismatched_interfaces_are_rejected(recorder):
+def test_shaders_with_mismatched_interfaces_are_rejected(programs):
     head = "#version 430 core\n"
     vertex = f"{head}out vec2 place; void main() {{ place = vec2(0.0); }}"
-    recorder.program(vertex, f"{head}in vec3 place; void main() {{ if (place.z > 0.0) discard; }}")
-    assert "place" in refused(recorder.folder)
+    fragment = f"{head}in vec3 place; void main() {{ if (place.z > 0.0) discard; }}"
+    programs.keep({"vert": vertex, "frag": fragment})
+    assert "place" in refused(programs.folder)

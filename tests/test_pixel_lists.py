@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render import pixel_lists
-from fastgen.render.sample_targets import SampleTargets
 
 SIZE = (201, 150)
 KINDS = {
@@ -19,10 +19,10 @@ def drawn(values, quality, scenes=2):
     config = Config.from_values({**values, "spreader": {"probability": 1}})
     found = []
     with Generator(config, seed=3, size=SIZE, quality=quality) as generator:
-        renderer = generator._gpu.renderer()
+        renderer = generator.gpu.renderer()
         for scene in map(generator.scene, range(scenes)):
             for camera in (scene.camera("A"), scene.camera("Cr")):
-                targets = renderer.draw(scene, camera, SIZE)
+                targets = renderer.draw(PreparedScene(scene), camera, SIZE)
                 found.append((targets.read(), listed(targets.lists.entries())))
     return found
 
@@ -73,7 +73,7 @@ def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
         for index in range(scenes)
         for damage in Generator(config, seed=3, size=SIZE).scene(index).damages
     ]
-    begin = SampleTargets.begin
+    begin = VisibilityBuffer.begin
     spoilt = []
 
     def spoil(targets, damage, *rest):
@@ -84,7 +84,7 @@ def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
             spoilt.append(value)
         begin(targets, damage, *rest)
 
-    monkeypatch.setattr(SampleTargets, "begin", spoil)
+    monkeypatch.setattr(VisibilityBuffer, "begin", spoil)
     for (one, _), (other, _) in zip(first, drawn(KINDS["holed"], quality, scenes), strict=True):
         for name in ("image", "cover", "ids", "damage", "depth"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)

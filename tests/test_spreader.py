@@ -15,8 +15,8 @@ from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader, tier_bounds_mm
-from fastgen.render.shapes import spreader_mesh
 from fastgen.scene import Decal, Scene, Spreader
 from fastgen.srgb import DECODED
 from tests import oracle
@@ -192,9 +192,9 @@ def test_a_thin_cable_has_the_mean_look_of_a_near_one():
             scene = generator.scene(0)
             aslant = {"position_mm": (-8e3, -7e3, 6e3), "target_mm": (0.0, 0.0, 9e3)}
             camera = replace(scene.cameras[0], focal_mm=focal_mm, roll_deg=0.0, **aslant)
-            renderer = generator._gpu.renderer()
+            renderer = generator.gpu.renderer()
             for layer in ("rust", "normals"):
-                frame = renderer.render(scene, camera, (side, side), layer)
+                frame = renderer.render(PreparedScene(scene), camera, (side, side), layer)
                 middle = slice(side * 2 // 5, side * 3 // 5)
                 code, cover = frame.image[middle], frame.cover[middle, :, None] / 255
                 linear = DECODED[code] if layer == "rust" else code / 255
@@ -279,10 +279,10 @@ def test_the_spreader_has_the_scenes_paint(generator):
     assert painted > 0.6
 
 
-def test_spreader_mesh_returns_the_mesh_that_is_drawn(generator):
+def test_the_prepared_spreader_is_the_one_that_is_drawn(generator):
     scene = generator.scene(1)
     generator.render(scene=scene, camera="B")
-    mesh = spreader_mesh(scene)
+    mesh = PreparedScene(scene).spreader.mesh
     pixels, depth = view_of(scene.camera("B"), SIZE).project(mesh.positions_mm)
     assert (depth > 0).all()
     sample = generator.render(scene=scene, camera="B")
@@ -293,7 +293,7 @@ def test_spreader_mesh_returns_the_mesh_that_is_drawn(generator):
     assert max(low[1], 0) - 1 <= y0
     assert y1 <= high[1] + 1
     none = replace(scene, spreader=Spreader(present=False))
-    assert spreader_mesh(none) is None
+    assert PreparedScene(none).spreader is None
     assert not (generator.render(scene=none, camera="B").ids == oracle.SPREADER).any()
 
 

@@ -9,6 +9,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen import Config, Generator
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.settings import QUALITY
 from fastgen.scene import EnvironmentView, Spreader
 from tests import oracle
@@ -40,9 +41,9 @@ def recess(request, tmp_path_factory):
             generator.scene(0), environment=EnvironmentView("sun", 0.0), decals=(),
             spreader=Spreader(False, (0.5, 0.5, 0.5), (False, False), 15.0),
         )  # fmt: skip
-        renderer = generator._gpu.renderer()
-        (sun,) = renderer.ambient("sun").suns
-        mesh = renderer.mesh(scene.container)
+        renderer = generator.gpu.renderer()
+        (sun,) = renderer.ambient("sun").lights
+        mesh = PreparedScene(scene).container
         sample = generator.render(scene=scene, camera="Cr")
         exposure = generator.exposure(scene, scene.camera("Cr"))
     hits = oracle.cast(mesh, sample.view)

@@ -56,7 +56,12 @@ _Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 
 
 class Renderer:
-    """Draws scenes on one GL context. A context manager: leaving it frees everything it made."""
+    """Draws scenes on one GL context. A context manager: leaving it frees everything it made.
+
+    Attributes:
+        ctx: The moderngl context.
+        shadow_map: Shadows of the directional lights of the last scene.
+    """
 
     def __init__(
         self,
@@ -75,25 +80,25 @@ class Renderer:
             mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
         """
         self._gl = gl
-        self._ctx = gl.ctx
+        self.ctx = gl.ctx
         self._light_of = light
         self._quality = quality
         self._mask_threshold_mm = mask_threshold_mm
-        self._programs = programs = Programs(self._ctx)
-        self._geometry = GeometryPass(self._ctx, programs)
-        self._background = BackgroundPass(self._ctx, programs, by_compute=not gl.software)
-        self._shading = ShadingPass(self._ctx, programs)
-        self._normals = NormalsPass(self._ctx, programs)
+        self._programs = programs = Programs(self.ctx)
+        self._geometry = GeometryPass(self.ctx, programs)
+        self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
+        self._shading = ShadingPass(self.ctx, programs)
+        self._normals = NormalsPass(self.ctx, programs)
         self._rays: Kept[RayPass] = Kept(2)
         self._targets: Kept[ImageTargets] = Kept(2)
         self._bodies: Recent[RayBodies] = Recent(2)
-        self._shapes = Shapes(self._ctx, self._geometry.programs)
+        self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights: Kept[GpuLight] = Kept(24)
         self._scenes: Kept[SceneResources] = Kept(2)
-        self._occluder = occluder_program(self._ctx)
-        self._shadow_map = ShadowMap(self._ctx, self._occluder, quality.shadow_detail)
+        self._occluder = occluder_program(self.ctx)
+        self.shadow_map = ShadowMap(self.ctx, self._occluder, quality.shadow_detail)
         self._blocks = {
-            block.name: self._ctx.buffer(reserve=block.size)
+            block.name: self.ctx.buffer(reserve=block.size)
             for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
         }
         for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
@@ -101,13 +106,13 @@ class Renderer:
         art, self._art_layers = art_images()
         tiles, self._fonts = glyph_tiles()
         table = dfg_table()
-        dfg = self._ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
+        dfg = self.ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         dfg.repeat_x = dfg.repeat_y = False
         glyphs = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
         self._tables: _Textures = {
             "noise_tiles": noise_texture(gl),
             "art": art_texture(gl, art),
-            "glyph_tiles": mipmapped_array(self._ctx, glyphs),
+            "glyph_tiles": mipmapped_array(self.ctx, glyphs),
             "dfg_table": dfg,
         }
 
@@ -167,7 +172,7 @@ class Renderer:
         scene, size, lens = prepared.scene, view.size, camera.lens is not None
         damages = seen_damages(scene.damages, camera.position_mm)
         damage = variant(damages)
-        limit = self._ctx.info["GL_MAX_TEXTURE_SIZE"]
+        limit = self.ctx.info["GL_MAX_TEXTURE_SIZE"]
         per_axis = fitting(self._quality.samples_per_axis, size, limit)
         targets = self._targets.get(
             (size, per_axis, radiance), lambda: ImageTargets(self._gl, size, per_axis, radiance)
@@ -217,14 +222,14 @@ class Renderer:
         outline = prepared.container_outline
         container = prepared.container if scene.damages else outline  # only fine triangles bend
         solid = None if spreader is None else spreader.solid
-        self._shadow_map.cast(container, solid, toward, scene.damages, outline)
-        inputs.textures["sun_shadow"] = self._shadow_map.depth
+        self.shadow_map.cast(container, solid, toward, scene.damages, outline)
+        inputs.textures["sun_shadow"] = self.shadow_map.depth
 
     def _set_view(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> None:
         """Fill the uniform block of the view."""
         scene, view, spreader = prepared.scene, inputs.view, inputs.spreader
         lights = self.ambient(scene.environment.name).lights
-        shadow = self._shadow_map if lights else None
+        shadow = self.shadow_map if lights else None
         materials = self._resources(prepared).materials
         exposure = self._exposure(scene, camera, view)
         values = {
@@ -273,7 +278,7 @@ class Renderer:
         self._set(SCENE_BLOCK, scene_values(scene, 0))
         textures = self._material_textures(self._resources(prepared), mesh, None)
         program = bake_program(self._programs, damage)
-        return bake_atlas(self._ctx, program, textures, mesh.mesh, texel_mm)
+        return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
 
     def bake_spreader(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's spreader; None where the scene has none."""
@@ -285,7 +290,7 @@ class Renderer:
         textures = self._material_textures(self._resources(prepared), container, spreader)
         program = bake_program(self._programs, "sound")
         return bake_atlas(
-            self._ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
+            self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
@@ -299,7 +304,7 @@ class Renderer:
 
     def _resources(self, prepared: PreparedScene) -> SceneResources:
         return self._scenes.get(
-            prepared, lambda: SceneResources(self._ctx, prepared, self._art_layers, self._fonts)
+            prepared, lambda: SceneResources(self.ctx, prepared, self._art_layers, self._fonts)
         )
 
     def _material_textures(
@@ -319,7 +324,7 @@ class Renderer:
         """Free every GL object of this renderer."""
         owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
         owners += [
-            self._shadow_map,
+            self.shadow_map,
             self._geometry,
             self._programs,
             self._occluder,

@@ -1,4 +1,4 @@
-"""What a Generator holds on the GPU: opened when asked for, current only while it draws."""
+"""GpuSession: the GL context and renderer of a Generator, opened on first use."""
 
 import contextlib
 import os
@@ -10,23 +10,29 @@ from fastgen.render.cuda import CudaFrames
 from fastgen.render.gl import GLContext
 from fastgen.render.renderer import Renderer
 
-_Left = tuple[int, GLContext, Renderer | None, CudaFrames | None]
+_Abandoned = tuple[int, GLContext, Renderer | None, CudaFrames | None]
 
-_left: list[_Left] = []
-"""Process that used what was dropped unclosed, and what that held."""
+_abandoned: list[_Abandoned] = []
+"""Process and GL objects of sessions that were dropped without being closed."""
 
 
-class Opened:
-    """A GL context with a renderer on it.
+class GpuSession:
+    """A GL context with a renderer on it, current only while it draws.
 
-    open_gl, make: open the one and make the other; bound to nothing that holds this, so that what
-    is dropped is gone at once. What was opened before a fork stays the parent's: the child opens
-    its own. What was dropped unclosed is freed when another is opened.
+    Threads take turns. A process that is forked off leaves its parent's context alone and opens its
+    own. What a session that was dropped unclosed held is freed when the next session opens.
     """
 
     def __init__(
         self, open_gl: Callable[[], GLContext], make: Callable[[GLContext], Renderer]
     ) -> None:
+        """Prepare a session without opening it.
+
+        Args:
+            open_gl: Opens a context.
+            make: Makes the renderer on it. Neither may hold a reference to this session, so that a
+                dropped session is collected at once.
+        """
         self._open_gl = open_gl
         self._make = make
         self._gl: GLContext | None = None
@@ -36,14 +42,18 @@ class Opened:
         self._lock = threading.RLock()
 
     def renderer(self) -> Renderer:
-        """The renderer, its context current. Raises ContextError without OpenGL."""
+        """Return the renderer with its context current.
+
+        Raises:
+            ContextError: There is no OpenGL.
+        """
         if self._process != os.getpid():
             self.close()
         if self._renderer is None:
             self._process = os.getpid()
-            for each in [each for each in _left if each[0] == self._process]:
+            for each in [each for each in _abandoned if each[0] == self._process]:
                 with contextlib.suppress(ValueError):  # another thread was quicker
-                    _left.remove(each)
+                    _abandoned.remove(each)
                     _free_quietly(*each[1:])
             self._gl = self._open_gl()
             try:
@@ -53,17 +63,17 @@ class Opened:
                 raise
         else:
             assert self._gl is not None
-            self._gl.make_current()  # another generator may have been at work in between
+            self._gl.make_current()  # another session may have drawn in between
         return self._renderer
 
     def context(self) -> GLContext:
-        """The context, current."""
+        """Return the context, current."""
         self.renderer()
         assert self._gl is not None
         return self._gl
 
     def frames(self, size: tuple[int, int]) -> CudaFrames:
-        """What hands frames of (width, height) = size to CUDA; always of the same size."""
+        """Return what hands frames to CUDA; (width, height) = size must not change."""
         gl = self.context()
         if self._cuda is None:
             self._cuda = CudaFrames(gl, size)
@@ -71,13 +81,15 @@ class Opened:
 
     @contextlib.contextmanager
     def drawing(self) -> Iterator[Renderer]:
-        """The renderer, to draw with, while other threads wait. Not to be nested. What stops that
-        half way, as Ctrl-C does, closes all: nobody knows what stands on the GPU then, and the next
-        draw would build on it."""
-        with self._alone():
+        """Lend the renderer while other threads wait. Must not be nested.
+
+        An interruption such as Ctrl-C closes the session: the state on the GPU is unknown then, and
+        the next draw would build on it.
+        """
+        with self._exclusive():
             try:
                 yield self.renderer()
-            except FastgenError:  # refused, not stopped
+            except FastgenError:  # a refused argument, not an interruption
                 raise
             except BaseException:
                 self.close()
@@ -86,32 +98,37 @@ class Opened:
                 if self._gl is not None:
                     self._gl.let_go()
 
-    def _alone(self) -> threading.RLock:
-        """A lock that no other thread of this process holds."""
-        if self._process != os.getpid():  # a thread that held it stayed with the parent
+    def _exclusive(self) -> threading.RLock:
+        """Return a lock that no other thread of this process holds."""
+        if self._process != os.getpid():  # a thread of the parent may have held the old one
             self._lock = threading.RLock()
         return self._lock
 
     def close(self) -> None:
-        """Free the renderer and its context; asked for again, they are opened again."""
-        with self._alone():
+        """Free renderer and context. The next use opens them again."""
+        with self._exclusive():
             gl, held = self._gl, (self._renderer, self._cuda)
-            # first, so that nothing goes on with what is freed in part
+            # first, so that nothing uses what is already freed in part
             self._cuda, self._renderer, self._gl = None, None, None
             if self._process == os.getpid() and gl is not None:
                 _free_quietly(gl, *held)
 
-    def __del__(self, left: "list[_Left]" = _left, process: Callable[[], int] = os.getpid) -> None:
-        # not freed here, perhaps in the middle of another's render: that switches contexts
+    def __del__(
+        self,
+        abandoned: "list[_Abandoned]" = _abandoned,
+        process: Callable[[], int] = os.getpid,
+    ) -> None:
+        # freeing switches contexts, perhaps in the middle of another session's draw: the next
+        # session that opens does it instead
         gl = getattr(self, "_gl", None)
         if gl is not None and self._process == process():
-            left.append((self._process, gl, self._renderer, self._cuda))
+            abandoned.append((self._process, gl, self._renderer, self._cuda))
 
 
 def _free_quietly(gl: GLContext, renderer: Renderer | None, cuda: CudaFrames | None) -> None:
-    """Free what nobody will use again; where that fails, it goes with the process."""
+    """Free GL objects that nobody will use again; on failure they go with the process."""
     with contextlib.suppress(ContextError):
-        gl.make_current()  # else what has the same names in another context is freed
+        gl.make_current()  # objects of another context may have the same names
         if cuda is not None:
             cuda.release()
         if renderer is not None:
