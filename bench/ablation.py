@@ -39,6 +39,7 @@ from results import machine, origin, parse_size, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.frame import Frame
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Scene
 
 NOTHING = Element("", "nothing")
@@ -61,6 +62,7 @@ class Drawer:
 
     def __init__(self, absence: Absence, whole: "Drawer | None" = None) -> None:
         self._absence = absence
+        self._latest: PreparedScene | None = None
         self._shared = whole is not None and absence.element.scene is not None
         if whole is not None and self._shared:
             self._generator = whole._generator
@@ -77,19 +79,27 @@ class Drawer:
     def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
         """Render the case's view of a scene."""
         with self._absence.gone():
-            renderer = self._generator._gpu.renderer()
-            return renderer.render(self._absence.scene(scene), scene.camera(case.camera), size)
+            renderer = self._generator.gpu.renderer()
+            return renderer.render(self._prepared(scene), scene.camera(case.camera), size)
 
     def seconds(self, case: Case, scene: Scene, size: tuple[int, int]) -> float:
         """Return the CPU time in seconds of one draw with warm caches."""
         with self._absence.gone():
-            renderer = self._generator._gpu.renderer()
-            less, camera = self._absence.scene(scene), scene.camera(case.camera)
-            renderer._ctx.finish()
+            renderer = self._generator.gpu.renderer()
+            prepared, camera = self._prepared(scene), scene.camera(case.camera)
+            renderer.draw(prepared, camera, size)
+            renderer.ctx.finish()
             began = time.process_time()
-            renderer.draw(less, camera, size)
-            renderer._ctx.finish()
+            renderer.draw(prepared, camera, size)
+            renderer.ctx.finish()
             return time.process_time() - began
+
+    def _prepared(self, scene: Scene) -> PreparedScene:
+        """Return the scene without the element."""
+        less = self._absence.scene(scene)
+        if self._latest is None or self._latest.scene != less:
+            self._latest = PreparedScene(less)
+        return self._latest
 
     def exposure(self, case: Case, scene: Scene) -> float:
         """Return the exposure of the case's camera."""

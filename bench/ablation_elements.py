@@ -10,10 +10,11 @@ from unittest import mock
 import numpy as np
 
 from fastgen.geometry.mesh import Mesh
-from fastgen.light import sky_visibility as openness
+from fastgen.geometry.shape_library import ShapeLibrary, SpreaderShape
+from fastgen.light import sky_visibility
 from fastgen.light.indirect_light import FormFactors
-from fastgen.render import programs, shapes
-from fastgen.render.sky_visibility_probe import Lit, SkyProbe
+from fastgen.render import programs
+from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.scene import Scene, Spreader
 from fastgen.scene.faces import FACE_AXES
 
@@ -83,15 +84,16 @@ class Absence:
         if element.text:
             yield programs, "expand", self._edited(programs.expand)
         if element.container:
-            for name in (
-                "build_container",
-                "container_outline",
-            ):  # the visible mesh, and the one for sun shadows
-                yield shapes, name, _built(getattr(shapes, name), element.container)
+            for name in ("container", "container_outline"):  # as drawn, and for sun shadows
+                yield ShapeLibrary, name, _edited_container(name, element.container)
         if element.spreader:
-            yield shapes, "build_spreader", _built(shapes.build_spreader, element.spreader)
-        for name in ("openness", "openness_of_spreader"):
-            yield SkyProbe, name, _probe(getattr(SkyProbe, name), element.open_sky)
+            yield ShapeLibrary, "spreader", _edited_spreader(element.spreader)
+        for name in ("container_light", "spreader_light"):
+            yield (
+                SkyVisibilityProbe,
+                name,
+                _probe(getattr(SkyVisibilityProbe, name), element.open_sky),
+            )
         if not element.thrown:
             yield FormFactors, "light", lambda _, sky, *others: np.asarray(sky)
 
@@ -118,20 +120,31 @@ def _edited_mesh(mesh: Mesh, edit: MeshEdit) -> Mesh:
     return edited
 
 
-def _built(build: Callable[..., Mesh], edit: MeshEdit) -> Callable[..., Mesh]:
-    return lambda *args, **named: _edited_mesh(build(*args, **named), edit)
+def _edited_container(name: str, edit: MeshEdit) -> Callable[..., Mesh]:
+    whole = getattr(ShapeLibrary, name)
+    return lambda *args, **named: _edited_mesh(whole(*args, **named), edit)
+
+
+def _edited_spreader(edit: MeshEdit) -> Callable[..., SpreaderShape]:
+    whole = ShapeLibrary.spreader
+    return lambda *args, **named: _edited_shape(whole(*args, **named), edit)
 
 
 @lru_cache(maxsize=64)
-def _all_open(mesh: Mesh) -> Lit:
+def _edited_shape(shape: SpreaderShape, edit: MeshEdit) -> SpreaderShape:
+    return SpreaderShape(_edited_mesh(shape.mesh, edit), _edited_mesh(shape.outline, edit))
+
+
+@lru_cache(maxsize=64)
+def _all_open(mesh: Mesh) -> LitMesh:
     dark = np.zeros(mesh.normals.shape, np.float32)
-    return Lit(mesh, openness.open_sky(mesh.normals), dark, dark)
+    return LitMesh(mesh, sky_visibility.open_sky(mesh.normals), dark, dark)
 
 
-def _probe(measured: Callable[..., Lit], open_sky: bool) -> Callable[..., Lit]:
-    """Wrap a SkyProbe method to use the unedited meshes, or to return unoccluded sky."""
+def _probe(measured: Callable[..., LitMesh], open_sky: bool) -> Callable[..., LitMesh]:
+    """Wrap a SkyVisibilityProbe method to use the unedited meshes, or to return unoccluded sky."""
 
-    def found(self: SkyProbe, mesh: Mesh, *others: Any) -> Lit:
+    def found(self: SkyVisibilityProbe, mesh: Mesh, *others: Any) -> LitMesh:
         if open_sky:
             return _all_open(mesh)
         return measured(self, *(_unedited(item) for item in (mesh, *others)))

@@ -48,8 +48,8 @@ from results import ROOT, machine, origin, save, write_section
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.export import export_glb
+from fastgen.geometry.shape_library import ShapeLibrary
 from fastgen.light import environment
-from fastgen.render import shapes
 from fastgen.scene import Camera, Scene
 
 PYRENDER_TEXEL_MM = 6.0
@@ -90,8 +90,7 @@ class Variant:
 
 
 def _coarse_mesh() -> Patches:
-    build = shapes.build_container
-    return [(shapes, "build_container", lambda *kind: build(*kind, max_edge_mm=2000.0))]
+    return [(ShapeLibrary, "container", ShapeLibrary.container_outline)]
 
 
 def _light_maps(scale: float) -> Callable[[], Patches]:

@@ -12,6 +12,7 @@ from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.labels.coverage import covered
 from fastgen.labels.objects import decal_of
@@ -81,7 +82,7 @@ def views(generator):
         close = Camera("near", (2500, -2600, 1900), (1500, -1000, 1300), 24.0)
         for camera in (*scene.cameras, close):
             yield generator.render(scene=scene, camera=camera)
-        mesh = generator._gpu.renderer().mesh(scene.container)
+        mesh = PreparedScene(scene).container
         for decal in [d for d in scene.decals if d.class_name and d.face == "front"][:3]:
             (x, y, z), *_ = mesh.sheet_to_surface("front", decal.center_mm)[0]
             # at 4 m the image is 3.6 m wide, so its border crosses the decal
@@ -92,7 +93,7 @@ def views(generator):
 def test_decal_coverage_matches_rays(generator):
     seen = cut = 0
     for sample in views(generator):
-        mesh = generator._gpu.renderer().mesh(sample.scene.container)
+        mesh = PreparedScene(sample.scene).container
         view = unbounded(sample.view)
         hits = {}
         for item in (o for o in sample.objects if o.class_name == "text" or o.class_name[0] == "C"):
@@ -133,7 +134,7 @@ def test_damage_coverage_matches_rays(generator):
     seen = 0
     threshold = generator.config.damage.mask_threshold_mm
     for sample in views(generator):
-        mesh = generator._gpu.renderer().mesh(sample.scene.container)
+        mesh = PreparedScene(sample.scene).container
         view = unbounded(sample.view)
         everything = np.arange(len(mesh.triangles))
         ray, rest, _ = all_hits(mesh, everything, view, sample.scene.damages)
@@ -182,7 +183,7 @@ def test_coarse_sampling_outside_a_large_image_keeps_damage_boxes_and_fractions(
 def test_container_coverage_matches_its_silhouette(generator):
     cut = 0
     for sample in views(generator):
-        mesh = generator._gpu.renderer().mesh(sample.scene.container)
+        mesh = PreparedScene(sample.scene).container
         bare = dataclasses.replace(sample.scene, spreader=Spreader())
         whole = oracle.cast(mesh, unbounded(sample.view), bare).hit
         container = sample.objects[0]
@@ -217,7 +218,7 @@ def test_spreader_coverage_matches_rays(generator):
 def test_casting_keypoint_visibility_matches_rays(generator):
     flags = set()
     for sample in views(generator):
-        mesh = generator._gpu.renderer().mesh(sample.scene.container)
+        mesh = PreparedScene(sample.scene).container
         low, high = mesh.bounds_mm
         moved = damage_law.deform(sample.scene.damages, mesh.positions_mm)
         body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))

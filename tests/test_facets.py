@@ -8,21 +8,19 @@ import pytest
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
-from fastgen.geometry.container import build_container
-from fastgen.geometry.decal_facets import decal_outlines
+from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import Outlines
 from fastgen.geometry.facets import Facets, clip, in_fours
-from fastgen.labels.objects import _container_points
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Decal
 from tests import oracle
 
 
 @pytest.fixture(scope="module")
 def scenes():
-    """Damaged scenes, each with the mesh of its container."""
+    """Damaged scenes."""
     generator = Generator(Config.from_values({"damage": {"probability": 1.0}}), seed=31)
-    found = [generator.scene(index) for index in range(4)]
-    return [(s, build_container(s.container.kind, s.container.profiles)) for s in found]
+    return [PreparedScene(generator.scene(index)) for index in range(4)]
 
 
 def test_clipping_halves_a_square():
@@ -77,13 +75,15 @@ def test_facets_store_each_corner_once_and_are_cut_with_their_rest_positions():
 
 @pytest.mark.parametrize("turned_deg", [0.0, 17.0])
 def test_outlines_of_decals_lie_on_the_surface(scenes, turned_deg):
-    for scene, mesh in scenes:
+    for prepared in scenes:
+        scene, mesh = prepared.scene, prepared.container
         decals = [decal for decal in scene.decals if decal.class_name]
         decals = [
             dataclasses.replace(decal, rotation_deg=decal.rotation_deg + turned_deg)
             for decal in decals
         ]
-        found = decal_outlines(dataclasses.replace(scene, decals=tuple(decals)), mesh)
+        turned = dataclasses.replace(scene, decals=tuple(decals))
+        found = DecalSurface(turned, mesh).outlines_mm
         edges = Outlines.of(decals).points_mm()
         for decal, edge, around in zip(decals, edges, found, strict=True):
             away = edge - decal.center_mm
@@ -113,9 +113,9 @@ def test_sides_and_reach_of_outlines_equal_brute_force():
 
 def test_container_points_include_the_outermost_in_every_direction(scenes):
     directions = np.random.default_rng(7).normal(size=(200, 3))
-    for scene, mesh in scenes:
-        everything = damage_law.deform(scene.damages, mesh.positions_mm)
-        kept = _container_points(scene, mesh, bent=False)
+    for prepared in scenes:
+        everything = damage_law.deform(prepared.scene.damages, prepared.container.positions_mm)
+        kept = prepared.hull_points_mm
         assert len(kept) < len(everything) / 4
         farthest = (everything @ directions.T).max(axis=0)
         np.testing.assert_allclose((kept @ directions.T).max(axis=0), farthest, atol=1e-9)

@@ -16,7 +16,7 @@ from fastgen.camera.projection import view_of
 from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
-from fastgen.geometry.container import build_container
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.scene import Camera, Scene
 from fastgen.scene.faces import SHEET_FACES
 from tests.backends import BACKENDS
@@ -203,12 +203,13 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         for made in ("shapes.GpuMesh", "shapes.zone_table", "renderer.GpuLight"):
             monkeypatch.setattr(f"fastgen.render.{made}", never)
         monkeypatch.setattr("fastgen.light.sky_visibility.encoded", never)
-        monkeypatch.setattr("fastgen.geometry.mesh._Locator.of", never)
+        monkeypatch.setattr("fastgen.geometry.chart_sheet._Locator.of", never)
         for index in range(30):
             sample = generator.render(index)
             container = sample.scene.container
             for face in SHEET_FACES:
-                build_container(container.kind, container.profiles).sheet_to_surface(face, [[0, 0]])
+                mesh = SHAPES.container(container.kind, container.profiles)
+                mesh.sheet_to_surface(face, [[0, 0]])
 
 
 def test_a_sample_prints_in_one_line(generator):

@@ -18,6 +18,7 @@ from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
 from fastgen.geometry.divided_mesh import divided
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.labels.objects import decal_of
 from fastgen.render.gl import open_context
@@ -63,7 +64,7 @@ def samples(lens, focal_mm):
         for index in (1, 2):
             scene = generator.scene(index)
             sample = generator.render(scene=scene, camera=camera(lens, focal_mm))
-            yield sample, generator._gpu.renderer().mesh(scene.container)
+            yield sample, PreparedScene(scene).container
 
 
 @pytest.fixture(scope="module", params=LENSES, ids=lambda name: name.replace(" ", "_"))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.srgb import DECODED
 from tests.plain import EVEN_PAINT
 
@@ -33,7 +34,7 @@ def wall(request):
         scene = generator.scene(request.param)
         rust = replace(scene.surface.rust, albedo=(0.0, 0.0, 0.0))
         scene = replace(scene, decals=(), surface=replace(scene.surface, rust=rust))
-        mesh = generator._gpu.renderer().mesh(scene.container)
+        mesh = PreparedScene(scene).container
         colors = generator.bake(scene, TEXEL_MM).base_color[::-1]
     side = next(c for c in mesh.charts if (c.face, c.material) == ("front", "paint_sheet"))
     x, y, width, height = (np.array(side.rect_mm) / TEXEL_MM).astype(int)
@@ -74,7 +75,7 @@ def test_old_rust_is_darker_and_lies_inside_younger_rust():
     config = Config.from_values({"damage": {"probability": 0}, **values})
     with Generator(config, 3, (64, 64)) as generator:
         scene = replace(generator.scene(0), decals=())
-        mesh = generator._gpu.renderer().mesh(scene.container)
+        mesh = PreparedScene(scene).container
         colors = DECODED[generator.bake(scene, 5.0).base_color[::-1]]
     roof = next(c for c in mesh.charts if (c.face, c.material) == ("roof", "paint_sheet"))
     x, y, width, height = (np.array(roof.rect_mm) / 5.0).astype(int)

@@ -7,9 +7,10 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.geometry.mesh import MATERIALS
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.rust import rusted
-from fastgen.render.shapes import spreader_mesh
-from fastgen.render.surface_values import reflectances, scene_values
+from fastgen.render.surface_values import SceneMaterials, scene_values
+from fastgen.scene import Spreader
 from fastgen.srgb import DECODED
 
 
@@ -32,7 +33,7 @@ def test_mean_albedo_under_rust_equals_baked_textures(rust):
     )
     with Generator(config, seed=3, size=(64, 64)) as generator:
         scene = generator.scene(index=1)
-        meshes = generator._gpu.renderer().mesh(scene.container), spreader_mesh(scene)
+        meshes = PreparedScene(scene).container, PreparedScene(scene).spreader.mesh
         atlases = generator.bake(scene, texel_mm=20.0), generator.bake_spreader(scene, 20.0)
     scene = replace(scene, decals=())
     base, trait = (np.asarray(scene_values(scene, 16)[f"material_{k}"]) for k in ("base", "trait"))
@@ -58,12 +59,13 @@ def test_mean_albedo_under_rust_equals_baked_textures(rust):
 
 def test_reflectance_is_albedo_plus_a_few_percent_specular():
     with Generator(seed=3, size=(64, 64)) as generator:
-        scene = generator.scene(index=1)
-        meshes = (generator._gpu.renderer().mesh(scene.container),)
+        scene = replace(generator.scene(index=1), spreader=Spreader(present=False))
     surface = scene.surface
     plain = replace(scene, surface=replace(surface, rust=replace(surface.rust, coverage=0.0)))
     paint = np.array(surface.paint.albedo)
-    sheet = np.array(reflectances(plain, meshes)[MATERIALS.index("paint_sheet")])
+    sheet = np.array(
+        SceneMaterials(PreparedScene(plain)).reflectances[MATERIALS.index("paint_sheet")]
+    )
     mirrored = (sheet - paint) / (1 - paint)
     assert (mirrored > 0.01).all()
     assert (mirrored < 0.1).all()

@@ -9,6 +9,7 @@ from fastgen import Config, Generator
 from fastgen.geometry.container import build_container
 from fastgen.geometry.damaged_mesh import damaged_mesh
 from fastgen.geometry.mesh import MATERIALS
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.render.gl import open_context
 from fastgen.scene import Camera, Damage
@@ -345,7 +346,7 @@ def test_small_pieces_age_alike_wherever_they_lie_in_the_atlas(even):
     surface = replace(scene.surface, ageing=replace(scene.surface.ageing, strength=1.0))
     scene = replace(scene, surface=surface, decals=())
     atlas = generator.bake(scene, 4.0)
-    mesh = generator._gpu.renderer().mesh(scene.container)
+    mesh = PreparedScene(scene).container
     small = np.array([zone.small for zone in mesh.zones])
     materials = np.array([mesh.charts[zone.chart].material_index for zone in mesh.zones])
     middle = mesh.atlas_mm[mesh.triangles].astype(float).mean(axis=1)

@@ -1,7 +1,7 @@
 """The eight corner fittings with their apertures, ISO 1161.
 
-An aperture is a recessed pocket with a twelve-point outline: at 10 m through a 45 mm lens on a
-36 mm sensor 640 px wide, 1 px is 12.5 mm, so a 63 mm opening is 5 px and needs no rounder arc.
+An aperture is a recessed pocket with a twelve-point outline. At 10 m, a 45 mm lens and a 36 mm
+sensor of 640 pixels resolve 12.5 mm: a 63 mm opening covers 5 pixels and needs no rounder arc.
 """
 
 import numpy as np
@@ -11,18 +11,18 @@ from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon, sweep
 from fastgen.scene.faces import FACE_AXES, FACES
 
 APERTURE_CENTER_MM = (101.5, 89.0, 59.0)
-"""Aperture centres from the end (x), the side (y) and the bottom or top (z)."""
+"""Distance of the aperture centres from the end (x), the side (y) and the bottom or top (z)."""
 
 _APERTURES: dict[int, tuple[tuple[float, float], float]] = {
     0: ((63.5, 51.0), 36.0),
     1: ((79.0, 63.5), 50.0),
     2: ((124.0, 63.5), 70.0),
 }
-"""By the face's axis: ((width, height) as seen, depth). No pocket reaches into another one."""
+"""((width, height) seen from outside, depth) by the axis of the face. Pockets do not overlap."""
 
 
 def castings(layout: Layout) -> list[Sheet]:
-    """All sheets of the eight fittings."""
+    """Return all sheets of the eight fittings."""
     half = np.array([*layout.half, layout.top / 2])
     sheets = []
     for x_face in ("no_door", "door"):
@@ -35,7 +35,7 @@ def castings(layout: Layout) -> list[Sheet]:
 
 
 def _casting(name: str, faces: tuple[str, str, str], half: Array, signs: Array) -> list[Sheet]:
-    """signs: [3], which corner of the box with half sizes `half` [3] it stands in."""
+    """Return the sheets of the fitting at corner `signs` [3] of a box of half size `half` [3]."""
     size = np.array(CASTING_MM)
     shift = np.array([0.0, 0.0, half[2]])
     corner = signs * half + shift
@@ -75,7 +75,7 @@ def _opposite(face: str) -> str:
 
 
 def _rectangle(corner: Array, far: Array, axis: int, level: float) -> Array:
-    """The four points [4, 3] of a casting's face at `level` along `axis`, in turn."""
+    """Return the corners [4, 3] of a casting's face at `level` along `axis`, in order around it."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     points = np.empty((4, 3))
     points[:, axis] = level
@@ -85,7 +85,7 @@ def _rectangle(corner: Array, far: Array, axis: int, level: float) -> Array:
 
 
 def _stadium(width: float, height: float) -> Array:
-    """Outline [12, 2] around the origin, counter-clockwise, with points on both axes."""
+    """Return an outline [12, 2] around the origin, counter-clockwise, with points on both axes."""
     radius = height / 2
     straight = width / 2 - radius
     diagonal = radius * np.sqrt(0.5)
@@ -97,7 +97,7 @@ def _stadium(width: float, height: float) -> Array:
 
 
 def _plate_with_hole(rectangle: Array, outline: Array, right: Array, up: Array) -> Patch:
-    """The plate between four corners [4, 3] and an outline [12, 3] with points on both axes."""
+    """Return the plate between corners [4, 3] and an outline [12, 3] with points on both axes."""
     seen = np.column_stack([rectangle @ right, rectangle @ up])
     middle = seen.mean(axis=0)
     turn = np.arctan2(seen[:, 1] - middle[1], seen[:, 0] - middle[0])

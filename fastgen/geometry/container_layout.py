@@ -1,6 +1,7 @@
-"""The measures of a container: kinds, corrugations, and where its members stand.
+"""Dimensions of a container: positions of its members by kind and corrugation.
 
-Inset d: distance from the castings' outer plane of an end, e: from that of a side, both in mm.
+Inset d is the distance from the castings' outer plane at an end, inset e the distance from the one
+at a side; both in mm.
 """
 
 from dataclasses import dataclass
@@ -14,30 +15,37 @@ Array = NDArray[np.float64]
 
 
 CASTING_MM = (178.0, 162.0, 118.0)
-"""Corner fitting along x, y and z; ISO 1161."""
+"""Size of a corner fitting along x, y and z; ISO 1161."""
 
 OVERLAP_MM = 5.0
-"""Parts run this far into one another, so that no ray slips between them."""
+"""Parts overlap by this much, so that no ray passes between them."""
 
 FLOOR_MM = 145.0
 BASE_RAIL_TOP_MM = 162.0
 FRONT_SILL_TOP_MM = 120.0
 RING_BOTTOM_MM = 11.0
-"""Lower edge z of rails and sills; ISO 668 keeps the base 12.5 mm (+5, -1.5) off the ground."""
+"""z of the lower edge of rails and sills; ISO 668 keeps the base 12.5 mm (+5, -1.5) off the
+ground."""
 
 RING_TOP_MM = 5.0
-"""Rails and headers below the top castings' plane."""
+"""Distance of rails and headers below the plane of the top castings."""
 
 DOOR_RING_MM = 12.0
-"""Inset of the rear posts, the gutter and the sill's lip; all door gear lies deeper."""
+"""Inset d of the rear posts, the gutter and the sill's lip; all door gear lies deeper."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the members of one container stand; depths follow the corrugations they cover.
+    """Positions of the members of one container; depths follow the corrugations they cover.
 
-    The recesses are insets from the castings' planes: of the walls' outermost flats, and of posts
-    and side rails.
+    Attributes:
+        kind: Outer dimensions.
+        profiles: Corrugation of the walls.
+        max_edge_mm: Longest edge on corrugated walls and door leaves.
+        side_recess_mm: Inset e of the side walls' outermost flats.
+        end_recess_mm: Inset d of the front end wall's outermost flats.
+        roof_recess_mm: Depth of the roof's outermost flats below the castings' plane.
+        frame_recess_mm: Inset of posts and side rails.
     """
 
     kind: ContainerKind
@@ -61,7 +69,7 @@ class Layout:
 
     @property
     def side_inner_mm(self) -> float:
-        """Inset e of the rails' inner faces: behind the side wall's inner flats."""
+        """Inset e of the rails' inner faces, behind the side wall's inner flats."""
         return max(64.0, self.side_recess_mm + self.profiles.side.depth_mm + 10)
 
     @property
@@ -71,12 +79,12 @@ class Layout:
 
     @property
     def post_mm(self) -> float:
-        """Inset d and e of the square front posts' inner faces, which is their width."""
+        """Insets d and e of the square front posts' inner faces, equal to their width."""
         return max(84.0, self.side_inner_mm, self.end_inner_mm)
 
     @property
     def rail_bottom_mm(self) -> float:
-        """Lower edge z of the top rails and the front header."""
+        """z of the lower edge of the top rails and the front header."""
         return self.top - max(65.0, self.roof_recess_mm + self.profiles.roof.depth_mm + 15)
 
     @property
@@ -85,7 +93,7 @@ class Layout:
         return 150.0, max(112.0, self.side_inner_mm)
 
     def outside_castings(self, points_mm: Array) -> NDArray[np.bool_]:
-        """Which points [..., 3] lie in no corner fitting, bool [...]."""
+        """Test which points [..., 3] lie outside all corner fittings; bool [...]."""
         half_length, half_width = self.half
         long, wide, high = CASTING_MM
         x, y, z = np.moveaxis(np.abs(points_mm), -1, 0)

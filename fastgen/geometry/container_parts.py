@@ -21,26 +21,26 @@ from fastgen.geometry.unfold import Patch, Sheet, breaks, coarsened, prism, swee
 from fastgen.scene.faces import FACE_AXES
 
 FORK_CENTERS_MM = (-1025.0, 1025.0)
-"""Fork pockets of a 20' container; ISO 1496-1 annex C: 2050 between centres, at least 355 wide and
-115 high, at least 20 above the base plane."""
+"""x of the fork pockets of a 20' container. ISO 1496-1 annex C: 2050 mm between centres, at least
+355 wide and 115 high, at least 20 above the base plane."""
 
 FORK_WIDTH_MM = 360.0
 FORK_Z_MM = (20.0, 136.0)
 
 DOOR_HEADER_MM = DOOR_SILL_MM = 120.0
-"""The door opening ends here from the top and from the bottom: flush with the castings."""
+"""Height of the door header and of the door sill, flush with the castings."""
 
 DOOR_FACE_MM = 50.0
-"""Inset of the door header's and sill's faces; the locking bars pass in front of them."""
+"""Inset d of the faces of the door header and sill; the locking bars pass in front of them."""
 
 _MEMBER_SPACING_MM = 300.0
 
 _FLOOR_CUT_MM, _MEMBER_CUT_MM = 280.0, 400.0
-"""The floor and the members below it are cut across so often: a lens bends corners only."""
+"""Spacing of cuts across the floor and the members below it: a lens distorts corners only."""
 
 
 def frame(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
-    """Posts, rails, headers and sills. Their stations are those of the walls beside them."""
+    """Return posts, rails, headers and sills, cut at the stations of the walls beside them."""
     return [
         *_posts(layout, walls),
         *_top_rails(layout, walls),
@@ -51,7 +51,7 @@ def frame(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
 
 
 def ring(outline: Sequence[tuple[float, float]]) -> Array:
-    """The outline [N, 2] counter-clockwise."""
+    """Return an outline [N, 2] in counter-clockwise order."""
     points = np.array(outline, np.float64)
     x, y = points.T
     area = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
@@ -64,7 +64,7 @@ def _posts(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
     stations = breaks(low, high, layout.max_edge_mm, walls["front"].rows_mm)
     outer, front = layout.frame_recess_mm, layout.post_mm
     depth, inner = layout.door_post_mm
-    step = inner - 42.0  # the hinges stand on this step
+    step = inner - 42.0  # the hinges are mounted on this step
     square = [(outer, outer), (front, outer), (front, front), (outer, front)]
     stepped = [
         (DOOR_RING_MM, outer), (depth, outer), (depth, inner),
@@ -94,7 +94,7 @@ def _top_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
 
 
 def _side_stations(layout: Layout, wall: Panel) -> Array:
-    """x from casting to casting, at knots of the side wall, so that both move as one."""
+    """Return x from casting to casting at knots of the side wall, so that both bend alike."""
     reach = layout.half[0] - CASTING_MM[0] + OVERLAP_MM
     knots = np.sort(wall.knots_mm * FACE_AXES[wall.sheet.face].right[0])
     inside = knots[(knots > -reach) & (knots < reach)]
@@ -137,7 +137,7 @@ def _bottom_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
 
 
 def _front_beams(layout: Layout, wall: Panel) -> list[Sheet]:
-    """Header and sill of the front end. The sill's inner side reaches up past the floor."""
+    """Return header and sill of the front end; the sill's inner side ends above the floor."""
     half_length, half_width = layout.half
     reach = half_width - CASTING_MM[1] + OVERLAP_MM
     inside = -wall.knots_mm[::-1]
@@ -156,7 +156,7 @@ def _front_beams(layout: Layout, wall: Panel) -> list[Sheet]:
 
 
 def _door_beams(layout: Layout) -> list[Sheet]:
-    """Header with its rain gutter and sill with its lip: both reach out to the door's ring."""
+    """Return the header with its rain gutter and the sill with its lip, both at DOOR_RING_MM."""
     half_length, half_width = layout.half
     reach = half_width - CASTING_MM[1] + OVERLAP_MM
     stations = breaks(-reach, reach, layout.max_edge_mm)
@@ -175,12 +175,12 @@ def _door_beams(layout: Layout) -> list[Sheet]:
 
 
 def _profile(section: list[tuple[float, float]]) -> Array:
-    """A section (x, z) as points in space, to be swept along y."""
+    """Return a section (x, z) as points [N, 3] for a sweep along y."""
     return np.array([(x, 0.0, z) for x, z in section])
 
 
 def _beam(name: str, face: str, section: list[tuple[float, float]], stations: Array) -> Sheet:
-    """A beam along y; its section (x, z) runs clockwise as seen from -y."""
+    """Return a beam along y; its section (x, z) runs clockwise as seen from -y."""
     patch = sweep(_profile(section), stations, (0, 1, 0))
     return Sheet(name, face, "paint_frame", "frame", patch)
 
@@ -190,7 +190,7 @@ def _fork_centers(layout: Layout) -> tuple[float, ...]:
 
 
 def base(layout: Layout) -> list[Sheet]:
-    """Floor, cross members and fork pockets, seen from below."""
+    """Return floor, cross members and fork pockets, as seen from below."""
     half_length, half_width = layout.half
     reach_y = half_width - layout.side_inner_mm + OVERLAP_MM
     start = -half_length + layout.end_inner_mm
@@ -228,14 +228,14 @@ def base(layout: Layout) -> list[Sheet]:
 
 
 def _member(x: float, rows: Array) -> Patch:
-    """A C channel across: web, lower flange and the web's other side; the rest is in the floor."""
+    """Return a C channel across; its upper flange is inside the floor."""
     top, flange, lip = FLOOR_MM + 2, x + 45.0, 18.0
     section = [(x + 5, top), (x + 5, lip), (flange, lip), (flange, 12.5), (x, 12.5), (x, top)]
     return sweep(_profile(section), rows, (0, 1, 0))
 
 
 def _fork_lining(center: float, outer: float) -> Patch:
-    """The tunnel from side to side, seen from inside."""
+    """Return the tunnel from side to side, facing inward."""
     low, high = center - FORK_WIDTH_MM / 2, center + FORK_WIDTH_MM / 2
     bottom, top = FORK_Z_MM
     section = [(low, bottom), (high, bottom), (high, top), (low, top), (low, bottom)]

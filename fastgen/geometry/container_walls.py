@@ -22,8 +22,14 @@ Flats = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A corrugated wall. flats: outer flats in sheet mm. knots_mm: stations across the ridges, as
-    seen from outside from left to right. rows_mm: stations along the ridges."""
+    """A corrugated wall.
+
+    Attributes:
+        sheet: The wall's surface.
+        flats: Sheet coordinates (start, end) in mm of the outermost flats.
+        knots_mm: Stations across the ridges, from left to right seen from outside.
+        rows_mm: Stations along the ridges.
+    """
 
     sheet: Sheet
     flats: Flats
@@ -32,9 +38,19 @@ class Panel:
 
 
 def wave_knots(wave: Wave, low: float, high: float, margin: float) -> tuple[Array, Array]:
-    """Stations [K] from low to high and the depth [K] there of whole waves, centred.
+    """Fit as many whole waves as possible between two stations, centred.
 
-    margin: least width of the flat on either side. Raises ConfigError if not one wave fits.
+    Args:
+        wave: One wave of the corrugation.
+        low: First station in mm.
+        high: Last station in mm.
+        margin: Least width in mm of the flat on either side.
+
+    Returns:
+        Stations [K] in mm from low to high, and the depth [K] in mm at each.
+
+    Raises:
+        ConfigError: Not even one wave fits.
     """
     count = int((high - low + wave.outer_mm - 2 * margin) // wave.pitch_mm)
     if count < 1:
@@ -50,7 +66,7 @@ def wave_knots(wave: Wave, low: float, high: float, margin: float) -> tuple[Arra
 
 
 def panels(layout: Layout) -> dict[str, Panel]:
-    """The four corrugated walls by face."""
+    """Return the four corrugated walls by face."""
     half_length, half_width = layout.half
     long, wide, high = (size - OVERLAP_MM for size in CASTING_MM)
     post = layout.post_mm - OVERLAP_MM
@@ -99,7 +115,18 @@ def _panel(
     along: tuple[float, float],
     row_notches: tuple[float, ...],
 ) -> Panel:
-    """A wall in the plane `plane` from the origin; castings are cut out of its corners."""
+    """Return a wall with the castings cut out of its corners.
+
+    Args:
+        layout: Dimensions of the container.
+        face: Face of the wall.
+        wave: Its corrugation.
+        plane: Distance of its outermost flats from the origin, along the face's outward axis.
+        across: First and last station across the ridges.
+        notches: Stations across the ridges where the castings begin.
+        along: First and last station along the ridges.
+        row_notches: Stations along the ridges where the castings begin.
+    """
     axes = FACE_AXES[face]
     low, high = across
     margin = max(notches[0] - low, high - notches[1]) + 2 * OVERLAP_MM
@@ -108,11 +135,11 @@ def _panel(
     station_depths = np.interp(stations, knots, depths)
     lengths = np.hypot(np.diff(stations), np.diff(station_depths))
     station_arc = np.append(0.0, np.cumsum(lengths))
-    # a cell's diagonal is an edge too: columns are no wider than the wave's own facets and take at
-    # most 0.8 of it, rows what is left
+    # a cell's diagonal counts as an edge: columns are no wider than the wave's facets and at most
+    # 0.8 max_edge_mm, and rows are limited by the diagonal that remains
     widest = max(wave.outer_mm, wave.inner_mm, float(np.hypot(wave.slope_mm, wave.depth_mm)))
     if face == "no_door":
-        widest /= 2  # light changes most across the facets of deep waves
+        widest /= 2  # light varies most across the facets of deep waves
     arc = breaks(0.0, station_arc[-1], min(widest, 0.8 * layout.max_edge_mm), station_arc)
     columns, depth = (
         np.interp(arc, station_arc, stations),

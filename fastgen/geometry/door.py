@@ -1,7 +1,7 @@
 """The door end: two leaves with swages on one sheet, their edges and gaskets.
 
-Insets d are measured from the castings' plane of the door end inward, in mm. The gear that stands
-on the leaves is in door_gear.
+Insets are distances in mm inward from the castings' plane of the door end. door_gear.py has the
+locking gear in front of the leaves.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ LEAF_MM = 58.0
 """Inset of the leaves' face."""
 
 SWAGE = Wave(424.0, 22.0, 110.0, 32.0, 250.0)
-"""Horizontal swages, shallow enough that the flat stiles beside them share their unfolding:
-on the slopes a stile is stretched by sqrt(1 + (22 / 32)^2) = 1.21."""
+"""Horizontal swages. They are so shallow that the flat stiles beside them can share their
+unfolding: beside a slope, a stile is stretched by sqrt(1 + (22 / 32)^2) = 1.21."""
 
 GASKET_MM = 14.0
 """Width of the seal around each leaf, set back to _GASKET_INSET_MM."""
@@ -29,7 +29,7 @@ _GASKET_INSET_MM = 72.0
 _CENTER_GAP_MM = 12.0
 _STILE_MM = 70.0
 _SHADE_MM = 50.0
-"""The leaves are cut as narrow: what a locking bar takes of the sky's light changes over that."""
+"""Width of cells on the leaves: the shade beside a locking bar varies over this distance."""
 
 _UP = FACE_AXES["door"].up
 _RIGHT = FACE_AXES["door"].right
@@ -37,8 +37,15 @@ _RIGHT = FACE_AXES["door"].right
 
 @dataclass(frozen=True)
 class Opening:
-    """Where the leaves stand. half_width: of the door opening; low, high: z of a leaf's edges;
-    left: y range of the left leaf, the right one mirrors it; x: of the castings' plane."""
+    """Position of the leaves.
+
+    Attributes:
+        half_width: Half the width of the door opening.
+        low: z of a leaf's lower edge.
+        high: z of a leaf's upper edge.
+        left: Range of y of the left leaf; the right leaf mirrors it.
+        x: x of the castings' plane.
+    """
 
     half_width: float
     low: float
@@ -48,7 +55,7 @@ class Opening:
 
 
 def opening(layout: Layout) -> Opening:
-    """The door opening between the rear posts, the sill and the header."""
+    """Return the door opening between the rear posts, the sill and the header."""
     half_width = layout.half[1] - layout.door_post_mm[1]
     return Opening(
         half_width,
@@ -60,7 +67,7 @@ def opening(layout: Layout) -> Opening:
 
 
 def leaves(layout: Layout) -> tuple[list[Sheet], Flats]:
-    """Both leaves with edges and gaskets, and the outer flats of their sheet along its y."""
+    """Return both leaves with edges and gaskets, and the outer flats along y of their sheet."""
     place = opening(layout)
     knots, depths = wave_knots(SWAGE, place.low, place.high, 90.0)
     arc_knots = np.append(0.0, np.cumsum(np.hypot(np.diff(knots), np.diff(depths))))
@@ -77,7 +84,7 @@ def leaves(layout: Layout) -> tuple[list[Sheet], Flats]:
             profile = np.column_stack([x, np.zeros(len(z)), z])
             rows = breaks(a, b, min(_SHADE_MM, 0.7 * layout.max_edge_mm))
             patch = sweep(profile, rows, _RIGHT, upright=False, arc_mm=arc)
-            # one sheet for both leaves: its x is y, up to a constant
+            # both leaves share one sheet, whose x is y plus a constant
             shift = (a - place.left[0], 0.0)
             patches.append(
                 Patch(patch.positions_mm, patch.normals, patch.sheet_mm + shift, patch.triangles)
@@ -96,7 +103,7 @@ def leaves(layout: Layout) -> tuple[list[Sheet], Flats]:
 
 
 def _swage_ends(knots: Array, place: Opening, low: float, high: float) -> list[Patch]:
-    """The trapezoids that close the swages toward the stiles."""
+    """Return the trapezoids that close the swages toward the stiles."""
     top, bottom = place.x - LEAF_MM, place.x - LEAF_MM - SWAGE.depth_mm
     patches = []
     for z in knots[1:-1].reshape(-1, 4):
@@ -108,7 +115,7 @@ def _swage_ends(knots: Array, place: Opening, low: float, high: float) -> list[P
 
 
 def _leaf_edges(layout: Layout, place: Opening, low: float, high: float) -> list[Patch]:
-    """The leaf's four narrow sides, down to behind the gasket."""
+    """Return the leaf's four narrow sides, which end behind the gasket."""
     face, back = place.x - LEAF_MM, place.x - _GASKET_INSET_MM - OVERLAP_MM
     z = breaks(place.low, place.high, layout.max_edge_mm)
     y = breaks(low, high, layout.max_edge_mm)
@@ -121,7 +128,7 @@ def _leaf_edges(layout: Layout, place: Opening, low: float, high: float) -> list
 
 
 def _gaskets(layout: Layout, place: Opening) -> list[Patch]:
-    """Seals around both leaves: strips in one plane, their ends under the neighbours' edges."""
+    """Return the seals around both leaves: strips in one plane that overlap their neighbours."""
     x = place.x - _GASKET_INSET_MM
     step = layout.max_edge_mm
     out_y, out_low = place.half_width + OVERLAP_MM, place.low - GASKET_MM - OVERLAP_MM

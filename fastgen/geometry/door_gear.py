@@ -1,7 +1,7 @@
 """Locking gear and hinges of the door end.
 
-A locking bar of 34 mm seen from 10 m through 45 mm on a 36 mm sensor 640 px wide (12.5 mm a
-pixel) is under 3 px wide, so eight sides are round enough; hinge knuckles of 28 mm get six.
+At 10 m, a 45 mm lens and a 36 mm sensor of 640 pixels resolve 12.5 mm. A locking bar of 34 mm is
+under 3 pixels wide, so eight sides are round enough; hinge knuckles of 28 mm get six.
 """
 
 import numpy as np
@@ -17,32 +17,35 @@ BAR_Y_MM = (-825.0, -275.0, 275.0, 825.0)
 
 _BAR_INSET_MM = 31.0
 _BAR_END_MM = 50.0
-"""The bars end this far from the castings' top and bottom planes."""
+"""Distance of the bars' ends from the castings' top and bottom planes."""
 
 _CAM_MM = 76.0
-"""Height of the bottom cams; the top ones hang as far below the top."""
+"""z of the bottom cams, and distance of the top cams below the container's top."""
 
 _BACK_MM = LEAF_MM + SWAGE.depth_mm + 4.0
-"""What stands on a leaf reaches behind the deepest swage."""
+"""Inset of the back of gear on a leaf, behind the deepest swage."""
 
 _FRONT_MM = DOOR_RING_MM + 0.5
 
 _BEND_MM = 80.0
-"""Blocks are cut as short, so that levers bend with a dented leaf and stay before it."""
+"""Longest piece of a block: levers bend with a dented leaf and stay in front of it."""
 
 
 _ON_BARS = ("bar", "cams", "brackets", "handle")
 
 
 def is_gear(chart: Chart) -> bool:
-    """Whether a chart is of a locking bar or hangs on one: it stands before the leaves and is not
-    torn or scarred with them, though it bends as they do."""
+    """Return True for charts of locking bars and their attachments.
+
+    They are in front of the leaves. Holes and scars in a leaf leave them whole, but they bend with
+    it.
+    """
     name = chart.name.split(".")
     return name[0] == "door" and len(name) > 1 and name[1] in _ON_BARS
 
 
 def gear(layout: Layout) -> list[Sheet]:
-    """Bars, cams, keepers, brackets, handles, catches and hinges."""
+    """Return bars, cams, keepers, brackets, handles, catches and hinges."""
     place = opening(layout)
     sheets = []
     for i, y in enumerate(BAR_Y_MM):
@@ -71,13 +74,13 @@ def _block(
 
 def _bar(layout: Layout, place: Opening, y: float) -> Patch:
     stations = breaks(_BAR_END_MM, layout.top - _BAR_END_MM, 2 * layout.max_edge_mm)
-    # unfolded from its back: there the sheet's borders, which rust like edges, are not seen
+    # unfolded from its back, which hides the sheet's borders: they rust like edges
     outline = np.roll(regular((place.x - _BAR_INSET_MM, y), BAR_RADIUS_MM, 8), 4, axis=0)
     return prism(outline, stations, 2, capped=(True, True))
 
 
 def _cams(layout: Layout, place: Opening, y: float, toward: float) -> list[Patch]:
-    """The forging at either end: a collar with a nose toward the middle of the door."""
+    """Return the forging at either end: a collar with a nose toward the middle of the door."""
     x = place.x - _BAR_INSET_MM
     nose = [(-16.0, -22.0), (16.0, -22.0), (18.0, 10.0), (10.0, 44.0), (-6.0, 44.0), (-18.0, 10.0)]
     outline = np.array([(x + dx, y + toward * dy) for dx, dy in nose])
@@ -90,7 +93,7 @@ def _cams(layout: Layout, place: Opening, y: float, toward: float) -> list[Patch
 
 
 def _keepers(layout: Layout, place: Opening, y: float) -> list[Patch]:
-    """Two jaws on the sill and on the header, above and below each cam's nose."""
+    """Return two jaws on the sill and on the header, above and below each cam's nose."""
     toward = -np.sign(y)
     patches = []
     for z in (_CAM_MM, layout.top - _CAM_MM):
@@ -102,7 +105,7 @@ def _keepers(layout: Layout, place: Opening, y: float) -> list[Patch]:
 
 
 def _brackets(place: Opening, y: float) -> list[Patch]:
-    """Guides that hold the bar to the leaf: a plate and a saddle over the bar."""
+    """Return the guides that fix the bar to the leaf: a plate, and a saddle over the bar."""
     patches = []
     for share in (0.12, 0.5, 0.88):
         z = place.low + share * (place.high - place.low)
@@ -112,9 +115,9 @@ def _brackets(place: Opening, y: float) -> list[Patch]:
 
 
 def _handle(place: Opening, y: float, toward: float) -> list[Patch]:
-    """Hub on the bar, lever along the leaf and the catch at its end.
+    """Return the hub on the bar, the lever along the leaf, and the catch at its end.
 
-    Levers of neighbouring bars lie at different heights, so that they may pass each other.
+    Levers of neighbouring bars have different heights, so that they can overlap.
     """
     z = 1120.0 if abs(y) > 500 else 980.0
     end = y + toward * 470.0
@@ -127,7 +130,7 @@ def _handle(place: Opening, y: float, toward: float) -> list[Patch]:
 
 
 def _hinges(place: Opening, sign: float) -> list[Patch]:
-    """Five a leaf: a strap on the leaf, a knuckle over the gap, two lugs on the post's step."""
+    """Return five hinges: a strap on the leaf, a knuckle over the gap, and two lugs on the post."""
     pin = sign * (place.half_width + 14.0)
     strap_end = sign * (place.half_width - 150.0)
     patches = []

@@ -1,4 +1,4 @@
-"""A triangle mesh with one texture atlas in millimetres, and the map from its sheets to the surface.
+"""A triangle mesh with one atlas in millimetres, and the map from its sheets to the surface.
 
 Container frame: right-handed, z up, origin at the centre of the footprint, z = 0 at the bottom of
 the bottom castings, +x at the door end.

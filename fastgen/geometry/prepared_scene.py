@@ -126,7 +126,5 @@ class PreparedScene:
         least = np.where(CORNER_SIGNS > 0, -np.inf, corners).max(axis=0)
         most = np.where(CORNER_SIGNS > 0, corners, np.inf).min(axis=0)
         moved = self.points_mm
-        inner = [
-            (along > a) & (along < b) for along, a, b in zip(moved.T, least, most, strict=True)
-        ]
-        return moved.compress(~np.logical_and.reduce(inner), axis=0)
+        inside = [(x > a) & (x < b) for x, a, b in zip(moved.T, least, most, strict=True)]
+        return moved.compress(~np.logical_and.reduce(inside), axis=0)

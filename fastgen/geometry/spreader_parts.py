@@ -1,9 +1,8 @@
 """The members of a ship-to-shore crane's spreader: frame, end beams, flippers, headblock, cables.
 
-Sizes are those that makers' drawings of single-lift telescopic spreaders have in common, to a
-few centimetres; a camera at 10 m sees no more. Heights `above` count from the spreader's lower
-plane. `ends` are the signs of the container's ends (-1 no_door, 1 door), `sides` those of its long
-sides (-1 front, 1 back).
+Sizes are common to manufacturers' drawings of single-lift telescopic spreaders, to a few
+centimetres; a camera at 10 m resolves no more. Heights named `above` are measured from the
+spreader's lower plane. An `end` is -1 (no_door) or 1 (door); a `side` is -1 (front) or 1 (back).
 """
 
 from collections.abc import Iterable
@@ -17,38 +16,39 @@ from fastgen.geometry.unfold import Patch, Sheet, beside, box, prism, regular
 from fastgen.scene.container_kinds import ContainerKind
 
 TIERS = ("frame", "headblock", "cables")
-"""What a spreader is made of from below, ever narrower: charts are named spreader.TIER.PART."""
+"""Tiers of a spreader from bottom to top, each narrower than the one below. Charts are named
+spreader.TIER.PART."""
 
 CABLE_LENGTH_MM = 12000.0
-"""What is drawn of the hoist cables: beyond the upper edge of every usual picture."""
+"""Modelled length of the hoist cables, which ends above the upper edge of usual images."""
 
 FLIPPER_REACH_MM = 330.0
-"""How far below the spreader's lower plane a lowered flipper ends."""
+"""Distance of a lowered flipper's end below the spreader's lower plane."""
 
 FLIPPER_GAP_MM = 30.0
-"""A lowered flipper's least distance from the planes of the container's sides and ends."""
+"""Least distance of a lowered flipper from the planes of the container's sides and ends."""
 
 _SIGNS = (-1.0, 1.0)
 
 _BEAM_Y_MM = 520.0
-"""The two main beams, and the sheaves above them, stand this far from the middle."""
+"""Distance of the two main beams, and of the sheaves above them, from the middle."""
 
 _FRAME_HALF_MM = 2650.0
-"""Half the main frame's length: what a spreader drawn in to 20 feet leaves room for."""
+"""Half the length of the main frame, which fits into a spreader retracted to 20 feet."""
 
 CUT_MM = 150.0
-"""Members are cut across so often: light is interpolated between vertices, and they hide it from
-each other where they meet."""
+"""Spacing of cuts across members. Indirect light is interpolated between vertices, and members
+shade each other where they meet."""
 
 _TWISTLOCK_MM = (-45.0, 220.0)
-"""A twistlock's ends above the castings' upper plane: its head reaches into a casting, which is 70
-deep there; its stem ends in its housing, however wide the gap below that is."""
+"""Heights of a twistlock's ends above the castings' upper plane. Its head is inside a casting,
+which is 70 mm deep there. Its stem ends inside its housing for every gap."""
 
 _PIVOT_MM = 200.0
-"""Height about which flippers swing: raised ones are lowered ones mirrored there."""
+"""Height of the flippers' pivot: raised flippers are lowered ones mirrored at this height."""
 
 _HEADBLOCK_MM = (690.0, 1000.0)
-"""Lower and upper edge of the headblock's beams."""
+"""Lower and upper edge of the headblock's beams above the spreader's lower plane."""
 
 _SHEAVE_X_MM, _SHEAVE_Z_MM, _SHEAVE_RADIUS_MM = 950.0, 1250.0, 330.0
 _CABLE_RADIUS_MM = 15.0
@@ -57,17 +57,20 @@ CABLES = 8
 CABLE_CHART = "spreader.cables.falls"
 
 LOCKS_CHARTS = {end: f"spreader.frame.locks.{end}" for end in ("no_door", "door")}
-"""Of the twistlocks at each end: what stays where it is when the rest is lifted."""
+"""Charts of the twistlocks at each end, which stay in place when the rest is lifted."""
 
 CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
-"""A cable's four sides lie along x and y."""
+"""Width of a cable, whose four sides are parallel to x and y."""
 
 
 @dataclass(frozen=True)
 class Hang:
-    """Where a spreader hangs: over which container, gap_mm above its upper castings.
+    """Position of a spreader over its container.
 
-    cut_mm: how often members are cut across.
+    Attributes:
+        kind: The container.
+        gap_mm: Distance of the spreader's lower plane from the castings' upper plane.
+        cut_mm: Spacing of cuts across members.
     """
 
     kind: ContainerKind
@@ -76,19 +79,19 @@ class Hang:
 
     @property
     def base(self) -> float:
-        """z of the spreader's lower plane in the container's frame."""
+        """z of the spreader's lower plane in the container frame."""
         return self.kind.height_mm + self.gap_mm
 
     def block(
         self, x: tuple[float, float], y: tuple[float, float], above: tuple[float, float]
     ) -> Patch:
-        """A box; x and y in either order."""
+        """Return a box from ranges of x and y in any order, and of the height above `base`."""
         low, high = (min(x), min(y), self.base + above[0]), (max(x), max(y), self.base + above[1])
         return box(low, high, self.cut_mm)
 
 
 def frame(hang: Hang) -> list[Sheet]:
-    """The main frame: two box beams and cross members."""
+    """Return the main frame: two box beams and cross members."""
     sheets = [
         _painted(
             f"spreader.frame.{name}",
@@ -106,7 +109,7 @@ def frame(hang: Hang) -> list[Sheet]:
 
 
 def ends(hang: Hang) -> list[Sheet]:
-    """Telescopic beams out of the main frame, end beams across, twistlocks in the castings."""
+    """Return telescopic beams, end beams across, and twistlocks in the castings."""
     sheets = []
     half_length, half_width = hang.kind.length_mm / 2, hang.kind.width_mm / 2
     for name, end in (("no_door", -1.0), ("door", 1.0)):
@@ -140,22 +143,26 @@ def ends(hang: Hang) -> list[Sheet]:
 
 
 def flippers(hang: Hang, down: tuple[bool, bool]) -> list[Sheet]:
-    """Gather guides at the corners: bent plates beside side and end, lowered or raised.
+    """Return the gather guides at the corners: bent plates beside each side and end.
 
-    down: those of the front and of the back side.
+    Args:
+        hang: Position of the spreader.
+        down: True where the flippers of the front and of the back side are lowered.
     """
     half = np.array([hang.kind.length_mm / 2, hang.kind.width_mm / 2])
     patches: list[Patch] = []
     for side, lowered in zip(_SIGNS, down, strict=True):
         for end in _SIGNS:
-            for across in (0, 1):  # the axis that the plate stands across
+            for across in (0, 1):  # the axis normal to the plate
                 patches.extend(_guide(hang, half, np.array([end, side]), across, lowered))
     return [_painted("spreader.frame.flippers", beside(patches))]
 
 
 def headblock(hang: Hang) -> list[Sheet]:
-    """What the cables carry: two beams on four feet, the cable basket, four sheaves; and the
-    cabinets that stand on the frame beside it."""
+    """Return the headblock and the cabinets on the frame beside it.
+
+    The headblock has two beams on four feet, the cable basket and four sheaves.
+    """
     low, high = _HEADBLOCK_MM
     beams = [
         hang.block((-1500.0, 1500.0), _around(side * _BEAM_Y_MM, 130.0), (low, high))
@@ -200,7 +207,7 @@ def headblock(hang: Hang) -> list[Sheet]:
 
 
 def cables(hang: Hang) -> list[Sheet]:
-    """Eight falls, two from each sheave straight up; under a pixel thick, so four sides will do."""
+    """Return eight vertical cables, two from each sheave; thinner than a pixel, with four sides."""
     falls = [
         prism(
             regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
@@ -211,7 +218,7 @@ def cables(hang: Hang) -> list[Sheet]:
 
 
 def cable_feet_mm(hang: Hang) -> list[tuple[float, float, float]]:
-    """Lower ends of the axes of the CABLES cables in the container's frame."""
+    """Return the lower ends of the CABLES cables' axes in the container frame, in mm."""
     z = hang.base + _SHEAVE_Z_MM
     return [
         (x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM, z)
@@ -232,11 +239,17 @@ def _around(middle: float, half: float) -> tuple[float, float]:
 def _guide(
     hang: Hang, half: np.ndarray, signs: np.ndarray, across: int, lowered: bool
 ) -> Iterable[Patch]:
-    """The plate at one corner that stands across axis 0 or 1, and the arm that holds it.
+    """Yield the parts of one gather guide: two pieces of its plate, and its arm.
 
-    half: half length and width. signs: which corner. Profiles are (outward, above): how far
-    outside the container's plane, how high over the spreader's lower plane when lowered.
+    Args:
+        hang: Position of the spreader.
+        half: Half length and half width of the container.
+        signs: The corner.
+        across: Axis normal to the plate, 0 or 1.
+        lowered: Whether the guide is lowered.
     """
+    # points (outward, above): distance outside the container's plane, and height above the
+    # spreader's lower plane when lowered
     gap = FLIPPER_GAP_MM
     straight = [(gap, 300.0), (gap + 25, 300), (gap + 25, -70), (gap, -70)]
     splayed = [(gap, -60.0), (gap + 25, -60), (gap + 125, -FLIPPER_REACH_MM)]
