@@ -9,25 +9,27 @@ import pytest
 from fastgen.camera import weather as falling
 from fastgen.camera.electronics import stamped
 from fastgen.camera.projection import view_of
-from fastgen.camera.sensor import develop
-from fastgen.camera.tone_curve import light_of
-from fastgen.camera.weather import rained
+from fastgen.camera.sensor import apply_camera_model
+from fastgen.camera.tone_curve import tone_map_and_encode
+from fastgen.camera.weather import add_rain
 from fastgen.config.config import Config
 from fastgen.frame import Frame
 from fastgen.generator import Generator
 from fastgen.scene import Camera
 from fastgen.scene.optics import Defocus, Noise, Rain, Sensor, Stamp, Weather
+from tests.tone_inverse import light_of
 
 SIZE = (161, 121)
 CAMERA = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0)
 AIR = (0.5, 0.5, 0.5)
 
 
-def recorded(image, sensor, depth_m=6.0):
-    """Return `image` [H, W, 3] as recorded by a camera with `sensor` from `depth_m` away."""
-    height, width = image.shape[:2]
+def recorded(light, sensor, depth_m=6.0):
+    """Return the image of `light` [H, W, 3] from `depth_m` away by a camera with `sensor`."""
+    height, width = light.shape[:2]
     frame = Frame(
-        image=image,
+        image=tone_map_and_encode(light),
+        radiance=light,
         cover=np.full((height, width), 255, np.uint8),
         ids=np.ones((height, width), np.uint16),
         damage=np.full((height, width), 1, np.uint16),
@@ -35,53 +37,56 @@ def recorded(image, sensor, depth_m=6.0):
     )
     camera = replace(CAMERA, sensor=sensor)
     view = view_of(camera, (width, height))
-    return develop(frame, view, camera, Weather(), AIR).image
+    return apply_camera_model(frame, view, camera, Weather(), AIR)
 
 
-def even(level=110):
-    return np.full((SIZE[1], SIZE[0], 3), level, np.uint8)
+LEVEL = 0.2
 
 
-def point():
-    """Return a dark image with one bright pixel near its centre."""
-    image = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
-    image[60, 80] = 250
-    return image
+def even():
+    return np.full((SIZE[1], SIZE[0], 3), LEVEL, np.float32)
 
 
-def ratio(after, before):
-    return light_of(after).mean(axis=(0, 1)) / light_of(before).mean(axis=(0, 1))
+def point(radiance=2.0):
+    """Return darkness with one bright pixel near its centre."""
+    light = np.zeros((SIZE[1], SIZE[0], 3), np.float32)
+    light[60, 80] = radiance
+    return light
+
+
+def ratio(sensor):
+    """Return how much brighter an even image is with `sensor`, for each channel."""
+    return light_of(recorded(even(), sensor)).mean(axis=(0, 1)) / LEVEL
 
 
 def test_exposure_error_is_in_stops():
     for stops in (-1.0, 0.5):
-        found = ratio(recorded(even(), Sensor(exposure_error_ev=stops)), even())
+        found = ratio(Sensor(exposure_error_ev=stops))
         np.testing.assert_allclose(found, 2**stops, rtol=0.02)
 
 
 def test_white_balance_multiplies_channels():
-    found = ratio(recorded(even(), Sensor(gains=(1.25, 1.0, 0.8))), even())
+    found = ratio(Sensor(gains=(1.25, 1.0, 0.8)))
     np.testing.assert_allclose(found, (1.25, 1.0, 0.8), rtol=0.02)
 
 
 def test_white_balance_follows_photon_noise_and_keeps_the_signal_to_noise_ratio():
     sensor = Sensor(gains=(1.5, 1.0, 0.7), noise=Noise(2000, 0.0, 3))
     light = light_of(recorded(even(), sensor)).reshape(-1, 3)
-    level = light_of(even())[0, 0, 0]
     np.testing.assert_allclose(
-        light.mean(axis=0) / light.std(axis=0), (level * 2000) ** 0.5, rtol=0.05
+        light.mean(axis=0) / light.std(axis=0), (LEVEL * 2000) ** 0.5, rtol=0.05
     )
 
 
 def test_exposure_error_precedes_photon_noise():
     light = light_of(recorded(even(), Sensor(exposure_error_ev=-2.0, noise=Noise(2000, 0.0, 3))))
-    counted = light_of(even())[0, 0, 0] / 4 * 2000
+    counted = LEVEL / 4 * 2000
     assert light.mean() / light.std() == pytest.approx(counted**0.5, rel=0.05)
 
 
 def test_corners_darken_by_the_vignetting():
     light = light_of(recorded(even(), Sensor(vignetting=0.5)))[..., 0]
-    assert light[60, 80] == pytest.approx(light_of(even())[0, 0, 0], rel=0.02)
+    assert light[60, 80] == pytest.approx(LEVEL, rel=0.02)
     assert light[0, 0] / light[60, 80] == pytest.approx(0.5, abs=0.02)
 
 
@@ -94,15 +99,28 @@ def test_motion_is_right_and_down_in_image_widths(motion, rows, columns):
 
 def test_only_points_out_of_focus_are_blurred():
     sensor = Sensor(defocus=Defocus(6000, 1.0))
-    np.testing.assert_array_equal(recorded(point(), sensor, depth_m=6.0) > 30, point() > 30)
+    np.testing.assert_array_equal(recorded(point(), sensor, depth_m=6.0) > 30, point() > 0)
     near = light_of(recorded(point(), sensor, depth_m=0.5))[..., 0]
     assert np.count_nonzero(near > 0.1 * near.max()) >= 5
 
 
+def test_defocus_spreads_more_light_from_a_brighter_lamp():
+    """Both lamps are white in a sharp image. Defocus must use their radiance."""
+    sensor = Sensor(defocus=Defocus(6000, 1.0))
+    sharp, blurred = (
+        [recorded(point(radiance), sensor, depth_m) for radiance in (2.0, 50.0)]
+        for depth_m in (6.0, 0.5)
+    )
+    assert min(image[60, 80].min() for image in sharp) > 240
+    faint, bright = (light_of(image) for image in blurred)
+    disc = faint > 0.1 * faint.max()
+    assert (bright[disc] > 5 * faint[disc]).all()
+
+
 def test_jpeg_compression_keeps_colours():
-    image = even()
-    image[:] = (220, 30, 60)
-    apart = recorded(image, Sensor(jpeg_quality=90)).astype(int) - image
+    light = even()
+    light[:] = (0.6, 0.06, 0.09)
+    apart = recorded(light, Sensor(jpeg_quality=90)).astype(int) - tone_map_and_encode(light)
     assert np.abs(apart).max() < 8
 
 
@@ -121,7 +139,7 @@ def test_a_limit_on_the_number_of_drops_keeps_their_total_light(monkeypatch):
     dark, far = np.zeros((121, 161, 3), np.float32), np.full((121, 161), np.inf, np.float32)
 
     def light():
-        return rained(dark, far, view, Rain(30, 0.004, 0.1, 5), np.ones(3, np.float32)).mean()
+        return add_rain(dark, far, view, Rain(30, 0.004, 0.1, 5), np.ones(3, np.float32)).mean()
 
     monkeypatch.setattr(falling, "_MOST_DROPS", 10**6)
     every = light()

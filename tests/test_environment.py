@@ -340,7 +340,7 @@ def test_folder_listing_is_sorted_and_ignores_other_files(tmp_path):
 
 def test_a_file_name_that_is_not_utf_8_is_refused(tmp_path):
     (tmp_path / os.fsdecode(b"sk\xff.hdr")).write_bytes(b"")
-    with pytest.raises(AssetError, match=r"hdr: is no name in UTF-8; rename it"):
+    with pytest.raises(AssetError, match=r"hdr: name is not valid UTF-8; rename it"):
         find_hdris(tmp_path)
 
 

@@ -11,15 +11,15 @@ from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.mesh import MATERIALS
+from fastgen.geometry.solids import without_cables
 from fastgen.geometry.spreader import build_spreader
 from fastgen.light import indirect_light as interreflection
-from fastgen.light.directional_lights import Sun
+from fastgen.light.directional_lights import DirectionalLight
 from fastgen.light.environment import Ambient, prefilter_environment
 from fastgen.light.indirect_light import Cells, form_factors
-from fastgen.light.occluders import without_cables
 from fastgen.light.sky_visibility import Sky, sky_directions
 from fastgen.render.gl import open_context
-from fastgen.render.sky_visibility_probe import Lit, SkyProbe, probe_points
+from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe, probe_points
 
 KIND = "20"
 ROOF, BEAM = np.array([0.8, 0.4, 0.2]), np.array([0.1, 0.2, 0.3])
@@ -209,7 +209,7 @@ def by_sky_and_sun(world, points, normals):
 
 @pytest.fixture(scope="module")
 def lit(world, tmp_path_factory):
-    """Function that returns SkyProbe's light on the spreader under a uniform sky of radiance 1.
+    """Function that returns the probe's light on the spreader under a uniform sky of radiance 1.
 
     Its arguments are the sun's light, the albedo of the container's sheets, that of the spreader,
     and optionally the light on the container. Any other material would be far too bright.
@@ -219,14 +219,16 @@ def lit(world, tmp_path_factory):
     outline, held = build_spreader(KIND, cut_mm=np.inf), container_outline(KIND)
     with pytest.MonkeyPatch.context() as patch, open_context() as gl:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        probe = SkyProbe(gl.ctx)
+        probe = SkyVisibilityProbe(gl.ctx)
 
         def found(sun, roof, beam, below=None):
-            sky = Sky(replace(ambient, suns=(Sun(tuple(TO_SUN), tuple(sun), 0.005),)), 0.0)
+            sky = Sky(
+                replace(ambient, lights=(DirectionalLight(tuple(TO_SUN), tuple(sun), 0.005),)), 0.0
+            )
             used = {"paint_sheet": roof, **{chart.material: beam for chart in spreader.charts}}
             paints = tuple(tuple(used.get(material, 50 * ROOF)) for material in MATERIALS)
-            below = below or probe.openness(container, spreader, sky)
-            return probe.openness_of_spreader(spreader, outline, held, below, sky, paints)
+            below = below or probe.container_light(container, spreader, sky)
+            return probe.spreader_light(spreader, outline, held, below, sky, paints)
 
         yield found
         probe.release()
@@ -270,7 +272,9 @@ def test_in_a_white_furnace_a_spreader_is_as_bright_as_the_sky(world, lit, monke
     monkeypatch.setattr(interreflection, "_BOUNCES", 100)
     container, spreader, _, _ = world
     count = len(container.positions_mm)
-    glowing = Lit(container, np.zeros((count, 0), np.uint8), *[np.ones((count, 3), np.float32)] * 2)
+    glowing = LitMesh(
+        container, np.zeros((count, 0), np.uint8), *[np.ones((count, 3), np.float32)] * 2
+    )
     light = lit(BLACK, WHITE, WHITE, glowing).irradiance
     locks = [".locks." in chart.name for chart in spreader.charts]
     assert light.max() < 1 + 1e-4

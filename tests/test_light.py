@@ -7,8 +7,8 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
-from fastgen.light.sky_visibility import encoded, open_sky, sky_directions
-from fastgen.render.sky_visibility_probe import Lit, SkyProbe
+from fastgen.light.sky_visibility import encoded_cones, open_sky, sky_directions
+from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from tests.sky_samples import texel_grid
 from tests.test_environment import write_exr
 
@@ -97,11 +97,11 @@ def lit_by(monkeypatch, values):
     """
 
     def seen(mesh):
-        return Lit(mesh, values(mesh.normals), *[np.ones(mesh.normals.shape, np.float32)] * 2)
+        return LitMesh(mesh, values(mesh.normals), *[np.ones(mesh.normals.shape, np.float32)] * 2)
 
     with monkeypatch.context() as patch:
-        patch.setattr(SkyProbe, "openness", lambda _, mesh, *others: seen(mesh))
-        patch.setattr(SkyProbe, "openness_of_spreader", lambda _, mesh, *others: seen(mesh))
+        patch.setattr(SkyVisibilityProbe, "container_light", lambda _, mesh, *others: seen(mesh))
+        patch.setattr(SkyVisibilityProbe, "spreader_light", lambda _, mesh, *others: seen(mesh))
         with Generator(LIT, seed=1, size=(128, 128)) as generator:
             return generator.render(index=0, camera="low")
 
@@ -133,7 +133,7 @@ def test_only_containers_get_estimated_light_from_their_hidden_sky(monkeypatch):
 
     def dark(normals):
         found = open_sky(normals)
-        found[:, :3] = encoded(normals, normals @ sky_directions().T > 0.8)
+        found[:, :3] = encoded_cones(normals, normals @ sky_directions().T > 0.8)
         found[:, 4:8] = 0
         found[:, 8:] = 0
         return found

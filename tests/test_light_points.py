@@ -8,9 +8,9 @@ import pytest
 
 import fastgen.render.renderer
 from fastgen import Config, Generator
-from fastgen.camera.tone_curve import light_of
 from fastgen.errors import ConfigError
 from fastgen.render import light_points
+from tests.tone_inverse import light_of
 
 FISHEYE = {"cameras": {"A": {"focal_mm": 24, "lens": {"model": "fisheye", "k1": [-0.02, 0.0]}}}}
 DAMAGED = {"damage": {"probability": 1, "count": [3, 5]}}

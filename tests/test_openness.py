@@ -10,20 +10,20 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from fastgen import Config, Generator
 from fastgen.classes import SPREADER_ID
 from fastgen.geometry.container import build_container
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
-from fastgen.light.directional_lights import Sun
+from fastgen.light.directional_lights import DirectionalLight
 from fastgen.light.environment import Ambient, prefilter_environment, sky_irradiance
 from fastgen.light.sky_visibility import (
-    Openness,
     Sky,
-    encoded,
+    SkyVisibility,
+    encoded_cones,
     lobe_masks,
     open_sky,
     sky_directions,
 )
 from fastgen.render.gl import open_context
-from fastgen.render.shapes import spreader_mesh
-from fastgen.render.sky_visibility_probe import SkyProbe, probe_points
+from fastgen.render.sky_visibility_probe import SkyVisibilityProbe, probe_points
 from tests.backends import needs_osmesa
 from tests.mesh_probe import behind_the_middle
 
@@ -88,7 +88,7 @@ def rays_open(meshes, points, directions):
 def test_an_open_sky_is_fully_visible_with_the_normal_as_bent_normal():
     normals = np.random.default_rng(0).normal(size=(500, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    for values in (encoded(normals, np.ones((1, 1), bool)), open_sky(normals)):
+    for values in (encoded_cones(normals, np.ones((1, 1), bool)), open_sky(normals)):
         direction, share = decoded(values)
         assert (share > 0.999).all()
         np.testing.assert_allclose(direction, normals, atol=0.01)
@@ -97,7 +97,7 @@ def test_an_open_sky_is_fully_visible_with_the_normal_as_bent_normal():
 def test_a_wall_halves_sky_visibility_and_tilts_the_bent_normal():
     """Only +x is open: half the light, with mean direction (2/3, 0, pi/3) by integration."""
     open_to = (sky_directions()[:, 0] > 0)[None]
-    direction, share = decoded(encoded(np.array([[0.0, 0.0, 1.0]]), open_to))
+    direction, share = decoded(encoded_cones(np.array([[0.0, 0.0, 1.0]]), open_to))
     assert share[0] == pytest.approx(0.5, abs=0.03)
     expected = np.array([2 / 3, 0, np.pi / 3])
     np.testing.assert_allclose(direction[0], expected / np.linalg.norm(expected), atol=0.05)
@@ -106,7 +106,7 @@ def test_a_wall_halves_sky_visibility_and_tilts_the_bent_normal():
 def half_open(normals, side):
     """Return the sky visibility of surfaces that see only the half sphere around `side` [3]."""
     open_to = np.tile(sky_directions() @ side > 0, (len(normals), 1))
-    return Openness(normals, np.packbits(open_to, axis=1), encoded(normals, open_to))
+    return SkyVisibility(normals, np.packbits(open_to, axis=1), encoded_cones(normals, open_to))
 
 
 def facing(count):
@@ -120,7 +120,7 @@ def facing(count):
 def test_light_beside_a_wall_is_the_integral_over_the_visible_sky(radiance, yaw_deg):
     normals = facing(60)
     side = np.array([0.36, -0.48, 0.8])
-    values = half_open(normals, side).under(Sky(light_of(radiance), yaw_deg))
+    values = half_open(normals, side).vertex_bytes(Sky(light_of(radiance), yaw_deg))
     d, solid_angle = sphere()
     cos, sin = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
     world = d @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
@@ -145,21 +145,26 @@ def test_equal_vertices_are_lit_as_when_alone():
     rng = np.random.default_rng(11)
     normals = facing(12)
     open_to = rng.random((12, 96)) < rng.random((12, 1))
-    bits, cones = np.packbits(open_to, axis=1), encoded(normals, open_to)
-    suns = (Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005), Sun((0.0, 0.8, 0.6), (9, 9, 9), 0.01))
-    sky = Sky(replace(light_of(sunset), suns=suns), 40.0)
-    alone = [Openness(*(part[[i]] for part in (normals, bits, cones))) for i in range(12)]
+    bits, cones = np.packbits(open_to, axis=1), encoded_cones(normals, open_to)
+    suns = (
+        DirectionalLight((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),
+        DirectionalLight((0.0, 0.8, 0.6), (9, 9, 9), 0.01),
+    )
+    sky = Sky(replace(light_of(sunset), lights=suns), 40.0)
+    alone = [SkyVisibility(*(part[[i]] for part in (normals, bits, cones))) for i in range(12)]
     mixed = rng.integers(0, 12, 500)
-    together = Openness(normals[mixed], bits[mixed], cones[mixed])
-    np.testing.assert_array_equal(together.open_to, open_to[mixed])
-    light, sun = together.irradiance(sky), together.sunlight(sky)
-    for found, of_one in ((light, "irradiance"), (sun, "sunlight")):
+    together = SkyVisibility(normals[mixed], bits[mixed], cones[mixed])
+    np.testing.assert_array_equal(together.visible, open_to[mixed])
+    light, sun = together.irradiance(sky), together.directional_irradiance(sky)
+    for found, of_one in ((light, "irradiance"), (sun, "directional_irradiance")):
         expected = np.concatenate([getattr(one, of_one)(sky) for one in alone])
         np.testing.assert_allclose(found, expected[mixed], rtol=1e-5, atol=1e-6)
-    values = np.concatenate([one.under(sky) for one in alone])[mixed].astype(int)
-    assert np.abs(together.under(sky) - values).max() <= 1  # one-row products round differently
+    values = np.concatenate([one.vertex_bytes(sky) for one in alone])[mixed].astype(int)
+    assert (
+        np.abs(together.vertex_bytes(sky) - values).max() <= 1
+    )  # one-row products round differently
     for found, expected in zip(
-        together.lit(sky), (together.under(sky, light), light + sun, light), strict=True
+        together.lit(sky), (together.vertex_bytes(sky, light), light + sun, light), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
 
@@ -167,30 +172,30 @@ def test_equal_vertices_are_lit_as_when_alone():
 def test_a_fully_visible_sky_gives_full_light():
     normals = facing(100)
     bits = np.full((100, 12), 255, np.uint8)
-    whole = Openness(normals, bits, open_sky(normals)[:, :3])
+    whole = SkyVisibility(normals, bits, open_sky(normals)[:, :3])
     for radiance in (even, sunset):
-        assert (whole.under(Sky(light_of(radiance), 30.0)) == open_sky(normals)).all()
+        assert (whole.vertex_bytes(Sky(light_of(radiance), 30.0)) == open_sky(normals)).all()
 
 
 def test_light_may_be_much_brighter_than_the_sky_around_the_bent_normal():
     """Sunlit roofs above dark ground need this. Beyond a ratio of 130 only the colour is kept."""
     normals = facing(2000)
-    openness = half_open(normals, np.array([0.0, 0.0, 1.0]))
+    visibility = half_open(normals, np.array([0.0, 0.0, 1.0]))
     sky = Sky(light_of(sunset), 70.0)
-    about = decoded(openness.under(sky))[0]
+    about = decoded(visibility.vertex_bytes(sky))[0]
     whole = sky_irradiance(sky.light, about.astype(np.float32), sky.yaw_deg)
     ratio = 10 ** np.random.default_rng(7).uniform(-2, 2, (2000, 3))
-    values = openness.under(sky, whole * ratio).astype(float)
+    values = visibility.vertex_bytes(sky, whole * ratio).astype(float)
     found = values[:, 4:7] / 127 * (1 + values[:, 7:8] / 4)  # decoded as in the shader
     brightest = np.maximum(ratio.max(axis=1, keepdims=True), 1)
     assert (np.abs(found - ratio) / brightest).max() < 0.005
-    values = openness.under(sky, whole * [3000.0, 1500.0, 300.0]).astype(int)
+    values = visibility.vertex_bytes(sky, whole * [3000.0, 1500.0, 300.0]).astype(int)
     assert (values[:, 7] == 255).all()
     np.testing.assert_allclose(values[:, 4:7], np.tile([[255, 127.5, 25.5]], (2000, 1)), atol=1)
 
 
 def test_under_an_even_sky_light_equals_sky_visibility(even_sky):
-    values = half_open(facing(200), np.array([0.6, 0.0, 0.8])).under(even_sky)
+    values = half_open(facing(200), np.array([0.6, 0.0, 0.8])).vertex_bytes(even_sky)
     # the stored cone length has steps of 1/127, which change a small share by up to 4/127
     for channel in values[:, 4:7].T:
         np.testing.assert_allclose(channel / 127, decoded(values)[1], atol=0.04)
@@ -198,31 +203,35 @@ def test_under_an_even_sky_light_equals_sky_visibility(even_sky):
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 130.0])
 def test_sunlight_reaches_surfaces_that_see_the_sun(yaw_deg):
-    ambient = replace(light_of(even), suns=(Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),))
+    ambient = replace(
+        light_of(even), lights=(DirectionalLight((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),)
+    )
     yaw = np.deg2rad(yaw_deg)
     sun = np.array([0.6 * np.cos(yaw), 0.6 * np.sin(yaw), 0.8])
     normals = facing(50)
     cosine = np.maximum(normals @ sun, 0)[:, None]
     for side, share in ((sun, 1.0), (-sun, 0.0)):
-        found = half_open(normals, side).sunlight(Sky(ambient, yaw_deg))
+        found = half_open(normals, side).directional_irradiance(Sky(ambient, yaw_deg))
         np.testing.assert_allclose(found, share * cosine * [3.0, 2.0, 1.0], atol=1e-5)
-    edge = half_open(normals, np.cross(sun, [0.0, 0.0, 1.0])).sunlight(Sky(ambient, yaw_deg))
+    edge = half_open(normals, np.cross(sun, [0.0, 0.0, 1.0])).directional_irradiance(
+        Sky(ambient, yaw_deg)
+    )
     partly = edge[cosine[:, 0] > 0.1, 0] / (3 * cosine[cosine[:, 0] > 0.1, 0])
     assert (partly > 0.2).all()
     assert (partly < 0.8).all()
-    assert not half_open(normals, sun).sunlight(Sky(light_of(even), yaw_deg)).any()
+    assert not half_open(normals, sun).directional_irradiance(Sky(light_of(even), yaw_deg)).any()
 
 
 def test_sunlight_of_several_suns_adds_up():
     lamps = (
-        Sun((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),
-        Sun((0.0, 0.8, 0.6), (0.5, 1.0, 2.0), 0.005),
-        Sun((0.0, -0.28, 0.96), (0.1, 0.1, 0.4), 0.005),
+        DirectionalLight((0.6, 0.0, 0.8), (3.0, 2.0, 1.0), 0.005),
+        DirectionalLight((0.0, 0.8, 0.6), (0.5, 1.0, 2.0), 0.005),
+        DirectionalLight((0.0, -0.28, 0.96), (0.1, 0.1, 0.4), 0.005),
     )
-    openness = half_open(facing(50), np.array([0.6, 0.64, 0.48]))
+    visibility = half_open(facing(50), np.array([0.6, 0.64, 0.48]))
 
     def lit_by(suns):
-        return openness.sunlight(Sky(replace(light_of(even), suns=suns), 20.0))
+        return visibility.directional_irradiance(Sky(replace(light_of(even), lights=suns), 20.0))
 
     each = [lit_by((lamp,)) for lamp in lamps]
     assert all(found.max() > 0.05 for found in each)
@@ -232,7 +241,7 @@ def test_sunlight_of_several_suns_adds_up():
 def test_a_black_sky_gives_defined_light():
     normals = facing(50)
     black = Sky(light_of(lambda d: np.zeros(d.shape)), 0.0)
-    values = half_open(normals, np.array([0.0, 0.0, 1.0])).under(black)
+    values = half_open(normals, np.array([0.0, 0.0, 1.0])).vertex_bytes(black)
     assert values[:, 4:7].max() <= 128
 
 
@@ -241,8 +250,8 @@ def test_a_black_sky_gives_defined_light():
 def test_sky_visibility_equals_ray_casts(gl, even_sky, kind, held):
     container = build_container(kind)
     spreader = build_spreader(kind) if held else None
-    probe = SkyProbe(gl.ctx)
-    found = probe.openness(container, spreader, even_sky).values
+    probe = SkyVisibilityProbe(gl.ctx)
+    found = probe.container_light(container, spreader, even_sky).values
     share = found[:, 4] / 127
     probe.release()
     sheets = [i for i, c in enumerate(container.charts) if c.face != "underside"]
@@ -265,8 +274,8 @@ def test_sky_visibility_equals_ray_casts(gl, even_sky, kind, held):
 def test_no_vertex_sees_the_sky_through_the_container(gl, even_sky):
     """Creases are at risk: there a depth map holds only a thin sheet of the wall."""
     container = build_container("20")
-    probe = SkyProbe(gl.ctx)
-    bits = probe.openness(container, None, even_sky).values[:, 8:]
+    probe = SkyVisibilityProbe(gl.ctx)
+    bits = probe.container_light(container, None, even_sky).values[:, 8:]
     probe.release()
     open_to = np.unpackbits(bits, axis=1).astype(bool)
     points = probe_points(container)
@@ -296,13 +305,13 @@ def test_lobe_masks_contain_the_nearest_directions_and_the_hemisphere():
 
 def test_the_disk_cache_returns_the_computed_values(gl, even_sky, monkeypatch):
     container, spreader = build_container("20"), build_spreader("20")
-    first = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
+    first = SkyVisibilityProbe(gl.ctx).container_light(container, spreader, even_sky).values
 
     def never(*_: object) -> None:
         raise AssertionError("cached sky visibility was computed again")
 
-    monkeypatch.setattr(SkyProbe, "_open_to", never)
-    again = SkyProbe(gl.ctx).openness(container, spreader, even_sky).values
+    monkeypatch.setattr(SkyVisibilityProbe, "_visible", never)
+    again = SkyVisibilityProbe(gl.ctx).container_light(container, spreader, even_sky).values
     np.testing.assert_array_equal(again, first)
 
 
@@ -312,8 +321,8 @@ def test_backends_compute_the_same_sky_visibility(even_sky):
     found = []
     for backend in ("egl", "osmesa"):
         with open_context(backend) as context:
-            probe = SkyProbe(context.ctx)
-            found.append(probe.openness(container, None, even_sky).values)
+            probe = SkyVisibilityProbe(context.ctx)
+            found.append(probe.container_light(container, None, even_sky).values)
     np.testing.assert_array_equal(*found)
 
 
@@ -325,10 +334,12 @@ def test_sky_visibility_of_reflections_is_close_to_ray_casts(camera, index):
     with Generator(sound, 8, size, quality="draft") as g:
         scene = g.scene(index)
         sample = g.render(scene=scene, camera=camera, normals=True)
-        targets = g._gpu.renderer().draw(scene, scene.camera(camera), size)
-        stored = np.frombuffer(targets.samples.openness.read(), np.uint8).reshape(*size[::-1], 4)
+        targets = g.gpu.renderer().draw(PreparedScene(scene), scene.camera(camera), size)
+        stored = np.frombuffer(
+            targets.samples.textures["openness_points"].read(), np.uint8
+        ).reshape(*size[::-1], 4)
         found = stored[..., 3] / 255
-        mesh = g._gpu.renderer().mesh(scene.container)
+        mesh = PreparedScene(scene).container
     start, rays = sample.view.rays()
     seen = (sample.ids > 0) & (sample.ids < SPREADER_ID)
     rays = rays[seen] / np.linalg.norm(rays[seen], axis=1, keepdims=True)
@@ -339,7 +350,7 @@ def test_sky_visibility_of_reflections_is_close_to_ray_casts(camera, index):
     mirrored = rays - 2 * (rays * normals).sum(1)[:, None] * normals
     spread = mirrored[:, None] + np.random.default_rng(5).normal(0, 0.29, (len(rays), 40, 3))
     ahead = (spread * normals[:, None]).sum(-1) > 0
-    spreader = spreader_mesh(scene)
+    spreader = PreparedScene(scene).spreader.mesh
     meshes = [mesh] if spreader is None else [mesh, spreader]
     free = rays_open(meshes, np.repeat(points, 40, axis=0), spread.reshape(-1, 3))
     expected = (free.reshape(ahead.shape) & ahead).sum(1) / ahead.sum(1)

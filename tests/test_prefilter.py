@@ -10,13 +10,13 @@ from fastgen.light.environment import (
     irradiance_at,
     prefilter_environment,
 )
-from fastgen.light.prefilter import (
+from fastgen.light.octahedral import (
     levelled,
     octahedral_decode,
     octahedral_encode,
     sample_octahedral,
-    shrink,
 )
+from fastgen.light.prefilter import shrink
 from fastgen.light.reflectance import dfg_table, fresnel_climb, mean_specular_albedo
 from fastgen.light.rgb9e5 import unpacked
 from tests.sky_samples import even_directions, one_light, patchwork, texel_grid
@@ -85,7 +85,7 @@ def test_a_light_appears_in_its_direction():
     y, z = (np.array([column, row]) + 0.5) / (size - 2) * 2 - 1
     found = np.array([1 - abs(y) - abs(z), y, z])
     assert found @ toward / np.linalg.norm(found) > np.cos(np.deg2rad(3))
-    (sun,) = light.suns
+    (sun,) = light.lights
     assert np.dot(sun.direction, toward) > np.cos(np.deg2rad(1))
 
 
@@ -100,7 +100,7 @@ def test_energy_of_a_single_texel_survives_every_map(toward, tolerance):
     light = prefilter_environment("lamp", radiance)
     directions = even_directions(200_000)
     # a directional light of irradiance pi E has a mean radiance of pi E / (4 pi)
-    aside = sum(sun.light[0] for sun in light.suns) / 4
+    aside = sum(sun.light[0] for sun in light.lights) / 4
     for layer, rest in (
         (unpacked(light.background), 0.0),
         *((layer, aside) for layer in light.specular),
@@ -133,7 +133,7 @@ def test_a_sun_beyond_the_range_of_half_floats_keeps_its_energy():
     radiance = one_light(np.array([0.0, 0.6, 0.8]), 1e6)
     expected = (radiance[..., 0] * texel_grid(128)[1]).sum() / (4 * np.pi)
     light = prefilter_environment("sun", radiance)
-    (sun,) = light.suns
+    (sun,) = light.lights
     seen = sample_octahedral(light.specular[4], even_directions(50_000))[:, 0]
     assert seen.mean() + sun.light[0] / 4 == pytest.approx(expected, rel=0.02)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fastgen.camera.projection import view_of
-from fastgen.camera.tone_curve import displayed, light_of
+from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
@@ -17,6 +17,7 @@ from fastgen.scene import Spreader
 from fastgen.srgb import DECODED
 from tests import oracle
 from tests.backends import needs_osmesa
+from tests.tone_inverse import light_of
 
 CAMERAS = ("A", "B", "Cl", "Cr")
 SIZE = (320, 240)
@@ -77,7 +78,7 @@ def test_antialiasing_approaches_a_fine_render_averaged_down():
     with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
         light = light_of(generator.render(index=1, camera="Cl").image)
     gathered = light.reshape(SIZE[1], 4, SIZE[0], 4, 3).mean(axis=(1, 3))
-    reference = displayed(gathered).astype(float)
+    reference = tone_map_and_encode(gathered).astype(float)
     errors = []
     for quality in ("draft", "balanced", "fine"):
         with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:

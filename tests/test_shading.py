@@ -167,7 +167,7 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
 
 
 def test_octahedral_mapping_equals_its_numpy_twin(gl):
-    from fastgen.light.prefilter import octahedral_encode
+    from fastgen.light.octahedral import octahedral_encode
 
     directions = np.random.default_rng(1).normal(size=(400, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

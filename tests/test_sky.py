@@ -10,7 +10,7 @@ from fastgen import Generator
 from fastgen.camera.projection import view_of
 from fastgen.light.environment import load_environment
 from fastgen.light.hdri import bundled_hdris
-from fastgen.light.prefilter import levelled, sample_octahedral
+from fastgen.light.octahedral import levelled, sample_octahedral
 from fastgen.light.rgb9e5 import unpacked
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fastgen.light.directional_lights import MIN_SHARE, MOST_SUNS, split_suns
+from fastgen.light.directional_lights import MAX_LIGHTS, MIN_SHARE, extract_lights
 from fastgen.light.environment import irradiance_at, load_environment, prefilter_environment
 from tests.sky_samples import even_directions, lamps_at_night, texel_grid
 from tests.test_environment import write_exr
@@ -24,7 +24,7 @@ def sunny(height=512):
 
 def test_direction_light_and_radius_of_a_known_sun_are_found():
     radiance, _, solid_angle, disc = sunny()
-    (sun,), rest = split_suns(radiance)
+    (sun,), rest = extract_lights(radiance)
     assert np.degrees(np.arccos(sun.direction @ TOWARD)) < 0.05
     np.testing.assert_allclose(sun.light, DISC * solid_angle[disc].sum() / np.pi, rtol=0.01)
     assert sun.radius == pytest.approx(RADIUS, rel=0.05)
@@ -34,7 +34,7 @@ def test_direction_light_and_radius_of_a_known_sun_are_found():
 def test_sun_and_remaining_sky_together_give_the_original_irradiance():
     radiance, direction, solid_angle, _ = sunny()
     light = prefilter_environment("sunny", radiance)
-    assert len(light.suns) == 1
+    assert len(light.lights) == 1
     normals = even_directions(40)
     cosine = np.maximum(direction.reshape(-1, 3) @ normals.T, 0) * solid_angle.reshape(-1, 1)
     expected = cosine.T @ radiance.reshape(-1, 3) / np.pi
@@ -45,7 +45,7 @@ def test_an_even_sky_and_a_broad_lamp_have_no_sun():
     direction, _ = texel_grid(256)
     lamp = 50 * np.exp((direction @ TOWARD - 1)[..., None] / 0.02) * np.ones(3)
     for radiance in (np.ones_like(lamp), np.zeros_like(lamp), 0.1 + lamp):
-        suns, rest = split_suns(radiance.astype(np.float32))
+        suns, rest = extract_lights(radiance.astype(np.float32))
         assert suns == ()
         np.testing.assert_array_equal(rest, radiance.astype(np.float32))
 
@@ -56,7 +56,7 @@ LAMPS /= np.linalg.norm(LAMPS, axis=1, keepdims=True)
 
 def test_lamps_of_a_night_are_found_brightest_first():
     lights = np.array([[0.2, 0.15, 0.1], [0.5, 0.5, 0.5], [0.1, 0.12, 0.2]])
-    suns, rest = split_suns(lamps_at_night(LAMPS, lights))
+    suns, rest = extract_lights(lamps_at_night(LAMPS, lights))
     for sun, k in zip(suns, (1, 0, 2), strict=True):
         assert np.degrees(np.arccos(sun.direction @ LAMPS[k])) < 0.1
         np.testing.assert_allclose(sun.light, lights[k], rtol=0.02)
@@ -70,8 +70,8 @@ def test_the_only_lamp_on_one_side_is_extracted_among_many():
     strength = np.array([1.0, 1.1, 1.2, 1.3, 1.4, 0.2])[:, None] * np.ones(3)
     radiance = lamps_at_night(toward, strength)
     light = prefilter_environment("night", radiance)
-    assert len(light.suns) == MOST_SUNS
-    assert light.suns[-1].direction @ toward[-1] > 0.9999
+    assert len(light.lights) == MAX_LIGHTS
+    assert light.lights[-1].direction @ toward[-1] > 0.9999
     direction, solid_angle = texel_grid(512)
     normals = even_directions(40)
     cosine = np.maximum(direction.reshape(-1, 3) @ normals.T, 0) * solid_angle.reshape(-1, 1)
@@ -83,19 +83,19 @@ def test_the_only_lamp_on_one_side_is_extracted_among_many():
 def test_suns_come_back_from_the_cache(tmp_path, radiance):
     file = write_exr(tmp_path / "sunny.exr", radiance)
     first = load_environment(file, tmp_path / "cache")
-    assert first.suns
-    assert load_environment(file, tmp_path / "cache").suns == first.suns
+    assert first.lights
+    assert load_environment(file, tmp_path / "cache").lights == first.lights
 
 
 def test_lamps_side_by_side_are_one_sun_and_a_broad_lamp_is_not_split():
     side = np.cross(LAMPS[0], [0.0, 0.0, 1.0])
     two = LAMPS[0] + np.outer([-1, 1], np.tan(np.deg2rad(1.4)) * side / np.linalg.norm(side))
     two /= np.linalg.norm(two, axis=1, keepdims=True)
-    (sun,), _ = split_suns(lamps_at_night(two, np.ones((2, 3)), radius_deg=0.4))
+    (sun,), _ = extract_lights(lamps_at_night(two, np.ones((2, 3)), radius_deg=0.4))
     assert np.degrees(np.arccos(sun.direction @ LAMPS[0])) < 0.1
     np.testing.assert_allclose(sun.light, 2.0, rtol=0.02)
     for radius_deg in (2.8, 3.5, 4.5, 8.0):
-        suns, _ = split_suns(lamps_at_night(LAMPS[:1], np.ones((1, 3)), radius_deg=radius_deg))
+        suns, _ = extract_lights(lamps_at_night(LAMPS[:1], np.ones((1, 3)), radius_deg=radius_deg))
         assert len(suns) <= 1
 
 
@@ -112,7 +112,7 @@ def test_a_lamp_is_extracted_above_a_share_of_the_light_on_its_side(times):
     lamp = times * MIN_SHARE / (1 - times * MIN_SHARE) * irradiance * np.ones((1, 3))
     radiance = around + lamps_at_night(aside[None], lamp, radius_deg=2.5) - np.float32(0.02)
     assert radiance[direction @ aside > np.cos(np.deg2rad(2))].max() < around.max()
-    suns, _ = split_suns(radiance)
+    suns, _ = extract_lights(radiance)
     assert len(suns) == (times > 1)
     for sun in suns:
         assert sun.direction @ aside > np.cos(np.deg2rad(0.2))
@@ -124,7 +124,7 @@ def test_a_sun_is_found_at_any_elevation(elevation_deg):
     up = np.deg2rad(elevation_deg)
     toward = np.array([np.cos(up), 0.0, np.sin(up)])
     radiance = lamps_at_night(toward[None], np.ones((1, 3)))
-    (sun,), rest = split_suns(radiance)
+    (sun,), rest = extract_lights(radiance)
     np.testing.assert_allclose(sun.light, 1.0, rtol=0.02)
     assert sun.direction @ toward > np.cos(np.deg2rad(0.1))
     np.testing.assert_allclose(rest, 0.02, rtol=1e-3)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.camera.tone_curve import light_of
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
 from fastgen.light.environment import load_environment
 from fastgen.render.settings import QUALITY, Quality
@@ -16,6 +15,7 @@ from fastgen.scene.container_kinds import KINDS
 from tests.plain import EVEN_PAINT
 from tests.sky_samples import lamps_at_night, one_light
 from tests.test_environment import write_exr
+from tests.tone_inverse import light_of
 
 GREY = np.full((512, 1024, 3), 0.2, np.float32)
 """An even sky to which suns are added."""
@@ -31,7 +31,7 @@ def test_pictures_of_an_end_use_its_own_shadow_tile(tmp_path, camera, x):
         scene = generator.scene(0)
         scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
         fine = generator.render(scene=scene, camera=camera)
-        shadow = generator._gpu.renderer()._sun_shadow
+        shadow = generator.gpu.renderer().shadow_map
         shadow.end = replace(shadow.end, inner=np.array([1.0, 1.0, 0.0, 0.0]))
         coarse = generator.render(scene=scene, camera=camera)
     apart = np.abs(fine.image.astype(int) - coarse.image).max(axis=2)[fine.ids > 0]
@@ -44,7 +44,7 @@ def test_no_sunlight_leaks_through_a_wall(tmp_path):
     write_exr(tmp_path / "behind.exr", GREY + one_light(toward, 3e5, 512))
     with Generator(seed=1, size=(640, 640), hdri_dir=tmp_path) as generator:
         scene = generator.scene(0)
-        assert load_environment(tmp_path / "behind.exr").suns
+        assert load_environment(tmp_path / "behind.exr").lights
         scene = replace(
             scene, environment=EnvironmentView("behind", 0.0), decals=(), damages=(),
             container=replace(scene.container, kind="20"), spreader=Spreader(),
@@ -81,7 +81,7 @@ def test_no_sunlight_leaks_along_a_post(tmp_path, side):
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
     with Generator(config, 1, (900, 900), "auto", tmp_path, "draft") as generator:
         scene = generator.scene(0)
-        assert load_environment(tmp_path / "low.exr").suns
+        assert load_environment(tmp_path / "low.exr").lights
         scene = replace(
             scene, environment=EnvironmentView("low", 0.0), decals=(), damages=dents,
             container=replace(scene.container, kind="20"), spreader=Spreader(),
@@ -124,7 +124,7 @@ def test_shadow_edges_are_not_jagged(tmp_path, others):
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     lights = [one_light(way, 1e5 if k == 0 else 5e3, 512) for k, way in enumerate(toward)]
     write_exr(tmp_path / "flat.exr", sum(lights[: 1 + others], GREY))
-    assert len(load_environment(tmp_path / "flat.exr").suns) == 1 + others
+    assert len(load_environment(tmp_path / "flat.exr").lights) == 1 + others
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
     half_length, height = KINDS["20"].size_mm[0] / 2, KINDS["20"].size_mm[2]
     target = (half_length - 12.0, -600.0, height + 15 + 260.0)

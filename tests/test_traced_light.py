@@ -6,7 +6,7 @@ import pytest
 import fastgen.light.traced_light
 from fastgen.light.environment import load_environment, to_map_frame
 from fastgen.light.hdri import bundled_hdris
-from fastgen.light.prefilter import octahedral_decode
+from fastgen.light.octahedral import octahedral_decode
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.reflectance import DIELECTRIC_F0, dfg_table
 from fastgen.light.sky_rays import SkyRays, spread_points

@@ -18,7 +18,7 @@ from fastgen.classes import MARKER_CLASSES
 from fastgen.geometry.container import build_container
 from fastgen.geometry.mesh import Mesh
 from fastgen.light.sky_visibility import open_sky
-from fastgen.render.sky_visibility_probe import Lit, SkyProbe
+from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.sample import Object, Sample
 from fastgen.sampling.scene import sheet_sizes, stream
 from fastgen.scene import Decal, Scene, Spreader
@@ -198,9 +198,13 @@ _SKY = (SHADE, EVERYTHING)
 def without(element: str) -> Iterator[None]:
     """Render without the part of `element` that no field of a scene controls."""
 
-    def unhidden(_: SkyProbe, container: Mesh, *__: object) -> Lit:
+    def unhidden(_: SkyVisibilityProbe, container: Mesh, *__: object) -> LitMesh:
         dark = np.zeros_like(container.normals)
-        return Lit(container, open_sky(container.normals), dark, dark)
+        return LitMesh(container, open_sky(container.normals), dark, dark)
 
-    with patch.object(SkyProbe, "openness", unhidden) if element in _SKY else nullcontext():
+    with (
+        patch.object(SkyVisibilityProbe, "container_light", unhidden)
+        if element in _SKY
+        else nullcontext()
+    ):
         yield

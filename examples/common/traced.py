@@ -1,4 +1,4 @@
-"""Cycles images of given scenes, rendered in batches of one process and kept."""
+"""Cycles images of given scenes, rendered in one process and cached."""
 
 import json
 import subprocess
@@ -11,22 +11,28 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen import Generator
-from fastgen.camera.tone_curve import displayed
+from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.export import export_glb
 from fastgen.light.hdri import bundled_hdris
 from fastgen.scene import Scene
 
 TEXEL_MM = 6.0
-"""Of the exported textures: a pixel of the images shows 13 to 20 mm."""
+"""Texel size of the exported textures. A pixel of the images covers 13 to 20 mm."""
 
 SAMPLES = 32
-"""Paths a pixel, denoised: twice as many took half as long again and look the same."""
+"""Paths per pixel before denoising. Twice as many take 50 % longer and look the same."""
 
 
 @dataclass(frozen=True, eq=False)
 class Traced:
-    """One Cycles image. radiance: float32 [H, W, 3], linear, without exposure. core_s: seconds of
-    all cores that its render call took."""
+    """One Cycles image.
+
+    Attributes:
+        scene: The scene shown.
+        camera: Camera name.
+        radiance: Linear, without exposure, float32 [H, W, 3].
+        core_s: CPU seconds of its render call.
+    """
 
     scene: Scene
     camera: str
@@ -35,8 +41,8 @@ class Traced:
 
 
 def display(radiance: NDArray[np.float32], exposure: float) -> NDArray[np.uint8]:
-    """Linear radiance [H, W, 3] as our images show it."""
-    return displayed((radiance * exposure).astype(np.float32))
+    """Convert linear radiance [H, W, 3] to sRGB like fastgen's images."""
+    return tone_map_and_encode((radiance * exposure).astype(np.float32))
 
 
 def trace(
@@ -46,9 +52,16 @@ def trace(
     folder: Path,
     python: Path,
 ) -> None:
-    """Render every scene through every camera that `folder` does not hold yet.
+    """Render every scene through every camera, unless `folder` already has the image.
 
-    python: a Python 3.11 with bpy. The scene is kept with its images: `kept` reads it back.
+    The scene is stored with its images, and `kept` reads both.
+
+    Args:
+        generator: Generator that exports the scenes.
+        scenes: Scenes to render.
+        cameras: Camera names.
+        folder: Folder of the images.
+        python: A Python 3.11 with bpy.
     """
     folder.mkdir(parents=True, exist_ok=True)
     hdris = bundled_hdris()
@@ -75,7 +88,7 @@ def trace(
 
 
 def kept(folder: Path, seed: int, index: int, cameras: Sequence[str]) -> list[Traced]:
-    """The images of one scene that `folder` holds, of none or of all cameras."""
+    """Return the stored images of one scene, or none if a camera is missing."""
     stem = f"{seed}_{index}"
     outs = [folder / f"{stem}_{camera}.exr" for camera in cameras]
     if not all(out.exists() for out in outs):

@@ -1,4 +1,4 @@
-"""Blur of the optics and of movement, in linear light; labels stay those of the sharp image."""
+"""Defocus and motion blur of linear light."""
 
 import cv2
 import numpy as np
@@ -9,13 +9,13 @@ from fastgen.scene import Camera
 from fastgen.scene.optics import Defocus
 
 _FINE = 8
-"""Kernels are drawn so many times finer and averaged, for smooth edges."""
+"""Subpixels along each side of a pixel when a kernel is drawn, for smooth edges."""
 
 _LEVELS = 4
-"""Uniformly blurred images that each pixel's own blur lies between."""
+"""Number of uniformly blurred images; each pixel interpolates between two of them."""
 
 _LEAST_PX = 0.3
-"""A disc of a smaller radius is a pixel."""
+"""Smaller blur radii have no effect."""
 
 _MOST_PX = 40.0
 
@@ -23,10 +23,20 @@ _MOST_PX = 40.0
 def blur_radius_px(
     defocus: Defocus, camera: Camera, width: int, depth_m: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Radius of the disc that a point at `depth_m` [H, W] becomes, inf included; thin lens.
+    """Return the radius of the circle of confusion of a thin lens at each depth.
 
-    Its diameter is A f |z - s| / (z (s - f)): A the aperture's diameter f / N, s the distance in
-    focus (Potmesil and Chakravarty 1981, "A Lens and Aperture Camera Model", eq. 2 and 3).
+    Its diameter is A f |z - s| / (z (s - f)), with the aperture diameter A = f / N, focal length f
+    and focus distance s (Potmesil and Chakravarty 1981, "A Lens and Aperture Camera Model", eq. 2
+    and 3).
+
+    Args:
+        defocus: focus distance and f-number.
+        camera: focal length and sensor width.
+        width: image width in pixels.
+        depth_m: float32 [H, W], metres along the optical axis; may be inf.
+
+    Returns:
+        float32 [H, W], pixels, at most 40.
     """
     f, s = camera.focal_mm, max(defocus.focus_mm, 1.1 * camera.focal_mm)
     diameter_mm = f * f / defocus.f_number / (s - f) * np.abs(1 - s * 1e-3 / depth_m)
@@ -35,7 +45,7 @@ def blur_radius_px(
 
 
 def defocused(light: Light, radius_px: NDArray[np.float32]) -> Light:
-    """Each pixel averaged over the disc of its own radius [H, W]."""
+    """Return light in which each pixel is the mean over a disc of its own radius [H, W]."""
     low, high = float(radius_px.min()), float(radius_px.max())
     if high < _LEAST_PX:
         return light
@@ -50,8 +60,14 @@ def defocused(light: Light, radius_px: NDArray[np.float32]) -> Light:
     return result
 
 
-def moved(light: Light, motion_px: tuple[float, float]) -> Light:
-    """Averaged along a line of motion_px, right and down, about each pixel: an open shutter."""
+def motion_blurred(light: Light, motion_px: tuple[float, float]) -> Light:
+    """Return light blurred by image motion while the shutter is open.
+
+    Args:
+        light: float32 [H, W, 3].
+        motion_px: displacement of the image during the exposure, (right, down) in pixels. Each
+            pixel becomes the mean along this line, centred on the pixel.
+    """
     if np.hypot(*motion_px) < _LEAST_PX:
         return light
     return np.asarray(
@@ -68,7 +84,7 @@ def _disc(radius_px: float) -> NDArray[np.float32]:
 
 
 def _line(motion_px: tuple[float, float]) -> NDArray[np.float32]:
-    """Each point of the line shared between the four pixels about it."""
+    """Return a kernel of a line; bilinear weights share each of its points among four pixels."""
     half = int(np.ceil(max(map(abs, motion_px)) / 2 + 0.5))
     along = (np.arange(256) + 0.5) / 256 - 0.5
     points = along[:, None] * motion_px + half

@@ -1,4 +1,4 @@
-"""What happens behind the lens: fall-off, gains and noise on light; stamps and JPEG on display."""
+"""Vignetting and noise of linear light; stamps and JPEG compression of the encoded image."""
 
 import cv2
 import numpy as np
@@ -10,14 +10,20 @@ from fastgen.scene.optics import Noise, Stamp
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0
-"""Height of that font's capitals at scale 1."""
+"""Height of the font's capitals at scale 1."""
 
 
-def falloff(size: tuple[int, int], corner_loss: float) -> Light:
-    """Share of light that each pixel gets, float32 [H, W, 1]: cos^4 of an angle to the axis.
+def vignette(size: tuple[int, int], corner_loss: float) -> Light:
+    """Return the transmission of the lens at each pixel: cos^4 of an angle to the axis.
 
-    size: (width, height). cos^4 a = (1 + tan^2 a)^-2, its angle such that the corners lose
-    `corner_loss`, 0 to less than 1.
+    cos^4 a = (1 + tan^2 a)^-2; the angle is scaled so that the corners lose `corner_loss`.
+
+    Args:
+        size: (width, height) in pixels.
+        corner_loss: share of the light lost in the corners, 0 to less than 1.
+
+    Returns:
+        float32 [H, W, 1], 0..1.
     """
     width, height = size
     x = (np.arange(width, dtype=np.float32) + 0.5) / width * 2 - 1
@@ -29,11 +35,11 @@ def falloff(size: tuple[int, int], corner_loss: float) -> Light:
 
 
 def noisy(light: Light, noise: Noise) -> Light:
-    """Light as a sensor counts it: shot noise, whose variance is the count, and read noise.
+    """Return light with shot noise and read noise.
 
-    EMVA 1288 release 4.0, section 2.2: sigma^2 = sigma_d^2 + mu electrons. The Poisson law of the
-    count is taken as a normal one, which from ten electrons on it nearly is. Colours are counted
-    for each pixel by itself, as after a demosaicing that blurs nothing.
+    EMVA 1288 release 4.0, section 2.2: sigma^2 = sigma_d^2 + mu electrons. A normal distribution
+    approximates the Poisson distribution of the electron count, which is close above ten electrons.
+    The channels of a pixel are independent; demosaicing is not modelled.
     """
     rng = np.random.Generator(np.random.SFC64(noise.seed))
     well = np.float32(noise.full_well_e)
@@ -46,8 +52,10 @@ def noisy(light: Light, noise: Noise) -> Light:
 
 
 def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:
-    """The image [H, W, 3] with white text, edged in black, burnt into a corner; smaller than asked
-    where it would not fit across."""
+    """Return the image [H, W, 3] with white, black-edged text burnt into a corner.
+
+    Text that is wider than the image is scaled down to fit.
+    """
     height, width = image.shape[:2]
     scale = max(stamp.height * height, 5.0) / _CAP_PX
     (long, tall), _ = cv2.getTextSize(stamp.text, _FONT, 1.0, 1)
@@ -64,8 +72,8 @@ def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:
     return np.asarray(np.rint(np.minimum(image * (1 - dark) + 255 * white, 255)), np.uint8)
 
 
-def through_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """The image [H, W, 3] as a camera's JPEG encoder of `quality` leaves it, colour halved."""
+def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Return the image [H, W, 3] after JPEG compression with 4:2:0 chroma subsampling."""
     data = simplejpeg.encode_jpeg(
         np.ascontiguousarray(image), quality=quality, colorspace="RGB", colorsubsampling="420"
     )

@@ -1,8 +1,9 @@
-"""Lens distortion: points of the ideal image plane to where a lens puts them, and back.
+"""Lens distortion and its inverse; the numpy twin of shaders/lens.glsl.
 
-Points are in focal lengths from the principal point: an ideal one is (x / z, y / z) in view space.
-Formulas are OpenCV's, in and around the image; farther out they may fold back on themselves, and go
-on as straight lines instead, so that what lies far beside the image stays beside it.
+Points are in focal lengths from the principal point. The undistorted ("ideal") point of a view
+space point is (x / z, y / z). Brown-Conrady and fisheye models with OpenCV's coefficients. Far
+outside the image the polynomials may fold back; there a straight line continues them, so that
+points beside the image stay beside it.
 """
 
 from collections.abc import Mapping
@@ -18,19 +19,19 @@ from fastgen.scene.optics import Lens
 Array = NDArray[np.float64]
 
 _LEAST_SLOPE = 0.05
-"""Of image radius by ideal radius or angle; where it falls below, the formula ends."""
+"""Derivative of image radius by ideal radius or angle below which the polynomial ends."""
 
 _MARGIN = 1.3
-"""The formula holds up to this many times the radius of the image's corners, if it can."""
+"""The polynomial is used up to this multiple of the radius of the image corners if possible."""
 
 _WIDEST_DEG = 78.0
-"""Off the axis at the corners; wider, what is drawn would meet the plane through the camera."""
+"""Largest angle off the axis at the corners. Wider views reach the plane through the camera."""
 
 _ROUNDS = 6
-"""Of Newton's iteration for tangential distortion; each doubles the digits."""
+"""Newton steps for tangential distortion; each doubles the number of correct digits."""
 
 _NUDGE = 1e-5
-"""Of ideal points, to either side, for slopes."""
+"""Offset to either side for numerical derivatives."""
 
 _FIT_TERMS = 8
 
@@ -43,19 +44,23 @@ PINHOLE: Mapping[str, ArrayLike] = MappingProxyType(
         "lens_end": (0.0, 0.0),
     }
 )
-"""What shaders/lens.glsl needs where there is no lens, see Distortion.shader_values."""
+"""Uniforms of shaders/lens.glsl without distortion, see Distortion.shader_values."""
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Third component of the cross products of vectors [..., 2]."""
+    """Return the cross product of plane vectors [..., 2], its component out of the plane."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], np.float64)
 
 
 class Distortion:
-    """A lens on an image of half_size (width, height), in focal lengths from its middle.
+    """Distortion of one lens over one image.
 
-    Raises ConfigError where the lens folds the image over, or sees farther to the side than can be
-    drawn.
+    Args:
+        lens: model and coefficients.
+        half_size: (width, height) from the centre of the image, in focal lengths.
+
+    Raises:
+        ConfigError: the lens folds the image over, or its field of view is too wide to draw.
     """
 
     def __init__(self, lens: Lens, half_size: tuple[float, float]) -> None:
@@ -65,7 +70,7 @@ class Distortion:
         c = lens.coefficients
         self._k = np.array(c if self._fisheye else (c[0], c[1], c[4], 0.0), np.float64)
         self._p = (0.0, 0.0) if self._fisheye else (c[2], c[3])
-        # tangential terms move a corner too
+        # tangential terms move the corner as well
         need = radius * (1 + 3 * radius * max(map(abs, self._p)))
         table = np.linspace(0, np.pi / 2 if self._fisheye else 8.0, 8193)
         steep = self._slope(table) >= _LEAST_SLOPE
@@ -94,7 +99,7 @@ class Distortion:
             )
 
     def apply(self, ideal: ArrayLike) -> Array:
-        """Where the lens puts ideal points [..., 2]."""
+        """Return the distorted positions of ideal points [..., 2]."""
         points = np.asarray(ideal, np.float64)
         radius = np.hypot(points[..., 0], points[..., 1])
         t = np.arctan(radius) if self._fisheye else radius
@@ -104,7 +109,7 @@ class Distortion:
         return points * scale[..., None] + self._shift(points)
 
     def remove(self, seen: ArrayLike) -> Array:
-        """The ideal points of what is seen at [..., 2]: the inverse of `apply`."""
+        """Return the ideal points of distorted positions [..., 2]: the inverse of `apply`."""
         points = np.asarray(seen, np.float64)
         ideal = self._straight(points)
         if any(self._p):
@@ -118,7 +123,7 @@ class Distortion:
         return ideal
 
     def _slopes(self, ideal: Array) -> tuple[Array, Array]:
-        """Derivatives [..., 2] of `apply` by an ideal point's x and y."""
+        """Return the derivatives [..., 2] of `apply` by x and by y of the ideal point."""
         x, y = (
             (self.apply(ideal + nudge) - self.apply(ideal - nudge)) / (2 * _NUDGE)
             for nudge in np.eye(2) * _NUDGE
@@ -126,10 +131,11 @@ class Distortion:
         return x, y
 
     def _folds(self, half_size: tuple[float, float]) -> bool:
-        """Whether two ideal points are seen at one place of the image."""
+        """Return whether two ideal points share a position in the image."""
         t = self._table[1:]
-        # radial distortion stretches by its slope along a radius, by curve / t across it, and
-        # tangential distortion's derivatives are no more than 8 |p| r: short of that, none fold
+        # radial distortion stretches by its slope along the radius and by curve / t across it;
+        # derivatives of tangential distortion are at most 8 |p| r, so below this bound no fold
+        # can occur
         if 8 * np.hypot(*self._p) * self._end < min(
             self._slope(t).min(), (self._curve(t) / t).min()
         ):
@@ -146,10 +152,10 @@ class Distortion:
 
     @cached_property
     def shader_values(self) -> Mapping[str, ArrayLike]:
-        """What shaders/lens.glsl needs of it.
+        """Uniforms of shaders/lens.glsl.
 
-        The way back is fitted there: seen over ideal radius, as a polynomial of the seen radius
-        squared, over all of the image.
+        The shader's inverse uses a fit over the whole image: the ratio of distorted to ideal radius
+        as a polynomial in the squared distorted radius.
         """
         t = np.linspace(0, self._end, 65)[1:]
         seen, ideal = self._curve(t), np.tan(t) if self._fisheye else t
@@ -164,7 +170,7 @@ class Distortion:
         }
 
     def _curve(self, t: Array) -> Array:
-        """Image radius by ideal radius, or by angle where the lens is a fisheye."""
+        """Return the image radius of an ideal radius, or of an angle for a fisheye."""
         k1, k2, k3, k4 = self._k
         q = t * t
         return np.asarray(t * (1 + q * (k1 + q * (k2 + q * (k3 + q * k4)))), np.float64)
@@ -175,7 +181,7 @@ class Distortion:
         return np.asarray(1 + q * (k1 + q * (k2 + q * (k3 + q * k4))), np.float64)
 
     def _shift(self, ideal: Array) -> Array | float:
-        """Tangential distortion, constant from where the formula ends."""
+        """Return the tangential distortion, which is constant beyond the end of the polynomial."""
         p1, p2 = self._p
         if not (p1 or p2):
             return 0.0
@@ -188,7 +194,7 @@ class Distortion:
         return np.stack([across, down], axis=-1)
 
     def _straight(self, seen: Array) -> Array:
-        """Undo the radial part: a table, then Newton's steps."""
+        """Invert the radial part by a table and Newton steps."""
         radius = np.hypot(seen[..., 0], seen[..., 1])
         inner = np.minimum(radius, self._end_bent)
         t = np.interp(inner, self._bent, self._table)

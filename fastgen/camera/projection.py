@@ -1,9 +1,9 @@
-"""Projection: a Camera and an image size to matrices, and points to pixels.
+"""Camera pose and projection for one image size.
 
-Pixel coordinates: x to the right, y down, (0, 0) at the top left corner of the image, so pixel
-(column i, row j) has its centre at (i + 0.5, j + 0.5). View space: x right, y down, z forward
-along the optical axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1; a
-lens's distortion comes between the division by depth and the camera matrix, see lens.py.
+Pixel coordinates: x right, y down, (0, 0) at the top left corner of the image. The centre of pixel
+(column i, row j) is (i + 0.5, j + 0.5). View space: x right, y down, z forward along the optical
+axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1. Lens distortion
+applies between the division by depth and the camera matrix, see lens.py.
 """
 
 from dataclasses import dataclass
@@ -21,11 +21,14 @@ from fastgen.scene.optics import Lens
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera bound to an image size.
+    """Projection of a camera for one image size.
 
-    rotation: float64 [3, 3], world to view. position_m: float64 [3], world metres.
-    focal_px: focal length in pixels, the same on both axes. size: (width, height). distortion: the
-    lens's, None for a pinhole.
+    Attributes:
+        rotation: float64 [3, 3], world to view.
+        position_m: float64 [3], world metres.
+        focal_px: focal length in pixels, equal on both axes.
+        size: (width, height) in pixels.
+        distortion: lens distortion, None for a pinhole.
     """
 
     rotation: NDArray[np.float64]
@@ -36,24 +39,24 @@ class View:
 
     @property
     def center_px(self) -> tuple[float, float]:
-        """Principal point (x, y) in pixels: the middle of the image."""
+        """Principal point (x, y) in pixels: the centre of the image."""
         return self.size[0] / 2, self.size[1] / 2
 
     @property
     def intrinsics(self) -> NDArray[np.float64]:
-        """Camera matrix float64 [3, 3] from view space to pixels; Hartley and Zisserman, 6.1."""
+        """Camera matrix float64 [3, 3], view space to pixels; Hartley and Zisserman, 6.1."""
         x, y = self.center_px
         return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1]])
 
     @property
     def translation_mm(self) -> NDArray[np.float64]:
-        """The world's origin in view space, float64 [3]; with `rotation` the container's pose."""
+        """World origin in view space, float64 [3]; with `rotation` the pose of the container."""
         return -self.rotation @ self.position_m / MM
 
     def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
-        """World points [..., 3] in mm to view space [..., 3] in metres."""
+        """Return world points [..., 3] in mm as view space points [..., 3] in metres."""
         points = np.asarray(points_mm, np.float64)
-        # in one product: of a stack of small matrices NumPy takes one after the other
+        # one product, because NumPy multiplies a stack of small matrices one by one
         turned = points.reshape(-1, 3) @ (MM * self.rotation.T)
         for axis, offset in enumerate(self.rotation @ self.position_m):
             turned[:, axis] -= offset  # NumPy is slow along an axis of three
@@ -62,9 +65,14 @@ class View:
     def project(
         self, points_mm: NDArray[np.floating]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """World points [..., 3] in mm to pixels [..., 2] and depth [...] in metres.
+        """Project world points.
 
-        Depth is along the optical axis; pixels of points at or behind the camera mean nothing.
+        Args:
+            points_mm: [..., 3], world mm.
+
+        Returns:
+            Pixels float64 [..., 2], meaningless for points at or behind the camera, and depth
+            float64 [...] along the optical axis in metres.
         """
         view = self.to_view(points_mm)
         depth = view[..., 2].copy()
@@ -82,9 +90,13 @@ class View:
     def rays(
         self, pixels: NDArray[np.floating] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Origin [3] in mm and unit directions [..., 3] of the rays through `pixels` [..., 2].
+        """Return the viewing rays of pixels.
 
-        By default those are all pixel centres, [H, W, 2].
+        Args:
+            pixels: [..., 2], by default all pixel centres [H, W, 2].
+
+        Returns:
+            Origin float64 [3] in world mm and unit directions float64 [..., 3] in world space.
         """
         width, height = self.size
         if pixels is None:
@@ -98,14 +110,18 @@ class View:
 
     @property
     def half_angle_deg(self) -> float:
-        """Angle between the optical axis and what the middle of the left border sees."""
+        """Angle between the optical axis and the ray of the middle of the left border, degrees."""
         edge = 0.5 * self.size[0] / self.focal_px
         if self.distortion:
             edge = float(np.linalg.norm(self.distortion.remove([-edge, 0.0])))
         return float(np.degrees(np.arctan(edge)))
 
     def lens_values(self, to_samples: NDArray[np.floating]) -> dict[str, ArrayLike]:
-        """The uniforms of shaders/lens.glsl; to_samples [2, 2]: see SampleLattice.to_clip."""
+        """Return the uniforms of shaders/lens.glsl.
+
+        Args:
+            to_samples: [2, 2], see SampleLattice.to_clip.
+        """
         return {
             **(self.distortion.shader_values if self.distortion else PINHOLE),
             "lens_to_clip": (to_samples * 2 * self.focal_px / self.size).T.ravel(),
@@ -114,11 +130,11 @@ class View:
         }
 
     def clip_matrix(self) -> NDArray[np.float64]:
-        """World metres to OpenGL clip space without the lens's distortion, float64 [4, 4].
+        """Return the matrix from world metres to OpenGL clip space, float64 [4, 4].
 
-        Clip y points down the image, so that row 0 of the framebuffer is the image's top row and
-        no read-back needs flipping; front faces are then clockwise. Depth maps [NEAR_M, FAR_M]
-        to [-1, 1]. OpenGL 4.5 core specification, section 13.6.
+        It ignores lens distortion. Clip y points down the image: row 0 of the framebuffer is the
+        top row of the image, read-back needs no flip, and front faces are clockwise. Depth
+        [NEAR_M, FAR_M] maps to [-1, 1]. OpenGL 4.5 core specification, section 13.6.
         """
         width, height = self.size
         world_to_view = np.eye(4)
@@ -134,10 +150,12 @@ class View:
 
 
 def view_of(camera: Camera, size: tuple[int, int]) -> View:
-    """The view of `camera` for an image of `size` (width, height) in pixels.
+    """Return the view of a camera for an image of `size` (width, height) in pixels.
 
-    The image's up direction is the world's z, turned clockwise by the camera's roll. Raises
-    ConfigError for a lens that cannot be drawn, see lens.Distortion.
+    The up direction of the image is world z, turned clockwise by the roll of the camera.
+
+    Raises:
+        ConfigError: the lens cannot be drawn, see lens.Distortion.
     """
     position = np.array(camera.position_mm, np.float64) * MM
     forward = np.array(camera.target_mm, np.float64) * MM - position
@@ -147,7 +165,7 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     right /= np.linalg.norm(right)
     down = np.cross(forward, right)
     roll = np.deg2rad(camera.roll_deg)
-    # turning the camera counter-clockwise turns what it sees clockwise
+    # turning the camera counter-clockwise turns the image clockwise
     rolled_right = np.cos(roll) * right - np.sin(roll) * down
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]

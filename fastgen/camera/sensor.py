@@ -1,65 +1,88 @@
-"""Frame -> the Frame that a real camera would have given: weather, optics, sensor, encoder.
+"""The camera model: linear light to the image that a real camera would deliver.
 
-In the order of the real thing: fog and rain, defocus and motion, fall-off, exposure, noise, white
-balance, all in linear light; then the tone curve, the stamp and JPEG. The image changes,
-labels are those of what is there, at the middle of the exposure.
+Order of the effects: fog and rain, defocus, motion blur, vignetting, exposure error, noise and
+white balance, all in linear light; then tone-mapping, encoding, stamp and JPEG. Only the image
+changes. Labels describe the sharp scene at the middle of the exposure.
 """
 
 from dataclasses import replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from fastgen.camera.blur import blur_radius_px, defocused, moved
-from fastgen.camera.electronics import falloff, noisy, stamped, through_jpeg
+from fastgen.camera.blur import blur_radius_px, defocused, motion_blurred
+from fastgen.camera.electronics import compress_jpeg, noisy, stamped, vignette
 from fastgen.camera.projection import View
-from fastgen.camera.tone_curve import Light, displayed, light_of
-from fastgen.camera.weather import foggy, rained
+from fastgen.camera.tone_curve import Light, tone_map_and_encode
+from fastgen.camera.weather import add_fog, add_rain
 from fastgen.frame import Frame
 from fastgen.scene import Camera, Color
 from fastgen.scene.optics import Sensor, Weather
 
 
 def is_needed(camera: Camera, weather: Weather) -> bool:
-    """Whether `develop` changes anything."""
-    return camera.sensor is not None or bool(weather.visibility_mm or weather.rain)
+    """Return whether the camera model changes the image."""
+    return camera.sensor is not None or _has_fog_or_rain(weather)
 
 
-def develop(frame: Frame, view: View, camera: Camera, weather: Weather, airlight: Color) -> Frame:
-    """The frame as `camera` records it in `weather`.
-
-    airlight: mean light of the sky in the frame's exposure: that of fog, and of drops.
-    """
+def needs_radiance(camera: Camera, weather: Weather) -> bool:
+    """Return whether the camera model works on linear light, not only on the encoded image."""
     sensor = camera.sensor or Sensor()
     encoding = replace(Sensor(), stamp=sensor.stamp, jpeg_quality=sensor.jpeg_quality)
+    return sensor != encoding or _has_fog_or_rain(weather)
+
+
+def apply_camera_model(
+    frame: Frame, view: View, camera: Camera, weather: Weather, airlight: Color
+) -> NDArray[np.uint8]:
+    """Return the image that a camera records of a rendered frame.
+
+    Args:
+        frame: the ideal image. `frame.radiance` is required if `needs_radiance`.
+        view: projection of `camera` at the size of the frame.
+        camera: its `sensor` holds the parameters of the model.
+        weather: fog and rain between the camera and the scene.
+        airlight: mean linear light of the sky in the exposure of the frame: colour of fog and rain.
+
+    Returns:
+        uint8 [H, W, 3], sRGB.
+    """
+    sensor = camera.sensor or Sensor()
     image = frame.image
-    if sensor != encoding or is_needed(replace(camera, sensor=None), weather):
-        light = _weathered(light_of(image), frame, view, weather, np.array(airlight, np.float32))
-        image = displayed(_exposed(light, frame, view, camera, sensor))
+    if needs_radiance(camera, weather):
+        assert frame.radiance is not None, "render with radiance=True"
+        sky = np.array(airlight, np.float32)
+        light = _through_weather(frame.radiance, frame, view, weather, sky)
+        image = tone_map_and_encode(_recorded(light, frame, view, camera, sensor))
     if sensor.stamp:
         image = stamped(image, sensor.stamp)
     if sensor.jpeg_quality:
-        image = through_jpeg(image, sensor.jpeg_quality)
-    return replace(frame, image=image)
+        image = compress_jpeg(image, sensor.jpeg_quality)
+    return image
 
 
-def _weathered(light: Light, frame: Frame, view: View, weather: Weather, sky: Light) -> Light:
+def _has_fog_or_rain(weather: Weather) -> bool:
+    return bool(weather.visibility_mm or weather.rain)
+
+
+def _through_weather(light: Light, frame: Frame, view: View, weather: Weather, sky: Light) -> Light:
     if weather.visibility_mm:
-        away = _ray_m(frame, view)
-        light = foggy(light, away, frame.cover, weather.visibility_mm, sky)
+        distance = _ray_m(frame, view)
+        light = add_fog(light, distance, frame.cover, weather.visibility_mm, sky)
     if weather.rain:
-        light = rained(light, frame.depth, view, weather.rain, sky)
+        light = add_rain(light, frame.depth, view, weather.rain, sky)
     return light
 
 
-def _exposed(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sensor) -> Light:
+def _recorded(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sensor) -> Light:
     width, _ = view.size
     if sensor.defocus:
         light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
     right, down = sensor.motion
-    light = moved(light, (right * width, down * width))
+    light = motion_blurred(light, (right * width, down * width))
     if sensor.vignetting:
-        light = light * falloff(view.size, sensor.vignetting)
+        light = light * vignette(view.size, sensor.vignetting)
     if sensor.exposure_error_ev:
         light = light * np.float32(2.0**sensor.exposure_error_ev)
     if sensor.noise:
@@ -70,8 +93,8 @@ def _exposed(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sen
     return light
 
 
-def _ray_m(frame: Frame, view: View) -> np.ndarray:
-    """Distance along each pixel's ray, float32 [H, W]."""
+def _ray_m(frame: Frame, view: View) -> NDArray[np.float32]:
+    """Return the distance along each pixel's ray in metres, float32 [H, W]."""
     if view.distortion:
         _, rays = view.rays()
         return np.asarray(frame.depth / (rays @ view.rotation[2]), np.float32)

@@ -1,7 +1,7 @@
-"""From the displayed image back to the light that made it, and forth: shaders/tone.glsl's curve.
+"""Tone-mapping and sRGB encoding of linear light; the numpy twin of shaders/tone.glsl.
 
-Eight bits of display hold light to a hundredth where it is neither in the last shades before black
-nor above white; what was clipped there comes back as _BRIGHTEST.
+Tone curve: Khronos PBR Neutral (Khronos Group 2024, specification section 2). The shader gets its
+constants from here.
 """
 
 from typing import Any
@@ -10,65 +10,57 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.camera import tone
-from fastgen.srgb import DECODED, ENCODED
+from fastgen.srgb import ENCODED
 
 Light = NDArray[np.float32]
-"""float32 [H, W, 3], linear Rec.709; 1 is what a white surface in metered light reflects, about."""
+"""float32 [H, W, 3], linear Rec. 709; a white surface in metered light is about 1."""
 
-_FRESNEL = np.float32(tone.FRESNEL)
-_CURVE = np.float32(0.25 / tone.FRESNEL)
-_START = np.float32(tone.SHOULDER - tone.FRESNEL)
+FRESNEL = 0.04
+"""Offset that reflection of a dielectric adds to every colour; the curve subtracts it."""
+
+SHOULDER = 0.8
+"""Brightest channel up to which colours are unchanged, before the offset is subtracted."""
+
+DESATURATION = 0.15
+"""Rate at which colours above the shoulder approach white."""
+
+_OFFSET = np.float32(FRESNEL)
+_CURVE = np.float32(0.25 / FRESNEL)
+_START = np.float32(SHOULDER - FRESNEL)
 _ROOM = np.float32(1 - _START)
-_DESATURATION = np.float32(tone.DESATURATION)
-_BRIGHTEST = np.float32(12.0)
-_TOP = np.float32(1 - _ROOM**2 / (_BRIGHTEST + _ROOM - _START))
+_DESATURATION = np.float32(DESATURATION)
+_BRIGHTEST = np.float32(1e6)  # as in the shader; keeps the products below finite
 
 
-def light_of(image: NDArray[np.uint8]) -> Light:
-    """The light that `displayed` would show as an sRGB image uint8 [H, W, 3]."""
-    red, green, blue = planes = cv2.split(image)
-    peak = cv2.max(cv2.max(red, green), blue)
-    scale, offset = _UNSHOWN_SCALE[peak], _UNSHOWN_OFFSET[peak]
-    low = DECODED[cv2.min(cv2.min(red, green), blue)] * scale + offset
-    low = np.maximum(low, 0)
-    offset += np.where(low < _FRESNEL, np.sqrt(low / _CURVE) - low, _FRESNEL)
-    return _joined([np.maximum(DECODED[plane] * scale + offset, 0) for plane in planes])
+def tone_map_and_encode(light: Light) -> NDArray[np.uint8]:
+    """Return the sRGB image of linear light.
 
+    Args:
+        light: float32 [H, W, 3], exposed linear Rec. 709; negative values become black.
 
-def displayed(light: Light) -> NDArray[np.uint8]:
-    """Light through the tone curve and sRGB's encoding, uint8 [H, W, 3]; below 0 is black."""
-    red, green, blue = planes = [np.maximum(plane, 0) for plane in cv2.split(light)]
+    Returns:
+        uint8 [H, W, 3], within one code of the image that the shader draws.
+    """
+    red, green, blue = planes = [np.clip(plane, 0, _BRIGHTEST) for plane in cv2.split(light)]
     low = cv2.min(cv2.min(red, green), blue)
-    taken = np.where(low < 2 * _FRESNEL, low - _CURVE * low * low, _FRESNEL)
-    scale, offset = _shown(np.maximum(np.maximum(red, green), blue) - taken)
-    offset -= taken * scale
-    shown = [
-        np.clip(plane * scale + offset, 0, 1) * np.float32(65535) + np.float32(0.5)
+    offset = np.where(low < 2 * _OFFSET, low - _CURVE * low * low, _OFFSET)
+    scale, white = _compressed(np.maximum(np.maximum(red, green), blue) - offset)
+    white -= offset * scale
+    encoded = [
+        np.clip(plane * scale + white, 0, 1) * np.float32(65535) + np.float32(0.5)
         for plane in planes
     ]
-    return _joined([ENCODED[plane.astype(np.uint16)] for plane in shown])
+    return _merged([ENCODED[plane.astype(np.uint16)] for plane in encoded])
 
 
-def _shown(peak: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The tone curve's shoulder as a factor and a summand, by the brightest channel."""
-    # where that is below the start, the formula leaves everything as it is
+def _compressed(peak: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the highlight compression as a factor and a summand, from the brightest channel."""
+    # a peak clamped to the start makes the formula below the identity
     old = np.maximum(peak, _START)
     new = 1 - _ROOM**2 / (old + _ROOM - _START)
     keep = 1 / (old * (_DESATURATION * (old - new) + 1))
     return np.asarray(new * keep, np.float32), np.asarray(new - new * old * keep, np.float32)
 
 
-def _unshown() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The inverse of `_shown`, by the brightest channel's eight bits."""
-    new = np.clip(DECODED, _START, _TOP)
-    old = _ROOM**2 / (1 - new) - _ROOM + _START
-    scale = old * (_DESATURATION * (old - new) + 1) / new
-    return np.asarray(scale, np.float32), np.asarray(old - new * scale, np.float32)
-
-
-_UNSHOWN_SCALE, _UNSHOWN_OFFSET = _unshown()
-
-
-def _joined(planes: list[NDArray[Any]]) -> NDArray[Any]:
+def _merged(planes: list[NDArray[Any]]) -> NDArray[Any]:
     return np.asarray(cv2.merge(planes))

@@ -1,4 +1,4 @@
-"""Fog and falling rain between the camera and what it sees, in linear light."""
+"""Fog and falling rain between the camera and the scene, in linear light."""
 
 import cv2
 import numpy as np
@@ -9,36 +9,44 @@ from fastgen.camera.tone_curve import Light
 from fastgen.scene.optics import Rain
 
 _CONTRAST = 3.912
-"""-ln 0.02: visibility is where 2 % of a contrast is left (Koschmieder 1924)."""
+"""-ln 0.02: at the visibility distance 2 % of a contrast remains (Koschmieder 1924)."""
 
 _BACKDROP_M = 300.0
-"""How far away the surroundings are taken to be, of which an HDRI does not say it."""
+"""Assumed distance of the surroundings, which an HDRI does not contain."""
 
 _BESIDE = 2
-"""Pixels around one in which its surroundings are looked for."""
+"""Radius in pixels of the search for uncovered neighbours."""
 
 _NEAREST_M, _FARTHEST_M = 0.12, 4.0
-"""Drops nearer are blurs before the lens, drops farther are too fine to tell apart."""
+"""Nearer drops are only blurs in front of the lens; farther drops are too fine to resolve."""
 
 _SMALLEST_MM, _LARGEST_MM = 1.0, 4.5
 _MOST_DROPS = 12_000
-"""Of more, as wide lenses see in heavy rain, so many are drawn, each for as many as it takes."""
+"""Limit on drawn drops. If a wide lens sees more, each drawn drop represents several."""
 
 _DROP_LIGHT = 0.94
-"""Of the mean light around, that a drop sends on (Garg and Nayar 2007, "Vision and Rain", 3)."""
+"""Share of the mean ambient light that a drop refracts to the camera (Garg and Nayar 2007, "Vision
+and Rain", section 3)."""
 
 
-def foggy(
+def add_fog(
     light: Light,
     ray_m: NDArray[np.float32],
     cover: NDArray[np.uint8],
     visibility_mm: float,
     airlight: Light,
 ) -> Light:
-    """Koschmieder's law: light L t + A (1 - t), t = exp(-3.912 d / V).
+    """Return light seen through fog, by Koschmieder's law: L t + A (1 - t), t = exp(-3.912 d / V).
 
-    ray_m: float32 [H, W], distance along the ray through each pixel's centre, inf for the
-    surroundings. cover: uint8 [H, W], see Frame. airlight: [3].
+    In partly covered pixels the object and the surroundings are attenuated separately.
+
+    Args:
+        light: float32 [H, W, 3], linear.
+        ray_m: float32 [H, W], distance along the ray of each pixel centre in metres, inf for the
+            surroundings.
+        cover: uint8 [H, W], see Frame.
+        visibility_mm: meteorological visibility V.
+        airlight: float32 [3], A.
     """
     decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
     far, near = np.exp(decay * np.float32(_BACKDROP_M)), np.exp(decay * _objects_m(ray_m))
@@ -60,11 +68,17 @@ def _behind(
     mixed: tuple[NDArray[np.intp], ...],
     share: NDArray[np.float32],
 ) -> NDArray[np.float32]:
-    """Of the light of pixels that objects cover a share [N, 1] of, the surroundings', [N, 3].
+    """Return the surroundings' part of the light of partly covered pixels, [N, 3].
 
-    It is that of pixels beside them that show nothing else, where there are some. But objects are
-    no brighter than pixels beside them that they cover whole, or where there are none, as beside
-    cables, than the mean of all such: what detail of the surroundings adds to that is theirs.
+    The uncovered neighbours give the estimate. It is raised so that the object in the pixel is not
+    brighter than the fully covered neighbours, or than the mean fully covered pixel if there are
+    none, as beside cables. This keeps bright detail of the surroundings out of the object.
+
+    Args:
+        light: float32 [H, W, 3].
+        cover: uint8 [H, W].
+        mixed: rows and columns [N] of the partly covered pixels.
+        share: float32 [N, 1], coverage of these pixels, 0..1.
     """
     step = np.arange(-_BESIDE, _BESIDE + 1)
     down, right = (offset.ravel() for offset in np.meshgrid(step, step, indexing="ij"))
@@ -82,20 +96,32 @@ def _behind(
 
 
 def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
-    """How far away is what covers a pixel [H, W], also where its centre shows the surroundings:
-    as far as beside it, or, of a cable that no centre meets, as the nearest thing."""
+    """Return the distance of the object that covers a pixel, [H, W].
+
+    If the pixel centre shows the surroundings, the nearest neighbour's distance is used. A cable
+    may miss all pixel centres; it gets the smallest distance in the image.
+    """
     beside = cv2.erode(ray_m, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
     nearest = np.minimum(ray_m.min(), np.float32(_BACKDROP_M))
     away = np.where(np.isfinite(beside), beside, nearest)
     return np.where(np.isfinite(ray_m), ray_m, away)
 
 
-def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, sky: Light) -> Light:
-    """Streaks of drops that fall while the shutter is open, before what is farther than they.
+def add_rain(
+    light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, sky: Light
+) -> Light:
+    """Return light with streaks of drops that fall while the shutter is open.
 
-    A drop of diameter a at speed v covers a pixel on its way for a / v, so that it mixes that share
-    of the exposure with its own light: Garg and Nayar 2007, section 5. Sizes: Marshall and Palmer
-    1948; speed: Atlas, Srivastava and Sekhon 1973. sky: [3], mean light around.
+    A drop of diameter a and speed v covers a pixel in its path for the time a / v and adds its own
+    light for that share of the exposure (Garg and Nayar 2007, section 5). Sizes follow Marshall and
+    Palmer 1948, speeds Atlas, Srivastava and Sekhon 1973. Nearer surfaces hide drops.
+
+    Args:
+        light: float32 [H, W, 3], linear.
+        depth_m: float32 [H, W], metres along the optical axis.
+        view: projection of the camera.
+        rain: rate, shutter time, wind and random seed.
+        sky: float32 [3], mean ambient light.
     """
     rng = np.random.Generator(np.random.PCG64(rain.seed))
     height, width = depth_m.shape
@@ -105,7 +131,7 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
     volume = reach.prod() * (_FARTHEST_M**3 - _NEAREST_M**3) / 3
     fallen = int(rng.poisson(per_m3 * volume))
     count = min(fallen, _MOST_DROPS)
-    # uniform in the pyramid that is seen
+    # uniform in the view pyramid
     near, far = _NEAREST_M**3, _FARTHEST_M**3
     z = np.cbrt(near + rng.random(count) * (far - near))
     start = rng.random((count, 2)) * (width, height)
@@ -124,7 +150,7 @@ def rained(light: Light, depth_m: NDArray[np.float32], view: View, rain: Rain, s
 
 
 def _mixed(light: Light, other: Light, share: NDArray[np.float32]) -> Light:
-    """Light [H, W, 3] and `other` [3], of which each pixel gets its `share` [H, W]."""
+    """Return light [H, W, 3] mixed with `other` [3] by the `share` [H, W] of each pixel."""
     planes = zip(cv2.split(light), other, strict=True)
     return np.asarray(cv2.merge([plane + share * (one - plane) for plane, one in planes]))
 
@@ -137,19 +163,26 @@ def _streaks(
     depth_m: NDArray[np.float32],
     times: float = 1.0,
 ) -> NDArray[np.float32]:
-    """Share of the exposure that drops cover each pixel for, float32 [H, W] in 0..1.
+    """Return the share of the exposure for which drops cover each pixel, float32 [H, W], 0..1.
 
-    middle, way_px: [N, 2] in pixels, of each streak. A drop's area, over its way and width in
-    whole pixels, adds up to wide_px squared. times: how many drops each stands for.
+    The coverage of one drop sums to wide_px squared over its streak.
+
+    Args:
+        middle: [N, 2], centre of each streak in pixels.
+        way_px: [N, 2], movement during the exposure in pixels.
+        wide_px: [N], diameter in pixels.
+        z: [N], depth in metres.
+        depth_m: float32 [H, W], depth of the scene.
+        times: number of drops that each streak represents.
     """
     height, width = depth_m.shape
     way = np.abs(way_px).max(axis=1)
-    length = way + wide_px  # from the first to the last that it covers
+    length = way + wide_px  # from the first covered pixel to the last
     steps = np.ceil(length).astype(np.int64) + 1
     drop = np.repeat(np.arange(len(z)), steps)
     along = np.arange(len(drop)) - np.repeat(np.cumsum(steps) - steps, steps)
     step = way_px / np.maximum(way, 1e-6)[:, None]
-    # what is wider than a pixel is so across its way
+    # streaks wider than a pixel are widened along the minor axis of their movement
     across = (np.abs(way_px[:, :1]) > np.abs(way_px[:, 1:])) == [False, True]
     cover = np.zeros(height * width)
     thick = np.maximum(np.rint(wide_px), 1).astype(int)

@@ -1,6 +1,6 @@
-"""The suns of an environment: compact lights, taken out of the maps so that they can cast shadows.
+"""Directional lights extracted from an HDRI: compact lights that cast shadows.
 
-Under an open sky that is the sun; by night and indoors up to MOST_SUNS lamps are.
+Under an open sky the only one is the sun. At night and indoors there are up to MAX_LIGHTS lamps.
 """
 
 from dataclasses import dataclass
@@ -12,29 +12,31 @@ from fastgen.light import prefilter
 from fastgen.scene import REC_709
 
 CAP_DEG = 3.0
-"""Radius about its brightest place that counts as a sun: its disc, blurred by texels and haze."""
+"""Radius of a light around its brightest point: its disc, blurred by texels and haze."""
 
 MIN_SHARE = 0.1
-"""Of the irradiance on a surface that faces it; what brings less casts no shadow worth its time."""
+"""Least share of the irradiance on a surface that faces the light. Shadows of weaker lights are not
+worth their cost."""
 
-MOST_SUNS = 4
+MAX_LIGHTS = 4
 
 _APART_DEG = 2 * CAP_DEG
-"""Between two suns, at least: their caps do not overlap."""
+"""Least angle between two lights, so that their caps do not overlap."""
 
-_ROUNDS = 4  # until a cap stands about the centre of a small light
-_SEARCH_WIDTH = 256  # texels around of the map that tells where to look
+_ROUNDS = 4  # iterations that centre a cap on a small light
+_SEARCH_WIDTH = 256  # width in texels of the map in which candidates are found
 
 Radiance = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Sun:
-    """A light from one direction, in the frame of the environment's map.
+class DirectionalLight:
+    """Light from one direction, in the frame of the environment map.
 
-    direction: unit vector toward it. light: linear RGB, irradiance / pi on a surface that faces it,
-    the unit of EnvironmentLight.irradiance. radius: angular radius in radians of the even disc that
-    spreads as much.
+    Attributes:
+        direction: unit vector toward the light.
+        light: linear RGB, irradiance / pi on a surface that faces the light.
+        radius: angular radius in radians of a uniform disc with the same spread.
     """
 
     direction: tuple[float, float, float]
@@ -42,56 +44,68 @@ class Sun:
     radius: float
 
 
-def split_suns(radiance: Radiance) -> tuple[tuple[Sun, ...], Radiance]:
-    """The suns of equirectangular radiance [H, 2H, 3], brightest first, and the radiance without.
+def extract_lights(radiance: Radiance) -> tuple[tuple[DirectionalLight, ...], Radiance]:
+    """Split radiance into directional lights and the rest.
 
-    A sun is what exceeds the sky around it, channel by channel, within CAP_DEG of a place where it
-    gives MIN_SHARE of the light; all parts together hold the light of the whole. Of two that stand
-    closer than twice that only one is, of a disc a little broader than the cap only a part. Of more
-    than MOST_SUNS those stay in the map that give the least share. Without any: (), and `radiance`
-    itself.
+    A light is the excess over the surrounding sky, per channel, within CAP_DEG of a point where it
+    gives at least MIN_SHARE of the irradiance. The lights and the rest add up to the input.
+    Only one of two candidates closer than twice CAP_DEG is extracted, and only a part of a disc
+    wider than the cap. With more than MAX_LIGHTS candidates, the weakest remain in the map.
+
+    Args:
+        radiance: float32 [H, 2H, 3], equirectangular.
+
+    Returns:
+        The lights, brightest first, and the remaining radiance float32 [H, 2H, 3]. Without a light,
+        () and `radiance` itself.
     """
     places = _Places(radiance)
     found: list[_Excess] = []
     while (place := places.next()) is not None:
         excess = places.excess_about(place)
         if excess is not None and all(
-            _apart_deg(excess.sun, other.sun) >= _APART_DEG for other in found
+            _apart_deg(excess.source, other.source) >= _APART_DEG for other in found
         ):
             found.append(excess)
-            places.rule_out(np.array(excess.sun.direction), _APART_DEG)
+            places.rule_out(np.array(excess.source.direction), _APART_DEG)
         places.rule_out(place, CAP_DEG)
     if not found:
         return (), radiance
     found.sort(key=lambda excess: -excess.share)
     rest = radiance.copy()
-    for excess in found[:MOST_SUNS]:
+    for excess in found[:MAX_LIGHTS]:
         rest[excess.at] = np.maximum(rest[excess.at] - excess.radiance, 0.0)
-    suns = sorted((excess.sun for excess in found[:MOST_SUNS]), key=_luminance, reverse=True)
-    return tuple(suns), rest
+    lights = sorted((excess.source for excess in found[:MAX_LIGHTS]), key=_luminance, reverse=True)
+    return tuple(lights), rest
 
 
-def _luminance(sun: Sun) -> float:
-    return float(np.dot(sun.light, REC_709))
+def _luminance(source: DirectionalLight) -> float:
+    return float(np.dot(source.light, REC_709))
 
 
-def _apart_deg(one: Sun, other: Sun) -> float:
+def _apart_deg(one: DirectionalLight, other: DirectionalLight) -> float:
     return float(np.degrees(np.arccos(np.clip(np.dot(one.direction, other.direction), -1, 1))))
 
 
 @dataclass(frozen=True, eq=False)
 class _Excess:
-    """What a sun has above the sky around it: radiance [K, 3] in the texels (rows, columns) `at`;
-    share: of the irradiance on what faces it."""
+    """Radiance of a light above the surrounding sky.
 
-    sun: Sun
+    Attributes:
+        source: the light.
+        share: its share of the irradiance on a surface that faces it.
+        at: rows and columns [K] of its texels.
+        radiance: [K, 3], excess in these texels.
+    """
+
+    source: DirectionalLight
     share: float
     at: tuple[NDArray[np.intp], ...]
     radiance: Radiance
 
 
 class _Places:
-    """Where suns may stand in a map [H, 2H, 3]."""
+    """Candidate directions of lights in a map [H, 2H, 3]."""
 
     def __init__(self, radiance: Radiance) -> None:
         height = radiance.shape[0]
@@ -104,7 +118,7 @@ class _Places:
         texel, cap = np.pi / len(coarse), np.deg2rad(CAP_DEG)
 
         def within(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-            """1 in a cap, falling to 0 over a texel: no light of a cap is lost between texels."""
+            """Return 1 inside the cap, falling to 0 over one texel to lose no light in between."""
             angle = np.arccos(np.clip(cosine, -1.0, 1.0))
             return np.clip((cap + texel - angle) / texel, 0.0, 1.0)
 
@@ -114,18 +128,20 @@ class _Places:
         self._share = np.where(most > 0, most / np.maximum(self._irradiance, 1e-30), 0.0)
 
     def next(self) -> NDArray[np.float64] | None:
-        """Unit vector to where most of the light may come from within a cap, among what is not
-        ruled out; None where it is too little."""
+        """Return the remaining direction whose cap may give the largest share of the light.
+
+        None if that share is below MIN_SHARE.
+        """
         place = np.unravel_index(np.argmax(self._share), self._share.shape)
         return self._places[place] if self._share[place] >= MIN_SHARE else None
 
     def rule_out(self, toward: NDArray[np.float64], radius_deg: float) -> None:
-        """All places about a unit vector, and the nearest."""
+        """Remove all candidates within an angle of a unit vector, at least the nearest one."""
         nearness = self._places @ toward
         self._share[nearness >= min(np.cos(np.deg2rad(radius_deg)), nearness.max())] = 0
 
     def excess_about(self, toward: NDArray[np.float64]) -> _Excess | None:
-        """What is brighter than the sky around, near a unit vector; None if that is too little."""
+        """Return the excess over the surrounding sky near a unit vector, None if it is too weak."""
         height = len(self._radiance)
         reach = int(np.ceil(height * 3 * CAP_DEG / 180))
         middle = int(np.arccos(np.clip(toward[2], -1.0, 1.0)) / np.pi * height)
@@ -147,7 +163,7 @@ class _Places:
             toward /= np.linalg.norm(toward)
         cosine = np.maximum(directions[cap] @ toward, 0.0)
         squared_angle = np.arccos(np.clip(cosine, 0.0, 1.0)) ** 2
-        # an even disc of radius r has a mean square of r^2 / 2
+        # the mean squared angle of a uniform disc of radius r is r^2 / 2
         radius = np.sqrt(2 * (flux @ squared_angle) / flux.sum())
         light = (weights[cap] * cosine) @ excess / np.pi
         x, y, z = (float(v) for v in toward)
@@ -157,12 +173,12 @@ class _Places:
         share = float(flux @ cosine) / float(self._irradiance.flat[nearest])
         if share < MIN_SHARE:
             return None
-        sun = Sun((x, y, z), (red, green, blue), float(radius))
-        return _Excess(sun, share, (row + first, column), excess)
+        source = DirectionalLight((x, y, z), (red, green, blue), float(radius))
+        return _Excess(source, share, (row + first, column), excess)
 
 
 def _median(values: NDArray[np.floating], weights: NDArray[np.float64]) -> NDArray[np.floating]:
-    """Of each channel of values [K, C] that count by weights [K]."""
+    """Return the weighted median of each channel of values [K, C]; weights: [K]."""
     order = np.argsort(values, axis=0)
     below = np.cumsum(weights[order], axis=0)
     middle = (below < below[-1] / 2).sum(axis=0)

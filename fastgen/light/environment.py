@@ -1,8 +1,8 @@
-"""HDRI -> prefiltered light, cached on disk. Plain arrays: no GL here.
+"""Prefiltered light of an HDRI, cached on disk.
 
-World z is up; map projections and their borders are described in prefilter.py. Radiance is linear
-with Rec. 709 primaries. A yaw in degrees turns the environment about +z, counter-clockwise seen
-from above: radiance(direction) = map(Rz(-yaw) direction).
+World z is up. prefilter.py and octahedral.py describe the map projections. Radiance is linear with
+Rec. 709 primaries. The yaw, in degrees, turns the environment about +z, counter-clockwise seen from
+above: radiance(direction) = map(Rz(-yaw) direction).
 """
 
 import contextlib
@@ -17,109 +17,113 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.errors import AssetError
 from fastgen.files import disk_cache
-from fastgen.light import prefilter, rgb9e5
-from fastgen.light.directional_lights import Sun, split_suns
+from fastgen.light import octahedral, prefilter, rgb9e5
+from fastgen.light.directional_lights import DirectionalLight, extract_lights
 from fastgen.light.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
 
 PREFILTER_VERSION = 12
-"""Part of the cache key: count up whenever the prefiltered arrays change."""
+"""Part of the cache key; increase it whenever the prefiltered arrays change."""
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
-"""Perceptual roughness of the layers of `EnvironmentLight.specular`; interpolate linearly."""
+"""Perceptual roughness of each layer of `EnvironmentLight.specular`; interpolate linearly."""
 
 SPECULAR_SIZE = 128
 IRRADIANCE_SIZE = 34
-"""Texels along a side, border included, as for SPECULAR_SIZE."""
+"""Texels along a side of the map, including the border; likewise SPECULAR_SIZE."""
 
 _LUMINANCE_WIDTH = 32
-_LUMINANCE_FLOOR = 1e-6  # so that one black texel does not turn a log average to 0
-_DARKEST = 1e-5  # below this the steps of half floats show, and then the meter's floor
-_BRIGHTEST = 1e4  # leaves what is six times the mean within half floats
-_SKY_CELLS = 42  # along a side of `Ambient.sky`: 5 degrees
-_MAPS = ("specular", "irradiance", "background", "luminance", "suns")
-_SUN_WIDTH = 2048  # a texel is a third of the real sun
-_MAX_WORK_WIDTH = 8192  # a background texel covers about two texels of this
+_LUMINANCE_FLOOR = 1e-6  # keeps one black texel from turning a log average to 0
+_DARKEST = 1e-5  # darker maps show the steps of half floats
+_BRIGHTEST = 1e4  # radiance up to six times the mean still fits half floats
+_SKY_CELLS = 42  # along a side of `Ambient.sky`; 5 degrees each
+_MAPS = ("specular", "irradiance", "background", "luminance", "lights")
+_LIGHTS_WIDTH = 2048  # a texel is a third of the diameter of the sun
+_MAX_WORK_WIDTH = 8192  # a background texel covers about two of its texels
 
 
 @dataclass(frozen=True, eq=False)
 class Ambient:
-    """What of an environment's light the CPU asks for, apart from the large maps.
+    """Light of an environment without the large maps of the GPU.
 
-    Maps are finite, float32 and within [0, HALF_MAX]. `irradiance` lacks what `suns` have.
+    Maps are finite, float32 and within [0, HALF_MAX]. `irradiance` excludes `lights`.
     """
 
     name: str
     irradiance: NDArray[np.float32]
-    """[M, M, 3] irradiance / pi by surface normal: what a white Lambert surface reflects."""
+    """[M, M, 3] irradiance / pi by surface normal: the radiance of a white Lambert surface."""
     luminance: NDArray[np.float32]
     """[16, 32] equirectangular, mean Rec. 709 luminance of each cell, for exposure metering."""
     mean_luminance: float
     """Mean of the luminance over the whole sphere."""
-    suns: tuple[Sun, ...]
-    """Strong compact lights, brightest first; none under an even sky."""
+    lights: tuple[DirectionalLight, ...]
+    """Directional lights, brightest first; none under an even sky."""
     sky: NDArray[np.float32]
-    """[42, 42, 3] octahedral without a border, mean radiance of each cell, without suns."""
+    """[42, 42, 3] octahedral without a border, mean radiance of each cell without `lights`."""
 
     @staticmethod
     def of(light: "Ambient") -> "Ambient":
-        """Only this of a whole light."""
+        """Return a copy of `light` without its large maps."""
         return Ambient(**{field.name: getattr(light, field.name) for field in fields(Ambient)})
 
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight(Ambient):
-    """Light of one HDRI, ready for a GPU.
+    """Prefiltered light of one HDRI, ready for a GPU.
 
-    The octahedral maps have a border of one texel (prefilter.py says how uv meets it). The values
-    of `specular` and `irradiance` are exactly representable as half floats.
+    The octahedral maps have a border of one texel, see octahedral.py. The values of `specular` and
+    `irradiance` are exactly representable as half floats.
     """
 
     specular: NDArray[np.float32]
-    """[L, N, N, 3] radiance convolved with the GGX lobe, a layer for each of ROUGHNESS_LEVELS;
-    without the suns, as `irradiance`."""
+    """[L, N, N, 3] radiance without `lights`, convolved with the GGX lobe of each roughness in
+    ROUGHNESS_LEVELS."""
     background: NDArray[np.uint32]
-    """[B, B] radiance as it is, as rgb9e5.py packs it, by prefilter.levelled directions. B is a
-    power of two from 512 to 2048 near twice the width, for as much as that is needed to look as
-    sharp as the HDRI itself, and 4096 where that is wider than 4096: a finer one shows in no
-    picture of a usual size, but takes 67 MB."""
+    """[B, B] unfiltered radiance, packed by rgb9e5.py and indexed by octahedral.levelled.
+    B is the power of two nearest twice the width of the HDRI, from 512 to 2048, which looks as
+    sharp as the HDRI. It is 4096 for an HDRI wider than 4096; a finer map would take 67 MB and is
+    not visible in images of usual size."""
 
 
 def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> EnvironmentLight:
-    """Prefilter equirectangular radiance, float32 [H, W, 3], finite and 0 or more, H close to W/2.
+    """Prefilter the radiance of an HDRI.
 
-    Sums stay in float32 or wider; only the results are clamped to half range, so a sun of 1e6 keeps
-    its energy wherever it is spread over more than a few texels.
+    Sums are in float32 or wider. Only the results are clamped to the range of half floats, so a sun
+    of 1e6 keeps its energy wherever it is spread over more than a few texels.
+
+    Args:
+        name: name of the environment.
+        radiance: float32 [H, W, 3], equirectangular, finite and 0 or more, H close to W / 2.
     """
     width = radiance.shape[1]
     background_size = int(np.clip(2 ** round(np.log2(2 * width)), 512, 2048))
     if width > 4096:
         background_size = 4096
     source = prefilter.shrink(radiance, min(2 * background_size, _MAX_WORK_WIDTH))
-    # a texel has sqrt(4 pi) / B radians a side, one of the source at most 2 pi / W
+    # a texel is sqrt(4 pi) / B radians wide, a source texel at most 2 pi / W
     samples = 1 if source.shape[1] <= 1.5 * background_size else 2
     poles = prefilter.smooth_poles(source)
-    background = prefilter.resample_octahedral(poles, background_size, samples, level=True)
+    background = octahedral.resample_octahedral(poles, background_size, samples, level=True)
 
-    # about a texel and a half of the layers; wider lobes do with half of it
-    narrow = prefilter.shrink(source, _SUN_WIDTH)
-    suns, sunless = split_suns(narrow)
-    fine = prefilter.shrink(sunless, 4 * SPECULAR_SIZE)
+    # about 1.5 texels per texel of the layers; half as many suffice for wider lobes
+    narrow = prefilter.shrink(source, _LIGHTS_WIDTH)
+    lights, rest = extract_lights(narrow)
+    fine = prefilter.shrink(rest, 4 * SPECULAR_SIZE)
     coarse = prefilter.shrink(fine, 2 * SPECULAR_SIZE)
     layers = []
     for roughness in ROUGHNESS_LEVELS:
-        if roughness < 0.08:  # the lobe is narrower than a texel, whose mean is the better answer
+        if roughness < 0.08:  # narrower than a texel, whose mean is more accurate
             lobes = prefilter.smooth_poles(fine)
         else:
             grid = fine if roughness < 0.25 else coarse
             lobes = prefilter.convolve(grid, prefilter.ggx_lobe(roughness))
-        layers.append(prefilter.resample_octahedral(lobes, SPECULAR_SIZE, 4))
+        layers.append(octahedral.resample_octahedral(lobes, SPECULAR_SIZE, 4))
     diffuse = prefilter.convolve(coarse, prefilter.cosine_lobe)
-    irradiance = prefilter.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
+    irradiance = octahedral.resample_octahedral(diffuse, IRRADIANCE_SIZE, 1)
 
     cells = prefilter.shrink(narrow, _LUMINANCE_WIDTH) @ REC_709.astype(np.float32)
     packed = rgb9e5.packed(background)
-    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, suns)
+    return _light(name, _half(np.stack(layers)), _half(irradiance), packed, cells, lights)
 
 
 def _half(radiance: NDArray[np.float32]) -> NDArray[np.float16]:
@@ -132,7 +136,7 @@ def _light(
     irradiance: NDArray[np.float16],
     background: NDArray[np.uint32],
     luminance: NDArray[np.float32],
-    suns: tuple[Sun, ...],
+    lights: tuple[DirectionalLight, ...],
 ) -> EnvironmentLight:
     weight = prefilter.row_solid_angle(luminance.shape[0]) / (4 * np.pi)
     return EnvironmentLight(
@@ -142,25 +146,31 @@ def _light(
         background=background,
         luminance=luminance,
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
-        suns=suns,
+        lights=lights,
         sky=_sky_cells(specular[0].astype(np.float32)),
     )
 
 
 def _sky_cells(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means over cells of an octahedral map [N, N, 3] with a border."""
-    inner = radiance[prefilter.BORDER : -prefilter.BORDER, prefilter.BORDER : -prefilter.BORDER]
+    """Return the mean of each cell of an octahedral map [N, N, 3] with a border."""
+    inner = radiance[octahedral.BORDER : -octahedral.BORDER, octahedral.BORDER : -octahedral.BORDER]
     cells = cv2.resize(inner, (_SKY_CELLS, _SKY_CELLS), interpolation=cv2.INTER_AREA)
     return np.asarray(cells, np.float32)
 
 
 def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> EnvironmentLight:
-    """Read and prefilter an HDRI, or take the result of an earlier time from the disk cache.
+    """Return the prefiltered light of an HDRI, from the disk cache if possible.
 
-    cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen. The key is the content of the
-    file, so a renamed file hits and a changed one misses. Cached or not, the result is the same to
-    the bit. A broken entry is built again, and without a writable folder nothing is cached.
-    Raises AssetError, as `load_radiance` does, and where it is too dark or too bright.
+    The cache key is the content of the file: a renamed file hits, a changed file misses. Cached and
+    new results are bit-identical. A broken entry is rebuilt. Without a writable folder nothing is
+    cached.
+
+    Args:
+        path: .hdr or .exr file.
+        cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen.
+
+    Raises:
+        AssetError: the file cannot be used, see `load_radiance`, or is too dark or too bright.
     """
     path = Path(path)
     try:
@@ -194,7 +204,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
 def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
     stored = disk_cache.read(entry)
     try:
-        specular, irradiance, background, luminance, suns = (stored[field] for field in _MAPS)
+        specular, irradiance, background, luminance, lights = (stored[field] for field in _MAPS)
     except KeyError:
         return None
     if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
@@ -205,24 +215,26 @@ def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
         irradiance.astype(np.float16),
         background.astype(np.uint32),
         luminance.astype(np.float32),
-        _unpacked_suns(suns.astype(np.float64)),
+        _unpacked_lights(lights.astype(np.float64)),
     )
 
 
-def _unpacked_suns(stored: NDArray[np.float64]) -> tuple[Sun, ...]:
+def _unpacked_lights(stored: NDArray[np.float64]) -> tuple[DirectionalLight, ...]:
     rows = stored.reshape(-1, 7).tolist()
-    return tuple(Sun((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows)
+    return tuple(
+        DirectionalLight((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows
+    )
 
 
 def _write_cache(light: EnvironmentLight, entry: Path) -> None:
     specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
-    suns = np.array([[*sun.direction, *sun.light, sun.radius] for sun in light.suns])
-    maps = (specular, irradiance, light.background, light.luminance, suns)
+    lights = np.array([[*each.direction, *each.light, each.radius] for each in light.lights])
+    maps = (specular, irradiance, light.background, light.luminance, lights)
     disk_cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
 
 
 def _remove_earlier(entry: Path) -> None:
-    """Remove what earlier versions of this module made of the same HDRI: 17 MB a light add up."""
+    """Remove entries of the same HDRI with an earlier version; each takes 17 MB."""
     key = entry.stem.rpartition("-")[0]
     for other in entry.parent.glob(f"{key}-*.npz"):
         version = other.stem.rpartition("-")[2]
@@ -232,19 +244,19 @@ def _remove_earlier(entry: Path) -> None:
 
 
 def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
-    """World directions [..., 3] as the directions of the map's own frame: Rz(-yaw) direction."""
+    """Return world directions [..., 3] in the frame of the environment map: Rz(-yaw) direction."""
     d = np.asarray(direction, np.float64)
     c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
     return d @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
 
 
 def irradiance_at(env: Ambient, normals: ArrayLike, yaw_deg: float = 0.0) -> NDArray[np.float32]:
-    """Irradiance / pi, float32 [K, 3], on surfaces with world normals [K, 3], suns included."""
+    """Return irradiance / pi, float32 [K, 3], by world normals [K, 3], including `env.lights`."""
     normals = to_map_frame(normals, yaw_deg)
-    found = prefilter.sample_octahedral(env.irradiance, normals)
-    for sun in env.suns:
-        cosine = np.maximum(normals @ np.array(sun.direction), 0.0)
-        found += (cosine[:, None] * sun.light).astype(np.float32)
+    found = octahedral.sample_octahedral(env.irradiance, normals)
+    for each in env.lights:
+        cosine = np.maximum(normals @ np.array(each.direction), 0.0)
+        found += (cosine[:, None] * each.light).astype(np.float32)
     return found
 
 
@@ -256,18 +268,28 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """`irradiance_at` without suns, [K, 3]: what ibl.glsl's diffuse_radiance is."""
-    return prefilter.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
+    """Return irradiance / pi, float32 [K, 3], by world normals [K, 3], without `env.lights`.
+
+    The numpy twin of diffuse_radiance() in shaders/ibl.glsl.
+    """
+    return octahedral.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 
 
 def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
-    """Mean radiance [K, 3], without suns, of what lies nearest to each of world directions.
+    """Return the mean radiance around each world direction, without `env.lights`.
 
-    The directions [K, 3] are spread over the whole sphere; each holds several cells of `env.sky`.
+    Args:
+        env: the light.
+        directions: [K, 3], spread over the whole sphere. Each cell of `env.sky` counts for the
+            nearest direction; each direction gets several cells.
+        yaw_deg: rotation of the environment.
+
+    Returns:
+        float32 [K, 3].
     """
     cells, solid_angle = _sky_geometry(env.sky.shape[0])
     toward = to_map_frame(directions, yaw_deg).astype(np.float32)
-    # by column: threads of a matrix library cost more than they save
+    # column by column, because the threads of a matrix library cost more than they save
     nearness = np.zeros((len(cells), len(toward)), np.float32)
     for along, to in zip(cells.T, toward.T, strict=True):
         nearness += np.outer(along, to)
@@ -280,19 +302,25 @@ def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray
 
 @functools.cache
 def _sky_geometry(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """As prefilter.octahedral_texels."""
-    cells, solid_angle = prefilter.octahedral_texels(size)
+    """Return octahedral_texels as float32."""
+    cells, solid_angle = octahedral.octahedral_texels(size)
     return cells.astype(np.float32), solid_angle.astype(np.float32)
 
 
 def metered_luminance(
     env: Ambient, direction: ArrayLike, half_angle_deg: float, yaw_deg: float = 0.0
 ) -> float:
-    """Log average of the luminance within a cone around a world direction [3].
+    """Return the log average of the luminance within a cone.
 
-    Cells of the luminance map, 11.25 degrees wide, fade out over their width at the rim, so that
-    the result moves smoothly with the direction; narrower cones are widened to one cell.
-    Luminance below 1e-6 counts as 1e-6.
+    Cells of the luminance map, 11.25 degrees wide, fade out over their width at the rim of the
+    cone, which makes the result continuous in the direction. Narrower cones are widened to one
+    cell. Luminance below 1e-6 counts as 1e-6.
+
+    Args:
+        env: the light.
+        direction: axis of the cone in the world, [3].
+        half_angle_deg: half of its opening angle.
+        yaw_deg: rotation of the environment.
     """
     cells, solid_angle = _meter_cells()
     cell = 2 * np.pi / _LUMINANCE_WIDTH

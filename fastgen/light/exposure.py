@@ -1,4 +1,4 @@
-"""Exposure as a camera meters it: the container in the middle counts more than what is behind."""
+"""Exposure metering of a camera, weighted to the container in the centre of the image."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from fastgen.light.environment import Ambient, irradiance_at, metered_luminance
 from fastgen.scene import REC_709, Camera, Color
 
 MIDDLE_GREY = 0.18
-"""Reflectance that a meter renders as a mid-tone (ISO 2720:1974 calibrates near 0.18)."""
+"""Reflectance that a meter exposes as a mid-tone (ISO 2720:1974 calibrates near 0.18)."""
 
 _CENTER_WEIGHT = 0.65
 _MIN_LUMINANCE = 1e-6
@@ -16,12 +16,19 @@ _MIN_LUMINANCE = 1e-6
 def metered_exposure(
     light: Ambient, yaw_deg: float, view: View, camera: Camera, paint: Color
 ) -> float:
-    """Factor on radiance that puts the metered mean at a mid-tone, then exposure_ev stops off it.
+    """Return the exposure: the factor on radiance that brings the metered mean to a mid-tone.
 
-    The middle of the picture is the container: its paint, half adapted to grey as a metering
-    pattern averages over it, under the light that falls on the side facing the camera, a wall or
-    from more than 45 degrees above or below the roof or the underside; around it stands the
-    background in view.
+    The centre of the image is assumed to be the container, under the light on the side that faces
+    the camera: a wall, or the roof or underside from more than 45 degrees above or below. Its
+    reflectance is the geometric mean of its paint and grey, because a metering pattern averages
+    over other surfaces as well. The rest of the image is the background in view.
+
+    Args:
+        light: light of the environment.
+        yaw_deg: rotation of the environment.
+        view: projection of the camera.
+        camera: its `exposure_ev` is added in stops.
+        paint: linear albedo of the container.
     """
     forward = view.rotation[2]
     level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""HDRI files: which there are, and their radiance as arrays."""
+"""HDRI files: bundled and user-supplied environments, and their radiance as arrays."""
 
 import json
 import re
@@ -15,29 +15,32 @@ from fastgen.errors import AssetError
 from fastgen.resources import asset_path
 
 HALF_MAX = 65504.0
-"""Largest finite value of IEEE 754 binary16, in which a GPU holds the maps."""
+"""Largest finite value of IEEE 754 binary16, the format of the maps on a GPU."""
 
 MIN_WIDTH, MAX_WIDTH = 256, 16384
-"""Widths of an HDRI that can be used, in texels."""
+"""Smallest and largest width of an HDRI in texels."""
 
 PORT_WEIGHT = 2.5
-"""How much oftener than another place out of doors a bundled port comes where none is named."""
+"""Weight of bundled ports in the draw of environments; other outdoor environments have 1."""
 
 _ASPECT_TOLERANCE = 0.02
-_MAX_RADIANCE = 1e9  # the sun's disc is 1.6e9 cd/m2; more could overflow a float32 sum
+_MAX_RADIANCE = 1e9  # the disc of the sun has 1.6e9 cd/m2; more could overflow a float32 sum
 
 
 def find_hdris(folder: str | Path) -> list[Path]:
-    """The .hdr and .exr files directly in a folder, sorted by name; any case of the extension.
+    """Return the .hdr and .exr files directly in a folder, sorted by name.
 
-    Hidden files, such as those that macOS leaves beside others on foreign disks, do not count.
-    Raises AssetError where the folder does not exist, holds none or has one that no UTF-8 names.
+    The case of the extension does not matter. Hidden files are ignored; macOS leaves such files on
+    foreign disks.
+
+    Raises:
+        AssetError: the folder does not exist or has no such file, or a name is not valid UTF-8.
     """
-    if not str(folder):  # Path takes it for the current folder
-        raise AssetError("'': names no folder; give one that holds .hdr or .exr files")
+    if not str(folder):  # Path would use the current folder
+        raise AssetError("'': is not a folder; give one that contains .hdr or .exr files")
     folder = Path(folder)
     if not folder.is_dir():
-        raise AssetError(f"{folder}: no such folder; give one that holds .hdr or .exr files")
+        raise AssetError(f"{folder}: no such folder; give one that contains .hdr or .exr files")
     seen = (path for path in folder.iterdir() if not path.name.startswith("."))
     found = sorted(path for path in seen if path.suffix.lower() in (".hdr", ".exr"))
     if not found:
@@ -45,15 +48,16 @@ def find_hdris(folder: str | Path) -> list[Path]:
     for path in found:
         try:
             str(path).encode()
-        except UnicodeEncodeError:  # scene files hold the name, and decoders ask for the path
-            raise AssetError(f"{path}: is no name in UTF-8; rename it") from None
+        except UnicodeEncodeError:  # scene files contain the name, and decoders need the path
+            raise AssetError(f"{path}: name is not valid UTF-8; rename it") from None
     return found
 
 
 def hdris_by_name(folder: str | Path) -> dict[str, Path]:
-    """Name -> file of the HDRIs in a folder, as `find_hdris` finds them.
+    """Return the HDRIs of a folder by name, see `find_hdris`.
 
-    Raises AssetError where two files differ in their ending alone.
+    Raises:
+        AssetError: two file names differ only in their extension.
     """
     named: dict[str, Path] = {}
     for path in find_hdris(folder):
@@ -71,17 +75,17 @@ _DAYTIME = (8, 17)
 
 
 def bundled_hdris() -> dict[str, Path]:
-    """Name -> file of every environment that ships with fastgen, sorted by name.
+    """Return the file of every bundled environment, sorted by name.
 
-    Their sources and licences stand in assets/hdri/SOURCES.md.
+    assets/hdri/SOURCES.md lists their sources and licences.
     """
     return {name: asset_path("hdri", entry["file"]) for name, entry in _index().items()}
 
 
 def bundled_weights() -> dict[str, float]:
-    """Name -> weight in the draw of every environment that ships with fastgen, sorted by name.
+    """Return the weight of every bundled environment in the random draw, sorted by name.
 
-    Interiors weigh 0: they come where a configuration names them.
+    Interiors have weight 0: they are used only if a configuration names them.
     """
     kinds = {name: entry["kind"] for name, entry in _index().items()}
     return {
@@ -92,8 +96,10 @@ def bundled_weights() -> dict[str, float]:
 
 @lru_cache
 def hours_of(name: str) -> tuple[int, int]:
-    """First and last hour of the day, past 24 after midnight, at which an environment may look so:
-    any for one that does not ship with fastgen."""
+    """Return the first and last hour of the day at which an environment looks plausible.
+
+    Hours after midnight are above 24. Environments that are not bundled have (0, 24).
+    """
     if name not in _index():
         return 0, 24
     kinds = _index()[name]["kind"]
@@ -106,11 +112,17 @@ def _index() -> dict[str, dict[str, Any]]:
 
 
 def load_radiance(path: str | Path) -> NDArray[np.float32]:
-    """Linear radiance float32 [H, W, 3] of an equirectangular .exr or .hdr file.
+    """Return the linear radiance of an equirectangular .exr or .hdr file.
 
-    W is 256 to 16384 and H within 2 % of W/2. Alpha is dropped, grey becomes three equal channels,
-    negative values become 0, infinity HALF_MAX (it stands for a sun too bright for half floats),
-    and NaN the mean of its valid neighbours. Raises AssetError, naming the file, for anything else.
+    W must be 256 to 16384 and H within 2 % of W / 2. Alpha is dropped and grey becomes three equal
+    channels. Negative values become 0, NaN the mean of its valid neighbours, and infinity HALF_MAX,
+    because files use it for a sun too bright for half floats.
+
+    Returns:
+        float32 [H, W, 3], finite and 0 or more.
+
+    Raises:
+        AssetError: the file is not such an image; the message names the file.
     """
     path = Path(path)
     kind = path.suffix.lower()
@@ -133,17 +145,17 @@ def _check_size(path: Path, width: int, height: int) -> None:
 
 def _read_exr(path: Path) -> NDArray[np.float32]:
     try:
-        # the header first, so that a file of a wrong size is not decoded
+        # read only the header first, to decode no file of a wrong size
         header = OpenEXR.File(str(path), header_only=True).header()
         low, high = header["dataWindow"]
         width, height = (int(n) for n in high - low + 1)
-    except Exception as error:  # whatever the decoder raises, the file is at fault
+    except Exception as error:  # any error of the decoder means a bad file
         raise AssetError(f"{path}: not a readable OpenEXR file ({error})") from None
     _check_size(path, width, height)
     try:
-        # asked first because the decoder prints to the terminal when a file ends too soon
+        # checked first, because the decoder prints to the terminal if a file is truncated
         if not OpenEXR.InputFile(str(path)).isComplete():
-            raise ValueError("it ends too soon")
+            raise ValueError("the file is truncated")
         channels = OpenEXR.File(str(path), separate_channels=True).channels()
         planes = {name: channel.pixels for name, channel in channels.items()}
     except Exception as error:
@@ -169,14 +181,14 @@ def _color_channels(path: Path, names: list[str]) -> tuple[str, str, str]:
         for grey in ("Y", "L"):
             if grey in names:
                 return grey, grey, grey
-    raise AssetError(f"{path}: holds channels {', '.join(names)}; an HDRI must hold R, G and B")
+    raise AssetError(f"{path}: has channels {', '.join(names)}; an HDRI must have R, G and B")
 
 
 def _read_hdr(path: Path) -> NDArray[np.float32]:
     with path.open("rb") as file:
         head = file.read(4096)
-    # Radiance's own resolution string (Reference Manual, picture format): rows from the top, then
-    # columns from the left; OpenCV reads no other order
+    # resolution string of the Radiance format (Reference Manual, picture format): rows from the
+    # top, then columns from the left; OpenCV reads no other order
     size = re.search(rb"\n\n-Y +(\d+) +\+X +(\d+)\n", head)
     if not head.startswith(b"#?") or not size:
         raise AssetError(f"{path}: not a Radiance HDR picture with rows from the top (-Y, +X)")
@@ -196,9 +208,9 @@ def _read_hdr(path: Path) -> NDArray[np.float32]:
 
 
 def _sanitized(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The radiance, changed in place, without NaN, infinity and negative values."""
+    """Replace NaN, infinity and negative values in place, and return the radiance."""
     unknown = np.zeros(radiance.shape[:2], bool)
-    for flags, values in zip(unknown, radiance, strict=True):  # by rows: small masks at 16k
+    for flags, values in zip(unknown, radiance, strict=True):  # row by row: small masks at 16k
         if not np.isfinite(values).all():
             flags[:] = np.isnan(values).any(axis=-1)
             np.nan_to_num(values, copy=False, nan=0.0, posinf=HALF_MAX, neginf=0.0)

@@ -1,9 +1,9 @@
-"""Light that surfaces throw on a spreader: those of the container below it, and its own.
+"""Indirect light on a spreader, from the container below it and from its own surfaces.
 
-Radiosity (Goral et al. 1984, Modeling the Interaction of Light Between Diffuse Surfaces): a vertex
-gets the sum of what the surfaces it sees give off, each weighted by its form factor, which rays
-cast from the vertex tell (Wallace et al. 1989, A Ray Tracing Algorithm for Progressive Radiosity).
-No GL here.
+Radiosity (Goral et al. 1984, Modeling the Interaction of Light Between Diffuse Surfaces): the
+irradiance of a vertex is the sum of the radiosity of visible surfaces, weighted by form factors.
+Rays from the vertex determine the form factors (Wallace et al. 1989, A Ray Tracing Algorithm for
+Progressive Radiosity).
 """
 
 import hashlib
@@ -14,46 +14,48 @@ from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Mesh
-from fastgen.light.occluders import Body
+from fastgen.geometry.solids import Body
 
 _CELL_MM = 500.0
-"""The container gives off light in squares of about that width: what a spreader leaves open of its
-roof changes over more."""
+"""Approximate width of the container's emitting cells. The visibility of the sky on the roof below
+a spreader varies over larger distances."""
 
 _FACING = 0.7
-"""Least cosine to a side of the container's box of the vertices that stand for it."""
+"""Least cosine between the normal of a vertex and the side of the container's box it represents."""
 
 _RECESS_MM = 150.0
-"""And how far within it they may lie, as corrugated walls do."""
+"""Largest depth of such a vertex inside the box; corrugated walls are recessed."""
 
 _TURNED_MM = 1000.0
-"""So far apart, for finding the vertex nearest to a place, are two surfaces at right angles."""
+"""Distance between perpendicular surfaces in the search for the nearest vertex."""
 
 _OFF_PLANE = 20.0
-"""And by so much counts what a vertex lies before or behind a place's plane more than what it lies
-beside it: a plate's two sides, or two plates, may be as near as a face's own vertices."""
+"""Weight of a vertex's distance from the plane of a hit, relative to distance along the plane. The
+two sides of a plate, or two plates, may be as close as the vertices of one face."""
 
 _NEAREST = 24
-"""Vertices that this chooses from."""
+"""Number of candidate vertices for a hit."""
 
 _LEAST_KNOWN = 0.25
-"""Of a hemisphere that is taken for what the rest of it looks like."""
+"""Least known share of a hemisphere by which the known part is scaled up."""
 
 _PARTS = 16
-"""Rays are cast so many lots at a time, from left to right."""
+"""Number of batches of rays, from left to right."""
 
 _BOUNCES = 2
-"""A third changes the FLIP of the objects in bench/references by 0.0001."""
+"""Number of bounces. A third changes the mean FLIP of objects in bench/references by 0.0001."""
 
 Array = NDArray[np.floating]
 Numbers = NDArray[np.integer]
 
 
 class Links:
-    """Form factors between receivers and emitters: a sparse matrix.
+    """Sparse matrix of form factors between receivers and emitters.
 
-    receiver, emitter: int [K], of one ray each, so that pairs may recur. weight [K]: the ray's
-    share of the receiver's cosine-weighted hemisphere.
+    Args:
+        receiver: int [K], receiver of each ray.
+        emitter: int [K], emitter that each ray hits. Pairs may occur several times.
+        weight: [K], share of the ray in the cosine-weighted hemisphere of its receiver.
     """
 
     def __init__(self, receiver: Numbers, emitter: Numbers, weight: Array) -> None:
@@ -67,22 +69,26 @@ class Links:
         self._starts = np.flatnonzero(new[apart])
 
     def gathered(self, given: NDArray[np.float32], count: int) -> NDArray[np.float32]:
-        """What each of `count` receivers gets, [M, count], of what the emitters give off [M, E]."""
+        """Return irradiance / pi [M, count] of receivers from the radiance [M, E] of emitters."""
         found = np.zeros((len(given), count), np.float32)
-        for gets, gives in zip(found, given, strict=True):
-            gets[self._rows] = np.add.reduceat(
-                self._weight * np.take(gives, self._emitter), self._starts
+        for received, emitted in zip(found, given, strict=True):
+            received[self._rows] = np.add.reduceat(
+                self._weight * np.take(emitted, self._emitter), self._starts
             )
         return found
 
 
 @dataclass(frozen=True, eq=False)
 class FormFactors:
-    """What a spreader's vertices see of one another, and of the container's cells.
+    """Form factors from the vertices of a spreader.
 
-    known: what share [V] of its hemisphere is either or sky. Rays that are hidden and meet nothing
-    from in front make up the rest: most start within a body that their face grows out of. What is
-    known stands for all of it, so `own` and `below` are shares of that.
+    Rays that are hidden and hit no front face have an unknown result; most start inside a body that
+    intersects their face. The known part of the hemisphere is scaled up to the whole.
+
+    Attributes:
+        own: form factors to other vertices of the spreader, relative to `known`.
+        below: form factors to the cells of the container, relative to `known`.
+        known: [V], share of the hemisphere that is sky or a known surface.
     """
 
     own: Links
@@ -90,10 +96,13 @@ class FormFactors:
     known: NDArray[np.float32]
 
     def light(self, sky: Array, sun: Array, below: Array, reflectance: Array) -> Array:
-        """Irradiance / pi [V, 3] of the vertices by the sky and by way of surfaces.
+        """Return irradiance / pi [V, 3] of the vertices from the sky and from other surfaces.
 
-        sky, sun: that which comes straight from either [V, 3]. below: radiance that the cells give
-        off [C, 3]. reflectance: of the vertices [V, 3].
+        Args:
+            sky: direct irradiance / pi from the sky, [V, 3].
+            sun: direct irradiance / pi from directional lights, [V, 3]. It is not in the result.
+            below: radiance of the cells of the container, [C, 3].
+            reflectance: diffuse reflectance of the vertices, [V, 3].
         """
         count = len(sky)
         from_sky, from_sun, cells, paint = (
@@ -112,12 +121,17 @@ class FormFactors:
 def form_factors(
     spreader: Mesh, body: Body, held: Mesh, points: Array, toward: Array, hidden: NDArray[np.bool_]
 ) -> FormFactors:
-    """Of a spreader above a container, for which the box around `held` stands; from the disk cache
-    where they are there.
+    """Return the form factors of a spreader above a container, from the disk cache if possible.
 
-    body: the spreader's surface, of as few triangles as can be. points [V, 3]: where its vertices
-    see from, in mm. toward [D, 3]: unit vectors spread evenly over the sphere. hidden [V, D]:
-    whether something stands there.
+    The container is represented by the bounding box of `held`.
+
+    Args:
+        spreader: mesh whose vertices receive light.
+        body: the surface of the spreader with few triangles.
+        held: mesh of the container.
+        points: [V, 3], origins of the rays in mm.
+        toward: [D, 3], unit vectors spread evenly over the sphere.
+        hidden: bool [V, D], whether a surface hides the sky in each direction.
     """
     box = box_of(held)
     digest = hashlib.sha256(spreader.shape_digest.encode())
@@ -130,10 +144,10 @@ def form_factors(
     )
     cosine = np.maximum(spreader.normals @ toward.T, 0)
     share = cosine / cosine.sum(axis=1, keepdims=True)
-    tells = ~hidden
+    is_known = ~hidden
     for receiver, ray, _ in found.values():
-        tells[receiver, ray] = True
-    known = np.maximum((share * tells).sum(axis=1), _LEAST_KNOWN).astype(np.float32)
+        is_known[receiver, ray] = True
+    known = np.maximum((share * is_known).sum(axis=1), _LEAST_KNOWN).astype(np.float32)
     share /= known[:, None]
     own, below = (
         Links(receiver, emitter, share[receiver, ray])
@@ -145,8 +159,8 @@ def form_factors(
 def _found(
     spreader: Mesh, body: Body, box: Array, points: Array, toward: Array, hidden: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.int32]]:
-    """Receivers, rays' directions and emitters, int32 [3, K], by what the emitters are of."""
-    from scipy.spatial import cKDTree  # takes 0.3 s
+    """Return receivers, direction indices and emitters, int32 [3, K], for each kind of emitter."""
+    from scipy.spatial import cKDTree  # imported late: takes 0.3 s
 
     tree = cKDTree(_with_normals(spreader.positions_mm, spreader.normals))
     corners = body.positions_mm[body.triangles].astype(np.float64)
@@ -158,7 +172,7 @@ def _found(
     for number, ray in enumerate(toward):
         receiver = np.flatnonzero(hidden[:, number] & facing[:, number])
         start = points[receiver]
-        before = normals @ ray < -1e-3  # a face turned away is the inside of something
+        before = normals @ ray < -1e-3  # a face turned away is the inside of a body
         hit, own_mm = _first_hits(start, ray, corners[before])
         side, box_mm = _entered(start, ray, box)
         on_box = box_mm < own_mm
@@ -166,16 +180,22 @@ def _found(
         met = start[on_own] + own_mm[on_own, None] * ray
         normal = normals[before][hit[on_own]]
         _, near = tree.query(_with_normals(met, normal), k=_NEAREST)
-        emitter = _standing_for(met, normal, near, spreader)
+        emitter = _representative(met, normal, near, spreader)
         rows["own"].append(_rows(receiver[on_own], number, emitter))
         met = start[on_box] + box_mm[on_box, None] * ray
         rows["below"].append(_rows(receiver[on_box], number, cell_of(side[on_box], met, box)))
     return {name: np.concatenate(found, axis=1) for name, found in rows.items()}
 
 
-def _standing_for(met: Array, normal: Array, near: Numbers, spreader: Mesh) -> Numbers:
-    """Which of the vertices `near` [K, N] to places [K, 3] of surfaces with normals [K, 3] stands
-    for each, [K]."""
+def _representative(met: Array, normal: Array, near: Numbers, spreader: Mesh) -> Numbers:
+    """Return the vertex [K] that represents each hit.
+
+    Args:
+        met: positions of the hits, [K, 3].
+        normal: normals of the hit surfaces, [K, 3].
+        near: candidate vertices, [K, N].
+        spreader: mesh of the vertices.
+    """
     apart = _with_normals(met, normal)[:, None] - _with_normals(
         spreader.positions_mm[near], spreader.normals[near]
     )
@@ -193,14 +213,23 @@ def _with_normals(positions_mm: Array, normals: Array) -> Array:
 
 
 def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.intp], Array]:
-    """Which of triangles [T, 3, 3], all of which face a direction [3], a ray from each of N points
-    meets first, and how far away; infinitely far where it meets none."""
-    along = np.array([1.0, 0.0, 0.0]) - ray[0] * ray  # spreaders are long, triangles few at a place
+    """Cast parallel rays at triangles that all face them.
+
+    Args:
+        start: origins, [N, 3].
+        ray: direction, [3].
+        corners: [T, 3, 3].
+
+    Returns:
+        Index of the first triangle that each ray hits, and its distance, inf without a hit.
+    """
+    # batches along x, because spreaders are long and few triangles share a range of x
+    along = np.array([1.0, 0.0, 0.0]) - ray[0] * ray
     along /= np.linalg.norm(along)
     frame = np.stack([along, np.cross(ray, along), ray])
     at, seen = start @ frame.T, corners @ frame.T
-    # which side of an edge a point is on, and how far away the plane is, are linear in its place;
-    # seen from the front, which is where the rays come from, corners run the other way round
+    # the side of an edge and the distance to the plane are linear in the position of the origin;
+    # corners are clockwise as the rays see them
     run, rise = (np.roll(seen, -1, axis=1) - seen)[..., :2].transpose(2, 0, 1)
     edges = np.stack([-rise, run, rise * seen[..., 0] - run * seen[..., 1]])
     across = np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0])
@@ -228,14 +257,22 @@ def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.in
 
 
 def box_of(container: Mesh) -> Array:
-    """Lowest and highest coordinates of a container, [2, 3]."""
+    """Return the lowest and highest coordinates of a container, [2, 3]."""
     return np.stack(container.bounds_mm).astype(np.float64)
 
 
 def _entered(start: Array, ray: Array, box: Array) -> tuple[NDArray[np.intp], Array]:
-    """Through which side of a box [2, 3] a ray from each of N points outside of it gets in, and how
-    far away that is; infinitely far where it misses it. 2 k is the lower side of axis k, 2 k + 1
-    the upper."""
+    """Intersect parallel rays with a box.
+
+    Args:
+        start: origins [N, 3], outside the box.
+        ray: direction, [3].
+        box: lowest and highest coordinates, [2, 3].
+
+    Returns:
+        Side through which each ray enters, 2 k for the lower side of axis k and 2 k + 1 for the
+        upper, and the distance, inf if the ray misses.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         near, far = np.sort((box[:, None] - start) / ray, axis=0)
     axis = near.argmax(axis=1)
@@ -245,18 +282,18 @@ def _entered(start: Array, ray: Array, box: Array) -> tuple[NDArray[np.intp], Ar
 
 
 def _counts(box: Array) -> NDArray[np.intp]:
-    """How many cells lie along each axis."""
+    """Return the number of cells along each axis, [3]."""
     return np.ceil((box[1] - box[0]) / _CELL_MM).astype(np.intp)
 
 
 def _first_cells(box: Array) -> NDArray[np.intp]:
-    """The first cell of each side of a box, and how many there are in all, [7]."""
+    """Return the first cell of each side of a box and the total number of cells, [7]."""
     x, y, z = _counts(box)
     return np.concatenate([[0], np.cumsum([y * z, y * z, x * z, x * z, x * y, x * y])])
 
 
 def cell_of(side: NDArray[np.intp], points: Array, box: Array) -> NDArray[np.intp]:
-    """The cell of each of K points on or near a side of the box, [K]."""
+    """Return the cell [K] of points [K, 3] on or near the sides [K] of the box."""
     counts = _counts(box)
     place = (points - box[0]) / (box[1] - box[0]) * counts
     at = np.clip(place.astype(np.intp), 0, counts - 1)
@@ -268,7 +305,7 @@ def cell_of(side: NDArray[np.intp], points: Array, box: Array) -> NDArray[np.int
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The cells of a container's box, and which of its vertices stand for them."""
+    """Cells of the bounding box of a container, and the vertices of the container in each."""
 
     vertices: NDArray[np.intp]
     cell: NDArray[np.intp]
@@ -276,7 +313,7 @@ class Cells:
 
     @staticmethod
     def of(container: Mesh, held: Mesh) -> "Cells":
-        """Of a container with the box of `held`."""
+        """Return the cells of a container in the bounding box of `held`."""
         box = box_of(held)
         side = 2 * np.abs(container.normals).argmax(axis=1)
         axis = side // 2
@@ -290,9 +327,9 @@ class Cells:
         return Cells(vertices, cell, int(_first_cells(box)[-1]))
 
     def mean(self, values: Array) -> Array:
-        """Of values [V, 3] of the container's vertices, in each cell [C, 3]; 0 where none is."""
+        """Return the mean of vertex values [V, 3] in each cell, [C, 3]; 0 without vertices."""
         number = np.maximum(np.bincount(self.cell, minlength=self.count), 1)
-        # channels apart: along the last axis NumPy takes several times as long
+        # channel by channel, because NumPy is several times slower along the last axis
         total = [
             np.bincount(self.cell, np.take(channel, self.vertices), self.count)
             for channel in values.T

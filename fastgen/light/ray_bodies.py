@@ -1,6 +1,6 @@
-"""What rays meet of a scene, and the light that comes back from there: Embree casts them.
+"""Ray casting against the lit surfaces of a scene, with Embree.
 
-Wald et al. 2014, Embree: A Kernel Framework for Efficient CPU Ray Tracing. No GL here.
+Wald et al. 2014, Embree: A Kernel Framework for Efficient CPU Ray Tracing.
 """
 
 import importlib
@@ -17,31 +17,36 @@ from fastgen.errors import ConfigError
 Floats = NDArray[np.float32]
 
 LIFT_MM = 1.0
-"""Off a surface start the rays that leave it."""
+"""Distance from a surface at which rays from it start."""
 
 
 def check_rays() -> None:
-    """Raises ConfigError where this machine has no Embree."""
+    """Raise ConfigError if Embree is not available on this machine."""
     _embree("rtcore_scene")
 
 
 def _embree(module: str) -> Any:
-    """A module of the package embreex, which takes 30 ms to import."""
+    """Import a module of the package embreex, which takes 30 ms."""
     try:
         return importlib.import_module(f"embreex.{module}")
     except ImportError as error:
         raise ConfigError(
-            "quality: high casts rays with Embree, and this machine has it not "
-            f"({error}; {platform.machine()}): pip install embreex, of which there are builds for "
-            "Linux on x86-64, or take fine"
+            "quality: high casts rays with Embree, which is not available on this machine "
+            f"({error}; {platform.machine()}): pip install embreex, which has builds for Linux on "
+            "x86-64, or use fine"
         ) from None
 
 
 @dataclass(frozen=True, eq=False)
 class LitBody:
-    """A surface in its light. positions_mm: [V, 3]. triangles: [T, 3], counter-clockwise from
-    outside. reflectance: of diffuse light, [V, 3], equal at the corners of a triangle. irradiance:
-    / pi [V, 3], without the suns'."""
+    """A surface and the light on it.
+
+    Attributes:
+        positions_mm: [V, 3].
+        triangles: [T, 3], counter-clockwise from outside.
+        reflectance: diffuse, [V, 3], equal at the corners of a triangle.
+        irradiance: irradiance / pi [V, 3] without directional lights.
+    """
 
     positions_mm: Floats
     triangles: NDArray[np.uint32]
@@ -51,18 +56,22 @@ class LitBody:
 
 @dataclass(frozen=True, eq=False)
 class DistantLight:
-    """A sun. toward: unit vector [3] to it in the world. light: irradiance / pi [3] on what faces
-    it."""
+    """A directional light in world space.
+
+    Attributes:
+        toward: unit vector [3] toward the light.
+        light: irradiance / pi [3] on a surface that faces the light.
+    """
 
     toward: Floats
     light: Floats
 
 
 class RayBodies:
-    """Bodies that rays are cast at, lit by what their vertices have and by suns."""
+    """Scene for ray casting: bodies with light at their vertices, and directional lights."""
 
-    def __init__(self, bodies: Sequence[LitBody], suns: Sequence[DistantLight]) -> None:
-        self._suns = suns
+    def __init__(self, bodies: Sequence[LitBody], lights: Sequence[DistantLight]) -> None:
+        self._lights = lights
         starts = np.cumsum([0, *(len(body.positions_mm) for body in bodies)])
         corners = [body.triangles + start for body, start in zip(bodies, starts[:-1], strict=True)]
         positions = np.concatenate([body.positions_mm for body in bodies]).astype(np.float32)
@@ -77,29 +86,37 @@ class RayBodies:
         light = np.concatenate([b.irradiance[b.triangles].mean(axis=1) for b in bodies])
         self._glow = self._paint * light
 
-    def met(self, start_mm: Floats, toward: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """Which of K rays, float32 [K, 3] each, meet a surface, [H], and the radiance [H, 3] that
-        its diffuse reflection sends back along them: none from a surface seen from behind."""
+    def hits(self, start_mm: Floats, toward: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """Cast rays and return the diffuse radiance of the surfaces that they hit.
+
+        Args:
+            start_mm: origins, float32 [K, 3].
+            toward: unit directions, float32 [K, 3].
+
+        Returns:
+            Indices [H] of the rays with a hit, and the radiance [H, 3] reflected along each, 0 from
+            the back of a surface.
+        """
         if not len(start_mm):
             return np.zeros(0, np.intp), np.zeros((0, 3), np.float32)
         found = self._scene.run(start_mm, toward, query="INTERSECT", output=True)
         which = np.flatnonzero(found["primID"] >= 0)
-        met = found["primID"][which]
-        normals, rays = self._normals[met], toward[which]
-        before = np.einsum("hc,hc->h", normals, rays) < 0
-        radiance = self._glow[met]
-        if self._suns:
+        triangle = found["primID"][which]
+        normals, rays = self._normals[triangle], toward[which]
+        front = np.einsum("hc,hc->h", normals, rays) < 0
+        radiance = self._glow[triangle]
+        if self._lights:
             place = start_mm[which] + found["tfar"][which, None] * rays + LIFT_MM * normals
-        for sun in self._suns:
-            cosine = normals @ sun.toward
-            lit = np.flatnonzero((cosine > 0) & before)
-            lit = lit[self._open(place[lit], sun.toward)]
-            radiance[lit] += self._paint[met[lit]] * (cosine[lit, None] * sun.light)
-        radiance[~before] = 0
+        for each in self._lights:
+            cosine = normals @ each.toward
+            lit = np.flatnonzero((cosine > 0) & front)
+            lit = lit[self._unoccluded(place[lit], each.toward)]
+            radiance[lit] += self._paint[triangle[lit]] * (cosine[lit, None] * each.light)
+        radiance[~front] = 0
         return which, radiance
 
-    def _open(self, start_mm: Floats, toward: Floats) -> NDArray[np.bool_]:
-        """From which places [K, 3] nothing stands in the way toward one direction [3]."""
+    def _unoccluded(self, start_mm: Floats, toward: Floats) -> NDArray[np.bool_]:
+        """Return for each point [K, 3] whether no surface is in one direction [3]."""
         if not len(start_mm):
             return np.zeros(0, bool)
         rays = np.repeat(toward[None], len(start_mm), axis=0)

@@ -1,4 +1,4 @@
-"""What a rough surface reflects of light from all around, as a table for the shader. No GL here."""
+"""Fresnel reflectance and GGX specular albedo; the numpy twin of shaders/reflector.glsl."""
 
 import functools
 
@@ -8,21 +8,23 @@ from numpy.typing import NDArray
 from fastgen.files import disk_cache
 
 DIELECTRIC_INDEX = 1.5
-"""Refractive index of what is no metal, usual for paints and plastics."""
+"""Refractive index of non-metals, typical of paints and plastics."""
 
 DIELECTRIC_F0 = ((DIELECTRIC_INDEX - 1) / (DIELECTRIC_INDEX + 1)) ** 2
-"""Its reflectance head on, by Fresnel's equations."""
+"""Reflectance of a dielectric at normal incidence, by Fresnel's equations."""
 
 _POINTS = 4096
 
 
 def fresnel_climb(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far reflectance has climbed from that head on, 0, to 1 where light grazes the surface.
+    """Return Fresnel reflectance, rescaled to 0 at normal and 1 at grazing incidence.
 
-    cosine: of the angle between light and normal, 0..1. Fresnel's equations for unpolarized light
-    on the dielectric of DIELECTRIC_INDEX, as Cook and Torrance 1982 write them (A Reflectance
-    Model for Computer Graphics). At 50 to 60 degrees the reflectance by Schlick's power of five is
-    a fifth too low. What is no dielectric is taken to climb alike.
+    Fresnel's equations for unpolarized light on a dielectric of DIELECTRIC_INDEX, in the form of
+    Cook and Torrance 1982, A Reflectance Model for Computer Graphics. At 50 to 60 degrees Schlick's
+    approximation is 20 % too low. Metals use the same curve.
+
+    Args:
+        cosine: cosine of the angle between light and normal, 0..1.
     """
     g = np.sqrt(cosine**2 + DIELECTRIC_INDEX**2 - 1)
     ratio = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)
@@ -32,22 +34,25 @@ def fresnel_climb(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @functools.cache
 def dfg_table(size: int = 32) -> NDArray[np.float32]:
-    """Split-sum scale and bias (A, B), float32 [size, size, 2]: specular albedo = A F0 + B.
+    """Return the split-sum table of scale A and bias B: specular albedo = A F0 + B.
 
-    Row r is roughness (r + 0.5) / size, column c is n.v (c + 0.5) / size: texel centres, so that GL
-    linear sampling with clamping reads it right at (n.v, roughness). GGX with height-correlated
-    Smith masking, `fresnel_climb` between F0 and 1, single scattering. The array is read-only.
-
+    GGX with height-correlated Smith masking, `fresnel_climb` between F0 and 1, single scattering.
     Karis 2013, Real Shading in Unreal Engine 4, environment BRDF; Heitz 2014, Understanding the
-    Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals,
-    mapped as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
+    Masking-Shadowing Function, eq. 72 and 99. Integrated over a lattice of visible normals, mapped
+    as in Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
+
+    Returns:
+        float32 [size, size, 2], read-only. Row r is at roughness (r + 0.5) / size, column c at n.v
+        (c + 0.5) / size. These are texel centres for OpenGL's linear sampling with clamping.
     """
     return disk_cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
 
 
 def mean_specular_albedo(f0: float, roughness: float) -> float:
-    """What a surface mirrors of light that is even all around: its specular albedo, averaged over
-    the cosine-weighted hemisphere."""
+    """Return the specular albedo of a surface, averaged over the cosine-weighted hemisphere.
+
+    This is the share of uniform light from all around that the surface reflects specularly.
+    """
     table = dfg_table()
     size = len(table)
     scale, bias = table[min(int(roughness * size), size - 1)].T
@@ -59,7 +64,7 @@ def _integrated(size: int) -> NDArray[np.float32]:
     center = (np.arange(size) + 0.5) / size
     n_dot_v = center[:, None]
     view = np.stack([np.sqrt(1 - n_dot_v**2), n_dot_v])
-    # a golden-ratio lattice; half the circle mirrors the other across the plane of incidence
+    # golden-ratio lattice over half the circle, because the other half is symmetric
     point = np.arange(_POINTS)
     height = ((point + 0.5) / _POINTS)[None]
     phi = np.pi * (point * (5**0.5 - 1) / 2 % 1.0)[None]

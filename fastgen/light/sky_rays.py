@@ -1,38 +1,43 @@
-"""An environment as rays ask for it: directions in which its light comes, more where much of it
-does, and its mean over a small solid angle. No GL here.
-"""
+"""Importance sampling of an environment for ray casting."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.light.prefilter import octahedral_decode, octahedral_encode, octahedral_texels
+from fastgen.light.octahedral import octahedral_decode, octahedral_encode, octahedral_texels
 
 Floats = NDArray[np.float32]
 
 _LEVELS, _LEVEL_STEP = 8, 1.5
-"""Maps that means are looked up in, and how often the side of each goes into the last one's."""
+"""Number of resolutions for mean radiance, and the ratio of their sides."""
 
 _EVEN = 0.5
-"""Share of the directions that are spread evenly: they find what surfaces throw on one another."""
+"""Share of the directions that are spread evenly; they find indirect light between surfaces."""
 
 
 class SkyRays:
-    """Of radiance [N, N, 3], an octahedral map without a border, suns taken out; all in its frame.
+    """Importance samples of an environment, in the frame of its map.
 
-    count: of directions, a power of two. Any run of 2^k of them that begins at a multiple of 2^k is
-    spread as well as all are. directions: unit [count, 3]. density: [count], of all directions a
-    steradian about each. radiance: [count, 3], which comes from there.
+    Any run of 2^k directions that starts at a multiple of 2^k is as well distributed as the whole.
+
+    Args:
+        radiance: [N, N, 3], octahedral map without a border and without directional lights.
+        count: number of directions, a power of two.
+
+    Attributes:
+        directions: unit vectors [count, 3].
+        density: [count], probability density per steradian at each direction.
+        radiance: [count, 3], radiance from each direction.
     """
 
     def __init__(self, radiance: Floats, count: int) -> None:
         size = len(radiance)
         solid_angle = octahedral_texels(size)[1].reshape(size, size)
         solid_angle = solid_angle * (4 * np.pi / solid_angle.sum())
-        # no channel before the others
+        # all channels count alike
         power = (radiance.mean(axis=2, dtype=np.float64) + 1e-20) * solid_angle
         share = _EVEN * solid_angle / solid_angle.sum() + (1 - _EVEN) * power / power.sum()
-        # a row, then a place in it: Pharr, Jakob and Humphreys 2023, section 2.4.3
+        # first a row, then a column: Pharr, Jakob and Humphreys 2023, section 2.4.3
         u, v = spread_points(count)
         row, down = _inverted(share.sum(axis=1)[None], v)
         column, right = _inverted(share[row], u)
@@ -46,9 +51,12 @@ class SkyRays:
         self._levels = np.concatenate([level.reshape(-1, 3) for level in levels])
 
     def mean(self, toward: NDArray[np.floating], solid_angle: Floats) -> Floats:
-        """Mean radiance [K, 3] over a solid angle [K] in steradians about directions [K, 3]."""
+        """Return the mean radiance [K, 3] over solid angles [K] in steradians.
+
+        The solid angles are centred on `toward`, [K, 3], in the frame of the map.
+        """
         sides = self._sides
-        # a level's texels are 4 pi / side^2 wide on the mean
+        # the mean solid angle of a texel is 4 pi / side^2
         fits = np.sqrt(4 * np.pi / np.maximum(solid_angle, 1e-9))
         level = np.rint(np.log(sides[0] / np.clip(fits, 1, sides[0])) / np.log(_LEVEL_STEP))
         level = np.minimum(level.astype(np.int32), len(sides) - 1)
@@ -60,9 +68,11 @@ class SkyRays:
 
 
 def spread_points(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Coordinates [count] each in [0, 1) of a sequence of which any run of 2^k points that begins
-    at a multiple of 2^k is a (0, k, 2)-net: van der Corput's and Sobol's, as Kollig and Keller 2002
-    (Efficient Multidimensional Sampling, section 3) have them."""
+    """Return u and v, each [count] in [0, 1), of a low-discrepancy sequence.
+
+    The van der Corput and Sobol sequences, as in Kollig and Keller 2002, Efficient Multidimensional
+    Sampling, section 3. Any run of 2^k points that starts at a multiple of 2^k is a (0, k, 2)-net.
+    """
     bits = 32
     number = np.arange(count, dtype=np.uint64)
     found = np.zeros((2, count), np.uint64)
@@ -81,8 +91,15 @@ def spread_points(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 def _inverted(
     share: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """In which of N parts, whose shares of a row are [K, N] or for all [1, N], a place [K] of it
-    from 0 to 1 lies, and how far through that part."""
+    """Invert discrete cumulative distributions.
+
+    Args:
+        share: probabilities of N bins, [K, N], or [1, N] for all rows.
+        at: [K], positions 0..1.
+
+    Returns:
+        The bin [K] of each position and the fraction of the bin before the position, [K].
+    """
     total = np.cumsum(share, axis=1)
     total /= total[:, -1:]
     part = np.minimum((total <= at[:, None]).sum(axis=1), total.shape[1] - 1)

@@ -1,14 +1,13 @@
-"""Light that rays find at points of surfaces: how much of the sky's gets there, and what other
-surfaces throw. Plain arrays: no GL here.
+"""Sky light and indirect light at points of surfaces, found by ray casting.
 
-Of diffuse light a point gets the sum over rays by the sky's light (Pharr, Jakob and Humphreys 2023,
-Physically Based Rendering, 4th ed., section 12.5); what mirrors show by visible normals of GGX
-(Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps). Both are told as what of
-an unhidden sky is left, a ratio of two sums over the same rays, in which the noise of a sky that
-nothing hides cancels, and what surfaces add.
+Diffuse light sums over rays that follow the light of the sky (Pharr, Jakob and Humphreys 2023,
+Physically Based Rendering, 4th ed., section 12.5). Specular light samples visible GGX normals
+(Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps). Both results have two
+parts. The share of the light of an unoccluded sky is a ratio of two sums over the same rays, in
+which the noise of an open sky cancels. The indirect light of other surfaces is added to it.
 
-Points of a tile of 2x2 cast rays in four different sets of directions, and where an image is shaded
-as many of each are averaged: Keller and Heidrich 2001, Interleaved Sampling.
+The points of a 2x2 tile use four different sets of directions, and shading averages over all four:
+Keller and Heidrich 2001, Interleaved Sampling.
 """
 
 from dataclasses import dataclass
@@ -25,27 +24,36 @@ from fastgen.scene.limits import MIN_ROUGHNESS
 Floats = NDArray[np.float32]
 
 TILE = 2
-"""Points along a side of what has all sets of directions."""
+"""Points along a side of a tile that uses all sets of directions."""
 
 RAYS = 64
-"""Of each point, a power of two: half of them start into the surface and are left out."""
+"""Diffuse rays of a point, a power of two. About half point into the surface and are not cast."""
 
 MIRRORED_RAYS = 16
+"""Specular rays of a point."""
 
 DIRECTIONS = RAYS * TILE * TILE
-"""That a SkyRays holds."""
+"""Number of directions that a SkyRays must have."""
 
 _BLOCK = 1024
-"""Points at once, as a core's cache holds their rays."""
+"""Points at a time; their rays fit the cache of a core."""
 
 _ORDER = np.array([0, 2, 3, 1])
-"""Bayer's: neighbours within a tile have sets far apart in the sequence."""
+"""Bayer order: neighbours in a tile use sets that are far apart in the sequence."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """K points. column, row: [K] in the grid that they are from. place_mm, normal, toward_eye:
-    float32 [K, 3], the last two unit vectors. roughness: [K], perceptual."""
+    """K points of surfaces.
+
+    Attributes:
+        column: [K], column in the grid of points.
+        row: [K], row in the grid of points.
+        place_mm: float32 [K, 3], world position.
+        normal: float32 [K, 3], unit vector.
+        toward_eye: float32 [K, 3], unit vector.
+        roughness: float32 [K], perceptual.
+    """
 
     column: NDArray[np.intp]
     row: NDArray[np.intp]
@@ -55,17 +63,23 @@ class Points:
     roughness: Floats
 
     def chosen(self, which: NDArray[np.intp]) -> "Points":
-        """Some of them."""
+        """Return the points of the given indices."""
         arrays = (self.place_mm, self.normal, self.toward_eye, self.roughness)
         return Points(self.column[which], self.row[which], *(array[which] for array in arrays))
 
 
 def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float) -> Floats:
-    """What reaches points [K], float32 [K, 4, 3]: the share of the irradiance of an unhidden sky,
-    irradiance / pi that surfaces throw; the share of what the mirror would show of it, and the
-    radiance of the surfaces that it shows instead.
+    """Return the light at points of surfaces.
 
-    sky: of DIRECTIONS directions, turned by yaw_deg as environment.py has it.
+    Args:
+        points: K points.
+        bodies: surfaces of the scene.
+        sky: samples of the environment, with DIRECTIONS directions.
+        yaw_deg: rotation of the environment.
+
+    Returns:
+        float32 [K, 4, 3]: share of the irradiance of an unoccluded sky; irradiance / pi of indirect
+        light; share of the specular light of an unoccluded sky; specular radiance of surfaces.
     """
     found = np.empty((len(points.row), 4, 3), np.float32)
     group = _ORDER[points.row % TILE * TILE + points.column % TILE]
@@ -83,29 +97,29 @@ def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float
 def _diffuse(
     points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, yaw_deg: float, group: int
 ) -> Floats:
-    """[K, 2, 3]"""
+    """Return sky share and indirect irradiance / pi, [K, 2, 3]."""
     rays = slice(group * RAYS, (group + 1) * RAYS)
     toward = to_map_frame(sky.directions[rays], -yaw_deg).astype(np.float32)
     density = sky.density[rays]
     cosine = np.maximum(points.normal @ toward.T, 0)
     point, ray = np.nonzero(cosine)
-    met, radiance = bodies.met(start[point], toward[ray])
-    point, ray = point[met], ray[met]
+    hit, radiance = bodies.hits(start[point], toward[ray])
+    point, ray = point[hit], ray[hit]
     hidden = np.zeros_like(cosine)
     hidden[point, ray] = cosine[point, ray]
     light = sky.radiance[rays] / density[:, None]
     whole = cosine @ light
     lost = hidden @ light
     weight = hidden[point, ray] / density[ray]
-    thrown = _sums(radiance * weight[:, None], point, len(start))
-    thrown /= np.maximum(cosine @ (1 / density), 1e-6)[:, None]
-    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown], axis=1)
+    indirect = _sums(radiance * weight[:, None], point, len(start))
+    indirect /= np.maximum(cosine @ (1 / density), 1e-6)[:, None]
+    return np.stack([1 - lost / np.maximum(whole, 1e-20), indirect], axis=1)
 
 
 def _mirrored(
     points: Points, start: Floats, bodies: RayBodies, sky: SkyRays, yaw_deg: float, group: int
 ) -> Floats:
-    """[K, 2, 3]"""
+    """Return the share of the mirrored sky and the mirrored radiance of surfaces, [K, 2, 3]."""
     toward, weight, density = lobe(points, group)
     # Krivanek and Colbert 2008, Real-time Shading with Filtered Importance Sampling
     wide = np.float32(1 / MIRRORED_RAYS) / density
@@ -113,18 +127,21 @@ def _mirrored(
     seen *= weight.reshape(-1, 1)
     whole = seen.reshape(*weight.shape, 3).sum(axis=1)
     point, ray = np.nonzero(weight)
-    met, radiance = bodies.met(start[point], toward[point, ray])
-    point, ray = point[met], ray[met]
+    hit, radiance = bodies.hits(start[point], toward[point, ray])
+    point, ray = point[hit], ray[hit]
     lost = _sums(seen.reshape(*weight.shape, 3)[point, ray], point, len(start))
-    thrown = _sums(radiance * weight[point, ray, None], point, len(start))
+    mirrored = _sums(radiance * weight[point, ray, None], point, len(start))
     total = np.maximum(weight.sum(axis=1), 1e-6)[:, None]
-    return np.stack([1 - lost / np.maximum(whole, 1e-20), thrown / total], axis=1)
+    return np.stack([1 - lost / np.maximum(whole, 1e-20), mirrored / total], axis=1)
 
 
 def lobe(points: Points, group: int) -> tuple[Floats, Floats, Floats]:
-    """Rays into what a dielectric's mirror shows: directions [K, M, 3], their weights [K, M], the
-    reflectance if all of them count alike, 0 for those into the surface, and how many of all rays
-    are a steradian about each, [K, M]."""
+    """Sample the specular lobe of a dielectric at K points with M = MIRRORED_RAYS rays each.
+
+    Returns:
+        Directions [K, M, 3]; weights [K, M], whose mean is the reflectance, 0 for rays into the
+        surface; probability density per steradian at each direction, [K, M].
+    """
     alpha = np.maximum(points.roughness, MIN_ROUGHNESS)[:, None] ** 2
     frame = _frames(points.normal)
     view = np.einsum("kac,kc->ka", frame, points.toward_eye)[:, None]
@@ -134,10 +151,10 @@ def lobe(points: Points, group: int) -> tuple[Floats, Floats, Floats]:
     local = 2 * facing[..., None] * half - view
     up = np.maximum(local[..., 2], 1e-4)
     climb = fresnel_climb(np.minimum(facing, 1).astype(np.float64)).astype(np.float32)
-    # G2 over the eye's G1, with masking and shadowing apart, is the light's G1
+    # with uncorrelated masking and shadowing, G2 / G1(view) is G1(light)
     weight = (local[..., 2] > 0) * _smith_g1(up, alpha)
     weight *= DIELECTRIC_F0 + (1 - DIELECTRIC_F0) * climb
-    # Walter et al. 2007, eq. 33, over the visible normals of Heitz 2018, eq. 3
+    # Walter et al. 2007, eq. 33, with the visible normals of Heitz 2018, eq. 3
     spread = half[..., 2] ** 2 * (alpha**2 - 1) + 1
     seen = _smith_g1(view[..., 2], alpha) / (4 * view[..., 2])
     density = np.asarray(alpha**2 / (np.pi * spread**2) * seen, np.float32)
@@ -145,20 +162,25 @@ def lobe(points: Points, group: int) -> tuple[Floats, Floats, Floats]:
 
 
 def _sums(values: Floats, row: NDArray[np.intp], count: int) -> Floats:
-    """Of values [H, 3] by the row [H] each belongs to, [count, 3]."""
+    """Return the sums [count, 3] of values [H, 3] by their row [H]."""
     total = [np.bincount(row, channel, count) for channel in values.T]
     return np.stack(total, axis=1).astype(np.float32)
 
 
 def _lattice(group: int) -> Floats:
-    """Points [MIRRORED_RAYS, 2] of the unit square, other ones for each group."""
+    """Return the points [MIRRORED_RAYS, 2] of the unit square for a group."""
     points = np.stack(spread_points(MIRRORED_RAYS * TILE * TILE), axis=1)
     return points[group * MIRRORED_RAYS :][:MIRRORED_RAYS].astype(np.float32)
 
 
 def _visible_normals(view: Floats, alpha: Floats, uv: Floats) -> Floats:
-    """Microfacet normals [K, M, 3] that a viewer [K, 1, 3] sees; alpha [K, 1], uv [M, 2]. Dupuy and
-    Benyoub 2023, listing 3."""
+    """Sample visible microfacet normals [K, M, 3]; Dupuy and Benyoub 2023, listing 3.
+
+    Args:
+        view: unit vectors [K, 1, 3] toward the eye, in the frame of the surface.
+        alpha: [K, 1], squared perceptual roughness.
+        uv: [M, 2], points of the unit square.
+    """
     stretch = np.concatenate([alpha, alpha, np.ones_like(alpha)], axis=1)[:, None]
     stretched = view * stretch
     stretched /= np.linalg.norm(stretched, axis=-1, keepdims=True)
@@ -171,14 +193,16 @@ def _visible_normals(view: Floats, alpha: Floats, uv: Floats) -> Floats:
 
 
 def _smith_g1(cosine: Floats, alpha: Floats) -> Floats:
-    """Share of microfacets that are not masked from a direction: Walter et al. 2007, eq. 34."""
+    """Return the share of microfacets that are visible; Walter et al. 2007, eq. 34."""
     tangent = 1 / (cosine * cosine) - 1
     return np.asarray(2 / (1 + np.sqrt(1 + alpha * alpha * tangent)), np.float32)
 
 
 def _frames(normal: Floats) -> Floats:
-    """Two tangents and the normal, rows of [K, 3, 3]: Duff et al. 2017, Building an Orthonormal
-    Basis, Revisited."""
+    """Return two tangents and the normal as rows of [K, 3, 3].
+
+    Duff et al. 2017, Building an Orthonormal Basis, Revisited.
+    """
     x, y, z = normal.T
     sign = np.copysign(np.float32(1), z)
     a = -1 / (sign + z)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.spreader_parts import CABLES
-from fastgen.light.directional_lights import MOST_SUNS
+from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render.noise import NOISE_LEVELS
 from fastgen.render.uniforms import Block
 from fastgen.scene.limits import MAX_DAMAGES
@@ -60,13 +60,13 @@ VIEW_BLOCK = Block(
         ("vec2", "lens_end"),  # where its formula ends, and the slope there
         ("float", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
-        ("mat4", "ray_to_shadow", MOST_SUNS),  # from the eye to a point in m, to a place in its map
-        ("vec4", "sun_tile", MOST_SUNS),  # the part of the map that is its own, centres of texels
+        ("mat4", "ray_to_shadow", MAX_LIGHTS),  # vector from the eye in m to (u, v, depth)
+        ("vec4", "sun_tile", MAX_LIGHTS),  # the part of the map that is its own, centres of texels
         ("vec4", "to_end_tile"),  # from a place in the first sun's tile: scale, offset
         ("vec4", "end_tile"),  # from and up to where it is asked for the end that it shines on:
         ("vec2", "end_from"),  # toward 1 or -1 along x, and that much farther than the eye, in m
-        ("vec4", "sun_toward", MOST_SUNS),  # unit vector to it, angular radius
-        ("vec4", "sun_light", MOST_SUNS),  # irradiance / pi on what faces it
+        ("vec4", "sun_toward", MAX_LIGHTS),  # unit vector to it, angular radius
+        ("vec4", "sun_light", MAX_LIGHTS),  # irradiance / pi on what faces it
         ("int", "sun_count"),
         ("float", "cable_zone"),
         ("vec4", "cable_rusted"),  # mean albedo under rust, and its share
@@ -91,7 +91,6 @@ DAMAGE_BLOCK = Block(
         ("int", "inner_row"),  # first row of the inner view in the sample targets
     ),
 )
-
 
 
 BLOCKS: Mapping[str, Block] = {"scene": SCENE_BLOCK, "view": VIEW_BLOCK, "damage": DAMAGE_BLOCK}

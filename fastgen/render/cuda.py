@@ -14,7 +14,7 @@ from typing import Any
 from fastgen.camera.projection import View
 from fastgen.errors import ContextError
 from fastgen.render.gl import GLContext
-from fastgen.render.targets import Targets
+from fastgen.render.image_targets import ImageTargets
 from fastgen.scene import Camera, Scene
 
 _LIBRARY = "libcuda.so.1"
@@ -133,7 +133,7 @@ class CudaFrames:
             self.release()
             raise
 
-    def take(self, targets: Targets) -> tuple[CudaArray, CudaArray, CudaArray]:
+    def take(self, targets: ImageTargets) -> tuple[CudaArray, CudaArray, CudaArray]:
         """Image, labels and depth of what was drawn into `targets`, see CudaFrame.
 
         Ends the life of those that the last call gave, once CUDA's default stream is through

@@ -1,4 +1,4 @@
-"""Depth maps of occluders, as parallel light from one direction sees them."""
+"""Depth maps of occluders under parallel light from one direction."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -6,20 +6,29 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from fastgen.light.occluders import Array, Solid
+from fastgen.geometry.solids import Solid
+from fastgen.light.occluders import Array
+from fastgen.render.program import shader_text
 
 _SUNK_MM = 50.0
-"""So far behind the front faces of a thick body light is stopped: less than a container's frame is
-thick, and more than what lookups beside their place find nearer to the light on the same face. By
-rays to suns all round, 30 mm let a fifth less light through, and shade a fifth more of what lies in
-it at a grazing angle."""
+"""Distance by which front faces of a thick body are moved into it. It is less than the thickness of
+a container's frame, but more than the depth range of one face within the shadow filter. Compared
+with ray casts for lights all around, 30 mm would reduce light leaks by 20 % and increase false
+shadow at grazing angles by 20 %."""
 
 Tile = tuple[int, int, int, int]
-"""A part of a map: its first texels along and across, and how many they are."""
+"""Rectangle of a map: x, y, width and height in texels."""
+
+
+def occluder_program(ctx: moderngl.Context) -> moderngl.Program:
+    """Return a new program that draws depth maps; the caller releases it."""
+    return ctx.program(
+        vertex_shader=shader_text("occluder.vert"), fragment_shader=shader_text("occluder.frag")
+    )
 
 
 class DrawnBody:
-    """A Solid on the GPU. program: of occluder.vert."""
+    """A Solid on the GPU. program: program of occluder.vert."""
 
     def __init__(self, ctx: moderngl.Context, program: moderngl.Program, body: Solid) -> None:
         self._vertices = ctx.buffer(np.ascontiguousarray(body.positions_mm, np.float32).tobytes())
@@ -28,16 +37,22 @@ class DrawnBody:
         self.array = ctx.vertex_array(program, content, self._indices)
 
     def release(self) -> None:
-        """Free it."""
+        """Free all GL objects."""
         for item in (self.array, self._vertices, self._indices):
             item.release()
 
 
 @dataclass(frozen=True, eq=False)
 class MapView:
-    """What a part of a map shows: bodies, as the map_matrix `to_map` sees them. thick: those of
-    them whose front faces are kept as well, sunk into them; near the edge of a thick body a texel
-    may hold no back face that stands in the way of what lies beside it."""
+    """Content of a tile of a map.
+
+    Attributes:
+        bodies: occluders, of which the back faces are drawn.
+        to_map: projection of the tile, see occluders.map_matrix.
+        tile: rectangle in the map.
+        thick: occluders of which the front faces are drawn as well, moved into the body. Near the
+            edge of a thick body a texel may have no back face that shades the surface beside it.
+    """
 
     bodies: Sequence[DrawnBody]
     to_map: Array
@@ -46,7 +61,7 @@ class MapView:
 
 
 class DepthMap:
-    """A depth texture of (along, across) = size texels. program: of occluder.vert, the owner's."""
+    """Depth texture of (width, height) = size. The caller owns `program`, of occluder.vert."""
 
     def __init__(
         self, ctx: moderngl.Context, program: moderngl.Program, size: tuple[int, int]
@@ -57,7 +72,7 @@ class DepthMap:
         self._target = ctx.framebuffer([], self.depth)
 
     def draw(self, views: Iterable[MapView]) -> None:
-        """Show views; what lies beside their tiles is left as it was."""
+        """Draw views; texels outside their tiles do not change."""
         ctx = self._ctx
         self._target.use()
         ctx.scissor = None
@@ -67,27 +82,27 @@ class DepthMap:
             self._target.clear(depth=1.0, viewport=view.tile)
             self._target.viewport = view.tile
             ctx.cull_face = "front"
-            self._show(view.bodies, view.to_map)
+            self._draw(view.bodies, view.to_map)
             if view.thick:
-                self._show_sunk(view.thick, view.to_map)
+                self._draw_sunk(view.thick, view.to_map)
         ctx.cull_face = "back"
 
-    def _show_sunk(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
+    def _draw_sunk(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
         sunk = to_map.copy()
         sunk[2, 3] += _SUNK_MM * np.linalg.norm(sunk[2, :3])
         self._ctx.cull_face = "back"
-        self._ctx.polygon_offset = 1.0, 0.0  # and by what a face falls within a texel
+        self._ctx.polygon_offset = 1.0, 0.0  # adds the slope of the face within a texel
         try:
-            self._show(bodies, sunk)
+            self._draw(bodies, sunk)
         finally:
             self._ctx.polygon_offset = 0.0, 0.0
 
-    def _show(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
+    def _draw(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
         self._program["to_map"] = tuple(to_map.T.ravel())
         for body in bodies:
             body.array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
-        """Free all but the program."""
+        """Free all GL objects except the program."""
         for item in (self._target, self.depth):
             item.release()

@@ -9,7 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.regions import Region, bands
-from fastgen.render.sky_visibility_probe import Lit
+from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.scene import Damage
 from fastgen.scene.limits import MM
@@ -56,7 +56,7 @@ class DrawInputs:
     damages: tuple[Damage, ...]
     container: GpuMesh
     spreader: GpuMesh | None
-    lit: tuple[Lit, ...]
+    lit: tuple[LitMesh, ...]
     regions: Regions
     targets: ImageTargets
     variant: ShaderVariant

@@ -1,4 +1,4 @@
-"""An EnvironmentLight on the GPU: three octahedral maps."""
+"""Textures of an EnvironmentLight: three octahedral maps."""
 
 import ctypes
 
@@ -7,7 +7,7 @@ import numpy as np
 
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.hdri import HALF_MAX
-from fastgen.light.prefilter import BORDER
+from fastgen.light.octahedral import BORDER
 from fastgen.light.sky_rays import SkyRays
 from fastgen.light.traced_light import DIRECTIONS
 from fastgen.render.gl import GLContext
@@ -20,8 +20,18 @@ _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 
 class GpuLight:
-    """Textures of one environment, and what of it the CPU asks for; traced: for rays as well.
-    Owned by the renderer, which releases it."""
+    """Light of one environment on the GPU. Owned by the renderer, which releases it.
+
+    Args:
+        gl: current context.
+        light: the environment.
+        traced: whether to prepare importance samples for ray casting.
+
+    Attributes:
+        ambient: light without the large maps.
+        background_size: texels along a side of the background map.
+        sky_rays: importance samples, None unless `traced`.
+    """
 
     def __init__(self, gl: GLContext, light: EnvironmentLight, traced: bool = False) -> None:
         ctx = gl.ctx
@@ -50,8 +60,10 @@ class GpuLight:
 
 
 def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
-    """RGB9_E5 texels, uint32 [N, N]: moderngl has no name for the type, and a driver that is given
-    another one takes 60 ms to convert it."""
+    """Return a texture of RGB9_E5 texels, uint32 [N, N].
+
+    moderngl does not know the pixel type, and the conversion from another type takes 60 ms.
+    """
     size = texels.shape[0]
     texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=_RGB9_E5)
     texture.use()
@@ -64,7 +76,7 @@ def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
 
 
 def _half(radiance: np.ndarray) -> bytes:
-    """Radiance [..., 3] as RGBA half floats, clamped to what they hold."""
+    """Return radiance [..., 3] as bytes of RGBA half floats, clamped to their range."""
     rgba = np.ones((*radiance.shape[:-1], 4), np.float16)
     rgba[..., :3] = np.clip(radiance, 0, HALF_MAX)
     return rgba.tobytes()

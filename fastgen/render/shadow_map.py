@@ -1,12 +1,11 @@
-"""The shadows of a container and its spreader: a depth map from where each sun stands.
+"""Shadow map of a container and its spreader: one tile for each directional light.
 
-Dents are bent in, holes are not cut out. Williams 1978, Casting Curved Shadows on
-Curved Surfaces; filtered as Reeves et al. 1987 do, in shaders/sun.glsl.
+Dents are included, holes are not. Williams 1978, Casting Curved Shadows on Curved Surfaces.
+shaders/sun.glsl filters the map as Reeves et al. 1987 do.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import moderngl
@@ -15,30 +14,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.damage_law import corners_mm, deform
 from fastgen.geometry.mesh import UNIT_CUBE, Mesh
-from fastgen.light.directional_lights import MOST_SUNS, Sun
-from fastgen.light.occluders import Body, Solid, map_matrix
+from fastgen.geometry.solids import Body, Solid
+from fastgen.light.directional_lights import MAX_LIGHTS, DirectionalLight
+from fastgen.light.occluders import map_matrix
 from fastgen.render.depth_map import DepthMap, DrawnBody, MapView, Tile
 from fastgen.scene import Damage
 from fastgen.scene.limits import MM
 
 _EDGE_TEXELS = 1
-"""Nothing is drawn on a sun's tile's edge: it stands for all that lies beyond."""
+"""Empty border of a tile. Lookups outside the tile are clamped to it and find no occluder."""
 
 _FIRST_TEXELS = (1536, 512)
-"""Along and across for the first sun, in full detail: of up to 10 mm each way."""
+"""Size of the tile of the first light at full detail; a texel is at most 10 mm wide."""
 
 _END_TEXELS = (1280, 1280)
 _END_TEXEL_MM = 2.5
 _END_DEPTH_MM = 450.0
-"""The first sun has another tile for the end that it shines on, to as far behind its castings as
-damage pushes leaves: in full detail texels no finer than that, as a locking bar is 34 mm wide, up
-to 3.6 mm where the tile is full."""
+"""The first light has a second, finer tile for the end of the container that it shines on. The tile
+reaches _END_DEPTH_MM behind the castings, as far as damage pushes door leaves. At full detail its
+texels are _END_TEXEL_MM wide, because a locking bar is 34 mm wide, or up to 3.6 mm if it is full.
+"""
 
 _END_BORDER_MM = 60.0
-"""Around the part of it that is asked for: more than lookups of a filtered shadow reach."""
+"""Border around the part of the end tile that shading uses; filtered lookups reach less far."""
 
 _OTHERS_TEXELS = (1024, 512)
-"""For each of the others: what they throw is fainter."""
+"""Size of the tile of each other light, whose shadows are fainter."""
 
 _BIAS_MM = 2.0
 
@@ -47,12 +48,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class EndTile:
-    """Where the first sun's map is drawn again, finer, for the end toward `side` along x, 1 or -1:
-    for what lies farther than from_mm that way.
+    """Second, finer tile of the first light, for the end of the container that it shines on.
 
-    to_tile: (scale u, v, offset u, v) from a place (u, v) in the first tile to that in this one.
-    inner: (u, v) of the lowest and of the highest place in it to ask for; lookups around them stay
-    in the tile.
+    Attributes:
+        to_tile: (scale u, scale v, offset u, offset v) from texture coordinates in the first tile
+            to texture coordinates in this one.
+        inner: lowest (u, v) and highest (u, v) for lookups; the filter around them stays inside.
+        side: 1 or -1, direction of the end along x.
+        from_mm: the tile is for points farther than this in that direction.
     """
 
     to_tile: Array
@@ -62,17 +65,19 @@ class EndTile:
 
 
 class _Layout(NamedTuple):
-    """Where a map of `size` texels has the tile of each sun, and `end`, the room for the end's,
-    whose texels are no finer than end_texel_mm."""
+    """Layout of the map: its size, the tile of each light and the space for the end tile.
+
+    Texels of the end tile are at least `end_texel_mm` wide.
+    """
 
     size: tuple[int, int]
-    suns: tuple[Tile, ...]
+    lights: tuple[Tile, ...]
     end: Tile
     end_texel_mm: float
 
 
 def _layout(detail: float) -> _Layout:
-    """detail: of the full number of texels each way."""
+    """Return the layout; detail: share of the full number of texels along each axis."""
 
     def scaled(texels: tuple[int, int], edge: int) -> tuple[int, int]:
         along, across = (round(detail * count) + 2 * edge for count in texels)
@@ -95,13 +100,20 @@ _NO_END = EndTile(np.zeros(4), np.array([1.0, 1.0, 0.0, 0.0]), 1.0, 0.0)
 
 
 class ShadowMap:
-    """What each sun meets first of a container and the spreader that holds it, less its cables.
+    """Depth map of a container and its spreader, as the directional lights see them.
 
-    Owned by the renderer, which releases it. program: of occluder.vert. One texture for all scenes:
-    made anew for each, freed ones would stay with the process in pieces. detail: of the full number
-    of texels each way, 0.5 for a quarter of them. toward: unit vectors
-    [S, 3] to the suns. tiles: [S, 4], where in the texture each has its own part, from the centre
-    (u, v) of the first texel to that of the last. end: the first sun's finer part.
+    Owned by the renderer, which releases it. All scenes share one texture, because textures made
+    per scene would fragment the memory of the process.
+
+    Args:
+        ctx: current OpenGL context.
+        program: program of occluder.vert.
+        detail: share of the full number of texels along each axis; 0.5 has a quarter of all texels.
+
+    Attributes:
+        toward: unit vectors [S, 3] toward the lights.
+        tiles: [S, 4], tile of each light: (u, v) of the centres of its first and last texels.
+        end: finer tile of the first light.
     """
 
     def __init__(
@@ -129,25 +141,31 @@ class ShadowMap:
         damages: tuple[Damage, ...] = (),
         outline: Mesh | None = None,
     ) -> None:
-        """Draw the map if it does not show this. container: at rest; damages: done to it. toward:
-        unit vectors [S, 3] to the suns in the container's frame, 1 to MOST_SUNS. outline: the same
-        container of fewer triangles, for charts that no damage reaches."""
+        """Draw the map unless it already shows the same.
+
+        Args:
+            container: undamaged mesh.
+            spreader: spreader without cables, or None.
+            toward: unit vectors [S, 3] toward the lights in world space, 1 to MAX_LIGHTS.
+            damages: damages of the container.
+            outline: the same container with fewer triangles, for charts that no damage touches.
+        """
         shown = (container, outline, spreader, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
             return
-        self._shown = ()  # until it does, whatever happens
-        # from below, floor members shade one another
+        self._shown = ()  # stays empty if drawing fails
+        # under light from below, floor members shade one another
         members = bool(toward[:, 2].min() <= 0)
         body, of_door = _bent(container, outline or container, damages, members)
         bodies: list[Solid] = [body] if spreader is None else [body, spreader]
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0).astype(np.float64)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0).astype(np.float64)
-        tiles = self._layout.suns[: len(toward)]
+        tiles = self._layout.lights[: len(toward)]
         to_tiles = np.stack([map_matrix(way, low, high) for way in toward])
         first, size = np.split(np.array(tiles), 2, axis=1)
         to_tiles[:, :2] *= (1 - 2 * _EDGE_TEXELS / size)[..., None]
         side = float(np.sign(toward[0, 0]))
-        # the door shades its own end alone, which has a tile of its own or the sun behind it
+        # the door shades only its own end, which has the end tile or faces away from the light
         plain = _plain(body, of_door) if side and of_door.any() else body
         drawn: dict[Solid, DrawnBody] = {}
 
@@ -168,10 +186,10 @@ class ShadowMap:
         self.end = _NO_END
         if side:
             from_mm = float(np.abs(container.bounds_mm[int(side > 0)][0])) - _END_DEPTH_MM
-            # what shades a point there stands still farther out, but for lookups around it
+            # occluders of such a point are farther out, except for the border of filtered lookups
             from_border = from_mm - _END_BORDER_MM
             container_end, *others = (_beyond(body, side, from_border) for body in bodies)
-            # deep damage may leave none
+            # deep damage may leave no triangle
             ends = [end for end in (container_end, *others) if len(end.triangles)]
             if ends:
                 self.end, matrix, tile = _end_tile(
@@ -184,8 +202,10 @@ class ShadowMap:
         self._shown = shown
 
     def from_ray(self, eye_m: Array) -> Array:
-        """From a vector in metres, from the eye to a point, to (u, v, depth) in the map of each
-        sun: [S, 4, 4]."""
+        """Return the matrices [S, 4, 4] to (u, v, depth) in the tile of each light.
+
+        They apply to the vector in metres from the eye, at eye_m [3], to a point.
+        """
         matrix = np.tile(np.eye(4), (len(self._to_map), 1, 1))
         matrix[:, :3, :3] = 500 * self._to_map[:, :3, :3]
         matrix[:, :3, 3] = matrix[:, :3, :3] @ eye_m + 0.5 * self._to_map[:, :3, 3] + 0.5
@@ -198,7 +218,7 @@ class ShadowMap:
 
 
 def _in_map(to_tiles: Array, tiles: NDArray[np.int64], layout: _Layout) -> Array:
-    """Of matrices [S, 4, 4] to clip space of `tiles` [S, 4]: to that of the whole map."""
+    """Return matrices [S, 4, 4] to clip space of `tiles` [S, 4] as matrices to that of the map."""
     first, size = np.split(tiles, 2, axis=1)
     found = to_tiles.copy()
     found[:, :2] *= (size / layout.size)[..., None]
@@ -214,15 +234,21 @@ def _end_tile(
     from_mm: float,
     layout: _Layout,
 ) -> tuple[EndTile, Array, Tile]:
-    """The tile of the end toward `side`, and the view of `ends`, as of _beyond, to draw in it.
+    """Return the end tile, its matrix from mm to clip space and its texels in the map.
 
-    to_first: to clip space of the first tile; first_to_map: of the whole map, through it.
+    Args:
+        to_first: [4, 4], mm to clip space of the first tile.
+        first_to_map: [4, 4], mm to clip space of the whole map through the first tile.
+        ends: triangles to draw, see _beyond.
+        side: 1 or -1, direction of the end along x.
+        from_mm: the tile is for points farther than this in that direction.
+        layout: layout of the map.
     """
     lows, highs = zip(*(_extent(body.positions_mm, body.triangles) for body in ends), strict=True)
     low, high = np.min(lows, axis=0).astype(np.float64), np.max(highs, axis=0).astype(np.float64)
     (low if side > 0 else high)[0] = side * from_mm
     seen = (low + UNIT_CUBE * (high - low)) @ to_first[:2, :3].T + to_first[:2, 3]
-    units = np.linalg.norm(to_first[:2, :3], axis=1)  # a millimetre
+    units = np.linalg.norm(to_first[:2, :3], axis=1)  # clip space per mm
     least = seen.min(axis=0) - _END_BORDER_MM * units
     most = seen.max(axis=0) + _END_BORDER_MM * units
     texels = np.ceil((most - least) / units / layout.end_texel_mm)
@@ -236,7 +262,7 @@ def _end_tile(
     units_in_map = np.linalg.norm(to_map[:2, :3], axis=1)
     scale = units_in_map / np.linalg.norm(first_to_map[:2, :3], axis=1)
     offset = to_map[:2, 3] - scale * first_to_map[:2, 3]
-    # places run from 0 to 1, clip space from -1 to 1; half of the border is for lookups
+    # texture coordinates are 0..1, clip space is -1..1; half of the border is for filtered lookups
     place = np.concatenate([scale, (offset + 1 - scale) / 2])
     border = _END_BORDER_MM / 2 * units_in_map / 2
     first, size = np.split(np.array(tile), 2)
@@ -245,7 +271,7 @@ def _end_tile(
 
 
 def _beyond(body: Solid, side: float, from_mm: float) -> Body:
-    """The triangles of a body that reach farther than from_mm toward `side` along x."""
+    """Return the triangles of a body that reach farther than from_mm toward `side` along x."""
     a, b, c = (side * body.positions_mm[:, 0] > from_mm)[body.triangles].T
     return Body(body.positions_mm, body.triangles[a | b | c])
 
@@ -253,23 +279,26 @@ def _beyond(body: Solid, side: float, from_mm: float) -> Body:
 def _extent(
     positions_mm: NDArray[np.float32], triangles: NDArray[np.uint32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lowest and highest coordinates [3] of triangles' corners."""
+    """Return the lowest and highest coordinates [3] of the corners of triangles."""
     corners = triangles.ravel().astype(np.intp)
-    axes = [np.take(axis, corners) for axis in positions_mm.T]  # rows take ten times as long
+    axes = [np.take(axis, corners) for axis in positions_mm.T]  # rows are ten times slower
     return np.stack([axis.min() for axis in axes]), np.stack([axis.max() for axis in axes])
 
 
 def _bent(
     container: Mesh, outline: Mesh, damages: tuple[Damage, ...], members: bool
 ) -> tuple[Body, NDArray[np.bool_]]:
-    """A container as the damages move it, of its own triangles where they do, else of outline's,
-    and which triangles are of its door. members: whether it has its floor's."""
+    """Return a damaged container and a mask [T] of the triangles of its door.
+
+    Charts that a damage touches keep the triangles of `container`; others use `outline`. members:
+    include the cross members of the floor.
+    """
     if not damages:
         part = _parts(outline)
         kept = (part != _MEMBER) | members
         return Body(outline.positions_mm, outline.triangles[kept]), part[kept] == _DOOR
     moved = container.positions_mm.copy()
-    columns = np.ascontiguousarray(moved.T)  # comparisons along rows take ten times as long
+    columns = np.ascontiguousarray(moved.T)  # comparisons along rows are ten times slower
     reached = np.zeros(len(container.charts), bool)
     for damage in damages:
         box = corners_mm(damage)
@@ -291,7 +320,7 @@ def _bent(
 
 
 def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
-    """A container with one flat sheet for its door, as deep as any of it is, damage included."""
+    """Return a container whose door is one flat sheet at the deepest point of the damaged door."""
     low, high = _extent(container.positions_mm, container.triangles[of_door])
     sheet = [(low[0], y, z) for y in (low[1], high[1]) for z in (low[2], high[2])]
     first = len(container.positions_mm)
@@ -309,22 +338,29 @@ def _plain(container: Body, of_door: NDArray[np.bool_]) -> Body:
 _DOOR, _MEMBER = 1, 2
 
 
-@lru_cache(maxsize=32)
 def _parts(container: Mesh) -> NDArray[np.uint8]:
-    """Of each triangle [T]: _DOOR, of leaves and gear, _MEMBER, below the floor, or 0."""
+    """Return for each triangle [T]: _DOOR for leaves and gear, _MEMBER below the floor, else 0."""
     numbers = {"door": _DOOR, "member": _MEMBER}  # charts such as member.3, door.handle.0
     of_chart = [numbers.get(chart.name.split(".")[0], 0) for chart in container.charts]
     return np.array(of_chart, np.uint8)[container.chart[container.triangles[:, 0]]]
 
 
-def shader_suns(suns: Sequence[Sun]) -> int:
-    """How many suns the shaders are linked for that shade their light: none, one, or MOST_SUNS."""
-    return len(suns) if len(suns) < 2 else MOST_SUNS
+def shader_lights(lights: Sequence[DirectionalLight]) -> int:
+    """Return the number of lights of the shader variant for `lights`: 0, 1 or MAX_LIGHTS."""
+    return len(lights) if len(lights) < 2 else MAX_LIGHTS
 
 
-def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> dict[str, ArrayLike]:
-    """Members of VIEW_BLOCK about the suns for a camera at eye_m [3]; shadow: None without any."""
-    lit = [] if shadow is None else [*zip(shadow.toward, suns, strict=True)]
+def light_values(
+    lights: Sequence[DirectionalLight], shadow: ShadowMap | None, eye_m: Array
+) -> dict[str, ArrayLike]:
+    """Return the members of VIEW_BLOCK that describe directional lights.
+
+    Args:
+        lights: the lights of the environment.
+        shadow: shadow map of the lights, None without lights.
+        eye_m: position of the camera in world metres, [3].
+    """
+    lit = [] if shadow is None else [*zip(shadow.toward, lights, strict=True)]
     end = _NO_END if shadow is None else shadow.end
     return {
         "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
@@ -332,7 +368,7 @@ def sun_values(suns: Sequence[Sun], shadow: ShadowMap | None, eye_m: Array) -> d
         "to_end_tile": end.to_tile,
         "end_tile": end.inner,
         "end_from": (end.side, MM * end.from_mm - end.side * eye_m[0]),
-        "sun_toward": np.array([[*toward, sun.radius] for toward, sun in lit]).reshape(-1, 4),
-        "sun_light": np.array([[*sun.light, 0.0] for _, sun in lit]).reshape(-1, 4),
+        "sun_toward": np.array([[*toward, each.radius] for toward, each in lit]).reshape(-1, 4),
+        "sun_light": np.array([[*each.light, 0.0] for _, each in lit]).reshape(-1, 4),
         "sun_count": len(lit),
     }

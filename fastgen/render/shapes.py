@@ -14,7 +14,7 @@ from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.sky_visibility import Sky
 from fastgen.render.gpu_mesh import GpuMesh, zone_table
 from fastgen.render.recent_cache import Kept
-from fastgen.render.sky_visibility_probe import Lit, SkyProbe
+from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.zone_codes import SPREADER_ZONE
 
@@ -33,11 +33,11 @@ class Shapes:
         self._containers: Kept[GpuMesh] = Kept(16)
         self._spreaders: Kept[GpuMesh] = Kept(64)
         self._zones: Kept[moderngl.Texture] = Kept(128)
-        self._probe = SkyProbe(ctx)
+        self._probe = SkyVisibilityProbe(ctx)
 
     def of(
         self, prepared: PreparedScene, materials: SceneMaterials, lens: bool, light: Ambient
-    ) -> tuple[GpuMesh, GpuMesh | None, tuple[Lit, ...]]:
+    ) -> tuple[GpuMesh, GpuMesh | None, tuple[LitMesh, ...]]:
         """Return the container and spreader of a scene, ready to be drawn.
 
         Args:
@@ -52,17 +52,17 @@ class Shapes:
         mesh, shape = self.container(prepared), prepared.spreader
         usual = prepared.usual_spreader
         sky = Sky(light, prepared.scene.environment.yaw_deg)
-        below = self._probe.openness(mesh.mesh, usual and usual.mesh, sky)
-        mesh.set_openness(below.values)
+        below = self._probe.container_light(mesh.mesh, usual and usual.mesh, sky)
+        mesh.set_sky_visibility(below.values)
         if shape is None or usual is None:
             return mesh, None, (below,)
         spreader = self._drawn_spreader(shape.drawn(lens))
         # a mesh with lens distortion has other vertices, which are probed at their own gap
         probed, outline = (spreader.mesh, shape.outline) if lens else (usual.mesh, usual.outline)
-        lit = self._probe.openness_of_spreader(
+        lit = self._probe.spreader_light(
             probed, outline, prepared.nominal_outline, below, sky, materials.reflectances
         )
-        spreader.set_openness(lit.values)
+        spreader.set_sky_visibility(lit.values)
         return mesh, spreader, (below, lit)
 
     def container(self, prepared: PreparedScene) -> GpuMesh:
@@ -97,7 +97,7 @@ def ray_bodies(
     prepared: PreparedScene,
     materials: SceneMaterials,
     lens: bool,
-    lit: Sequence[Lit],
+    lit: Sequence[LitMesh],
     light: Ambient,
 ) -> RayBodies:
     """Return the bodies of a scene that rays can hit.

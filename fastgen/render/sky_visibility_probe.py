@@ -1,5 +1,7 @@
-"""Finds how open each vertex of a container or spreader lies to the sky, by depth maps from all
-around: a point is hidden from a direction where a face of an occluders.DepthMap stands before it.
+"""Sky visibility of the vertices of containers and spreaders, found with depth maps.
+
+A depth map is drawn for each direction of the sky. A point is hidden from a direction if the map
+has a face in front of it.
 """
 
 import hashlib
@@ -12,51 +14,53 @@ from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
 from fastgen.geometry.mesh import MATERIALS, Mesh
+from fastgen.geometry.solids import Solid, without_cables
 from fastgen.light.indirect_light import Cells, FormFactors, form_factors
-from fastgen.light.occluders import Solid, core_of, map_matrix, without_cables
+from fastgen.light.occluders import core_of, map_matrix
 from fastgen.light.sky_visibility import (
     DIRECTIONS,
     Array,
     Directions,
-    Openness,
     Sky,
-    encoded,
+    SkyVisibility,
+    encoded_cones,
     sky_directions,
 )
-from fastgen.render.depth_map import DepthMap, DrawnBody, MapView
-from fastgen.render.programs import link
+from fastgen.render.depth_map import DepthMap, DrawnBody, MapView, occluder_program
 from fastgen.render.recent_cache import Recent
 
 _VERSION = 4
-"""Part of the disk cache's key: count up whenever the openness changes."""
+"""Part of the key in the disk cache; increase it whenever the sky visibility changes."""
 
 _MAP_SIZE = (2048, 512)
-"""Texels along and across a container: 6 mm for the longest."""
+"""Texels along and across a container, 6 mm wide for the longest container."""
 
 _COARSE_SIZE = (512, 256)
-"""For what is not beside the surface that it hides."""
+"""Map size for occluders that are not close to the surface."""
 
 _SPREADER_SIZE = (1024, 512)
-"""For the spreader itself: 14 mm, a quarter of its beams' least gaps."""
+"""Map size for the spreader itself; texels of 14 mm are a quarter of the smallest beam gaps."""
 
 _INSET = 0.5
-"""Share of the way from a vertex to the middle of its facets at which it is probed: what is
-interpolated between the vertices is then right on average, where creases would be too dark."""
+"""Position of a probe between the vertex (0) and the centres of its facets (1). The interpolation
+between vertices is then correct on average; probes at the vertices would make creases too dark."""
 
 _INSET_LIMIT_MM = 30.0
 _LIFT_MM = 2.0
 _BIAS_MM = 1.0
 
 Paints = tuple[tuple[float, float, float], ...]
-"""What each of mesh.MATERIALS reflects of diffuse light."""
+"""Diffuse reflectance of each of mesh.MATERIALS."""
 
 _CAPACITY = 128
-_LIT_CAPACITY = 2  # a scene asks for two, once a camera
+_LIT_CAPACITY = 2  # a scene needs two, again for each camera
 
 
 def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
-    """Where each vertex of `mesh` is probed, [V, 3] in mm: just off the surface, beside creases,
-    no further than inset_limit_mm from the vertex."""
+    """Return the point at which each vertex of a mesh is probed, [V, 3] in mm.
+
+    Points are slightly above the surface and at most inset_limit_mm from their vertex along it.
+    """
     positions = mesh.positions_mm.astype(np.float64)
     middle = positions[mesh.triangles].mean(axis=1)
     corners = mesh.triangles.ravel()
@@ -70,90 +74,117 @@ def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
 
 
 def _spreader_points(spreader: Mesh) -> Array:
-    # its faces are long and run into one another: their ends stand for nothing
+    # its faces are long and intersect, so the surroundings of their ends are not representative
     return probe_points(spreader, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
-class Lit:
-    """A mesh in its light. values: `Openness.under` its sky, uint8 [V, VERTEX_BYTES]. irradiance:
-    [V, 3], / pi, the suns' included. without_suns: the same without."""
+class LitMesh:
+    """A mesh and the light at its vertices.
+
+    Attributes:
+        mesh: the mesh.
+        values: uint8 [V, VERTEX_BYTES], see SkyVisibility.vertex_bytes.
+        irradiance: irradiance / pi [V, 3], including directional lights.
+        without_lights: irradiance / pi [V, 3], without directional lights.
+    """
 
     mesh: Mesh
     values: NDArray[np.uint8]
     irradiance: NDArray[np.float32]
-    without_suns: NDArray[np.float32]
+    without_lights: NDArray[np.float32]
 
 
-def _lit(mesh: Mesh, openness: Openness, sky: Sky) -> Lit:
-    return Lit(mesh, *openness.lit(sky))
+def _lit(mesh: Mesh, visibility: SkyVisibility, sky: Sky) -> LitMesh:
+    return LitMesh(mesh, *visibility.lit(sky))
 
 
-class SkyProbe:
-    """Finds the openness of meshes on one GL context. Owned by the renderer, which releases it."""
+class SkyVisibilityProbe:
+    """Computes the sky visibility and the light of meshes on one OpenGL context.
+
+    Owned by the renderer, which releases it.
+    """
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self._ctx = ctx
-        # depth maps are the driver's, and so is what is found with them
+        # depth maps, and so the results, depend on the driver
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
-        self._program = link(ctx, "occluder.vert", "occluder.frag", {})
+        self._program = occluder_program(ctx)
         self._own: Recent[NDArray[np.uint8]] = Recent(_CAPACITY)
-        self._found: Recent[Openness] = Recent(_CAPACITY)
+        self._found: Recent[SkyVisibility] = Recent(_CAPACITY)
         self._factors: Recent[FormFactors] = Recent(_CAPACITY)
         self._cells: Recent[Cells] = Recent(_CAPACITY)
-        self._lit: Recent[Lit] = Recent(_LIT_CAPACITY)
+        self._lit: Recent[LitMesh] = Recent(_LIT_CAPACITY)
 
-    def openness(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> Lit:
-        """Of a container below the spreader that holds it. Asked again at once, it gives the same
-        object."""
-        key = (container, spreader)
-        openness = self._opened(key, lambda: self._of_container(container, spreader))
-        return self._lit.get((openness, sky), lambda: _lit(container, openness, sky))
+    def container_light(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> LitMesh:
+        """Return a container in the light of the sky.
 
-    def openness_of_spreader(
-        self, spreader: Mesh, outline: Mesh, held: Mesh, below: Lit, sky: Sky, paints: Paints
-    ) -> Lit:
-        """As `openness`, of a spreader above a container, with the light that surfaces throw on it.
+        Args:
+            container: the mesh.
+            spreader: spreader above the container, or None.
+            sky: the environment.
 
-        outline: the same surface of as few triangles as can be. held: what of the container hides
-        the sky. below: the container in its light. paints: what all materials reflect.
+        Returns:
+            The lit mesh. A second call with the same arguments returns the same object.
         """
-        openness = self._opened((spreader, held), lambda: self._of_spreader(spreader, held))
+        key = (container, spreader)
+        visibility = self._visibility(key, lambda: self._of_container(container, spreader))
+        return self._lit.get((visibility, sky), lambda: _lit(container, visibility, sky))
 
-        def lit() -> Lit:
+    def spreader_light(
+        self, spreader: Mesh, outline: Mesh, held: Mesh, below: LitMesh, sky: Sky, paints: Paints
+    ) -> LitMesh:
+        """Return a spreader above a container in the light of the sky and indirect light.
+
+        Args:
+            spreader: the mesh.
+            outline: the same surface with few triangles.
+            held: mesh of the container as an occluder of the sky.
+            below: the container in its light.
+            sky: the environment.
+            paints: reflectance of all materials.
+
+        Returns:
+            The lit mesh. A second call with the same arguments returns the same object.
+        """
+        key = (spreader, held)
+        visibility = self._visibility(key, lambda: self._of_spreader(spreader, held))
+
+        def lit() -> LitMesh:
             factors = self._factors.get(
-                (openness, outline),
+                (visibility, outline),
                 lambda: form_factors(
                     spreader,
                     without_cables(outline),
                     held,
                     _spreader_points(spreader),
                     sky_directions(),
-                    ~openness.open_to,
+                    ~visibility.visible,
                 ),
             )
             cells = self._cells.get((below.mesh, held), lambda: Cells.of(below.mesh, held))
             sheet = np.array(paints[MATERIALS.index("paint_sheet")])
             reflectance = np.array(paints)[[chart.material_index for chart in spreader.charts]]
-            sun = openness.sunlight(sky)
+            direct = visibility.directional_irradiance(sky)
             light = factors.light(
-                openness.irradiance(sky),
-                sun,
+                visibility.irradiance(sky),
+                direct,
                 sheet * cells.mean(below.irradiance),
                 reflectance[spreader.chart],
             )
-            return Lit(spreader, openness.under(sky, light), light + sun, light)
+            values = visibility.vertex_bytes(sky, light)
+            return LitMesh(spreader, values, light + direct, light)
 
-        return self._lit.get((openness, sky, below, paints), lit)
+        return self._lit.get((visibility, sky, below, paints), lit)
 
-    def _opened(
+    def _visibility(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
-    ) -> Openness:
+    ) -> SkyVisibility:
         return self._found.get(key, lambda: self._stored(key, measure))
 
     def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
-    ) -> Openness:
+    ) -> SkyVisibility:
         shapes = [mesh.shape_digest if mesh else "" for mesh in key]
         digest = hashlib.sha256(f"{_VERSION} {self._driver} {shapes}".encode())
         normals = key[0].normals
@@ -161,30 +192,30 @@ class SkyProbe:
         def make() -> NDArray[np.uint8]:
             bits = measure()
             directions = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
-            return np.concatenate([encoded(normals, directions), bits], axis=1)
+            return np.concatenate([encoded_cones(normals, directions), bits], axis=1)
 
         shape = (len(normals), 3 + DIRECTIONS // 8)
         stored = _from_disk(digest.hexdigest(), shape, make)
-        return Openness(normals, stored[:, 3:], stored[:, :3])
+        return SkyVisibility(normals, stored[:, 3:], stored[:, :3])
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
         points = _spreader_points(spreader)
-        own = self._kept([without_cables(spreader)], points, _SPREADER_SIZE)
-        below = self._kept([container], points, _COARSE_SIZE)
+        own = self._cached([without_cables(spreader)], points, _SPREADER_SIZE)
+        below = self._cached([container], points, _COARSE_SIZE)
         return own & below
 
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
         whole: list[Solid] = [container, core_of(container)]
-        open_to = self._own.get(container, lambda: self._kept(whole, points, _MAP_SIZE))
+        visible = self._own.get(container, lambda: self._cached(whole, points, _MAP_SIZE))
         if spreader is not None:
-            open_to = open_to & self._kept([without_cables(spreader)], points, _COARSE_SIZE)
-        return open_to
+            visible = visible & self._cached([without_cables(spreader)], points, _COARSE_SIZE)
+        return visible
 
-    def _kept(
+    def _cached(
         self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
     ) -> NDArray[np.uint8]:
-        """As _open_to, packed along the directions; from the disk cache where it is there."""
+        """Return _visible packed along the directions, from the disk cache if possible."""
         about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
         digest = hashlib.sha256(about)
         arrays = [array for body in bodies for array in (body.positions_mm, body.triangles)]
@@ -193,17 +224,17 @@ class SkyProbe:
         return _from_disk(
             digest.hexdigest(),
             (len(points_mm), DIRECTIONS // 8),
-            lambda: np.packbits(self._open_to(bodies, points_mm, size), axis=1),
+            lambda: np.packbits(self._visible(bodies, points_mm, size), axis=1),
         )
 
-    def _open_to(
+    def _visible(
         self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
     ) -> Directions:
         drawn = [DrawnBody(self._ctx, self._program, body) for body in bodies]
         depths = DepthMap(self._ctx, self._program, size)
         low = np.min([body.bounds_mm[0] for body in bodies], axis=0)
         high = np.max([body.bounds_mm[1] for body in bodies], axis=0)
-        # what is probed outside of the box of occluders may be hidden too
+        # points outside the bounding box of the occluders may be hidden as well
         low, high = np.minimum(low, points_mm.min(axis=0)), np.maximum(high, points_mm.max(axis=0))
         found = np.empty((len(points_mm), DIRECTIONS), bool)
         corner = np.array(size) - 1
@@ -229,7 +260,7 @@ class SkyProbe:
 def _from_disk(
     key: str, shape: tuple[int, int], make: Callable[[], NDArray[np.uint8]]
 ) -> NDArray[np.uint8]:
-    """The disk cache's array of `key`; where there is none of `shape`, what `make` gives."""
+    """Return the array of a key from the disk cache, or make it if none has the right shape."""
     entry = disk_cache.default_folder() / f"openness-{key[:32]}.npz"
 
     def kept() -> NDArray[np.uint8] | None:
