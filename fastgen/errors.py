@@ -2,20 +2,23 @@
 
 
 class FastgenError(Exception):
-    """Base of every error raised for bad input or a missing capability of the machine."""
+    """Base of all errors for bad input or a missing capability of the machine."""
 
 
-class ConfigError(FastgenError):
-    """A configuration value, key or preset that cannot be used."""
+class ConfigError(FastgenError, ValueError):
+    """Unusable configuration value, key, preset or argument.
+
+    It is a ValueError so that pydantic reports it with the location of the value.
+    """
 
 
 class AssetError(FastgenError):
-    """A missing, broken or unsuitable file: an HDRI, a font, a marker."""
+    """Missing, broken or unsuitable file: an HDRI, a font, a marker."""
 
 
 class ContextError(FastgenError):
-    """This machine gives no OpenGL context, or CUDA no access to what it draws."""
+    """OpenGL context that this machine cannot create, or CUDA without access to its images."""
 
 
 class OutputError(FastgenError):
-    """An output folder that cannot be written or holds something else."""
+    """Output folder that cannot be written or that holds something else."""

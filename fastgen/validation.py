@@ -1,8 +1,10 @@
-"""Frozen dataclasses to and from plain JSON/YAML values, with errors that name the field.
+"""Validation of user input: of single arguments, and of whole dataclasses with pydantic.
 
-One small engine serves both the configuration (bounds and ranges are checked) and the scenes
-(exact round trip). A field may carry `metadata=bounds(lo, hi)`; every number below it is held to
-these bounds, and a `Range` must also be ordered.
+The type of a dataclass field declares its limits, for example `Annotated[Range, Bounds(0, 1)]` or
+`Annotated[str, OneOf(FACES)]`. pydantic enforces these types; the YAML comments and the JSON Schema
+of configurations show them. This module translates pydantic's errors to ConfigError.
+
+Importing pydantic takes about 0.1 s. The first validation does it, not the import of this module.
 """
 
 import dataclasses
@@ -11,46 +13,145 @@ import functools
 import math
 import numbers
 import reprlib
-import sys
 import types
 import typing
-from collections.abc import Callable, Collection, Mapping
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from fastgen.errors import ConfigError
 
+if typing.TYPE_CHECKING:
+    from pydantic import TypeAdapter
+    from pydantic_core import CoreSchema, ErrorDetails
+
 T = TypeVar("T")
+
+_PAIR = "[lowest, highest]"
+_NUMBER = "[number]"
+"""Tags in the location of pydantic's errors, for the two ways to write a range."""
 
 _short = reprlib.repr
 
 
 class Range(NamedTuple):
-    """A closed interval that a value is drawn from, uniformly unless said otherwise."""
+    """A closed interval that a value is drawn from, uniformly unless documented otherwise."""
 
     lo: float
     hi: float
 
     def draw(self, rng: np.random.Generator) -> float:
-        """A value of it, each as likely as any other."""
+        """Return a uniformly distributed value of the interval."""
         return float(rng.uniform(self.lo, self.hi))
 
 
-def bounds(lo: float = -math.inf, hi: float = math.inf, unit: str = "") -> dict[str, Any]:
-    """Field metadata: the closed interval that all numbers of the field lie in, and their unit."""
-    return {"lo": lo, "hi": hi, "unit": unit}
+class Bounds(NamedTuple):
+    """Closed interval of a number, and its unit.
+
+    It annotates `float`, `int`, `Range` or `tuple[int, int]`. The latter two must be ordered, and
+    one number stands for both values.
+    """
+
+    lo: float
+    hi: float
+    unit: str = ""
+
+    @property
+    def words(self) -> str:
+        """The interval in words, for example '0.5 to 2 mm'."""
+        return f"{self.lo:g} to {self.hi:g} {self.unit}".rstrip()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
+        from pydantic_core import core_schema
+
+        if source is float or source is int:
+            return self._number_schema(source)
+        make, kind = (Range._make, float) if source is Range else (tuple, int)
+        number = self._number_schema(kind)
+        pair = core_schema.tagged_union_schema(
+            {_NUMBER: number, _PAIR: core_schema.tuple_schema([number, number])},
+            lambda value: _NUMBER if _is_number(value) else _PAIR,
+        )
+        return core_schema.no_info_after_validator_function(
+            functools.partial(self._ordered, make), pair
+        )
+
+    def _number_schema(self, kind: type) -> "CoreSchema":
+        from pydantic_core import core_schema
+
+        if kind is int:
+            whole_number = core_schema.int_schema(ge=int(self.lo), le=int(self.hi))
+            schema = core_schema.no_info_before_validator_function(_integral, whole_number)
+            return _refusing("number", schema, bounds=self)
+        number = core_schema.float_schema(strict=True, allow_inf_nan=False, ge=self.lo, le=self.hi)
+        return _refusing("number", number, bounds=self)
+
+    def _ordered(self, make: Callable[..., Any], pair: Any) -> Any:
+        lo, hi = pair if isinstance(pair, tuple) else (pair, pair)
+        if lo > hi:
+            from pydantic_core import PydanticCustomError
+
+            full_turn = self.unit == "degrees" and lo - 360 >= self.lo
+            instead = f", or write [{lo - 360:g}, {hi:g}]" if full_turn else ""
+            words = f"the lowest value {lo:g} is above the highest {hi:g}; swap them{instead}"
+            raise PydanticCustomError("words", "{words}", {"words": words})
+        return make((lo, hi))
 
 
-UNIT = bounds(0.0, 1.0)
-"""Bounds of shares, probabilities and colours."""
+class OneOf(NamedTuple):
+    """Allowed values of a text field."""
 
-LENGTH = bounds(0.0, 20000.0, "mm")
-"""Bounds of what is measured on a container, with room to spare."""
+    choices: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
+        from pydantic_core import core_schema
+
+        literal = core_schema.literal_schema(list(self.choices))
+        return _refusing("choice", literal, choices=self.choices)
 
 
-def nearest(word: Any, choices: typing.Iterable[str]) -> str:
-    """A hint ' (did you mean X?)' for a mistyped word, or the list of choices. Returns text."""
+class Matching(NamedTuple):
+    """Regular expression of a text field, and the end of the message about other text."""
+
+    pattern: str
+    otherwise: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
+        from pydantic_core import core_schema
+
+        text = core_schema.str_schema(pattern=f"^(?:{self.pattern})$", strict=True)
+        return _refusing("text", text, otherwise=self.otherwise)
+
+
+class _Strict:
+    """Accepts only values of the type itself; pydantic would convert 1 to True."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
+        return typing.cast("CoreSchema", {**handler(source), "strict": True})
+
+
+def _refusing(kind: str, schema: "CoreSchema", **context: Any) -> "CoreSchema":
+    """Return a schema whose errors are of type `kind` and carry `context`, for `_in_words`."""
+    from pydantic_core import core_schema
+
+    return core_schema.custom_error_schema(
+        schema, kind, custom_error_message="", custom_error_context=context
+    )
+
+
+UNIT = Bounds(0.0, 1.0)
+"""Bounds of shares, probabilities and colors."""
+
+LENGTH = Bounds(0.0, 20000.0, "mm")
+"""Bounds of lengths on a container, with room to spare."""
+
+Flag = Annotated[bool, _Strict()]
+Share = Annotated[float, UNIT]
+
+
+def nearest(word: Any, choices: Iterable[str]) -> str:
+    """Return the hint ' (did you mean X?)' for a mistyped word, or the list of choices."""
     names = sorted(choices)
     alike = [name for name in names if name.casefold() == str(word).casefold()]
     close = alike or difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
@@ -60,28 +161,22 @@ def nearest(word: Any, choices: typing.Iterable[str]) -> str:
 
 
 def check_known(name: str, value: Any, choices: Collection[str]) -> None:
-    """Raise ConfigError that calls it `name` where `value` is none of `choices`."""
+    """Raise ConfigError, starting with `name`, unless `value` is one of `choices`."""
     if not isinstance(value, str) or value not in choices:
-        raise ConfigError(f"{name}: {value!r} is unknown{nearest(value, choices)}")
-
-
-def check_order(name: str, pair: tuple[float, float]) -> None:
-    """Raise ConfigError that calls it `name` where a lowest value is above its highest."""
-    lo, hi = pair
-    if lo > hi:
-        raise ConfigError(f"{name}: the lowest value {lo:g} is above the highest {hi:g}; swap them")
+        raise ConfigError(f"{name}: {_short(value)} is unknown{nearest(value, choices)}")
 
 
 def check_distinct(name: str, values: Collection[str], hint: str) -> None:
-    """Raise ConfigError that calls them `name` where one stands twice; hint: what to do instead."""
+    """Raise ConfigError, starting with `name`, if a value is repeated; `hint`: what to do."""
     if len(set(values)) < len(values):
-        raise ConfigError(f"{name}: one stands twice; {hint}")
+        raise ConfigError(f"{name}: a value is given twice; {hint}")
 
 
 def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
-    """`value` if it is a whole number within these limits, of whatever type.
+    """Return `value` as an int if it is a whole number of `least` to `most`, of any numeric type.
 
-    Raises ConfigError that calls it `name` if not.
+    Raises:
+        ConfigError: otherwise; the message starts with `name`.
     """
     is_number = _is_number(value)
     if is_number and least <= value <= most and value == int(value):
@@ -91,13 +186,8 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     raise ConfigError(f"{name}: {_short(value)} is not a whole number of {wanted}")
 
 
-def _is_number(value: Any) -> bool:
-    """Also NumPy's; but True and False are none."""
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
-
-
 def to_plain(value: Any) -> Any:
-    """Turn dataclasses, tuples and mappings into the dicts, lists and scalars of JSON and YAML."""
+    """Return dataclasses, tuples and mappings as the dicts, lists and scalars of JSON and YAML."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Mapping):
@@ -108,242 +198,189 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -> T:
-    """Build dataclass `cls` from plain values.
+    """Return an instance of dataclass `cls`, validated.
 
-    data: mapping of field names; missing fields are taken from `base`, else from the defaults.
-    path: what stands before the field names in error messages, for example 'cameras.A'.
-    Raises ConfigError naming the field, the value and what would be right.
+    Args:
+        cls: Dataclass whose field types declare their limits.
+        data: Mapping from field names to plain values, nested like `cls`; or an instance of `cls`.
+        path: Prefix of field names in error messages, for example 'scene'.
+        base: Values of the fields that `data` leaves out, at any depth. A `dict` field is replaced
+            as a whole, but a dataclass in it takes from the base's entry of the same name what it
+            leaves out. Without a base, the defaults of `cls` apply.
+
+    Raises:
+        ConfigError: naming the field, the value and what to give instead.
     """
-    if not isinstance(data, Mapping):
-        instead = "; remove the key, or write {}" if data is None and path else ""
-        raise ConfigError(
-            f"{path or cls.__name__}: expected a mapping of fields, got {_short(data)}{instead}"
-        )
-    hints = typing.get_type_hints(cls)
-    fields = {f.name: f for f in dataclasses.fields(typing.cast(Any, cls))}
-    values: dict[str, Any] = {}
-    for key, item in data.items():
-        where = f"{path}.{key}" if path else str(key)
-        if key not in fields:
-            raise ConfigError(f"{where}: unknown key{nearest(str(key), fields)}")
-        old = getattr(base, key) if base is not None else None
-        values[key] = _convert(hints[key], item, where, fields[key].metadata, old)
-    if base is not None:
-        return _made(lambda: dataclasses.replace(typing.cast(Any, base), **values), path)
-    missing = [
-        name
-        for name, field in fields.items()
-        if name not in values
-        and field.default is dataclasses.MISSING
-        and field.default_factory is dataclasses.MISSING
-    ]
-    if missing:
-        raise ConfigError(f"{path or cls.__name__}: missing {', '.join(missing)}")
-    return _made(lambda: cls(**values), path)
-
-
-def _made(make: Callable[[], Any], path: str) -> Any:
-    """What `make` gives; what its __post_init__ refuses, it names by its own fields alone."""
     try:
-        return make()
-    except ConfigError as error:
-        raise ConfigError(f"{path}.{error}" if path else str(error)) from None
+        values = _over(base, data)
+    except RecursionError:
+        raise ConfigError(f"{path or cls.__name__}: a value contains itself") from None
+    made: T = _validated(cls, values, path, strict=None)
+    return made
 
 
-def _convert(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> Any:
-    if isinstance(value, (np.generic, np.ndarray)):
-        value = value.tolist()
-    origin = typing.get_origin(hint)
-    if origin in (typing.Union, types.UnionType):
-        choices = [arg for arg in typing.get_args(hint) if arg is not type(None)]
-        return None if value is None else _convert(choices[0], value, path, meta, old)
-    if dataclasses.is_dataclass(hint):
-        return from_plain(typing.cast(type, hint), value, path, old)
-    if hint is Range:
-        return _range(value, path, meta)
-    if origin is tuple:
-        return _tuple(hint, value, path, meta)
-    if origin in (dict, Mapping):
-        return _mapping(hint, value, path, meta, old)
-    return _scalar(hint, value, path, meta)
+def check_fields(value: Any, cls: type, path: str) -> None:
+    """Raise ConfigError unless `value` is an instance of `cls` whose fields fit their types.
+
+    Unlike `from_plain` this converts nothing: a list is not accepted as a tuple.
+    """
+    _validated(cls, value, path, strict=True)
 
 
-def _range(value: Any, path: str, meta: Mapping[str, Any]) -> Range:
-    pair = _both(value)
-    if not isinstance(pair, (list, tuple)) or len(pair) != 2:
-        got = f"{_short(value)}{_as_number(value)}"
-        raise ConfigError(f"{path}: expected [lowest, highest] or one number, got {got}")
-    lo, hi = (_convert(float, item, path, meta, None) for item in pair)
-    if lo > hi and meta.get("unit") == "degrees" and lo - 360 >= meta["lo"]:
-        raise ConfigError(
-            f"{path}: the lowest value {lo:g} is above the highest {hi:g}; swap them, or write "
-            f"[{lo - 360:g}, {hi:g}]"
-        )
-    check_order(path, (lo, hi))
-    return Range(lo, hi)
+def annotation(kind: type[T], hint: Any) -> T | None:
+    """Return the first annotation of class `kind` in a type, or in the types inside it."""
+    for note in getattr(hint, "__metadata__", ()):
+        if isinstance(note, kind):
+            return note
+    inner = (annotation(kind, part) for part in typing.get_args(hint))
+    return next((found for found in inner if found is not None), None)
 
 
-def _both(value: Any) -> Any:
-    """One number stands for both of a pair."""
-    return [value, value] if _is_number(value) else value
-
-
-def _tuple(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> tuple[Any, ...]:
-    args = typing.get_args(hint)
-    any_length = len(args) == 2 and args[1] is Ellipsis
-    if args == (int, int):
-        value = _both(value)
-    if not isinstance(value, (list, tuple)):
-        many = "" if any_length else f" of {len(args)} values"
-        instead = f"; write [{value!r}]" if any_length and isinstance(value, str) else ""
-        raise ConfigError(f"{path}: expected a list{many}, got {_short(value)}{instead}")
-    if any_length:
-        args = (args[0],) * len(value)
-    if len(args) != len(value):
-        raise ConfigError(f"{path}: expected {len(args)} values, got {len(value)}")
-    return tuple(
-        _convert(arg, item, f"{path}[{i}]", meta, None)
-        for i, (arg, item) in enumerate(zip(args, value, strict=True))
-    )
-
-
-def _mapping(hint: Any, value: Any, path: str, meta: Mapping[str, Any], old: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError(f"{path}: expected a mapping, got {_short(value)}")
-    item_hint = typing.get_args(hint)[1]
-    for key in value:
-        if isinstance(key, bool) or not isinstance(key, (str, int, float)):  # YAML 1.1's no, off, ~
-            raise ConfigError(f"{path}: expected a name, got {_short(key)}; put it in quotes")
-    old = old or {}
-    # what is given is the whole mapping; an item with a namesake inherits what it leaves out
-    return {
-        str(key): _convert(item_hint, item, f"{path}.{key}", meta, old.get(str(key)))
-        for key, item in value.items()
+def _over(base: Any, new: Any) -> Any:
+    """Return `new` with what it inherits from `base`, and without NumPy's types."""
+    if isinstance(new, (np.generic, np.ndarray)):
+        return new.tolist()
+    if isinstance(new, list):
+        return [_over(None, item) for item in new]
+    if not isinstance(new, Mapping):
+        return new
+    inherited = vars(base) if dataclasses.is_dataclass(base) else {}
+    old = base if isinstance(base, Mapping) else inherited
+    # YAML reads the name 20 as a number. Names like no or ~ become other types and are refused.
+    named = {
+        str(key) if _is_number(key) else key: _over(old.get(key), item) for key, item in new.items()
     }
+    return {**inherited, **named}
 
 
-def _scalar(hint: Any, value: Any, path: str, meta: Mapping[str, Any]) -> Any:
-    if hint is bool or hint is str:
-        if not isinstance(value, hint):
-            kind = "true or false" if hint is bool else "text"
-            lost = _unquoted(value) if hint is str else ""
-            raise ConfigError(f"{path}: expected {kind}, got {_short(value)}{lost}")
-        return value
-    if not _is_number(value):
-        raise ConfigError(f"{path}: expected a number, got {_short(value)}{_as_number(value)}")
-    lo, hi, wanted = _limits(meta)
-    if not lo <= value <= hi:
-        raise ConfigError(f"{path}: {_short(value)} is out of range; give {wanted}")
-    if hint is int and value != int(value):
-        raise ConfigError(f"{path}: expected a whole number, got {_short(value)}")
-    return hint(value)
+def _integral(value: Any) -> Any:
+    """Refuse text and booleans, which pydantic would convert, and convert NumPy's integers."""
+    if isinstance(value, (bool, str, bytes)):
+        raise ValueError
+    return int(value) if isinstance(value, numbers.Integral) else value
 
 
-def _limits(meta: Mapping[str, Any]) -> tuple[float, float, str]:
-    """Lowest and highest number that a field may hold, and the two in words."""
-    lo, hi = meta.get("lo", -math.inf), meta.get("hi", math.inf)
-    unit = f" {meta['unit']}" if meta.get("unit") else ""
-    wanted = f"{lo:g} to {hi:g}{unit}" if math.isfinite(hi - lo) else "a finite number"
-    # an int may be too large for a float, and infinity lies within bounds that have no end
-    return max(lo, -sys.float_info.max), min(hi, sys.float_info.max), wanted
-
-
-def check_fields(value: Any, cls: type, path: str, most: float = math.inf) -> None:
-    """Hold an instance of dataclass `cls` that Python code made to its annotations and bounds.
-
-    Everything below it is looked at: types, lengths of tuples, finite numbers. most: how far from 0
-    numbers without bounds may lie. Raises ConfigError that names the field below `path`.
-    """
-    try:
-        _check_of(cls, most)(value)
-    except ConfigError as error:
-        raise ConfigError(f"{path}{error}") from None
-
-
-_Check = Callable[[Any], None]
-"""Raises ConfigError whose words begin with what stands behind the name of the value."""
+def _is_number(value: Any) -> bool:
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 @functools.cache
-def _check_of(cls: type, most: float) -> _Check:
-    hints = typing.get_type_hints(cls)
-    parts = tuple(
-        (f.name, _check(hints[f.name], {"lo": -most, "hi": most, **f.metadata}, most))
-        for f in dataclasses.fields(typing.cast(Any, cls))
-    )
+def adapter(cls: type) -> "TypeAdapter[Any]":
+    """Return pydantic's validator of a dataclass; nested dataclasses share its settings."""
+    from pydantic import ConfigDict, TypeAdapter, with_config
 
-    def check(value: Any) -> None:
-        if not isinstance(value, cls):
-            raise ConfigError(f": expected a {cls.__name__}, got {_short(value)}")
-        for name, part in parts:
-            try:
-                part(getattr(value, name))
-            except ConfigError as error:
-                raise ConfigError(f".{name}{error}") from None
-
-    return check
+    settings = ConfigDict(extra="forbid", revalidate_instances="always")
+    return TypeAdapter(with_config(settings)(cls))
 
 
-def _check(hint: Any, meta: Mapping[str, Any], most: float) -> _Check:
-    origin, args = typing.get_origin(hint), typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        inner = _check(args[0], meta, most)
-        return lambda value: None if value is None else inner(value)
-    if dataclasses.is_dataclass(hint):
-        return _check_of(typing.cast(type, hint), most)
-    if origin is tuple:
-        return _check_tuple(args, meta, most)
-    if hint is bool or hint is str:
-        return functools.partial(_check_kind, hint)
-    kind = numbers.Integral if hint is int else numbers.Real
-    lo, hi, wanted = _limits(meta)
+def _validated(cls: type, value: Any, path: str, strict: bool | None) -> Any:
+    from pydantic import ValidationError
 
-    def check(value: Any) -> None:
-        exact = type(value)
-        if not (exact is hint or (isinstance(value, kind) and exact is not bool)):
-            what = "whole number" if hint is int else "number"
-            raise ConfigError(f": expected a {what}, got {_short(value)}")
-        if not lo <= value <= hi:
-            raise ConfigError(f": {_short(value)} is out of range; give {wanted}")
-
-    return check
+    try:
+        return adapter(cls).validate_python(value, strict=strict)
+    except ValidationError as error:
+        raise _in_words(cls, error.errors(include_url=False), path) from None
 
 
-def _check_tuple(args: tuple[Any, ...], meta: Mapping[str, Any], most: float) -> _Check:
-    any_length = args[-1] is Ellipsis
-    parts = [_check(arg, meta, most) for arg in args if arg is not Ellipsis]
+def _in_words(cls: type, errors: "list[ErrorDetails]", root: str) -> ConfigError:
+    """Return the first of pydantic's errors as a ConfigError.
 
-    def check(value: Any) -> None:
-        if not isinstance(value, tuple):
-            raise ConfigError(f": expected a tuple, got {_short(value)}")
-        if not any_length and len(value) != len(parts):
-            raise ConfigError(f": expected {len(parts)} values, got {len(value)}")
-        for i, item in enumerate(value):
-            try:
-                parts[0 if any_length else i](item)
-            except ConfigError as error:
-                raise ConfigError(f"[{i}]{error}") from None
+    Unknown keys come first, because a misspelt key also leaves a field missing.
+    """
+    error = min(errors, key=lambda each: each["type"] != "unexpected_keyword_argument")
+    kind, loc, value, context = error["type"], error["loc"], error["input"], error.get("ctx", {})
+    if kind == "missing":
+        loc = loc[:-1]
+        missing = [e["loc"][-1] for e in errors if e["type"] == kind and e["loc"][:-1] == loc]
+    if kind == "invalid_key":
+        loc = (*loc, "[key]")
+    is_key = loc[-1:] == ("[key]",)
+    path = _path(root, loc[:-2] if is_key else loc)
+    got = f"got {_short(value)}"
+    match kind:
+        case "value_error":  # from __post_init__; its message begins with the field
+            return ConfigError(f"{path}.{context['error']}" if path else str(context["error"]))
+        case "words":
+            words = context["words"]
+        case "unexpected_keyword_argument":
+            words = f"unknown key{nearest(loc[-1], _fields_at(cls, loc[:-1]))}"
+        case "tuple_type" | "too_long" | "missing" if loc[-1:] == (_PAIR,):
+            words = f"expected {_PAIR} or one number, {got}{_unquoted(value)}"
+        case "missing" if isinstance(missing[0], int):
+            words = f"expected {int(missing[-1]) + 1} values, got {missing[0]}"
+        case "missing":
+            words = f"missing {', '.join(map(str, missing))}"
+        case "too_long":
+            words = f"expected at most {context['max_length']} values, got {len(value)}"
+        case "too_short":
+            words = f"{_short(value)} is empty; give at least one"
+        case "tuple_type":
+            instead = f"; write [{value!r}]" if isinstance(value, str) else ""
+            words = f"expected a {'tuple' if isinstance(value, list) else 'list'}, {got}{instead}"
+        case "dict_type":
+            words = f"expected a mapping, {got}"
+        case "dataclass_type":
+            instead = "; remove the key, or write {}" if value is None and path else ""
+            words = f"expected a mapping of fields, {got}{instead}"
+        case "dataclass_exact_type":
+            words = f"expected a {context['class_name']}, {got}"
+        case "bool_type":
+            words = f"expected true or false, {got}"
+        case "number" if not _is_number(value):
+            words = f"expected a number, {got}{_unquoted(value)}"
+        case "number" if not context["bounds"].lo <= value <= context["bounds"].hi:
+            words = f"{_short(value)} is out of range; give {context['bounds'].words}"
+        case "number":
+            words = f"expected a whole number, {got}"
+        case "choice":
+            words = f"{_short(value)} is unknown{nearest(value, context['choices'])}"
+        case "text" if isinstance(value, str):
+            words = f"{_short(value)} {context['otherwise']}"
+        case _ if is_key:
+            words = f"expected a name, {got}; put it in quotes"
+        case "text" | "string_type":
+            words = f"expected text, {got}{_quoted(value)}"
+        case _:
+            words = f"{error['msg']}, {got}"
+    return ConfigError(f"{path or cls.__name__}: {words}")
 
-    return check
+
+def _path(root: str, loc: tuple[int | str, ...]) -> str:
+    """Return a location as users write it, for example 'cameras.A.lens.k1'."""
+    path = root
+    for step in loc:
+        if step in (_PAIR, _NUMBER):
+            break
+        path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else step
+    return path
 
 
-def _check_kind(kind: type, value: Any) -> None:
-    if not isinstance(value, kind):
-        what = "True or False" if kind is bool else "text"
-        raise ConfigError(f": expected {what}, got {_short(value)}")
+def _fields_at(cls: type, loc: tuple[int | str, ...]) -> list[str]:
+    """Return the field names of the dataclass at a location below `cls`."""
+    hint: Any = cls
+    for step in (*loc, None):
+        if isinstance(hint, types.UnionType):
+            hint = typing.get_args(hint)[0]
+        if step is None:
+            break
+        if dataclasses.is_dataclass(hint):
+            hint = typing.get_type_hints(hint)[str(step)]
+        else:
+            hint = typing.get_args(hint)[0 if isinstance(step, int) else 1]
+    return [field.name for field in dataclasses.fields(hint)]
 
 
-def _unquoted(value: Any) -> str:
-    """A hint for text that YAML took for something else."""
+def _quoted(value: Any) -> str:
+    """Return a hint for text that YAML read as another type."""
     if value is None:
-        return "; if it began with #, quote it: YAML takes that for a comment"
+        return "; if it began with #, quote it, because # begins a comment in YAML"
     return "; put it in quotes" if _is_number(value) else ""
 
 
-def _as_number(value: Any) -> str:
-    """A hint for text that reads as a number: YAML 1.1 takes 1e-2 for text, and quotes make it."""
+def _unquoted(value: Any) -> str:
+    """Return a hint for a number that was given as text."""
     try:
         number = float(value) if isinstance(value, str) else math.nan
     except ValueError:
         return ""
-    return f" (a text; write {number:g} without quotes)" if math.isfinite(number) else ""
+    return f" (text; write {number:g} without quotes)" if math.isfinite(number) else ""

@@ -14,7 +14,7 @@ from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import deform
 from fastgen.sampling.coverage import possible_shapes
 from fastgen.sampling.scene import sample_scene
-from fastgen.validation import Range
+from fastgen.validation import Bounds, annotation
 
 NASTY = (
     *(math.nan, math.inf, -math.inf, 1e300, 10**400, -1, 0, 0.5, None, True, "", "x", "#+1+2+3"),
@@ -72,35 +72,27 @@ def test_any_value_is_either_sampled_or_refused_by_its_key(path):
 
 
 def limits(cls, path=()):
-    """Yield path, type and metadata of every bounded field of a dataclass and its parts."""
-    hints = typing.get_type_hints(cls)
-    for field in dataclasses.fields(cls):
-        hint, here = hints[field.name], (*path, field.name)
+    """Yield path and bounds of the numbers in a dataclass and its parts, except in mappings."""
+    for name, hint in typing.get_type_hints(cls, include_extras=True).items():
         if dataclasses.is_dataclass(hint):
-            yield from limits(hint, here)
-        elif field.metadata and hint is not dict:
-            yield here, hint, field.metadata
+            yield from limits(hint, (*path, name))
+        elif typing.get_origin(hint) is not dict and (bounds := annotation(Bounds, hint)):
+            yield (*path, name), bounds
 
 
-BOUNDED = [
-    *limits(Config),
-    *limits(CameraConfig, ("cameras", "A")),
-]
+BOUNDED = {
+    path: bounds
+    for path, bounds in (*limits(Config), *limits(CameraConfig, ("cameras", "A")))
+    if "profiles" not in path  # the widths of a wave must add up to its pitch
+}
 
 
 @pytest.mark.parametrize(
-    ("path", "hint", "meta"), BOUNDED, ids=[".".join(path) for path, _, _ in BOUNDED]
+    ("path", "bounds"), BOUNDED.items(), ids=[".".join(path) for path in BOUNDED]
 )
-def test_the_limits_of_every_field_can_be_sampled(path, hint, meta):
+def test_the_limits_of_every_field_can_be_sampled(path, bounds):
     base = Config.from_values(MUCH)
-    low, high = meta["lo"], meta["hi"]
-    for value in (low, high) if math.isfinite(high - low) else ():
-        if hint in (int, float, Range):
-            given = value
-        elif typing.get_origin(hint) is tuple:
-            given = [value, value]
-        else:
-            continue  # mappings from names to weights or probabilities
+    for given in (bounds.lo, bounds.hi):
         if path == ("container", "depth_scale"):
             given = [0.2, 2.6]  # 2.6 * 46 mm is just below the deepest wave allowed
         if path[-1] in ("depth_mm", "distance_mm"):  # bulges could come too close to a camera
@@ -120,17 +112,20 @@ def test_errors_in_a_file_name_the_file(tmp_path):
         ("damage: {faces: []}", "damage.faces: the list is empty"),
         ("markings: {fonts: [comic]}", "markings.fonts: 'comic' is unknown"),
         ("markings: {brand: {lid: 1}}", "markings.brand: 'lid' is unknown"),
-        ("container: {depth_scale: [1, 3]}", r"container.depth_scale\[1\]: 3 times end: depth_mm"),
+        ("container: {depth_scale: [1, 3]}", r"container.depth_scale\[1\]: 3 times end.depth_mm"),
         (
             "container: {profiles: {side: {slope_mm: 1}}}",
             "container.profiles.side.pitch_mm: 278 is",
         ),
-        ("damage: {count: a}", "damage.count: expected a list of 2 values, got 'a'"),
-        ("damage: {count: 2.5}", r"damage.count\[0\]: expected a whole number, got 2.5"),
+        (
+            "damage: {count: a}",
+            r"damage.count: expected \[lowest, highest\] or one number, got 'a'",
+        ),
+        ("damage: {count: 2.5}", "damage.count: expected a whole number, got 2.5"),
         ("damage:\n", "damage: expected a mapping of fields, got None; remove the key"),
-        ("markings: {marker_faces: [door, door]}", "markings.marker_faces: one stands twice"),
-        ("damage: {kinds: [axis, axis]}", "damage.kinds: one stands twice"),
-        ("damage: {faces: [roof, door, roof]}", "damage.faces: one stands twice"),
+        ("markings: {marker_faces: [door, door]}", "markings.marker_faces: a value is given twice"),
+        ("damage: {kinds: [axis, axis]}", "damage.kinds: a value is given twice"),
+        ("damage: {faces: [roof, door, roof]}", "damage.faces: a value is given twice"),
         (
             "cameras: {a: {face: front, focal_mm: 12, distance_mm: 5000}, A: {}}",
             "cameras.A: its files would be those of a on disks",
@@ -138,16 +133,16 @@ def test_errors_in_a_file_name_the_file(tmp_path):
         ("cameras: {A: {target_shift_mm: 20000}}", "cameras.A.target_shift_mm: 20000 is out"),
         ("damage: {kinds: dented}", r"damage.kinds: .* got 'dented'; write \['dented'\]"),
         ("markings: {marker_side_mm: 20}", "markings.marker_side_mm: 20 is out of range"),
-        ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' stands twice .*.line 3, column 1."),
-        ('{"split": {"val": 1, "val": 0}}', ".*'val' stands twice"),
-        ("cameras: {0x8: {face: front}, 8: {face: back}}", ".*'8' stands twice"),
+        ("damage: {}\nlabels: {}\ndamage: {}", ".*'damage' is given twice .*.line 3, column 1."),
+        ('{"split": {"val": 1, "val": 0}}', ".*'val' is given twice"),
+        ("cameras: {0x8: {face: front}, 8: {face: back}}", ".*'8' is given twice"),
         ("cameras: {010: {face: front}}", ".*YAML reads '010' as 8; write that, or put it in"),
         ("damage: {count: -0_17}", ".*YAML reads '-0_17' as -15; .* .line 1, column 17."),
         ("damage: {count: 1:30}", ".*YAML reads '1:30' as 90; write that"),
         ("damage: {count: 0200000001}", ".*as 33554433; write that"),
         (f"damage: {{count: 0{'7' * 400}}}", ".*YAML reads '0777.*7' as "),
-        (f"weather: {{wind: {'1:' + '30:' * 250}30.5}}", ".*is no number"),
-        ("damage: {count: !!int ''}", ".*'' is no number"),
+        (f"weather: {{wind: {'1:' + '30:' * 250}30.5}}", ".*is not a number"),
+        ("damage: {count: !!int ''}", ".*'' is not a number"),
         ("weather: {wind: 1:30.5}", ".*YAML reads '1:30.5' as 90.5; write that"),
         ("weather: {shutter_s: ['1e-3', 0.1]}", "weather.shutter_s.* write 0.001 without quotes"),
         ("cameras: {no: {face: front}}", "cameras: expected a name, got False; put it in quotes"),
@@ -162,9 +157,9 @@ def test_errors_in_a_file_name_the_file(tmp_path):
 def test_a_base_that_is_not_a_config_is_refused(base, tmp_path):
     path = tmp_path / "port.yaml"
     path.write_text("damage: {probability: 0.5}")
-    with pytest.raises(ConfigError, match=r"base: .* is no Config; take what Config.preset"):
+    with pytest.raises(ConfigError, match=r"base: .* is not a Config; take one from Config.preset"):
         Config.from_values({}, base)
-    with pytest.raises(ConfigError, match=r"base: .* is no Config"):
+    with pytest.raises(ConfigError, match=r"base: .* is not a Config"):
         Config.load(path, base)
 
 
@@ -223,7 +218,7 @@ def test_names_may_use_any_script(escaped, tmp_path):
 def test_a_lone_surrogate_is_refused(tmp_path):
     path = tmp_path / "port.json"
     path.write_text('{"surface": {"colors": {"\\ud83d": "#ff0000"}}}')
-    with pytest.raises(ConfigError, match=r"not a YAML file .*half of a letter"):
+    with pytest.raises(ConfigError, match=r"not a YAML file .*half of a surrogate pair"):
         Config.load(path)
 
 

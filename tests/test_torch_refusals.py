@@ -1,6 +1,7 @@
 """Bad arguments and foreign states that datasets and loaders refuse."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -9,14 +10,39 @@ import pytest
 from fastgen import Config
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import bundled_hdris
-from fastgen.torch import ContainerDataset, Loader, ShardSampler
+from fastgen.torch import (
+    ContainerDataset,
+    ContainerStream,
+    ItemSettings,
+    Loader,
+    RenderSettings,
+    SceneSettings,
+    ShardSampler,
+)
 from tests.test_torch import SMALL, dataset, stream
 
 SLANTED = Config.from_values({"cameras": {"Cr": {"azimuth_deg": [40, 80]}, "Cl": {}}})
 
 
 def test_the_door_task_takes_the_cameras_that_always_see_an_end():
-    assert ContainerDataset("door", SLANTED, length=2, size=SMALL).cameras == ("Cl",)
+    assert ContainerDataset("door", SLANTED, length=2, render=SMALL).cameras == ("Cl",)
+
+
+def dataset_of(task="imdg", config=None, length=23, size=(64, 64), form="detection", **scenes):
+    """Make a dataset from plain values."""
+    return ContainerDataset(
+        task,
+        config,
+        length=length,
+        render=RenderSettings(size),
+        scenes=SceneSettings(**scenes),
+        items=ItemSettings(form=form),
+    )
+
+
+def lit_by(folder):
+    """Make a dataset whose HDRIs come from a folder."""
+    return ContainerDataset("imdg", seed=4, length=23, render=replace(SMALL, hdri_dir=folder))
 
 
 @pytest.mark.parametrize("position", [-1, 1.5, "a"])
@@ -30,19 +56,19 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
     [
         ({"task": "damge"}, r"task: 'damge' is unknown \(did you mean damage\?\)"),
         ({"length": 0}, "length: 0 is not a whole number of 1 to"),
-        ({"cameras": ["A", "D"]}, "cameras: 'D' is none of the imdg task's"),
-        ({"task": "door", "cameras": ["A"]}, "cameras: 'A' is none of the door task's"),
+        ({"cameras": ["A", "D"]}, "cameras: 'D' does not suit the imdg task"),
+        ({"task": "door", "cameras": ["A"]}, "cameras: 'A' does not suit the door task"),
         ({"task": ["door"]}, r"task: \['door'\] is unknown"),
         ({"task": "door", "config": SLANTED, "cameras": ["Cr"]}, "cameras: 'Cr' .* 45 degrees"),
-        ({"cameras": []}, "cameras: name at least one"),
+        ({"cameras": []}, "cameras: give at least one name"),
         ({"split": "trian"}, r"split: 'trian' is unknown \(did you mean train\?\)"),
         ({"form": "coco"}, "form: 'coco' is unknown"),
-        ({"task": "door", "form": "yolo"}, "form: 'yolo' holds boxes"),
-        ({"size": (10, 10)}, "size: 10x10 cannot be"),
+        ({"task": "door", "form": "yolo"}, "form: 'yolo' is for boxes"),
+        ({"size": (10, 10)}, "size: 10x10 is out of range"),
         ({"curriculum": lambda epoch: 3}, "curriculum: epoch 0 gives 3"),
         ({"curriculum": lambda epoch: {"damge": {}}}, "curriculum: epoch 0: damge: unknown key"),
-        ({"config": {}}, "config: dict is no Config"),
-        ({"cameras": "A"}, r"cameras: 'A' is no list; give \['A'\]"),
+        ({"config": {}}, "config: dict is not a Config"),
+        ({"cameras": "A"}, r"cameras: 'A' is not a list; give \['A'\]"),
         ({"length": "9"}, "length: '9' is not a whole number"),
         (
             {"curriculum": lambda epoch: {"damage": {"mask_threshold_mm": 9.0}}},
@@ -56,7 +82,7 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
 )
 def test_bad_arguments_are_named(arguments, words):
     with pytest.raises(ConfigError, match=words):
-        ContainerDataset(**{"task": "imdg", "size": SMALL, **arguments})
+        dataset_of(**arguments)
 
 
 def test_the_last_epoch_has_scenes_and_the_next_is_refused():
@@ -81,6 +107,8 @@ def test_bad_ranks_states_and_batches_are_named():
         Loader(dataset(), batch_size=0)
     with pytest.raises(ConfigError, match="dataset: list is neither"):
         Loader([1, 2])
+    with pytest.raises(ConfigError, match="dataset: str is not a ContainerDataset"):
+        ContainerStream("imdg")
     with pytest.raises(ConfigError, match="a stream has its own"):
         Loader(stream(), shuffle=True)
     with pytest.raises(ConfigError, match="epoch: -1"):
@@ -103,7 +131,7 @@ def test_a_state_fits_only_loaders_with_the_same_hdris(tmp_path):
     for folder, level in zip(folders, (0.5, 0.5, 0.7), strict=True):
         folder.mkdir()
         picture(folder / "sky.hdr", level)
-    one, moved, other = (Loader(dataset(hdri_dir=folder)) for folder in folders)
+    one, moved, other = (Loader(lit_by(folder)) for folder in folders)
     state = json.loads(json.dumps(one.state_dict()))
     moved.load_state_dict(state)  # another path with the same bytes
     for loader in (other, Loader(dataset())):
@@ -114,7 +142,7 @@ def test_a_state_fits_only_loaders_with_the_same_hdris(tmp_path):
 def test_a_state_does_not_fit_a_loader_with_other_hdri_weights():
     shipped = next(iter(bundled_hdris().values())).parent
     with pytest.raises(ConfigError, match="state: was taken with another hdri_dir"):
-        Loader(dataset(hdri_dir=shipped)).load_state_dict(Loader(dataset()).state_dict())
+        Loader(lit_by(shipped)).load_state_dict(Loader(dataset()).state_dict())
 
 
 def test_a_state_fits_only_loaders_with_an_equal_curriculum():
@@ -161,12 +189,13 @@ def test_an_invalid_state_is_refused_and_changes_nothing(change, words):
 
 @pytest.mark.parametrize("position", ["a", 1.5, None])
 def test_indexing_refuses_positions_that_are_no_whole_numbers(position):
-    with pytest.raises(TypeError, match="is no whole number"):
+    with pytest.raises(TypeError, match="is not a whole number"):
         dataset()[position]
 
 
 def test_transforms_that_return_no_pair_are_named():
-    data = dataset(transforms=lambda image, target: None)
+    items = ItemSettings(transforms=lambda image, target: None)
+    data = ContainerDataset("imdg", render=SMALL, items=items)
     with pytest.raises(ConfigError, match="transforms: gave NoneType; return the pair"):
         data[0]
     data.close()

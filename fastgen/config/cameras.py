@@ -1,10 +1,10 @@
-"""Cameras of a rig: their ranges (SeaFront paper, 3.3.1), and where within them one stands."""
+"""Cameras of a rig: their ranges (SeaFront paper, 3.3.1), and the poses that these allow."""
 
 import functools
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,58 +14,59 @@ from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, mm_away
 from fastgen.scene.faces import FACES
 from fastgen.scene.limits import MM, NEAR_M
-from fastgen.validation import Range, bounds, check_known
+from fastgen.validation import Bounds, OneOf, Range
 
 _STEPS, _ROUNDS, _THIRDS = 33, 3, 40
-"""Angles tried along each range, how often those around the nearest are tried more finely, and how
-often a third of the distances is left out."""
+"""Search for the nearest camera position: angles per range, refinements of the angles around the
+best ones, and steps of the ternary search over the distance."""
 
 _ROUNDED_MM = 0.1
-"""Places of cameras are rounded to this."""
+"""Camera positions are rounded to this."""
 
 Array = NDArray[np.float64]
+
+_Angle = Annotated[Range, Bounds(-89.0, 89.0, "degrees")]
 
 
 @dataclass(frozen=True)
 class CameraConfig:
-    """One camera of the rig: it looks at the middle of a face from a varied position.
+    """One camera of the rig. It looks at the middle of a face from a varying position.
 
-    face: front, back, door, no_door, roof or underside. Over the roof hangs the spreader, up to 2 m
-        high: a camera nearer than that may stand among its beams, which then are cut open.
-    focal_mm: for a sensor of sensor_width_mm; of a fisheye, what an angle of one radian spans.
-    distance_mm: from the point that it looks at.
-    azimuth_deg: turns the camera about the vertical through that point; 0 looks straight at the
-        face, and where it is positive the camera stands to the right, seen from itself. Of roof
-        and underside: how far it stands aside along the length.
-    elevation_deg: lifts the camera, which goes on looking there; of roof and underside: how far it
-        stands aside across the length, and where it is negative over the roof the ropes run up the
-        image.
-    roll_deg: turns the image from where a wall stands upright, or the length of roof or underside
-        lies across.
-    target_shift_mm: how far beside the middle it looks, along each axis of the face.
-    sensor_width_mm: width of the image on the sensor.
-    exposure_ev: from the exposure that suits the light.
-    lens: its distortion, null for a pinhole.
+    Attributes:
+        face: Face that the camera looks at. The spreader hangs up to 2 m above the roof; a camera
+            nearer than that may be among its beams and see them cut open.
+        focal_mm: Focal length for a sensor of sensor_width_mm. In a fisheye, one radian from the
+            optical axis is imaged at this distance from the centre.
+        distance_mm: Distance from the point that the camera looks at.
+        azimuth_deg: Rotation of the camera about the vertical through the point that it looks at.
+            At 0 it faces the wall squarely; a positive angle moves it to its right. On roof and
+            underside it moves the camera along the length of the container.
+        elevation_deg: Elevation of the camera above the point that it looks at. On roof and
+            underside it moves the camera across the container; over the roof, a negative angle
+            makes the ropes run up the image.
+        roll_deg: Rotation of the image. At 0, walls are upright; on roof and underside, the length
+            of the container is horizontal.
+        target_shift_mm: Shift of the point that the camera looks at from the middle of the face,
+            along both axes of the face.
+        sensor_width_mm: Width of the sensor, which spans the width of the image.
+        exposure_ev: Deviation from the metered exposure.
+        lens: Distortion, null for a pinhole.
     """
 
-    face: str
-    focal_mm: float = field(metadata=bounds(1.0, 2000.0, "mm"))
-    distance_mm: Range = field(metadata=bounds(300.0, 1.5e5, "mm"))  # camera.FAR_M ends sight
-    azimuth_deg: Range = field(default=Range(-12, 12), metadata=bounds(-89.0, 89.0, "degrees"))
-    elevation_deg: Range = field(default=Range(-8, 18), metadata=bounds(-89.0, 89.0, "degrees"))
-    roll_deg: Range = field(default=Range(-1.5, 1.5), metadata=bounds(-180.0, 180.0, "degrees"))
-    target_shift_mm: Range = field(default=Range(-350, 350), metadata=bounds(-1e4, 1e4, "mm"))
-    sensor_width_mm: float = field(default=36.0, metadata=bounds(0.1, 1000.0, "mm"))
-    exposure_ev: Range = field(default=Range(-0.5, 0.4), metadata=bounds(-10.0, 10.0, "stops"))
+    face: Annotated[str, OneOf(FACES)]
+    focal_mm: Annotated[float, Bounds(1.0, 2000.0, "mm")]
+    distance_mm: Annotated[Range, Bounds(300.0, 1.5e5, "mm")]  # well before the far plane
+    azimuth_deg: _Angle = Range(-12, 12)
+    elevation_deg: _Angle = Range(-8, 18)
+    roll_deg: Annotated[Range, Bounds(-180.0, 180.0, "degrees")] = Range(-1.5, 1.5)
+    target_shift_mm: Annotated[Range, Bounds(-1e4, 1e4, "mm")] = Range(-350, 350)
+    sensor_width_mm: Annotated[float, Bounds(0.1, 1000.0, "mm")] = 36.0
+    exposure_ev: Annotated[Range, Bounds(-10.0, 10.0, "stops")] = Range(-0.5, 0.4)
     lens: LensConfig | None = None
-
-    def __post_init__(self) -> None:
-        """Hold the face to those that exist."""
-        check_known("face", self.face, FACES)
 
 
 def seafront_rig() -> dict[str, CameraConfig]:
-    """The paper's four cameras (3.2 and Fig. 4); a 40' fills about 3/4 of A and B."""
+    """Return the paper's four cameras (3.2 and Fig. 4); a 40' fills about 3/4 of A and B."""
     return {
         "A": CameraConfig("front", 14.5, Range(5600, 7400)),
         "B": CameraConfig("back", 28.0, Range(10500, 13500)),
@@ -75,8 +76,11 @@ def seafront_rig() -> dict[str, CameraConfig]:
 
 
 class FaceFrame(NamedTuple):
-    """Unit vectors [3] out of a face, to its right and up, seen from outside, and its middle [3]
-    in millimetres of the container's frame. The right of roof and underside is the door end."""
+    """Axes and middle of a face in the container frame, seen from outside.
+
+    `outward`, `right` and `up` are unit vectors [3]. On roof and underside, `right` points to the
+    door end.
+    """
 
     outward: Array
     right: Array
@@ -86,7 +90,7 @@ class FaceFrame(NamedTuple):
 
 @functools.cache
 def face_frame(face: str, kind: str) -> FaceFrame:
-    """The frame of a face of a container of a kind."""
+    """Return the frame of `face` on a container of `kind`."""
     length, width, height = KINDS[kind].size_mm
     outward, middle_mm = {
         "front": ((0, -1, 0), (0, -width / 2, height / 2)),
@@ -102,18 +106,27 @@ def face_frame(face: str, kind: str) -> FaceFrame:
 
 
 def direction_from(frame: FaceFrame, azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> Array:
-    """Unit vectors [..., 3] from what a camera looks at to the camera, of angles [...]."""
+    """Return unit vectors [..., 3] from the target to the camera, for angles [...] in degrees."""
     azimuth, elevation = np.deg2rad(azimuth_deg)[..., None], np.deg2rad(elevation_deg)[..., None]
     level = np.cos(azimuth) * frame.outward + np.sin(azimuth) * frame.right
     return np.cos(elevation) * level + np.sin(elevation) * frame.up
 
 
 def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: float) -> None:
-    """Raise ConfigError if the camera may come too near to a container of one of `kinds`, whose
-    sheets may stand out by `bulge_mm`."""
+    """Check that no position of a camera is too close to a container.
+
+    Args:
+        name: Name of the camera in the rig.
+        rig: Ranges of the camera.
+        kinds: Container kinds that may occur.
+        bulge_mm: Largest outward displacement by damage.
+
+    Raises:
+        ConfigError: if the camera may be nearer than the near plane.
+    """
     least_mm = NEAR_M / MM + bulge_mm
     widest = np.deg2rad([np.abs(rig.azimuth_deg).max(), np.abs(rig.elevation_deg).max()])
-    if rig.distance_mm.lo * np.cos(widest).prod() >= least_mm:  # stays before the face's plane
+    if rig.distance_mm.lo * np.cos(widest).prod() >= least_mm:  # never beside the face
         return
     for kind in kinds:
         nearest_mm = _nearest_mm(rig, kind)
@@ -125,17 +138,17 @@ def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: flo
             raise ConfigError(
                 f"cameras.{name}: may come within {nearest_mm:.0f} mm of a container of kind "
                 f"{kind}{bulges}, and nothing nearer than {NEAR_M / MM:g} mm is drawn; give a "
-                f"larger distance_mm, azimuth_deg and elevation_deg nearer to 0, or {less}"
+                f"larger distance_mm, azimuth_deg and elevation_deg closer to 0, or {less}"
             )
 
 
 def _nearest_mm(rig: CameraConfig, kind: str) -> float:
-    """How near the camera may come to a sound container, in millimetres."""
+    """Return the smallest distance of the camera from an undamaged container in millimetres."""
     frame = face_frame(rig.face, kind)
 
     def away_mm(direction: Array, distance_mm: Array) -> Array:
         offset = distance_mm[..., None] * direction
-        # of what it may look at, the point that brings the camera nearest to the face's middle
+        # the target shift that brings the camera nearest to the middle of the face
         for axis in (frame.right, frame.up):
             shift = np.clip(-(offset @ axis), *rig.target_shift_mm)
             offset = offset + shift[..., None] * axis
@@ -156,8 +169,10 @@ def _nearest_mm(rig: CameraConfig, kind: str) -> float:
 
 
 def _least(of: Callable[[Array], Array], within: Range, shape: tuple[int, ...]) -> Array:
-    """Least values [...] of a convex function of numbers within a range, each by itself; a camera's
-    distance from a box is convex in how far it stands from what it looks at."""
+    """Return minima [...] of convex functions over a range, by ternary search.
+
+    The distance of a camera from a box is convex in its distance from the target.
+    """
     lo, hi = np.full(shape, within.lo), np.full(shape, within.hi)
     for _ in range(_THIRDS):
         third = (hi - lo) / 3

@@ -1,6 +1,6 @@
-"""A configuration as commented YAML: every key with its value, its limits and what it means.
+"""A configuration as commented YAML: every key with its value, its meaning and its limits.
 
-The words are the docstrings of the configuration's classes, so that they stand in one place.
+The comments are the docstrings of the configuration classes.
 """
 
 import dataclasses
@@ -10,91 +10,75 @@ import re
 import textwrap
 import typing
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import Any
 
 import yaml
 
 from fastgen.config.config import Config
 from fastgen.config.yaml_values import Dumper
-from fastgen.validation import Range
+from fastgen.validation import Bounds, OneOf, Range, annotation
 
 _HEAD = (
-    "Every key. A file of your own needs only those that it changes; --config reads it. A range "
-    "is [lowest, highest], drawn from uniformly unless said otherwise; one number stands for both. "
-    "Lengths are millimetres, angles degrees, colors sRGB."
+    "All keys. A file of your own needs only the keys that it changes; pass it with --config. A "
+    "range is [lowest, highest], drawn from uniformly unless documented otherwise; one number "
+    "stands for both. Lengths are millimetres, angles degrees, colors sRGB."
 )
 _WIDTH = 100
-_GIVEN_AS_A_WHOLE = "given as a whole"
 
 
 def as_yaml(config: Config) -> str:
-    """The whole of a configuration, as text that Config.load reads back to an equal one."""
+    """Return the whole configuration as text that Config.load reads back to an equal one."""
     return "\n".join([*_comment(_HEAD), *_Text().fields(config, apart=True)]) + "\n"
 
 
 def meanings(cls: type) -> tuple[str, dict[str, str]]:
-    """What the docstring of a dataclass says of it, and of its fields by name.
+    """Return the description of a dataclass and those of its fields, from its docstring.
 
-    A field's words begin a line behind its name and a colon; several may share them.
+    Fields are described in the docstring's section `Attributes:`, one entry `name: words` each.
     """
-    names = {field.name for field in dataclasses.fields(cls)}
-    about: list[str] = []
-    of: dict[str, str] = {}
-    entry = ""
-    for line in inspect.cleandoc(cls.__doc__ or "").splitlines():
-        start = re.fullmatch(r"(\w+(?:, \w+)*): (.+)", line)
-        if start and names.issuperset(start[1].split(", ")):
-            entry = start[1].split(", ")[0]
-            of |= dict.fromkeys(start[1].split(", "), "") | {entry: start[2]}
-        elif line.startswith("    ") and entry:
-            of[entry] += " " + line.strip()
-        elif line.startswith("Raises "):
-            break
-        elif line:
-            about.append(line)
-    return " ".join(about), of
+    about, _, rest = inspect.cleandoc(cls.__doc__ or "").partition("\n\nAttributes:\n")
+    section = re.match(r"(?:    .*\n?|\n(?=    ))*", rest)
+    entries = re.split(r"^    (\w+): ", section[0] if section else "", flags=re.MULTILINE)[1:]
+    words = [" ".join(text.split()) for text in entries[1::2]]
+    return " ".join(about.split()), dict(zip(entries[::2], words, strict=True))
 
 
 class _Text:
-    """Says once of each class what its fields mean."""
+    """Lines of YAML; the fields of a class are described only where it occurs first."""
 
     def __init__(self) -> None:
-        self._told: set[type] = set()
+        self._described: set[type] = set()
 
     def fields(self, record: Any, apart: bool = False) -> Iterator[str]:
-        """Lines of all fields of a dataclass instance; apart: with empty ones in between."""
-        hints = typing.get_type_hints(type(record))
-        words = {} if type(record) in self._told else meanings(type(record))[1]
-        self._told.add(type(record))
-        for field in dataclasses.fields(record):
+        """Yield the lines of a dataclass instance; apart: with empty lines between its fields."""
+        hints = typing.get_type_hints(type(record), include_extras=True)
+        words = {} if type(record) in self._described else meanings(type(record))[1]
+        self._described.add(type(record))
+        for name, hint in hints.items():
             if apart:
                 yield ""
-            value, said = getattr(record, field.name), words.get(field.name, "")
-            yield from self._entry(field.name, value, hints[field.name], field.metadata, said)
+            yield from self._entry(name, getattr(record, name), hint, words.get(name, ""))
 
-    def _entry(
-        self, key: str, value: Any, hint: Any, meta: Mapping[str, Any], words: str = ""
-    ) -> Iterator[str]:
+    def _entry(self, key: str, value: Any, hint: Any, words: str = "") -> Iterator[str]:
         name = f"{_plain(key)}:"
         if dataclasses.is_dataclass(value):
-            if type(value) not in self._told:
+            if type(value) not in self._described:
                 words = f"{words} {meanings(type(value))[0]}".strip()
             yield from _explained(name, words)
             yield from _indented(self.fields(value))
         elif isinstance(value, Mapping):
-            yield from _explained(name if value else f"{name} {{}}", words, _GIVEN_AS_A_WHOLE, meta)
+            yield from _explained(name if value else f"{name} {{}}", words, _limits(value, hint))
             for item_key, item in value.items():
-                yield from _indented(self._entry(item_key, item, typing.get_args(hint)[1], {}))
+                yield from _indented(self._entry(item_key, item, None))
         elif value is None:
             yield from _explained(f"{name} null", words)
             (cls,) = (arg for arg in typing.get_args(hint) if arg is not type(None))
-            if cls not in self._told:
+            if cls not in self._described:
                 yield from _indented(_comment(f"Or a mapping, for example: {meanings(cls)[0]}"))
                 yield from _indented(f"# {line}" for line in self.fields(cls()))
         else:
             plain = list(value) if isinstance(value, tuple) else value
-            yield from _explained(f"{name} {_plain(plain)}", words, _kind(value, hint), meta)
+            yield from _explained(f"{name} {_plain(plain)}", words, _limits(value, hint))
 
 
 def _indented(lines: Iterator[str]) -> Iterator[str]:
@@ -106,7 +90,7 @@ def _comment(words: str) -> Iterator[str]:
 
 
 def _plain(value: Any) -> str:
-    """A scalar or a list of them, as YAML has it on one line, in ASCII for any terminal."""
+    """Return a scalar or a list of scalars as YAML on one line, in ASCII for any terminal."""
     if isinstance(value, list):
         return f"[{', '.join(map(_plain, value))}]"
     if isinstance(value, float) and value.is_integer():
@@ -119,21 +103,35 @@ def _kind(value: Any, hint: Any) -> str:
     if isinstance(value, Range):
         return "range"
     if isinstance(value, tuple):
-        any_length = typing.get_args(hint)[-1] is Ellipsis
-        return "list" if any_length else "two whole numbers"
-    return "whole" if hint is int else ""
+        return "two whole numbers" if typing.get_args(hint)[0] == tuple[int, int] else "list"
+    if isinstance(value, Mapping):
+        return "replaced as a whole"
+    return "whole number" if isinstance(value, int) else ""
 
 
-def _explained(
-    line: str, words: str, kind: str = "", meta: Mapping[str, Any] = MappingProxyType({})
-) -> Iterator[str]:
-    """A line with comments of what it means and what may stand there; above it where it is long."""
-    unit = f" {meta['unit']}" if meta.get("unit") else ""
-    each = "each " if kind in ("list", _GIVEN_AS_A_WHOLE) else ""
-    within = f"{each}{meta['lo']:g} to {meta['hi']:g}{unit}" if "lo" in meta else ""
-    limits = ", ".join(filter(None, (kind, within)))
-    whole = "; ".join(filter(None, (words.removesuffix("."), limits)))
-    if len(line) + len(whole) > _WIDTH - 10 and words:
+def _limits(value: Any, hint: Any) -> str:
+    """Return type and limits of a field in words, for example 'list, each 0 to 1'."""
+    kind, bounds, names = _kind(value, hint), annotation(Bounds, hint), annotation(OneOf, hint)
+    prefix = {"list": "list of ", "replaced as a whole": "keys "}.get(kind, "one of ")
+    each = "each " if kind in ("list", "replaced as a whole") else ""
+    return _joined(
+        "" if kind == "list" and names else kind,
+        prefix + ", ".join(names.choices) if names else "",
+        each + bounds.words if bounds else "",
+    )
+
+
+def _joined(*parts: str, by: str = ", ") -> str:
+    return by.join(filter(None, parts))
+
+
+def _explained(line: str, words: str, limits: str = "") -> Iterator[str]:
+    """Yield a line with a comment of its meaning and limits; a long meaning goes above it."""
+    comment = _joined(words.removesuffix("."), limits, by="; ")
+    if len(line) + len(limits) > _WIDTH - 10:
+        yield from _comment(f"{words} {limits[:1].upper()}{limits[1:]}.")
+        comment = ""
+    elif len(line) + len(comment) > _WIDTH - 10 and words:
         yield from _comment(words)
-        whole = limits
-    yield f"{line}  # {whole}" if whole else line
+        comment = limits
+    yield f"{line}  # {comment}" if comment else line

@@ -1,18 +1,18 @@
-"""Config: every parameter of the distributions that scenes are drawn from, validated, with units.
+"""Config: all parameters of the distributions that scenes are drawn from.
 
-A preset is a Config made here; a YAML or JSON file changes single values of it. Ranges are drawn
-uniformly unless their docstring says otherwise. Lengths are millimetres, angles degrees, colours
-sRGB hex in files (people pick them on screens) and linear albedo in scenes.
+A preset is a Config defined here; a YAML or JSON file changes single values of it. Ranges are
+drawn from uniformly unless documented otherwise. Lengths are millimetres and angles degrees. Colors
+are sRGB hex codes, because people pick them on screens; scenes hold linear albedo.
 """
 
-import re
 import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import yaml
+from annotated_types import MinLen
 
 from fastgen import srgb
 from fastgen.config.cameras import CameraConfig, check_room, seafront_rig
@@ -23,37 +23,57 @@ from fastgen.config.yaml_values import loaded
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.scene.limits import GAP_LIMITS_MM, MIN_ROUGHNESS
-from fastgen.validation import UNIT, Range, bounds, check_known, from_plain, to_plain
+from fastgen.validation import (
+    UNIT,
+    Bounds,
+    Matching,
+    OneOf,
+    Range,
+    Share,
+    check_known,
+    from_plain,
+    to_plain,
+)
 
-REACH = bounds(1.0, 1e6, "mm")
-"""What falls off over a reach is divided by it."""
-
-ROUGHNESS = bounds(MIN_ROUGHNESS, 1.0)
+_Color = Annotated[str, Matching("#?[0-9a-fA-F]{6}", "is not a color; write it as '#rrggbb'")]
+_Colors = Annotated[tuple[_Color, ...], MinLen(1)]
+_Reach = Annotated[Range, Bounds(1.0, 1e6, "mm")]
+_Roughness = Annotated[Range, Bounds(MIN_ROUGHNESS, 1.0)]
+_Size = Annotated[Range, Bounds(50, 1e5, "mm")]
+_CameraName = Annotated[
+    str,
+    Matching(
+        "[A-Za-z0-9_-]{1,64}",
+        "is not a camera name; it is used in file names, so give up to 64 letters, digits, - and _",
+    ),
+]
 
 
 @dataclass(frozen=True)
 class SurfaceConfig:
-    """Paint and its ageing, SeaFront paper, section 3.2; one block of ranges per layer of Fig. 5.
+    """Paint and its ageing (SeaFront paper, section 3.2), layer by layer as in its Fig. 5.
 
-    colors: of sound paint, by a name of your own, each as likely as any other.
-    roughness: of sound paint; GGX, perceptual.
-    tone_variation: how much the paint's tone varies over a side.
-    ageing_strength: of the darkening toward the corners of each panel.
-    ageing_reach_mm: how far from a corner it reaches.
-    dirt_strength: of the deposit along edges.
-    dirt_reach_mm: how far from an edge it reaches.
-    dirt_color: of that deposit.
-    rust_coverage: share of the sheet that is rusty, its runs not counted; squared in the draw, so
-        that low ones prevail.
-    rust_scale_mm: size of the patches.
-    rust_colors: each as likely as any other.
-    rust_roughness: GGX, perceptual.
-    scratch_coverage: share of the sheet under fine bright scratches; above 0.1 no more is seen.
-    wear_strength: how unevenly the paint reflects.
-    wear_scale_mm: size of the noise of wear, scratches and dirt.
+    Attributes:
+        colors: Colors of undamaged paint by name; all are equally likely.
+        roughness: Perceptual GGX roughness of undamaged paint.
+        tone_variation: Variation of the paint's tone over a side.
+        ageing_strength: Strength of the darkening toward the corners of each panel.
+        ageing_reach_mm: Distance from a corner up to which it is visible.
+        dirt_strength: Strength of the deposit along edges.
+        dirt_reach_mm: Distance from an edge up to which it is visible.
+        dirt_color: Color of the deposit.
+        rust_coverage: Share of the sheet that is rusty, not counting rust runs. The drawn position
+            in the range is squared, so low values prevail.
+        rust_scale_mm: Size of the patches.
+        rust_colors: Colors of the rust; all are equally likely.
+        rust_roughness: Perceptual GGX roughness of rust.
+        scratch_coverage: Share of the sheet under fine bright scratches; values above 0.1 add no
+            more.
+        wear_strength: Unevenness of the paint's reflection.
+        wear_scale_mm: Size of the noise of wear, scratches and dirt.
     """
 
-    colors: dict[str, str] = field(
+    colors: Annotated[dict[str, _Color], MinLen(1)] = field(
         default_factory=lambda: {
             "oxide red": "#6b2a22",
             "maroon": "#57202a",
@@ -75,55 +95,43 @@ class SurfaceConfig:
             "charcoal": "#3a3d40",
         }
     )
-    roughness: Range = field(default=Range(0.38, 0.62), metadata=ROUGHNESS)
-    tone_variation: Range = field(default=Range(0.02, 0.12), metadata=UNIT)
-    ageing_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
-    ageing_reach_mm: Range = field(default=Range(300, 1100), metadata=REACH)
-    dirt_strength: Range = field(default=Range(0.05, 0.55), metadata=UNIT)
-    dirt_reach_mm: Range = field(default=Range(60, 320), metadata=REACH)
-    dirt_color: str = "#a8a59c"
-    rust_coverage: Range = field(default=Range(0.0, 0.12), metadata=UNIT)
-    rust_scale_mm: Range = field(default=Range(500, 1400), metadata=bounds(50, 1e5, "mm"))
-    rust_colors: tuple[str, ...] = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
-    rust_roughness: Range = field(default=Range(0.8, 0.95), metadata=ROUGHNESS)
-    scratch_coverage: Range = field(default=Range(0.0, 0.003), metadata=UNIT)
-    wear_strength: Range = field(default=Range(0.1, 0.6), metadata=UNIT)
-    wear_scale_mm: Range = field(default=Range(700, 2500), metadata=bounds(50, 1e5, "mm"))
-
-    def __post_init__(self) -> None:
-        """Refuse what are no colors."""
-        for name, color in self.colors.items():
-            linear_color(color, f"colors.{name}")
-        if not self.colors:
-            raise ConfigError("colors: none is given; give at least one, as in {red: '#6b2a22'}")
-        _check_colors("rust_colors", self.rust_colors)
-        linear_color(self.dirt_color, "dirt_color")
+    roughness: _Roughness = Range(0.38, 0.62)
+    tone_variation: Annotated[Range, UNIT] = Range(0.02, 0.12)
+    ageing_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
+    ageing_reach_mm: _Reach = Range(300, 1100)
+    dirt_strength: Annotated[Range, UNIT] = Range(0.05, 0.55)
+    dirt_reach_mm: _Reach = Range(60, 320)
+    dirt_color: _Color = "#a8a59c"
+    rust_coverage: Annotated[Range, UNIT] = Range(0.0, 0.12)
+    rust_scale_mm: _Size = Range(500, 1400)
+    rust_colors: _Colors = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
+    rust_roughness: _Roughness = Range(0.8, 0.95)
+    scratch_coverage: Annotated[Range, UNIT] = Range(0.0, 0.003)
+    wear_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
+    wear_scale_mm: _Size = Range(700, 2500)
 
 
 @dataclass(frozen=True)
 class ContainerConfig:
-    """Which containers come, and how much their corrugation differs from the nominal profile.
+    """Container kinds and their corrugation.
 
-    kinds: weight of 20, 40, 40HC and 45HC in the draw.
-    depth_scale: factors of the corrugations' depth, each as likely as any other; no range, as every
-        one is a mesh of its own. What does not fit the frame then is refused.
+    Attributes:
+        kinds: Relative frequency of each kind.
+        depth_scale: Factors of the corrugation depth; all are equally likely. This is a list and
+            not a range because each factor needs a mesh of its own. Depths that do not fit the
+            frame are refused.
     """
 
-    kinds: dict[str, float] = field(
-        default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1},
-        metadata=bounds(0.0, 1e6),
+    kinds: dict[Annotated[str, OneOf(tuple(KINDS))], Annotated[float, Bounds(0.0, 1e6)]] = field(
+        default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1}
     )
     profiles: WallProfiles = field(default_factory=WallProfiles)
-    depth_scale: tuple[float, ...] = field(default=(0.95, 1.06), metadata=bounds(0.2, 3.0))
+    depth_scale: Annotated[tuple[Annotated[float, Bounds(0.2, 3.0)], ...], MinLen(1)] = (0.95, 1.06)
 
     def __post_init__(self) -> None:
-        """Hold weights and depths to what can be drawn and built."""
-        for kind in self.kinds:
-            check_known("kinds", kind, KINDS)
+        """Refuse kinds without any weight, and depths that do not fit the frame."""
         if sum(self.kinds.values()) <= 0:
             raise ConfigError("kinds: all weights are 0; give at least one above 0")
-        if not self.depth_scale:
-            raise ConfigError("depth_scale: the list is empty; give at least one, as in [1.0]")
         for i, scale in enumerate(self.depth_scale):
             try:
                 self.profiles.deepened(scale)
@@ -133,73 +141,75 @@ class ContainerConfig:
 
 @dataclass(frozen=True)
 class EnvironmentConfig:
-    """The light.
+    """Light of the surroundings.
 
-    names: HDRIs to choose from, all alike, by file name without ending; those that are bundled lie
-        in assets/hdri. Without names all that --hdri finds come, or of the bundled ones all but the
-        interiors, ports more often than others.
-    yaw_deg: how the environment is turned about the vertical.
+    Attributes:
+        names: HDRIs to draw from, all equally likely, by file name without extension; assets/hdri
+            has the bundled ones. If the list is empty, all HDRIs of --hdri are used. Without
+            --hdri these are the bundled ones except interiors, ports more often than others.
+        yaw_deg: Rotation of the environment about the vertical.
     """
 
     names: tuple[str, ...] = ()
-    yaw_deg: Range = field(default=Range(0, 360), metadata=bounds(-360.0, 360.0, "degrees"))
+    yaw_deg: Annotated[Range, Bounds(-360.0, 360.0, "degrees")] = Range(0, 360)
 
 
 @dataclass(frozen=True)
 class SplitConfig:
-    """Fractions of the scenes that go to each part; they are normalised to sum to 1.
+    """Shares of the scenes in each split. They are normalised to a sum of 1.
 
-    train: to learn from.
-    val: to choose by.
-    test: to report on.
+    Attributes:
+        train: Share of the training split.
+        val: Share of the validation split.
+        test: Share of the test split.
     """
 
-    train: float = field(default=0.7, metadata=UNIT)
-    val: float = field(default=0.15, metadata=UNIT)
-    test: float = field(default=0.15, metadata=UNIT)
+    train: Share = 0.7
+    val: Share = 0.15
+    test: Share = 0.15
 
 
 @dataclass(frozen=True)
 class SpreaderConfig:
-    """How often a container hangs on a crane's spreader, and what that looks like.
+    """Spreader of the crane that holds the container.
 
-    probability: of a spreader; the container floats without.
-    colors: of its paint, each as likely as any other.
-    flippers_down: probability of each side that its gather guides are lowered.
-    gap_mm: from the castings to the spreader, rounded to 10 mm within the range.
+    Attributes:
+        probability: Probability of a spreader; without one the container floats.
+        colors: Colors of its paint; all are equally likely.
+        flippers_down: Probability, for each side, that the gather guides are lowered.
+        gap_mm: Distance from the castings to the spreader, rounded to 10 mm within the range.
     """
 
-    probability: float = field(default=0.9, metadata=UNIT)
-    colors: tuple[str, ...] = ("#d9a514", "#e0b428", "#c9661b", "#b8321f", "#a8541c", "#8f9396")
-    flippers_down: float = field(default=0.6, metadata=UNIT)
-    gap_mm: Range = field(default=Range(10, 30), metadata=bounds(*GAP_LIMITS_MM, "mm"))
-
-    def __post_init__(self) -> None:
-        """Refuse what are no colors."""
-        _check_colors("colors", self.colors)
+    probability: Share = 0.9
+    colors: _Colors = ("#d9a514", "#e0b428", "#c9661b", "#b8321f", "#a8541c", "#8f9396")
+    flippers_down: Share = 0.6
+    gap_mm: Annotated[Range, Bounds(*GAP_LIMITS_MM, "mm")] = Range(10, 30)
 
 
 @dataclass(frozen=True)
 class LabelConfig:
-    """What becomes of objects that are hard to see.
+    """Treatment of objects that are hard to see.
 
-    min_visible_px: objects with fewer visible pixels are marked ignored: formats with ignore
-        regions list them as such, others leave them out.
-    min_visible_fraction: so are those with a smaller visible part of what they would cover alone.
-    min_text_px: height below which a text is no legible crop.
+    Attributes:
+        min_visible_px: Objects with fewer visible pixels are marked as ignored. Formats with ignore
+            regions list them as such; other formats leave them out.
+        min_visible_fraction: Objects with a smaller visible fraction are ignored as well. The
+            fraction is relative to their pixels if nothing hid them.
+        min_text_px: Height below which a text is not a legible crop.
     """
 
-    min_visible_px: int = field(default=12, metadata=bounds(1, 1e6, "pixels"))
-    min_visible_fraction: float = field(default=0.05, metadata=UNIT)
-    min_text_px: float = field(default=10.0, metadata=bounds(1.0, 1e4, "pixels"))
+    min_visible_px: Annotated[int, Bounds(1, 1e6, "pixels")] = 12
+    min_visible_fraction: Share = 0.05
+    min_text_px: Annotated[float, Bounds(1.0, 1e4, "pixels")] = 10.0
 
 
 @dataclass(frozen=True)
 class Config:
-    """All that decides a distribution of scenes and the labels made from them.
+    """All parameters of a distribution of scenes and of the labels made from them.
 
-    cameras: the rig, by names of your own. What is given is all of it; a camera named as one of the
-        preset's inherits what is left out.
+    Attributes:
+        cameras: Rig of cameras by name. A file that has this key gives the whole rig; a camera with
+            the name of one of the preset's inherits what the file leaves out.
     """
 
     container: ContainerConfig = field(default_factory=ContainerConfig)
@@ -208,77 +218,93 @@ class Config:
     damage: DamageConfig = field(default_factory=DamageConfig)
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
-    cameras: dict[str, CameraConfig] = field(default_factory=seafront_rig)
+    cameras: Annotated[dict[_CameraName, CameraConfig], MinLen(1)] = field(
+        default_factory=seafront_rig
+    )
     sensor: SensorConfig = field(default_factory=SensorConfig)
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
 
     def __post_init__(self) -> None:
-        """Hold values to the choices that no single bound can express."""
-        if not self.cameras:
-            raise ConfigError("cameras: the rig is empty; describe at least one camera")
+        """Refuse splits without shares, and camera names that differ only in case."""
+        if self.split.train + self.split.val + self.split.test <= 0:
+            raise ConfigError("split: all shares are 0; give at least one above 0")
         taken: dict[str, str] = {}
         for name in self.cameras:
-            if not re.fullmatch(r"[A-Za-z0-9_-]{1,64}", name):
-                raise ConfigError(
-                    f"cameras.{name!r}: they name files; use up to 64 letters, digits, - and _"
-                )
             alike = taken.setdefault(name.casefold(), name)
             if alike != name:
                 raise ConfigError(
-                    f"cameras.{name}: its files would be those of {alike} on disks that do not "
-                    "tell capitals from small letters; rename one"
+                    f"cameras.{name}: its files would be those of {alike} on disks that ignore "
+                    "case; rename one"
                 )
-        if self.split.train + self.split.val + self.split.test <= 0:
-            raise ConfigError("split: all fractions are 0; give at least one above 0")
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
-        """A named starting point. Raises ConfigError with the nearest name for an unknown one."""
+        """Return a named preset.
+
+        Raises:
+            ConfigError: for an unknown name, suggesting the nearest one.
+        """
         check_known("preset", name, tuple(PRESETS))
         return from_plain(Config, PRESETS[name], base=Config())
 
     @staticmethod
     def checked(config: Any) -> "Config":
-        """`config` held to the bounds that files are held to, the preset in place of None.
+        """Return a validated copy of a Config made in Python, or the preset for None.
 
-        Raises ConfigError naming the field that does not fit: Python checks no types.
+        Args:
+            config: A Config, whose values may be of other types or out of range, or None.
+
+        Raises:
+            ConfigError: naming the field that does not fit.
         """
         if config is None:
             return Config.preset()
         if not isinstance(config, Config):
             raise ConfigError(
-                f"config: {type(config).__name__} is no Config; take Config.preset, Config.load "
+                f"config: {type(config).__name__} is not a Config; use Config.preset, Config.load "
                 "or Config.from_values"
             )
-        return Config.from_values(config.to_plain())
+        return _with_room(from_plain(Config, config))
 
     @staticmethod
     def from_values(data: Any, base: "Config | None" = None) -> "Config":
-        """Plain values, as a file holds them, over `base` (default: seafront); see `load`."""
+        """Return `base` with the values that `data` changes.
+
+        Args:
+            data: Mapping of plain values, as in a file; see `load`.
+            base: Values of everything that `data` leaves out; None stands for preset seafront.
+
+        Raises:
+            ConfigError: naming the key or value that does not fit.
+        """
         if not isinstance(base, Config | None):
-            raise ConfigError(f"base: {base!r} is no Config; take what Config.preset gives")
-        made = from_plain(Config, data, base=Config.preset() if base is None else base)
-        kinds = [kind for kind, weight in made.container.kinds.items() if weight > 0]
-        for name, rig in made.cameras.items():
-            check_room(name, rig, kinds, made.damage.bulge_mm)
-        return made
+            raise ConfigError(f"base: {base!r} is not a Config; take one from Config.preset")
+        base = Config.preset() if base is None else base
+        return _with_room(from_plain(Config, data, base=base))
 
     @staticmethod
     def load(path: str | Path, base: "Config | None" = None) -> "Config":
-        """Read a YAML or JSON file whose values replace those of `base` (default: seafront).
+        """Return `base` with the values that a file changes.
 
-        A mapping such as `cameras` or `surface.colors` is replaced as a whole, so a port describes
-        its own rig; a camera named as one of the base's inherits what the file leaves out.
-        Raises ConfigError naming the file and the key or value that does not fit.
+        A mapping such as `cameras` or `surface.colors` is replaced as a whole, so that a port can
+        describe its own rig. A camera with the name of one of the base's inherits from it what the
+        file leaves out.
+
+        Args:
+            path: YAML or JSON file.
+            base: Values of everything that the file leaves out; None stands for preset seafront.
+
+        Raises:
+            ConfigError: naming the file and the key or value that does not fit.
         """
         try:
             data = loaded(Path(path).read_text(encoding="utf-8"))
         except (OSError, TypeError) as error:
             words = error.strerror if isinstance(error, OSError) else "give a path"
             raise ConfigError(f"{path}: cannot be read ({words})") from None
-        except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date that is none
+        except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: invalid dates
             raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
         if not isinstance(data, Mapping | None):
             raise ConfigError(
@@ -291,14 +317,22 @@ class Config:
             raise ConfigError(f"{path}: {error}") from None
 
     def to_plain(self) -> dict[str, Any]:
-        """The configuration as plain values, ready for JSON or YAML."""
+        """Return the configuration as plain values, ready for JSON or YAML."""
         plain: dict[str, Any] = to_plain(self)
         return plain
 
 
+def _with_room(config: Config) -> Config:
+    """Return `config` if no camera can be too close to a container."""
+    kinds = [kind for kind, weight in config.container.kinds.items() if weight > 0]
+    for name, rig in config.cameras.items():
+        check_room(name, rig, kinds, config.damage.bulge_mm)
+    return config
+
+
 PRESETS: dict[str, dict[str, Any]] = {
     "seafront": {},
-    # as cameras on cranes deliver: wide lenses, weather, and what electronics do to an image
+    # images of real crane cameras: wide lenses, weather and sensor effects
     "crane": {
         "cameras": {
             "A": {
@@ -330,20 +364,7 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 
 
-def linear_color(text: str, path: str = "color") -> tuple[float, float, float]:
-    """Linear Rec.709 albedo of an sRGB hex color such as '#1f4e84'.
-
-    Raises ConfigError naming `path` when the text is no color.
-    """
-    digits = text.removeprefix("#")
-    if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
-        raise ConfigError(f"{path}: {text!r} is not a color; write it as '#rrggbb'")
-    red, green, blue = (srgb.linear(code / 255) for code in bytes.fromhex(digits))
+def linear_color(text: str) -> tuple[float, float, float]:
+    """Return the linear Rec. 709 albedo of an sRGB hex color such as '#1f4e84'."""
+    red, green, blue = (srgb.linear(code / 255) for code in bytes.fromhex(text.removeprefix("#")))
     return red, green, blue
-
-
-def _check_colors(name: str, colors: tuple[str, ...]) -> None:
-    if not colors:
-        raise ConfigError(f"{name}: the list is empty; give at least one color")
-    for i, color in enumerate(colors):
-        linear_color(color, f"{name}[{i}]")

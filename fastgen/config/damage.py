@@ -1,133 +1,133 @@
-"""Ranges of the four kinds of damage, SeaFront paper, section 3.3.2; all lengths in millimetres."""
+"""Ranges of the four kinds of damage (SeaFront paper, section 3.3.2)."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.scene.limits import LOBE_LIMIT, MAX_INSTANCES
-from fastgen.validation import UNIT, Range, bounds, check_distinct, check_known, check_order
+from fastgen.validation import UNIT, Bounds, OneOf, Range, Share, check_distinct
 
-EXTENT = bounds(5.0, 20000.0, "mm")
-"""Of what a face cuts off. Fields are scaled by their extents, which must not vanish."""
+_Extent = Annotated[Range, Bounds(5.0, 20000.0, "mm")]
+"""Extent that is cut to the size of the face. Fields are divided by it, so it must not vanish."""
 
-DEPTH = bounds(0.0, 2400.0, "mm")
-"""Of what goes in, or to a side: a container is 2438 mm wide, and what is pushed in deeper comes
-out on the other side."""
+_Reach = Annotated[Range, Bounds(5.0, 2400.0, "mm")]
+"""Extent that is not cut to the size of the face."""
 
-REACH = bounds(5.0, 2400.0, "mm")
-"""As EXTENT, of what no face cuts off."""
+_Depth = Annotated[Range, Bounds(0.0, 2400.0, "mm")]
+"""Displacement. A container is 2438 mm wide; a deeper dent would come out on the other side."""
 
 
 @dataclass(frozen=True)
 class AxisConfig:
-    """An edge or corner post pushed in.
+    """Edge or corner post that is pushed in.
 
-    length_mm: along the edge.
-    reach_mm: how far its neighbours are dragged along.
-    depth_mm: at its deepest.
+    Attributes:
+        length_mm: Length along the edge.
+        reach_mm: Distance from the edge up to which the faces beside it are bent.
+        depth_mm: Largest displacement.
     """
 
-    length_mm: Range = field(default=Range(700, 1900), metadata=EXTENT)
-    reach_mm: Range = field(default=Range(320, 650), metadata=REACH)
-    depth_mm: Range = field(default=Range(110, 260), metadata=DEPTH)
+    length_mm: _Extent = Range(700, 1900)
+    reach_mm: _Reach = Range(320, 650)
+    depth_mm: _Depth = Range(110, 260)
 
 
 @dataclass(frozen=True)
 class ConcaveConfig:
-    """A whole area of a face bowed.
+    """Area of a face that is bowed inward or outward.
 
-    length_mm: across the face.
-    width_mm: up the face.
-    depth_mm: at its deepest.
-    outward: probability that it bulges instead.
+    Attributes:
+        length_mm: Horizontal size; along the container on the roof.
+        width_mm: Vertical size; across the container on the roof.
+        depth_mm: Largest displacement.
+        outward: Probability that the area bulges outward.
     """
 
-    length_mm: Range = field(default=Range(900, 2600), metadata=EXTENT)
-    width_mm: Range = field(default=Range(800, 2000), metadata=EXTENT)
-    depth_mm: Range = field(default=Range(110, 250), metadata=DEPTH)
-    outward: float = field(default=0.3, metadata=UNIT)
+    length_mm: _Extent = Range(900, 2600)
+    width_mm: _Extent = Range(800, 2000)
+    depth_mm: _Depth = Range(110, 250)
+    outward: Share = 0.3
 
 
 @dataclass(frozen=True)
 class DentedConfig:
-    """A fine fold along a path.
+    """Narrow fold along a path.
 
-    length_mm: of the path.
-    width_mm: of what sinks along it.
-    depth_mm: of the crease, where it is deepest.
-    crease_mm: half width of the crease.
-    sink_share: part of the depth that the surroundings sink by.
-    amplitude_mm: how far the path swings where it does.
-    wavelength_mm: of its swings.
-    stretch_mm: it swings and runs straight by turns of this length.
-    turn_deg: angle of the path against the horizontal.
+    Attributes:
+        length_mm: Length of the path.
+        width_mm: Width of the area that sinks along the path.
+        depth_mm: Largest depth of the crease.
+        crease_mm: Half width of the crease.
+        sink_share: Depth of the sunken area as a share of depth_mm.
+        amplitude_mm: Amplitude of the swings of the path.
+        wavelength_mm: Wavelength of the swings.
+        stretch_mm: Length of the stretches in which the path alternately swings and runs straight.
+        turn_deg: Angle between the path and the horizontal.
     """
 
-    length_mm: Range = field(default=Range(600, 1700), metadata=EXTENT)
-    width_mm: Range = field(default=Range(180, 420), metadata=REACH)
-    depth_mm: Range = field(default=Range(40, 90), metadata=DEPTH)
-    crease_mm: Range = field(default=Range(35, 70), metadata=bounds(5, 1000, "mm"))
-    sink_share: Range = field(default=Range(0.25, 0.5), metadata=UNIT)
-    amplitude_mm: Range = field(default=Range(25, 110), metadata=DEPTH)
-    wavelength_mm: Range = field(default=Range(280, 800), metadata=bounds(20, 1e5, "mm"))
-    stretch_mm: Range = field(default=Range(250, 600), metadata=bounds(20, 1e5, "mm"))
-    turn_deg: Range = field(default=Range(-50, 50), metadata=bounds(-180, 180, "degrees"))
+    length_mm: _Extent = Range(600, 1700)
+    width_mm: _Reach = Range(180, 420)
+    depth_mm: _Depth = Range(40, 90)
+    crease_mm: Annotated[Range, Bounds(5, 1000, "mm")] = Range(35, 70)
+    sink_share: Annotated[Range, UNIT] = Range(0.25, 0.5)
+    amplitude_mm: _Depth = Range(25, 110)
+    wavelength_mm: Annotated[Range, Bounds(20, 1e5, "mm")] = Range(280, 800)
+    stretch_mm: Annotated[Range, Bounds(20, 1e5, "mm")] = Range(250, 600)
+    turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-50, 50)
 
 
 @dataclass(frozen=True)
 class PerforationConfig:
-    """A torn hole.
+    """Torn hole.
 
-    diameter_mm: on the mean.
-    rim_mm: width of the sheet around it that is bent in.
-    depth_mm: how far it is, at the edge.
-    lobes: how far the outline strays from a circle, as a share of the radius, five times over.
+    Attributes:
+        diameter_mm: Mean diameter.
+        rim_mm: Width of the rim that is bent inward.
+        depth_mm: Displacement of the rim at the edge of the hole.
+        lobes: Amplitude of each of the five harmonics of the outline, as a share of the radius.
     """
 
-    diameter_mm: Range = field(default=Range(90, 320), metadata=bounds(5, 2000, "mm"))
-    rim_mm: Range = field(default=Range(50, 150), metadata=bounds(5, 1000, "mm"))
-    depth_mm: Range = field(default=Range(35, 100), metadata=DEPTH)
-    lobes: Range = field(default=Range(0.05, 0.16), metadata=bounds(0.0, LOBE_LIMIT))
+    diameter_mm: Annotated[Range, Bounds(5, 2000, "mm")] = Range(90, 320)
+    rim_mm: Annotated[Range, Bounds(5, 1000, "mm")] = Range(50, 150)
+    depth_mm: _Depth = Range(35, 100)
+    lobes: Annotated[Range, Bounds(0.0, LOBE_LIMIT)] = Range(0.05, 0.16)
 
 
 @dataclass(frozen=True)
 class DamageConfig:
-    """How often a container is damaged and how (SeaFront paper, Table 2).
+    """Frequency and kinds of damage (SeaFront paper, Table 2).
 
-    probability: of a container that is damaged.
-    count: how many damages it has then, each number as likely.
-    kinds: axis, concave, dented, perforation; each as likely as any other.
-    faces: front, back, door, no_door, roof; where all but axis happen, which takes any edge.
-        Lengths and widths below are cut to what a face has room for.
-    mask_threshold_mm: the mask of a damage is where it moved the sheet farther than this.
+    Attributes:
+        probability: Probability that a container is damaged.
+        count: Number of damages of a damaged container; all numbers are equally likely.
+        kinds: Kinds to draw from; all are equally likely.
+        faces: Faces to draw from; axis damages are not limited to them but take any edge. The
+            extents below are cut to the size of the face.
+        mask_threshold_mm: Displacement above which a pixel belongs to the mask of a damage.
     """
 
-    probability: float = field(default=0.4, metadata=UNIT)
-    count: tuple[int, int] = field(default=(1, 4), metadata=bounds(0, MAX_INSTANCES))
-    kinds: tuple[str, ...] = DAMAGE_CLASSES
-    faces: tuple[str, ...] = ("front", "back", "door", "no_door")
-    mask_threshold_mm: float = field(default=5.0, metadata=bounds(0.1, 1000.0, "mm"))
+    probability: Share = 0.4
+    count: Annotated[tuple[int, int], Bounds(0, MAX_INSTANCES)] = (1, 4)
+    kinds: tuple[Annotated[str, OneOf(DAMAGE_CLASSES)], ...] = DAMAGE_CLASSES
+    faces: tuple[Annotated[str, OneOf(SHEET_FACES)], ...] = ("front", "back", "door", "no_door")
+    mask_threshold_mm: Annotated[float, Bounds(0.1, 1000.0, "mm")] = 5.0
     axis: AxisConfig = field(default_factory=AxisConfig)
     concave: ConcaveConfig = field(default_factory=ConcaveConfig)
     dented: DentedConfig = field(default_factory=DentedConfig)
     perforation: PerforationConfig = field(default_factory=PerforationConfig)
 
     def __post_init__(self) -> None:
-        """Hold names to those that exist and the counts to their order."""
-        for i, kind in enumerate(self.kinds):
-            check_known(f"kinds[{i}]", kind, DAMAGE_CLASSES)
-        for i, face in enumerate(self.faces):
-            check_known(f"faces[{i}]", face, SHEET_FACES)
+        """Refuse repeated names, and damages that have no face."""
         for name in ("kinds", "faces"):
             check_distinct(name, getattr(self, name), "each is as likely as any other")
         if not self.faces and set(self.kinds) - {"axis"}:
             raise ConfigError("faces: the list is empty; give at least one, or kinds: [axis]")
-        check_order("count", self.count)
 
     @property
     def bulge_mm(self) -> float:
-        """How far a damage may stand out of its face."""
+        """Largest outward displacement of a face."""
         damaged = self.probability > 0 and self.count[1] > 0
         bulges = damaged and "concave" in self.kinds and self.concave.outward > 0
         return self.concave.depth_mm.hi if bulges else 0.0

@@ -1,36 +1,44 @@
-"""Ranges of what a real camera and its weather do to an image; everything is off by default."""
+"""Ranges of lens, sensor and weather effects on an image. All are off by default."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
+
+from annotated_types import MinLen
 
 from fastgen.errors import ConfigError
 from fastgen.scene.limits import CORNERS
 from fastgen.scene.optics import LENS_MODELS
-from fastgen.validation import UNIT, Range, bounds, check_known, check_order
+from fastgen.validation import UNIT, Bounds, OneOf, Range, Share
 
 _ZERO = Range(0.0, 0.0)
-_COEFFICIENT = bounds(-10.0, 10.0)
+_Radial = Annotated[Range, Bounds(-10.0, 10.0)]
+_Tangential = Annotated[Range, Bounds(-0.1, 0.1)]
 
 
 @dataclass(frozen=True)
 class LensConfig:
-    """A lens's distortion by OpenCV's coefficients, which differ a little between lenses of a kind.
+    """Distortion in OpenCV's coefficients, which vary a little between lenses of one type.
 
-    model: brown_conrady takes k1, k2, k3, p1 and p2, fisheye (Kannala-Brandt) k1 to k4.
-    k1, k2, k3, k4: radial.
-    p1, p2: tangential.
+    Attributes:
+        model: brown_conrady uses k1, k2, k3, p1 and p2; fisheye (Kannala-Brandt) uses k1 to k4.
+        k1: First radial coefficient.
+        k2: Second radial coefficient.
+        k3: Third radial coefficient.
+        k4: Fourth radial coefficient, of a fisheye only.
+        p1: First tangential coefficient, not of a fisheye.
+        p2: Second tangential coefficient, not of a fisheye.
     """
 
-    model: str = "brown_conrady"
-    k1: Range = field(default=_ZERO, metadata=_COEFFICIENT)
-    k2: Range = field(default=_ZERO, metadata=_COEFFICIENT)
-    k3: Range = field(default=_ZERO, metadata=_COEFFICIENT)
-    k4: Range = field(default=_ZERO, metadata=_COEFFICIENT)
-    p1: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
-    p2: Range = field(default=_ZERO, metadata=bounds(-0.1, 0.1))
+    model: Annotated[str, OneOf(tuple(LENS_MODELS))] = "brown_conrady"
+    k1: _Radial = _ZERO
+    k2: _Radial = _ZERO
+    k3: _Radial = _ZERO
+    k4: _Radial = _ZERO
+    p1: _Tangential = _ZERO
+    p2: _Tangential = _ZERO
 
     def __post_init__(self) -> None:
-        """Refuse coefficients that the model has not."""
-        check_known("model", self.model, LENS_MODELS)
+        """Refuse coefficients that the model does not have."""
         foreign = ("p1", "p2") if self.model == "fisheye" else ("k4",)
         for name in foreign:
             if getattr(self, name) != _ZERO:
@@ -38,118 +46,115 @@ class LensConfig:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The model's coefficients in OpenCV's order."""
+        """Names of the model's coefficients in OpenCV's order."""
         fisheye = self.model == "fisheye"
         return ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3")
 
 
 @dataclass(frozen=True)
 class NoiseConfig:
-    """Photon shot and read noise. Small outdoor cameras' pixels hold 5,000 to 20,000 electrons.
+    """Photon shot noise and read noise.
 
-    probability: of an image that has it.
-    full_well_e: electrons that make white; drawn so that twice as many are as likely at any level.
-    read_noise_e: standard deviation without light.
+    Attributes:
+        probability: Probability that an image has noise.
+        full_well_e: Electrons of a white pixel, drawn log-uniformly. Pixels of small outdoor
+            cameras hold 5,000 to 20,000.
+        read_noise_e: Standard deviation without light.
     """
 
-    probability: float = field(default=0.0, metadata=UNIT)
-    full_well_e: Range = field(default=Range(2500, 12000), metadata=bounds(50, 1e6, "electrons"))
-    read_noise_e: Range = field(default=Range(2, 12), metadata=bounds(0, 1e4, "electrons"))
+    probability: Share = 0.0
+    full_well_e: Annotated[Range, Bounds(50, 1e6, "electrons")] = Range(2500, 12000)
+    read_noise_e: Annotated[Range, Bounds(0, 1e4, "electrons")] = Range(2, 12)
 
 
 @dataclass(frozen=True)
 class StampConfig:
-    """Date and time burnt in.
+    """Date and time burnt into the image.
 
-    probability: of an image that has it.
-    years: of the date.
-    corners: where it may stand: top left, top right, bottom left, bottom right.
-    height: of its capitals, as a share of the image's.
+    Attributes:
+        probability: Probability that an image has a stamp.
+        years: First and last year of the date.
+        corners: Corners of the image; all are equally likely.
+        height: Height of the capitals as a share of the image height.
     """
 
-    probability: float = field(default=0.0, metadata=UNIT)
-    years: tuple[int, int] = field(default=(2019, 2027), metadata=bounds(1970, 2100))
-    corners: tuple[str, ...] = CORNERS
-    height: Range = field(default=Range(0.018, 0.032), metadata=bounds(0.005, 0.2))
-
-    def __post_init__(self) -> None:
-        """Hold corners to those that exist, and the years to their order."""
-        for corner in self.corners:
-            check_known("corners", corner, CORNERS)
-        if not self.corners:
-            raise ConfigError("corners: the list is empty; give at least one")
-        check_order("years", self.years)
+    probability: Share = 0.0
+    years: Annotated[tuple[int, int], Bounds(1970, 2100)] = (2019, 2027)
+    corners: Annotated[tuple[Annotated[str, OneOf(CORNERS)], ...], MinLen(1)] = CORNERS
+    height: Annotated[Range, Bounds(0.005, 0.2)] = Range(0.018, 0.032)
 
 
 @dataclass(frozen=True)
 class DefocusConfig:
-    """A focus that misses the container.
+    """Focus that misses the container.
 
-    probability: of an image that has it.
-    focus: what is sharp, as a share of the distance to the target.
-    f_number: of the aperture.
+    Attributes:
+        probability: Probability that an image is out of focus.
+        focus: Focused distance as a multiple of the distance to the target.
+        f_number: F-number of the aperture.
     """
 
-    probability: float = field(default=0.0, metadata=UNIT)
-    focus: Range = field(default=Range(0.25, 0.8), metadata=bounds(0.01, 100.0))
-    f_number: Range = field(default=Range(1.4, 4.0), metadata=bounds(0.5, 64.0))
+    probability: Share = 0.0
+    focus: Annotated[Range, Bounds(0.01, 100.0)] = Range(0.25, 0.8)
+    f_number: Annotated[Range, Bounds(0.5, 64.0)] = Range(1.4, 4.0)
 
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Camera and load move while the shutter is open.
+    """Motion of camera and load during the exposure.
 
-    probability: of an image that has it.
-    extent: how far, as a share of the image's width.
+    Attributes:
+        probability: Probability that an image has motion blur.
+        extent: Length of the motion as a share of the image width.
     """
 
-    probability: float = field(default=0.0, metadata=UNIT)
-    extent: Range = field(default=Range(0.001, 0.012), metadata=bounds(0.0, 0.2))
+    probability: Share = 0.0
+    extent: Annotated[Range, Bounds(0.0, 0.2)] = Range(0.001, 0.012)
 
 
 @dataclass(frozen=True)
 class SensorConfig:
-    """What cameras do to their images; applies to each camera of the rig.
+    """Effects of the sensor on an image, the same for every camera of the rig.
 
-    vignetting: share of the light that is lost in the corners.
-    exposure_error_ev: beyond the rig's exposure_ev, after the lens, clipping included.
-    white_balance_ev: by which red and blue stray from green.
-    jpeg_quality: of the camera's own encoder, 0 for none.
+    Attributes:
+        vignetting: Share of the light that is lost in the corners.
+        exposure_error_ev: Exposure error after the lens, in addition to exposure_ev of the camera.
+            Highlights clip.
+        white_balance_ev: Deviation of red and of blue from green.
+        jpeg_quality: Quality of the camera's own JPEG encoder, 0 for none.
     """
 
     defocus: DefocusConfig = field(default_factory=DefocusConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
-    vignetting: Range = field(default=_ZERO, metadata=bounds(0.0, 0.95))
-    exposure_error_ev: Range = field(default=_ZERO, metadata=bounds(-6.0, 6.0, "stops"))
-    white_balance_ev: Range = field(default=_ZERO, metadata=bounds(-2.0, 2.0, "stops"))
+    vignetting: Annotated[Range, Bounds(0.0, 0.95)] = _ZERO
+    exposure_error_ev: Annotated[Range, Bounds(-6.0, 6.0, "stops")] = _ZERO
+    white_balance_ev: Annotated[Range, Bounds(-2.0, 2.0, "stops")] = _ZERO
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     stamp: StampConfig = field(default_factory=StampConfig)
-    jpeg_quality: tuple[int, int] = field(default=(0, 0), metadata=bounds(0, 100))
-
-    def __post_init__(self) -> None:
-        """Hold the qualities to their order."""
-        check_order("jpeg_quality", self.jpeg_quality)
+    jpeg_quality: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 0)
 
 
 @dataclass(frozen=True)
 class WeatherConfig:
-    """How often there is fog or rain, and how wet what was rained on is.
+    """Fog, rain and wet surfaces.
 
-    fog_probability: of a scene in fog.
-    visibility_mm: distance at which fog leaves 2 % of a contrast (Koschmieder); fog is below 1 km.
-    rain_probability: of a scene in rain.
-    rate_mm_h: of water that falls.
-    shutter_s: for how long a drop draws its streak.
-    wind: speed of drops across the image over that of their fall.
-    wet_probability: of a scene that is wet without rain.
-    wetness: of paint in rain or after it.
+    Attributes:
+        fog_probability: Probability of fog.
+        visibility_mm: Distance at which fog leaves 2 % of the contrast (Koschmieder). Fog is
+            defined as a visibility below 1 km.
+        rain_probability: Probability of rain.
+        rate_mm_h: Water that falls as rain.
+        shutter_s: Exposure time in which a drop draws its streak.
+        wind: Speed of the drops across the image, as a multiple of their falling speed.
+        wet_probability: Probability that a scene without rain is wet.
+        wetness: Wetness of paint during or after rain.
     """
 
-    fog_probability: float = field(default=0.0, metadata=UNIT)
-    visibility_mm: Range = field(default=Range(2.5e4, 3e5), metadata=bounds(1000, 1e8, "mm"))
-    rain_probability: float = field(default=0.0, metadata=UNIT)
-    rate_mm_h: Range = field(default=Range(2, 50), metadata=bounds(0.1, 300, "mm/h"))
-    shutter_s: Range = field(default=Range(0.0005, 0.004), metadata=bounds(1e-5, 0.1, "s"))
-    wind: Range = field(default=Range(-0.5, 0.5), metadata=bounds(-3.0, 3.0))
-    wet_probability: float = field(default=0.0, metadata=UNIT)
-    wetness: Range = field(default=Range(0.3, 1.0), metadata=UNIT)
+    fog_probability: Share = 0.0
+    visibility_mm: Annotated[Range, Bounds(1000, 1e8, "mm")] = Range(2.5e4, 3e5)
+    rain_probability: Share = 0.0
+    rate_mm_h: Annotated[Range, Bounds(0.1, 300, "mm/h")] = Range(2, 50)
+    shutter_s: Annotated[Range, Bounds(1e-5, 0.1, "s")] = Range(0.0005, 0.004)
+    wind: Annotated[Range, Bounds(-3.0, 3.0)] = Range(-0.5, 0.5)
+    wet_probability: Share = 0.0
+    wetness: Annotated[Range, UNIT] = Range(0.3, 1.0)

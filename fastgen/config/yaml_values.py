@@ -1,4 +1,4 @@
-"""YAML as people and other programs write it, JSON among it: what PyYAML leaves undone."""
+"""Reading and writing of YAML and JSON text, with corrections to PyYAML."""
 
 import re
 import reprlib
@@ -11,12 +11,16 @@ _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
     re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)[eE][-+]?[0-9]+$"),
     list("-+.0123456789"),
 )
-"""Arguments of add_implicit_resolver, by which PyYAML takes 1e-05 for a number."""
+"""Arguments of add_implicit_resolver that make PyYAML read 1e-05 as a number."""
 
 
 def loaded(text: str) -> Any:
-    """The value of a YAML or JSON text. Raises yaml.YAMLError that says where, and ValueError or
-    RecursionError for what PyYAML itself stumbles over."""
+    """Return the value of a YAML or JSON text.
+
+    Raises:
+        yaml.YAMLError: naming the line and column of the mistake.
+        ValueError, RecursionError: from PyYAML itself, for example for an invalid date.
+    """
     try:
         return yaml.load(text, _Loader)
     except yaml.YAMLError as error:
@@ -26,7 +30,7 @@ def loaded(text: str) -> Any:
 
 
 def _in_words(error: yaml.YAMLError) -> str:
-    """What PyYAML says, with line and column, but without a name and an excerpt of the text."""
+    """Return PyYAML's message with line and column, but without file name and excerpt."""
     if not isinstance(error, yaml.MarkedYAMLError):
         return str(error).replace('in "<unicode string>", ', "at ")
     said = ((error.context, error.context_mark), (error.problem, error.problem_mark))
@@ -38,9 +42,10 @@ def _in_words(error: yaml.YAMLError) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """Takes numbers as JSON writes them, 1e-05 too, which YAML 1.1 has for text; refuses those that
-    YAML 1.1 counts by eights or sixties, which people mean otherwise, and a key that stands twice,
-    of which PyYAML would drop the first without a word (YAML 1.2.2, sections 10.3.2 and 3.2.1.1).
+    """YAML loader that is stricter than PyYAML's, following YAML 1.2.2, 3.2.1.1 and 10.3.2.
+
+    It reads all JSON numbers, also 1e-05, which is text in YAML 1.1. It refuses octal and base-60
+    numbers, which users rarely intend. It refuses repeated keys, where PyYAML ignores the first.
     """
 
     def construct_number(self, node: yaml.ScalarNode) -> float:
@@ -48,7 +53,7 @@ class _Loader(yaml.SafeLoader):
         try:
             number = self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
         except (ArithmeticError, IndexError, ValueError):
-            words = f"{reprlib.repr(node.value)} is no number"
+            words = f"{reprlib.repr(node.value)} is not a number"
             raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
         if number and (":" in node.value or (whole and re.match(r"[-+]?0[0-9_]", node.value))):
             words = (
@@ -60,10 +65,10 @@ class _Loader(yaml.SafeLoader):
 
     def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> Any:
         text = super().construct_scalar(node)
-        try:  # JSON escapes some letters as two halves (RFC 8259, section 7), which PyYAML keeps
+        try:  # PyYAML does not join the surrogate pairs of JSON (RFC 8259, section 7)
             return str(text).encode("utf-16", "surrogatepass").decode("utf-16")
         except UnicodeDecodeError:
-            words = "a text holds half of a letter"
+            words = "a text contains half of a surrogate pair"
             raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
 
     def compose_mapping_node(self, anchor: dict[Any, Any]) -> yaml.MappingNode:
@@ -73,14 +78,14 @@ class _Loader(yaml.SafeLoader):
             number = key.tag.endswith((":int", ":float"))
             name = str(self.construct_object(key)) if number else key.value  # 0x8 is 8
             if name in seen:
-                words = f"the key {name!r} stands twice in one mapping"
+                words = f"the key {name!r} is given twice in one mapping"
                 raise yaml.composer.ComposerError(None, None, words, key.start_mark)
             seen.add(name)
         return node
 
 
 class Dumper(yaml.SafeDumper):
-    """Quotes text that `loaded` would take for a number."""
+    """YAML dumper that quotes text which `loaded` would read as a number."""
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_number)

@@ -1,20 +1,22 @@
-"""Container kinds after ISO 668 and the corrugation profiles of their walls."""
+"""Container kinds of ISO 668 and the corrugation profiles of their walls."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.errors import ConfigError
+from fastgen.validation import Bounds
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ContainerKind:
-    """External length, width and height in mm (ISO 668) and the size-type code (ISO 6346)."""
+    """External size in mm (ISO 668) and size-type code (ISO 6346) of a container."""
 
     length_mm: float
     width_mm: float
@@ -23,7 +25,7 @@ class ContainerKind:
 
     @property
     def size_mm(self) -> tuple[float, float, float]:
-        """Length, width, height in mm."""
+        """Length, width and height in mm."""
         return self.length_mm, self.width_mm, self.height_mm
 
 
@@ -38,8 +40,15 @@ KINDS: Mapping[str, ContainerKind] = MappingProxyType(
 
 
 def mm_away(points_mm: Array, kind: str) -> Array:
-    """How far points [..., 3] are from the box around a container of a kind, below 0 inside of it;
-    [...]."""
+    """Return the signed distance in mm of points from the bounding box of a container.
+
+    Args:
+        points_mm: Points [..., 3] in the container frame.
+        kind: A key of KINDS.
+
+    Returns:
+        Distances [...], negative inside the box.
+    """
     length, width, height = KINDS[kind].size_mm
     outside = np.abs(points_mm - (0.0, 0.0, height / 2)) - (length / 2, width / 2, height / 2)
     most = outside.max(axis=-1)
@@ -47,59 +56,54 @@ def mm_away(points_mm: Array, kind: str) -> Array:
     return away
 
 
-_DEEPEST_MM = 120.0
-"""A deeper wave would not fit between a wall's plane and the inner side of a casting."""
+_DEPTH = Bounds(0.001, 120.0, "mm")
+"""A deeper wave would not fit between the plane of a wall and the inner side of a casting."""
 
-_SHORTEST_MM = 40.0
-"""A shorter pitch multiplies the triangles beyond use."""
+_PITCH = Bounds(40.0, 1000.0, "mm")
+"""A shorter pitch multiplies the triangles and shows no more."""
+
+_Width = Annotated[float, Bounds(0.001, 1000.0, "mm")]
 
 
 @dataclass(frozen=True)
 class Wave:
     """A trapezoidal corrugation.
 
-    pitch_mm: of a whole wave, 40 to 1000: outer_mm + 2 slope_mm + inner_mm.
-    depth_mm: across the wall, over 0, at most 120; what a wall's frame has room for.
-    outer_mm: width of the outer flat.
-    slope_mm: width of a slope, along the wall.
-    inner_mm: width of the inner flat.
+    Attributes:
+        pitch_mm: Length of one wave: outer_mm + 2 slope_mm + inner_mm.
+        depth_mm: Depth across the wall.
+        outer_mm: Width of the outer flat.
+        slope_mm: Width of a slope, measured along the wall.
+        inner_mm: Width of the inner flat.
 
-    Raises ConfigError for widths that do not add up or cannot be built.
+    Raises:
+        ConfigError: if the widths do not add up to the pitch.
     """
 
-    pitch_mm: float
-    depth_mm: float
-    outer_mm: float
-    slope_mm: float
-    inner_mm: float
+    pitch_mm: Annotated[float, _PITCH]
+    depth_mm: Annotated[float, _DEPTH]
+    outer_mm: _Width
+    slope_mm: _Width
+    inner_mm: _Width
 
     def __post_init__(self) -> None:
-        """Hold the widths to their sum and the depth to what the frame can take."""
-        for name in ("outer_mm", "slope_mm", "inner_mm"):
-            if not getattr(self, name) > 0:
-                raise ConfigError(f"{name}: {getattr(self, name):g} is no width; give mm above 0")
+        """Check that the widths add up."""
         total = self.outer_mm + 2 * self.slope_mm + self.inner_mm
         if abs(total - self.pitch_mm) > 1e-6 * total:
             raise ConfigError(
-                f"pitch_mm: {self.pitch_mm:g} is not outer + 2 slope + inner = {total:g}; "
+                f"pitch_mm: {self.pitch_mm:g} is not outer_mm + 2 slope_mm + inner_mm = {total:g}; "
                 "make them agree"
-            )
-        if not _SHORTEST_MM <= self.pitch_mm <= 1000:
-            raise ConfigError(f"pitch_mm: {self.pitch_mm:g} is outside {_SHORTEST_MM:g} to 1000 mm")
-        if not 0 < self.depth_mm <= _DEEPEST_MM:
-            raise ConfigError(
-                f"depth_mm: {self.depth_mm:g} does not fit the frame; "
-                f"give mm above 0, at most {_DEEPEST_MM:g}"
             )
 
 
 @dataclass(frozen=True)
 class WallProfiles:
-    """Corrugation of the walls; common makers' figures.
+    """Corrugation of the walls; typical values of manufacturers.
 
-    side: of both long sides.
-    end: of no_door, the end without doors.
-    roof: of the roof.
+    Attributes:
+        side: Both long sides.
+        end: The end without doors, no_door.
+        roof: The roof.
     """
 
     side: Wave = field(default_factory=lambda: Wave(278.0, 36.0, 72.0, 68.0, 70.0))
@@ -107,14 +111,18 @@ class WallProfiles:
     roof: Wave = field(default_factory=lambda: Wave(209.0, 20.0, 91.0, 13.5, 91.0))
 
     def deepened(self, scale: float) -> "WallProfiles":
-        """The profiles with their depths times `scale`, to a thousandth of a millimetre.
+        """Return the profiles with depths multiplied by `scale`, rounded to 0.001 mm.
 
-        Raises ConfigError where that makes one too deep or too shallow.
+        Raises:
+            ConfigError: if a wave gets too deep or too shallow.
         """
         waves = {}
         for name, wave in vars(self).items():
-            try:
-                waves[name] = replace(wave, depth_mm=round(wave.depth_mm * scale, 3))
-            except ConfigError as error:
-                raise ConfigError(f"{scale:g} times {name}: {error}") from None
+            depth_mm = round(wave.depth_mm * scale, 3)
+            if not _DEPTH.lo <= depth_mm <= _DEPTH.hi:
+                raise ConfigError(
+                    f"{scale:g} times {name}.depth_mm is {depth_mm:g}, which does not fit the "
+                    f"frame; the depth must be {_DEPTH.words}"
+                )
+            waves[name] = replace(wave, depth_mm=depth_mm)
         return WallProfiles(**waves)

@@ -1,93 +1,123 @@
-"""Scene: everything that decides an image, as plain frozen data, without GL.
+"""Scene: everything that determines an image, as plain frozen data without OpenGL.
 
-Lengths are millimetres and angles degrees. The container frame is the world frame: right-handed,
-z up, origin at the centre of the footprint, z = 0 at the bottom of the castings, +x at the door.
-Colours are linear Rec.709 albedo in 0..1. Decals are placed in the sheet coordinates of their
+Lengths are in millimetres and angles in degrees. The container frame is the world frame: right-
+handed, z up, origin at the centre of the footprint, z = 0 at the bottom of the castings, +x toward
+the door. Colors are linear Rec. 709 albedo in 0..1. Decals are placed in sheet coordinates of their
 face: origin at the lower left corner of the face's chart seen from outside, x to the right, y up,
 measured along the unfolded sheet.
 """
 
 import json
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+from annotated_types import MaxLen
 from numpy.typing import NDArray
 
+from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
 from fastgen.errors import ConfigError
-from fastgen.scene.container_kinds import WallProfiles
-from fastgen.scene.limits import GAP_LIMITS_MM
-from fastgen.scene.optics import WHOLE, Lens, Sensor, Weather
-from fastgen.validation import UNIT, bounds, from_plain, to_plain
-
-Color = tuple[float, float, float]
+from fastgen.scene.container_kinds import KINDS, WallProfiles
+from fastgen.scene.faces import SHEET_FACES
+from fastgen.scene.limits import (
+    DECAL_KINDS,
+    GAP_LIMITS_MM,
+    MAX_DAMAGES,
+    MAX_DECALS,
+    WHOLE,
+    Degrees,
+    Millimetres,
+    Number,
+)
+from fastgen.scene.optics import Lens, Sensor, Weather
+from fastgen.validation import Bounds, Flag, OneOf, Share, from_plain, to_plain
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of a linear colour is its product with this; ITU-R BT.709-6, section 3.2."""
+"""Weights of linear red, green and blue in the luminance; ITU-R BT.709-6, section 3.2."""
 
-Vec2 = tuple[float, float]
-Vec3 = tuple[float, float, float]
+Color = tuple[Share, Share, Share]
+Vec2 = tuple[Number, Number]
+Vec3 = tuple[Number, Number, Number]
 
-_REACH = bounds(0.0, 1e6, "mm")
-_SCALE = bounds(1.0, 1e6, "mm")
-_LENGTH = bounds(1e-3, 1e6, "mm")
+_Reach = Annotated[float, Bounds(0.0, 1e6, "mm")]
+_Scale = Annotated[float, Bounds(1.0, 1e6, "mm")]
+_Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
 
 
 @dataclass(frozen=True)
 class Paint:
-    """Base coat. albedo: linear colour; roughness: GGX perceptual roughness of sound paint."""
+    """Base coat.
+
+    Attributes:
+        name: Name of the color in the configuration.
+        albedo: Linear color.
+        roughness: Perceptual GGX roughness of undamaged paint.
+        tone_variation: Variation of the tone over a side.
+    """
 
     name: str
-    albedo: Color = field(metadata=UNIT)
-    roughness: float = field(metadata=UNIT)
-    tone_variation: float = field(metadata=UNIT)
+    albedo: Color
+    roughness: Share
+    tone_variation: Share
 
 
 @dataclass(frozen=True)
 class Ageing:
-    """Darkening toward the corners of each panel. strength 0..1; reach in mm from a corner."""
+    """Darkening toward the corners of each panel; `reach_mm` is measured from a corner."""
 
-    strength: float = field(metadata=UNIT)
-    reach_mm: float = field(metadata=_REACH)
+    strength: Share
+    reach_mm: _Reach
 
 
 @dataclass(frozen=True)
 class Dirt:
-    """Light grey deposit along edges. strength 0..1; reach in mm from an edge."""
+    """Light grey deposit along edges; `reach_mm` is measured from an edge."""
 
-    strength: float = field(metadata=UNIT)
-    reach_mm: float = field(metadata=_REACH)
-    albedo: Color = field(metadata=UNIT)
+    strength: Share
+    reach_mm: _Reach
+    albedo: Color
 
 
 @dataclass(frozen=True)
 class Rust:
-    """Ochre corrosion that breaks the paint. coverage: fraction of the sheet; scale in mm."""
+    """Ochre corrosion that breaks through the paint.
 
-    coverage: float = field(metadata=UNIT)
-    scale_mm: float = field(metadata=_SCALE)
-    albedo: Color = field(metadata=UNIT)
-    roughness: float = field(metadata=UNIT)
+    Attributes:
+        coverage: Share of the sheet that is rusty.
+        scale_mm: Size of the patches.
+        albedo: Linear color.
+        roughness: Perceptual GGX roughness.
+    """
+
+    coverage: Share
+    scale_mm: _Scale
+    albedo: Color
+    roughness: Share
 
 
 @dataclass(frozen=True)
 class Scratches:
-    """Fine bright lines down to primer or steel. coverage: fraction of the sheet."""
+    """Fine bright lines down to primer or steel; `coverage` is their share of the sheet."""
 
-    coverage: float = field(metadata=UNIT)
+    coverage: Share
 
 
 @dataclass(frozen=True)
 class Wear:
-    """Worn reflection: how much noise spreads the roughness of exposed paint, 0..1. Scratches and
-    dirt share the noise tile whose scale_mm stands here."""
+    """Uneven reflection of worn paint.
 
-    strength: float = field(metadata=UNIT)
-    scale_mm: float = field(metadata=_SCALE)
+    Attributes:
+        strength: How far noise spreads the roughness of exposed paint.
+        scale_mm: Size of the noise tile, which scratches and dirt share.
+    """
+
+    strength: Share
+    scale_mm: _Scale
 
 
 @dataclass(frozen=True)
 class Surface:
-    """All material layers of one container. noise_offset_mm moves the noise about."""
+    """All material layers of one container; `noise_offset_mm` shifts their noise."""
 
     paint: Paint
     ageing: Ageing
@@ -102,150 +132,187 @@ class Surface:
 class Decal:
     """One thing printed or stuck on the sheet.
 
-    kind: marker, text, sticker or emblem. class_name: label class, or '' for things without one.
-    face: chart it lies on. center_mm: centre in sheet coordinates. size_mm: width and height of
-    the drawn rectangle before rotation (a marker's is the square around the standing diamond; a
-    text's is the tight box around its ink). art: marker, sticker or emblem name, or 'stripes' for
-    the bands of high cubes. albedo: of the ink of texts, emblems and stripes.
-    lines: text, one string a line; vertical text has one glyph below the other, columns from left
-    to right. cap_mm: height of the capitals. wear 0..1: how much of the print has gone.
+    Attributes:
+        kind: 'marker', 'text', 'sticker' or 'emblem'.
+        class_name: Label class; '' for decals without a label.
+        face: Face that it lies on.
+        center_mm: Centre in sheet coordinates.
+        size_mm: Width and height of the drawn rectangle before its rotation. For a marker this is
+            the square that stands on its corner, for a text the tight box around its ink.
+        rotation_deg: Counter-clockwise rotation on the sheet.
+        art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes.
+        lines: Text, one string per line. In vertical text the letters of a line are below one
+            another, and lines are columns from left to right.
+        font: Name of the font of a text.
+        vertical: Whether a text is vertical.
+        cap_mm: Height of the capitals of a text.
+        albedo: Linear color of texts, emblems and stripes.
+        wear: Share of the ink that has gone.
     """
 
-    kind: str
-    class_name: str
-    face: str
+    kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind != "stripes"))]
+    class_name: Annotated[str, OneOf(("", *DETECTION_CLASSES[1:]))]
+    face: Annotated[str, OneOf(SHEET_FACES)]
     center_mm: Vec2
-    size_mm: Vec2 = field(metadata=_LENGTH)
-    rotation_deg: float = 0.0
+    size_mm: tuple[_Length, _Length]
+    rotation_deg: Degrees = 0.0
     art: str = ""
     lines: tuple[str, ...] = ()
     font: str = ""
-    vertical: bool = False
-    cap_mm: float = 0.0
-    albedo: Color = field(default=(0.8, 0.8, 0.8), metadata=UNIT)
-    wear: float = field(default=0.0, metadata=UNIT)
+    vertical: Flag = False
+    cap_mm: Millimetres = 0.0
+    albedo: Color = (0.8, 0.8, 0.8)
+    wear: Share = 0.0
 
     @property
     def text(self) -> str:
-        """The whole text, lines joined by one space; '' for markers and stickers."""
+        """The lines joined by single spaces; '' for markers and stickers."""
         return " ".join(self.lines)
 
     @property
     def turn(self) -> NDArray[np.float64]:
-        """From the decal's axes to its sheet's, float64 [2, 2]: columns are its right and up."""
+        """Rotation [2, 2] from the decal's axes to its sheet's: columns are its right and up."""
         angle = np.deg2rad(self.rotation_deg)
         return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 @dataclass(frozen=True)
 class Damage:
-    """One damage: a displacement field, see fastgen/damage.py for its formula.
+    """One damage: a displacement field, see geometry/damage_law.py for its formula.
 
-    kind: one of classes.DAMAGE_CLASSES. face: what it was done to, for people. origin_mm: rest
-    point in the container frame. along, across, inward: orthonormal axes of the field; positive
-    depth_mm moves the sheet along `inward`. size_mm: full length along and full width across; for
-    a perforation both are the mean diameter, for an axis the width is twice the reach from the
-    edge. shape: dented (crease half width mm, share of sink 0..1, amplitude mm, wavelength mm,
-    phase rad, stretch length mm); perforation (rim width mm, then share and phase of 5 outline
-    harmonics); else empty.
+    Attributes:
+        kind: One of classes.DAMAGE_CLASSES.
+        face: Damaged face, for information only.
+        origin_mm: Origin of the field in the undamaged container.
+        along: First of three orthonormal axes of the field, in the container frame.
+        across: Second axis.
+        inward: Third axis. A positive `depth_mm` moves the sheet in its direction.
+        size_mm: Full length along and full width across. For a perforation both are the mean
+            diameter; for an axis damage the width is twice the reach from the edge.
+        depth_mm: Largest displacement.
+        shape: Further parameters. Dented: half width of the crease in mm, sink share 0..1,
+            amplitude in mm, wavelength in mm, phase in radians, stretch length in mm. Perforation:
+            rim width in mm, then share and phase of 5 harmonics of the outline. Otherwise empty.
     """
 
-    kind: str
+    kind: Annotated[str, OneOf(DAMAGE_CLASSES)]
     face: str
     origin_mm: Vec3
     along: Vec3
     across: Vec3
     inward: Vec3
-    size_mm: Vec2 = field(metadata=_LENGTH)
-    depth_mm: float
-    shape: tuple[float, ...] = ()
+    size_mm: tuple[_Length, _Length]
+    depth_mm: Millimetres
+    shape: tuple[Number, ...] = ()
 
 
 @dataclass(frozen=True)
 class Container:
-    """Which box: kind is 20, 40, 40HC or 45HC; profiles are its corrugations."""
+    """Container kind (20, 40, 40HC or 45HC) and the corrugation of its walls."""
 
-    kind: str
+    kind: Annotated[str, OneOf(tuple(KINDS))]
     profiles: WallProfiles
 
 
 @dataclass(frozen=True)
 class Spreader:
-    """The crane's spreader that the container hangs on, where one is present.
+    """Spreader of the crane that holds the container.
 
-    albedo: of its paint. flippers_down: whether the gather guides of the front and of the back
-    side hang beside the container. gap_mm: from the upper castings to the spreader.
+    Attributes:
+        present: Whether there is one.
+        albedo: Linear color of its paint.
+        flippers_down: Whether the gather guides of the front and of the back are lowered beside
+            the container.
+        gap_mm: Distance between the upper castings and the spreader.
     """
 
-    present: bool = False
-    albedo: Color = field(default=(0.6, 0.35, 0.02), metadata=UNIT)
-    flippers_down: tuple[bool, bool] = (True, True)
-    gap_mm: float = field(default=15.0, metadata=bounds(*GAP_LIMITS_MM, "mm"))
+    present: Flag = False
+    albedo: Color = (0.6, 0.35, 0.02)
+    flippers_down: tuple[Flag, Flag] = (True, True)
+    gap_mm: Annotated[float, Bounds(*GAP_LIMITS_MM, "mm")] = 15.0
 
 
 @dataclass(frozen=True)
 class EnvironmentView:
-    """Which HDRI lights the scene, turned about the vertical by yaw_deg (counter-clockwise)."""
+    """HDRI that lights the scene, turned counter-clockwise about the vertical by `yaw_deg`."""
 
     name: str
-    yaw_deg: float
+    yaw_deg: Degrees
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera. The sensor's width spans the image's width, whatever its aspect ratio.
+    """Camera with its pose. The sensor width spans the image width at any aspect ratio.
 
-    exposure_ev: deviation from the metered exposure, in stops. roll_deg turns the image clockwise.
-    lens: how it distorts, None for a pinhole. sensor: what it does to the image, None for nothing.
+    Attributes:
+        name: Name in the rig.
+        position_mm: Position in the container frame.
+        target_mm: Point that it looks at.
+        focal_mm: Focal length.
+        roll_deg: Clockwise rotation of the image.
+        sensor_width_mm: Width of the sensor.
+        exposure_ev: Deviation from the metered exposure, in stops.
+        lens: Distortion, None for a pinhole.
+        sensor: Effects of the sensor on the image, None for none.
     """
 
     name: str
     position_mm: Vec3
     target_mm: Vec3
-    focal_mm: float = field(metadata=_LENGTH)
-    roll_deg: float = 0.0
-    sensor_width_mm: float = field(default=36.0, metadata=_LENGTH)
-    exposure_ev: float = field(default=0.0, metadata=bounds(-30.0, 30.0, "stops"))
+    focal_mm: _Length
+    roll_deg: Degrees = 0.0
+    sensor_width_mm: _Length = 36.0
+    exposure_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     lens: Lens | None = None
     sensor: Sensor | None = None
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One container with all that is on it, its light and its cameras."""
+    """One container with its markings, damage, spreader, light, weather and cameras.
 
-    seed: int = field(metadata=WHOLE)
-    index: int = field(metadata=WHOLE)
+    Attributes:
+        seed: Seed of the sequence that the scene belongs to.
+        index: Number of the scene in its sequence.
+    """
+
+    seed: Annotated[int, WHOLE]
+    index: Annotated[int, WHOLE]
     container: Container
     surface: Surface
     environment: EnvironmentView
     cameras: tuple[Camera, ...]
-    decals: tuple[Decal, ...] = ()
-    damages: tuple[Damage, ...] = ()
+    decals: Annotated[tuple[Decal, ...], MaxLen(MAX_DECALS)] = ()
+    damages: Annotated[tuple[Damage, ...], MaxLen(MAX_DAMAGES)] = ()
     spreader: Spreader = field(default_factory=Spreader)
     weather: Weather = field(default_factory=Weather)
 
     def camera(self, name: str) -> Camera:
-        """The camera of that name. Raises KeyError naming those that exist."""
+        """Return the camera called `name`.
+
+        Raises:
+            KeyError: if there is none; the message lists the names.
+        """
         for camera in self.cameras:
             if camera.name == name:
                 return camera
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
 
     def to_json(self) -> str:
-        """The scene as JSON text; `from_json` gives back an equal scene."""
+        """Return the scene as JSON text, which `from_json` reads back to an equal scene."""
         return json.dumps(to_plain(self), indent=1)
 
     @staticmethod
     def from_json(text: str) -> "Scene":
-        """A scene from `to_json`'s text, or from that of a dataset's scene file.
+        """Return the scene in the text of `to_json` or of a dataset's scene file.
 
-        Raises ConfigError naming a field that does not fit.
+        Raises:
+            ConfigError: naming the field that is missing or does not fit.
         """
         try:
             data = json.loads(text)
         except (ValueError, TypeError) as error:
             raise ConfigError(f"scene: is no JSON ({error})") from None
-        if isinstance(data, dict) and "scene" in data:  # a scene file of a dataset
+        if isinstance(data, dict) and "scene" in data:
             data = data["scene"]
         return from_plain(Scene, data, "scene")

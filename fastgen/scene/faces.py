@@ -1,4 +1,4 @@
-"""Faces of a container and the axes of each face as seen from outside."""
+"""Faces of a container, and the axes of each face as seen from outside."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,12 +8,18 @@ FACES = ("front", "back", "door", "no_door", "roof", "underside")
 """front: -y, back: +y, door: +x, no_door: -x, roof: +z, underside: -z."""
 
 SHEET_FACES = ("front", "back", "door", "no_door", "roof")
-"""Those that can bear decals and damage."""
+"""Faces that can carry decals and damage."""
 
 
 @dataclass(frozen=True)
 class Axes:
-    """How a face is looked at from outside: right, up and toward the viewer, unit 3-vectors."""
+    """Unit vectors of a face in the container frame, for a viewer in front of it.
+
+    Attributes:
+        right: To the right of the viewer.
+        up: Upward for the viewer.
+        out: Out of the face, toward the viewer.
+    """
 
     right: tuple[float, float, float]
     up: tuple[float, float, float]
@@ -30,4 +36,4 @@ FACE_AXES: Mapping[str, Axes] = MappingProxyType(
         "underside": Axes((1, 0, 0), (0, -1, 0), (0, 0, -1)),
     }
 )
-"""right x up = out for every face, so nothing printed on a sheet is mirrored."""
+"""Axes by face. right x up = out for every face, so no decal is mirrored."""

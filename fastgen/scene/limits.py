@@ -1,34 +1,55 @@
-"""Limits that a scene must keep: what labels can tell apart and what the renderer can draw."""
+"""Limits of a scene: what the labels can distinguish and what the renderer can draw."""
+
+from typing import Annotated
+
+from fastgen.validation import Bounds
 
 MM = 1e-3
-"""Metres in a millimetre: scene data is in mm, the GPU and view space in metres."""
+"""Metres per millimetre: scene data is in mm, the GPU and view space in metres."""
 
 NEAR_M = 0.1
 FAR_M = 200.0
+"""Near and far plane of every camera, in metres along its optical axis."""
 
 MAX_DAMAGES = 128
-"""Damages in one scene that fit the 16 KiB that every driver gives a uniform block."""
+"""Damages per scene; they fit the 16 KiB that every driver grants a uniform block."""
+
+MAX_DECALS = 4096
+"""Decals per scene; a texture has a row for each, and every driver supports several times more."""
 
 MAX_INSTANCES = 99
-"""A mask value is class * 100 + instance, so that a hundredth would pass for the next class."""
+"""Damages of one kind per scene. A mask value is class * 100 + instance."""
 
 GLYPH_RANGE = 4096
-"""More than the letters of a text, as scene_check sees to: a * GLYPH_RANGE + b is below 2^24 for
-two of their numbers, and float32 holds it exactly."""
+"""Upper limit of the letters in a text, exclusive. Two letter numbers a and b are stored as
+a * GLYPH_RANGE + b, which stays below 2^24 and is therefore exact in float32."""
 
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
+"""Number of each decal kind in the shaders."""
 
 LOBES = 5
-"""Harmonics of a hole's outline; more would be finer than the mesh and most pixels."""
+"""Harmonics of a hole's outline; higher ones would be finer than the mesh and most pixels."""
 
 LOBE_LIMIT = 0.19
-"""Of each harmonic, as a share of the mean radius: all together leave a hole about its centre."""
+"""Largest amplitude of each harmonic, as a share of the mean radius. The sum of all harmonics then
+stays below the radius, so the outline runs once around its centre."""
 
 GAP_LIMITS_MM = (0.0, 200.0)
-"""Wider, nothing would look held any more."""
+"""Distance between container and spreader; a wider gap would not look connected."""
 
 MIN_ROUGHNESS = 0.045
-"""Least perceptual roughness that is shaded: Filament's where it computes in single precision (Guy
-and Agopian 2018, Physically Based Rendering in Filament)."""
+"""Lowest perceptual roughness that is shaded. It is Filament's limit for single precision (Guy and
+Agopian 2018, Physically Based Rendering in Filament)."""
 
 CORNERS = tuple(f"{level} {side}" for level in ("top", "bottom") for side in ("left", "right"))
+"""Corners of an image, for date stamps."""
+
+WHOLE = Bounds(0, 2**63 - 1)
+"""Bounds of seeds and indices."""
+
+FARTHEST = 1e6
+"""Largest magnitude of any number in a scene; the GPU computes in float32."""
+
+Number = Annotated[float, Bounds(-FARTHEST, FARTHEST)]
+Degrees = Annotated[float, Bounds(-FARTHEST, FARTHEST, "degrees")]
+Millimetres = Annotated[float, Bounds(-FARTHEST, FARTHEST, "mm")]

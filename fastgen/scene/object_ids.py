@@ -1,4 +1,4 @@
-"""Numbers that stand for decals in the id target and for damages in the damage target."""
+"""Numbers of decals in the id target and of damages in the damage target."""
 
 from fastgen.classes import (
     CONTAINER_ID,
@@ -11,15 +11,20 @@ from fastgen.scene.data import Damage, Scene
 
 
 def object_ids(scene: Scene) -> list[int]:
-    """Id of each decal in the id target, 0 for those without a label: 2, 3, ... in scene order,
-    those of damages left out."""
+    """Return the id of each decal in the id target, in scene order.
+
+    Labelled decals get 2, 3, ..., skipping the values of damages. Unlabelled decals get 0.
+    """
     numbers = range(CONTAINER_ID + 1, SPREADER_ID)
     free = (number for number in numbers if number not in DAMAGE_VALUES)
     return [next(free) if decal.class_name else 0 for decal in scene.decals]
 
 
 def mask_values(damages: tuple[Damage, ...]) -> list[int]:
-    """Value of each damage in the damage target: category * 100 + instance (3.3.4 of the paper)."""
+    """Return the value of each damage in the damage target: category * 100 + instance.
+
+    Source: SeaFront paper, section 3.3.4.
+    """
     counts = dict.fromkeys(DAMAGE_CLASSES, 0)
     values = []
     for damage in damages:

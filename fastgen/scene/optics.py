@@ -1,31 +1,38 @@
-"""What a Scene says of its lenses, sensors and weather: plain frozen data."""
+"""Lens, sensor and weather of a Scene, as plain frozen data."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 from fastgen.errors import ConfigError
-from fastgen.validation import UNIT, bounds, check_known
-
-WHOLE = bounds(0, 2**63 - 1)
+from fastgen.scene.limits import CORNERS, WHOLE, Number
+from fastgen.validation import Bounds, OneOf, Share, check_known
 
 LENS_MODELS = {"brown_conrady": 5, "fisheye": 4}
-"""Coefficients of each lens model, in OpenCV's order."""
+"""Number of coefficients of each lens model, which are in OpenCV's order."""
+
+_Move = Annotated[float, Bounds(-1.0, 1.0)]
+_Gain = Annotated[float, Bounds(0.0, 1000.0)]
 
 
 @dataclass(frozen=True)
 class Lens:
-    """Distortion of a lens as OpenCV has it, so that a calibration can be pasted in.
+    """Distortion of a lens, in OpenCV's conventions: a calibration can be pasted in.
 
-    model: brown_conrady, with coefficients k1, k2, p1, p2, k3 (Brown 1971, "Close-Range Camera
-    Calibration"), or fisheye, with k1, k2, k3, k4 (Kannala and Brandt 2006, "A Generic Camera Model
-    and Calibration Method", eq. 6): radius = f (a + k1 a^3 + ... + k4 a^9), a the angle off axis.
-    Raises ConfigError for another model or another count of coefficients.
+    Attributes:
+        model: 'brown_conrady' (Brown 1971, "Close-Range Camera Calibration") or 'fisheye' (Kannala
+            and Brandt 2006, "A Generic Camera Model and Calibration Method", eq. 6). A fisheye
+            maps the angle a from the optical axis to the radius f (a + k1 a^3 + ... + k4 a^9).
+        coefficients: k1, k2, p1, p2, k3 of brown_conrady; k1, k2, k3, k4 of fisheye.
+
+    Raises:
+        ConfigError: for another model or another number of coefficients.
     """
 
-    model: str
-    coefficients: tuple[float, ...]
+    model: Annotated[str, OneOf(tuple(LENS_MODELS))]
+    coefficients: tuple[Number, ...]
 
     def __post_init__(self) -> None:
-        """Refuse what no formula fits."""
+        """Check the model and the number of its coefficients."""
         check_known("model", self.model, LENS_MODELS)
         wanted = LENS_MODELS[self.model]
         if len(self.coefficients) != wanted:
@@ -36,67 +43,97 @@ class Lens:
 
 @dataclass(frozen=True)
 class Noise:
-    """A sensor's noise, see sensor/electronics.py. full_well_e: electrons that make white;
-    read_noise_e: standard deviation without light, in electrons; seed: of this image's noise."""
+    """Noise of a sensor, applied by camera/electronics.py.
 
-    full_well_e: float = field(metadata=bounds(1.0, 1e9, "electrons"))
-    read_noise_e: float = field(metadata=bounds(0.0, 1e6, "electrons"))
-    seed: int = field(metadata=WHOLE)
+    Attributes:
+        full_well_e: Electrons of a white pixel.
+        read_noise_e: Standard deviation without light, in electrons.
+        seed: Seed of the noise of this image.
+    """
+
+    full_well_e: Annotated[float, Bounds(1.0, 1e9, "electrons")]
+    read_noise_e: Annotated[float, Bounds(0.0, 1e6, "electrons")]
+    seed: Annotated[int, WHOLE]
 
 
 @dataclass(frozen=True)
 class Stamp:
-    """Text that the camera burns in: one line, in which corner (top or bottom, left or right),
-    height of its capitals as a share of the image's."""
+    """One line of text that the camera burns into the image.
+
+    Attributes:
+        text: The line.
+        corner: 'top left', 'top right', 'bottom left' or 'bottom right'.
+        height: Height of its capitals as a share of the image height.
+    """
 
     text: str
-    corner: str
-    height: float = field(metadata=bounds(0.001, 1.0))
+    corner: Annotated[str, OneOf(CORNERS)]
+    height: Annotated[float, Bounds(0.001, 1.0)]
 
 
 @dataclass(frozen=True)
 class Defocus:
-    """A thin lens focused at focus_mm along the optical axis, its aperture focal_mm / f_number."""
+    """A thin lens that is focused at `focus_mm` along the optical axis.
 
-    focus_mm: float = field(metadata=bounds(1.0, 1e9, "mm"))
-    f_number: float = field(metadata=bounds(0.1, 1e4))
+    Its aperture has the diameter focal_mm / f_number.
+    """
+
+    focus_mm: Annotated[float, Bounds(1.0, 1e9, "mm")]
+    f_number: Annotated[float, Bounds(0.1, 1e4)]
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """What one camera does to one image, see sensor/develop.py; the defaults do nothing.
+    """Effects of one camera on one image, applied by camera/sensor.py. The defaults do nothing.
 
-    motion: how far the image moves while the shutter is open, as a share of its width, right and
-    down. vignetting: light lost in the corners, 0..1. exposure_error_ev: stops. gains: of red,
-    green and blue, white balance's error. jpeg_quality: 0 for none.
+    Attributes:
+        defocus: Focus and aperture; None for a sharp image.
+        motion: Movement of the image during the exposure, right and down, as a share of its width.
+        vignetting: Share of the light that is lost in the corners.
+        exposure_error_ev: Exposure error in stops.
+        gains: White balance error: factors of red, green and blue.
+        noise: Sensor noise, or None.
+        stamp: Text burnt into the image, or None.
+        jpeg_quality: Quality of the camera's own JPEG encoder, 0 for none.
     """
 
     defocus: Defocus | None = None
-    motion: tuple[float, float] = field(default=(0.0, 0.0), metadata=bounds(-1.0, 1.0))
-    vignetting: float = field(default=0.0, metadata=bounds(0.0, 0.95))
-    exposure_error_ev: float = field(default=0.0, metadata=bounds(-30.0, 30.0, "stops"))
-    gains: tuple[float, float, float] = field(default=(1.0, 1.0, 1.0), metadata=bounds(0.0, 1000.0))
+    motion: tuple[_Move, _Move] = (0.0, 0.0)
+    vignetting: Annotated[float, Bounds(0.0, 0.95)] = 0.0
+    exposure_error_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
+    gains: tuple[_Gain, _Gain, _Gain] = (1.0, 1.0, 1.0)
     noise: Noise | None = None
     stamp: Stamp | None = None
-    jpeg_quality: int = field(default=0, metadata=bounds(0, 100))
+    jpeg_quality: Annotated[int, Bounds(0, 100)] = 0
 
 
 @dataclass(frozen=True)
 class Rain:
-    """Falling drops. rate_mm_h: of water; shutter_s: for how long each draws its streak; wind: its
-    speed across the image over that of the fall; seed: of where they are."""
+    """Falling drops.
 
-    rate_mm_h: float = field(metadata=bounds(0.001, 1000.0, "mm/h"))
-    shutter_s: float = field(metadata=bounds(1e-6, 1.0, "s"))
-    wind: float = field(metadata=bounds(-10.0, 10.0))
-    seed: int = field(metadata=WHOLE)
+    Attributes:
+        rate_mm_h: Water that falls, in mm per hour.
+        shutter_s: Exposure time in which a drop draws its streak.
+        wind: Speed of the drops across the image, as a multiple of their falling speed.
+        seed: Seed of their positions.
+    """
+
+    rate_mm_h: Annotated[float, Bounds(0.001, 1000.0, "mm/h")]
+    shutter_s: Annotated[float, Bounds(1e-6, 1.0, "s")]
+    wind: Annotated[float, Bounds(-10.0, 10.0)]
+    seed: Annotated[int, WHOLE]
 
 
 @dataclass(frozen=True)
 class Weather:
-    """Between container and camera, and on the container. visibility_mm: of fog, 0 without; wetness
-    of painted surfaces 0..1."""
+    """Weather between camera and container, and water on the container.
 
-    visibility_mm: float = field(default=0.0, metadata=bounds(0.0, 1e9, "mm"))
+    Attributes:
+        visibility_mm: Visibility in fog; 0 without fog.
+        rain: Falling rain, or None.
+        wetness: Wetness of painted surfaces.
+    """
+
+    visibility_mm: Annotated[float, Bounds(0.0, 1e9, "mm")] = 0.0
     rain: Rain | None = None
-    wetness: float = field(default=0.0, metadata=UNIT)
+    wetness: Share = 0.0
