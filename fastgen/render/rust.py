@@ -1,4 +1,4 @@
-"""Rust as shaders/rust.glsl lays it on: its constants, and what it comes to on the mean."""
+"""Constants of shaders/rust.glsl, and the mean albedo of materials under rust and its stains."""
 
 from collections.abc import Iterable
 from statistics import NormalDist
@@ -11,35 +11,41 @@ from fastgen.geometry.mesh import MATERIALS, Mesh
 Array = NDArray[np.floating]
 
 EDGE_SHARE = 0.4
-"""Dirt and rust come no farther in from an edge than this share of a zone's width: all of a narrow
-beam would be their edge."""
+"""Largest reach of dirt and rust from an edge, as a share of the zone's width.
+
+Without this limit, all of a narrow beam would count as its edge."""
 
 SMALL_WIDE_MM, SMALL_EDGE_MM = 60.0, 15.0
-"""Width of small pieces, as they wear, and the mean distance from their edges: where in a piece a
-point lies is not known."""
+"""Assumed width of small pieces, and assumed distance of their points from an edge.
+
+The position of a point within a small piece is unknown, because they share one zone."""
 
 DEFINES = {
-    "RUST_REACH_MM": 90.0,  # from an edge, to where rust is 1 / e as much more likely
-    "RUST_FAR": 0.6,  # share of the coverage far from edges,
-    "RUST_NEAR": 3.0,  # and what is added at an edge
-    "RUST_MOST": 0.9,
-    "RUST_OLD": 0.35,  # of what is rusty
-    "HALO": 0.3,  # deviations of the noise by which stains reach out
+    # Share of a surface gone to rust: coverage * (FAR + NEAR * exp(-edge distance / REACH)).
+    "RUST_REACH_MM": 90.0,
+    "RUST_FAR": 0.6,
+    "RUST_NEAR": 3.0,
+    "RUST_MOST": 0.9,  # Upper limit of the share.
+    "RUST_OLD": 0.35,  # Share of the rust that is old and dark.
+    # Stains around rust: distance and softness in standard deviations of the noise.
+    "HALO": 0.3,
     "HALO_SOFTNESS": 0.25,
-    "RUN_REACH_MM": 400.0,  # below an edge, to where run-off is 1 / e as much more likely
+    # Run-off: as for rust, with the distance below the upper edge.
+    "RUN_REACH_MM": 400.0,
     "RUN_FAR": 1.2,
     "RUN_NEAR": 4.0,
     "RUN_MOST": 0.6,
     "RUN_SOFTNESS": 0.5,
-    "STAIN_HIDES": 0.4,  # of the paint, in the channel that rust reflects most,
-    "STAIN_HIDES_MOST": 0.8,  # and where it reflects nothing
-    "STAIN_ALBEDO": 2.2,  # how bright a stain is, thin, beside rust
+    "STAIN_HIDES": 0.4,  # Share of the paint hidden in the channel that rust reflects most.
+    "STAIN_HIDES_MOST": 0.8,  # The same in a channel that rust does not reflect.
+    "STAIN_ALBEDO": 2.2,  # Albedo of a stain divided by that of rust.
     "EDGE_SHARE": EDGE_SHARE,
     "SMALL_WIDE_MM": SMALL_WIDE_MM,
     "SMALL_EDGE_MM": SMALL_EDGE_MM,
 }
-"""What the shader reads of these."""
+"""Constants of the shader by name."""
 
+# NormalDist, because a warm start needs SciPy for nothing else and imports it slowly.
 _normal_cdf = np.vectorize(NormalDist().cdf)
 _normal_quantile = np.vectorize(NormalDist().inv_cdf)
 
@@ -47,12 +53,19 @@ _normal_quantile = np.vectorize(NormalDist().inv_cdf)
 def rusted(
     albedo: Array, coverage: Array, rust_albedo: Array, meshes: Iterable[Mesh]
 ) -> tuple[Array, Array]:
-    """Of MATERIALS that had `albedo` [M, 3] the mean albedo [M, 3], under rust and what it stains,
-    and the share that has gone to rust, [M, 1].
+    """Return the mean albedo of each material under rust and its stains.
 
-    coverage: times each material's proneness, [M, 1]; up to 0.2 that is good to 5 %, above it edges
-    count for too much. rust_albedo: [3]. meshes: what is made of them. Sheet is taken for a roof's,
-    the only one that throws much light on other parts.
+    All sheets are treated as roofs, because only the roof reflects much light to other parts. The
+    result is within 5 % for coverages up to 0.2; above, edges have too much influence.
+
+    Args:
+        albedo: Linear albedo of each of MATERIALS without rust, [M, 3].
+        coverage: Rust coverage times the proneness of each material, [M, 1].
+        rust_albedo: Linear albedo of rust, [3].
+        meshes: Meshes made of the materials.
+
+    Returns:
+        Mean albedo [M, 3], and the share of each material's surface gone to rust [M, 1].
     """
     c = DEFINES
     near_edge, below, level = _edges(meshes)
@@ -69,13 +82,16 @@ def rusted(
 
 
 def _spread(share: Array, reach: float, softness: float) -> Array:
-    """Mean of the shader's normal_covered from `reach` below the threshold of a share."""
+    """Return the mean of the shader's `normal_covered`, `reach` below the threshold of `share`."""
     return np.asarray(_normal_cdf((_normal_quantile(share) + reach) / np.hypot(1.0, softness)))
 
 
 def _edges(meshes: Iterable[Mesh]) -> Array:
-    """Means over each of MATERIALS, [3, M, 1]: how near it is to an edge, and to one above it where
-    it is not level, as the shader falls off with either; what share is level."""
+    """Return [3, M, 1] with three means over each material.
+
+    They are the shader's falloff from edges, its falloff below upper edges (over surfaces that are
+    not level), and the share of level surfaces.
+    """
     sums = np.zeros((4, len(MATERIALS)))
     for mesh in meshes:
         sums += _edge_sums(mesh)
@@ -86,14 +102,15 @@ def _edges(meshes: Iterable[Mesh]) -> Array:
 
 
 def _edge_sums(mesh: Mesh) -> Array:
-    """Of each of MATERIALS, [4, M]: area, and that times what `_edges` says."""
+    """Return [4, M]: area of each material in mm^2, and the area times each mean of `_edges`."""
     low, high = np.sort([zone.rect_mm[2:] for zone in mesh.zones], axis=1).T
     reach = np.minimum(DEFINES["RUST_REACH_MM"], EDGE_SHARE * low)
-    # of a rectangle, 2 (low + high) - 8 d lies d from its border, up to half its width
+    # Integrates the falloff over a rectangle: 2 (low + high) - 8 d is the length of the line at
+    # distance d from its border, for d up to low / 2.
     end = np.exp(-low / (2 * reach))
     ring = 2 * (low + high) * (1 - end) - 8 * reach * (1 - end * (1 + low / (2 * reach)))
     near = reach * ring / (low * high)
-    # over the height of a zone, which is its lesser side: beams lie along
+    # Means over the shorter side, taken as the height of a zone, because most beams are horizontal.
     below = DEFINES["RUN_REACH_MM"] / low * (1 - np.exp(-low / DEFINES["RUN_REACH_MM"]))
     small = [zone.small for zone in mesh.zones]
     near[small] = np.exp(-SMALL_EDGE_MM / (EDGE_SHARE * SMALL_WIDE_MM))
