@@ -1,6 +1,7 @@
 """The corrugated panels: two sides, the front end wall and the roof."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,6 +66,14 @@ def wave_knots(wave: Wave, low: float, high: float, margin: float) -> tuple[Arra
     return np.concatenate([[low], knots.ravel(), [high]]), np.concatenate([[0.0], depths, [0.0]])
 
 
+class Span(NamedTuple):
+    """Extent of a wall along one axis: first and last station, and where castings begin."""
+
+    low: float
+    high: float
+    notches: tuple[float, ...]
+
+
 def panels(layout: Layout) -> dict[str, Panel]:
     """Return the four corrugated walls by face."""
     half_length, half_width = layout.half
@@ -85,24 +94,27 @@ def panels(layout: Layout) -> dict[str, Panel]:
     end_plane = half_length - layout.end_recess_mm
     roof_plane = layout.top - layout.roof_recess_mm
     to_front, to_door = half_length - post, half_length - door_post
+    sides, ends = Span(*side_rows, z_notches), Span(*end_rows, z_notches)
+    roof_across = Span(behind_header - half_length, to_door, x_notches)
     return {
         "front": _panel(
-            layout, "front", profiles.side, side_plane, (-to_front, to_door), x_notches,
-            side_rows, z_notches,
+            layout, "front", profiles.side, side_plane, Span(-to_front, to_door, x_notches), sides
         ),
         "back": _panel(
-            layout, "back", profiles.side, side_plane, (-to_door, to_front), x_notches,
-            side_rows, z_notches,
+            layout, "back", profiles.side, side_plane, Span(-to_door, to_front, x_notches), sides
         ),
         "no_door": _panel(
-            layout, "no_door", profiles.end, end_plane, (post - half_width, half_width - post),
-            y_notches, end_rows, z_notches,
+            layout,
+            "no_door",
+            profiles.end,
+            end_plane,
+            Span(post - half_width, half_width - post, y_notches),
+            ends,
         ),
         "roof": _panel(
-            layout, "roof", profiles.roof, roof_plane, (behind_header - half_length, to_door),
-            x_notches, (-roof_y, roof_y), y_notches,
+            layout, "roof", profiles.roof, roof_plane, roof_across, Span(-roof_y, roof_y, y_notches)
         ),
-    }  # fmt: skip
+    }
 
 
 def _panel(
@@ -110,10 +122,8 @@ def _panel(
     face: str,
     wave: Wave,
     plane: float,
-    across: tuple[float, float],
-    notches: tuple[float, float],
-    along: tuple[float, float],
-    row_notches: tuple[float, ...],
+    across: Span,
+    along: Span,
 ) -> Panel:
     """Return a wall with the castings cut out of its corners.
 
@@ -122,13 +132,11 @@ def _panel(
         face: Face of the wall.
         wave: Its corrugation.
         plane: Distance of its outermost flats from the origin, along the face's outward axis.
-        across: First and last station across the ridges.
-        notches: Stations across the ridges where the castings begin.
-        along: First and last station along the ridges.
-        row_notches: Stations along the ridges where the castings begin.
+        across: Stations across the ridges.
+        along: Stations along the ridges.
     """
     axes = FACE_AXES[face]
-    low, high = across
+    low, high, notches = across
     margin = max(notches[0] - low, high - notches[1]) + 2 * OVERLAP_MM
     knots, depths = wave_knots(wave, low, high, margin)
     stations = breaks(low, high, np.inf, (*knots, *notches))
@@ -146,7 +154,7 @@ def _panel(
         np.interp(arc, station_arc, station_depths),
     )
     step = float(np.sqrt(layout.max_edge_mm**2 - np.diff(arc).max() ** 2))
-    rows = breaks(*along, step, row_notches)
+    rows = breaks(along.low, along.high, step, along.notches)
     right, out = np.array(axes.right), np.array(axes.out)
     profile = columns[:, None] * right + (plane - depth)[:, None] * out
     patch = sweep(profile, rows, axes.up, keep=layout.outside_castings)
