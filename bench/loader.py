@@ -24,7 +24,14 @@ from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
 
 from fastgen.files.images import jpeg, write
-from fastgen.torch import ContainerDataset, class_names, collate_yolo
+from fastgen.torch import (
+    ContainerDataset,
+    ItemSettings,
+    RenderSettings,
+    SceneSettings,
+    class_names,
+    collate_yolo,
+)
 
 WARM_STEPS = 40
 """Steps before measuring starts, in which workers load lights and link programs."""
@@ -161,7 +168,14 @@ def main() -> None:
     torch.set_num_threads(1)
     length = (options.steps + WARM_STEPS) * options.batch
     size = parse_size(options.size)
-    rendered = ContainerDataset("imdg", seed=7, size=size, length=length, form="yolo", fixed=True)
+    rendered = ContainerDataset(
+        "imdg",
+        seed=7,
+        length=length,
+        render=RenderSettings(size),
+        scenes=SceneSettings(fixed=True),
+        items=ItemSettings(form="yolo"),
+    )
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         save_items(rendered, Path(folder))

@@ -21,7 +21,7 @@ from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, t
 
 from fastgen import Config
 from fastgen.classes import SEGMENTATION_CLASSES
-from fastgen.torch import ContainerDataset
+from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings
 
 PLANS = {
     "cpu": Plan(images=3500, test_images=600, size=(320, 320), batch=4, passes=3, rate=1.5e-3),
@@ -55,16 +55,28 @@ def training_data(run: Run) -> ContainerDataset:
     """Return the preset's images of all cameras; on a CPU, images of the ends with many damages."""
     plan = run.plan
     config = Config.preset() if run.full else Config.from_values(MANY_DAMAGES)
-    options: dict[str, Any] = {"cameras": None if run.full else ("Cl", "Cr"), "split": "train"}
-    return ContainerDataset("damage", config, run.seed, plan.size, plan.images, **options)
+    cameras = None if run.full else ("Cl", "Cr")
+    return ContainerDataset(
+        "damage",
+        config,
+        run.seed,
+        plan.images,
+        render=RenderSettings(plan.size),
+        scenes=SceneSettings(cameras, split="train"),
+    )
 
 
 def test_data(run: Run) -> Kept:
     """Return the preset's images of test scenes, from the same cameras as the training images."""
     plan = run.plan
-    options: dict[str, Any] = {"length": plan.test_images, "split": "test", "fixed": True}
-    options["cameras"] = None if run.full else ("Cl", "Cr")
-    data = ContainerDataset("damage", seed=run.seed, size=plan.size, **options)
+    cameras = None if run.full else ("Cl", "Cr")
+    data = ContainerDataset(
+        "damage",
+        seed=run.seed,
+        length=plan.test_images,
+        render=RenderSettings(plan.size),
+        scenes=SceneSettings(cameras, split="test", fixed=True),
+    )
     return rendered(data, run.cache)
 
 

@@ -7,6 +7,7 @@ Needs fastgen[examples]. --full trains ResNet-50 on a GPU while workers render.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -17,7 +18,7 @@ from torch.nn import functional
 from transformers import ResNetConfig, ResNetForImageClassification
 
 from fastgen import Config
-from fastgen.torch import ContainerDataset, class_names
+from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings, class_names
 
 PLANS = {
     "cpu": Plan(images=1200, test_images=400, size=(192, 192), batch=16, passes=6, rate=2e-3),
@@ -89,7 +90,10 @@ performs at chance level there.
 def training_data(run: Run) -> tuple[ContainerDataset, list[ContainerDataset]]:
     """Return the preset's images of Cl and Cr, and the distant ones that the CPU version adds."""
     plan = run.plan
-    options: dict[str, Any] = {"size": plan.size, "split": "train"}
+    options: dict[str, Any] = {
+        "render": RenderSettings(plan.size),
+        "scenes": SceneSettings(split="train"),
+    }
     near = ContainerDataset("door", seed=run.seed, length=plan.images, **options)
     if run.full:
         return near, []
@@ -103,10 +107,15 @@ def test_data(run: Run) -> tuple[Kept, Kept]:
     """Return images of Cl and Cr with their labels, and as many of A and B with meaningless
     targets."""
     plan = run.plan
-    options: dict[str, Any] = {"seed": run.seed, "size": plan.size, "length": plan.test_images}
-    ends = ContainerDataset("door", split="test", fixed=True, **options)
+    scenes = SceneSettings(split="test", fixed=True)
+    options: dict[str, Any] = {
+        "seed": run.seed,
+        "length": plan.test_images,
+        "render": RenderSettings(plan.size),
+    }
+    ends = ContainerDataset("door", scenes=scenes, **options)
     # the door task has no cameras A and B
-    sides = ContainerDataset("imdg", cameras=("A", "B"), split="test", fixed=True, **options)
+    sides = ContainerDataset("imdg", scenes=replace(scenes, cameras=("A", "B")), **options)
     return rendered(ends, run.cache), rendered(sides, run.cache)
 
 

@@ -9,7 +9,6 @@ cameras at 640x640 on a GPU while workers render.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from common import charts, drawing
@@ -21,7 +20,7 @@ from common.run import Plan, Run, Table, conclude, feed_of, parameters, start, t
 
 from fastgen import Config
 from fastgen.classes import DETECTION_CLASSES
-from fastgen.torch import ContainerDataset
+from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings
 
 PLANS = {
     "cpu": Plan(images=4000, test_images=500, size=(320, 320), batch=4, passes=4, rate=1.5e-3),
@@ -42,8 +41,15 @@ def training_data(run: Run) -> ContainerDataset:
     """Return the preset's images of all cameras; on a CPU, images of the ends with many markers."""
     plan = run.plan
     config = Config.preset() if run.full else Config.from_values(MANY_MARKERS)
-    options: dict[str, Any] = {"cameras": None if run.full else ("Cl", "Cr"), "split": "train"}
-    return ContainerDataset("imdg", config, run.seed, plan.size, plan.images, **options)
+    cameras = None if run.full else ("Cl", "Cr")
+    return ContainerDataset(
+        "imdg",
+        config,
+        run.seed,
+        plan.images,
+        render=RenderSettings(plan.size),
+        scenes=SceneSettings(cameras, split="train"),
+    )
 
 
 def test_data(run: Run) -> Kept:
@@ -53,11 +59,9 @@ def test_data(run: Run) -> Kept:
     data = ContainerDataset(
         "imdg",
         seed=run.seed,
-        size=plan.size,
         length=plan.test_images,
-        cameras=cameras,
-        split="test",
-        fixed=True,
+        render=RenderSettings(plan.size),
+        scenes=SceneSettings(cameras, split="test", fixed=True),
     )
     return rendered(data, run.cache)
 

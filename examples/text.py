@@ -8,7 +8,7 @@ first, and whole identifiers after that. Needs fastgen[examples]. --full trains 
 GPU while workers render.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from torch.utils.data import Dataset
 
 from fastgen.decals.iso6346 import check_digit
 from fastgen.errors import ConfigError
-from fastgen.torch import ContainerDataset
+from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 PLANS = {
     "cpu": Plan(images=800, test_images=200, size=(640, 640), batch=16, passes=16, rate=4e-3),
@@ -195,7 +195,9 @@ def strips_of(crops: Any, target: dict[str, Any]) -> tuple[list[torch.Tensor], d
     return [strip(crop) for crop in crops], target
 
 
-def data_of(run: Run, split: str) -> list[ContainerDataset]:
+def data_of(
+    run: Run, split: str, transforms: Callable[..., Any] | None = None
+) -> list[ContainerDataset]:
     """Return datasets of end and side cameras, with a new container in each image.
 
     With --full, one dataset covers all cameras.
@@ -203,12 +205,16 @@ def data_of(run: Run, split: str) -> list[ContainerDataset]:
     plan = run.plan
     training = split == "train"
     length = plan.images if training else plan.test_images
-    options: dict[str, Any] = {"seed": run.seed, "split": split, "all_views": False}
-    options |= {"fixed": not training, "length": length}
+    items = ItemSettings(transforms=transforms)
+
+    def data(size: tuple[int, int], cameras: tuple[str, ...] | None = None) -> ContainerDataset:
+        scenes = SceneSettings(cameras, split, fixed=not training, all_views=False)
+        render = RenderSettings(size)
+        return ContainerDataset("text", None, run.seed, length, render, scenes, items)
+
     if plan.workers:
-        return [ContainerDataset("text", size=plan.size, **options)]
-    ends = ContainerDataset("text", size=plan.size, cameras=("Cl", "Cr"), **options)
-    return [ends, ContainerDataset("text", size=SIDES_SIZE, cameras=("A", "B"), **options)]
+        return [data(plan.size)]
+    return [data(plan.size, ("Cl", "Cr")), data(SIDES_SIZE, ("A", "B"))]
 
 
 def kept(run: Run, split: str) -> Kept:
@@ -225,8 +231,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     plan = run.plan
     source: Any
     if plan.workers:
-        source = data_of(run, "train")[0]
-        source.transforms = strips_of
+        source = data_of(run, "train", strips_of)[0]
         crops = kept(replace(run, plan=replace(plan, images=LETTERS.images)), "train")
     else:
         crops = kept(run, "train")

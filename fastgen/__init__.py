@@ -1,28 +1,106 @@
 """fastgen: exactly labelled synthetic images of shipping containers, rasterized fast."""
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fastgen.config.config import Config
-    from fastgen.errors import FastgenError
+    from fastgen.config.config import Config, LabelConfig
+    from fastgen.dataset.generate import generate
+    from fastgen.dataset.job import Job
+    from fastgen.errors import AssetError, ConfigError, ContextError, FastgenError, OutputError
+    from fastgen.export import export_glb
+    from fastgen.frame import Frame
     from fastgen.generator import Generator
+    from fastgen.render.settings import RenderSettings
+    from fastgen.sample import Object, Sample
+    from fastgen.scene import (
+        Ageing,
+        Camera,
+        Container,
+        Damage,
+        Decal,
+        Defocus,
+        Dirt,
+        EnvironmentView,
+        Lens,
+        Noise,
+        Paint,
+        Rain,
+        Rust,
+        Scene,
+        Scratches,
+        Sensor,
+        Spreader,
+        Stamp,
+        Surface,
+        Wear,
+        Weather,
+    )
 
-__all__ = ["Config", "FastgenError", "Generator"]
+__all__ = [
+    "Ageing",
+    "AssetError",
+    "Camera",
+    "Config",
+    "ConfigError",
+    "Container",
+    "ContextError",
+    "Damage",
+    "Decal",
+    "Defocus",
+    "Dirt",
+    "EnvironmentView",
+    "FastgenError",
+    "Frame",
+    "Generator",
+    "Job",
+    "LabelConfig",
+    "Lens",
+    "Noise",
+    "Object",
+    "OutputError",
+    "Paint",
+    "Rain",
+    "RenderSettings",
+    "Rust",
+    "Sample",
+    "Scene",
+    "Scratches",
+    "Sensor",
+    "Spreader",
+    "Stamp",
+    "Surface",
+    "Wear",
+    "Weather",
+    "export_glb",
+    "generate",
+]
 __version__ = "0.23.0"
 
-_HOMES = {"Config": "config", "FastgenError": "errors", "Generator": "generator"}
+_HOMES = {
+    "Config": "config.config",
+    "Frame": "frame",
+    "Generator": "generator",
+    "Job": "dataset.job",
+    "LabelConfig": "config.config",
+    "Object": "sample",
+    "RenderSettings": "render.settings",
+    "Sample": "sample",
+    "export_glb": "export",
+    "generate": "dataset.generate",
+}
+"""Modules of public names; the other names are errors and parts of a scene."""
 
 
 def __getattr__(name: str) -> Any:
-    """The public names, imported when they are first asked for (PEP 562).
+    """Import a public name at its first use (PEP 562).
 
-    The command has to hear Ctrl-C before numpy, OpenCV and SciPy load, which takes a second.
+    Importing NumPy, OpenCV and SciPy takes a second, in which the command must react to Ctrl-C.
     """
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module 'fastgen' has no attribute {name!r}")
-    from importlib import import_module
-
-    value = globals()[name] = getattr(import_module(f"fastgen.{_HOMES[name]}"), name)
+    module = _HOMES.get(name, "errors" if name.endswith("Error") else "scene")
+    value = globals()[name] = getattr(import_module(f"fastgen.{module}"), name)
     return value
 
 

@@ -6,7 +6,7 @@ from fastgen.cli.stopping import ended_at_once
 
 
 def main() -> int:
-    """Run the command line; returns its exit code, see `fastgen.cli.main.main`."""
+    """Run the command line and return its exit code; see `fastgen.cli.main.main`."""
     with ended_at_once():
         from fastgen.cli.main import main as run
     return run()

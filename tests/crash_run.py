@@ -19,8 +19,10 @@ import simplejpeg
 
 from fastgen.config.config import Config
 from fastgen.dataset.generate import generate, run_here
-from fastgen.dataset.shards import Job, Maker, stem_of
+from fastgen.dataset.job import Job, stem_of
+from fastgen.dataset.shards import Maker
 from fastgen.dataset.storage import storage_of
+from fastgen.render.settings import RenderSettings
 from fastgen.sampling.scene import split_of
 
 FAULTY_SCENE = 5
@@ -58,7 +60,7 @@ class QuickMaker(Maker):
 def make(out, scenes, workers, hang_s=60.0, then=lambda: None):
     """Run the job and return the content of dataset.json. `then` is called after the last shard."""
     config = Config.preset()
-    job = Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
+    job = Job(str(out), scenes, config, 1, ("A",), RenderSettings((64, 64)), shard_scenes=2)
     run = run_here(workers, hang_s, QuickMaker)
 
     def runner(*arguments):

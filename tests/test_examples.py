@@ -19,7 +19,7 @@ from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from pycocotools import mask as coco_mask
 
-from fastgen.torch import ContainerDataset
+from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("container", "axis", "dented")
@@ -234,7 +234,7 @@ def test_slenderness_of_a_tilted_bar_is_its_length_over_its_width():
 
 def test_cached_items_equal_those_of_the_dataset_and_are_read_back(tmp_path):
     config = damage.Config.from_values(damage.MANY_DAMAGES)
-    data = ContainerDataset("damage", config, seed=2, size=(96, 64), length=4)
+    data = ContainerDataset("damage", config, seed=2, length=4, render=RenderSettings((96, 64)))
     first, again = rendered(data, tmp_path), rendered(data, tmp_path)
     assert len(list(tmp_path.iterdir())) == 1
     for i in range(4):
@@ -260,8 +260,13 @@ def test_order_of_batches_depends_on_seed_and_pass():
 
 
 def test_workers_render_new_strips_for_every_pass():
-    options = {"size": (640, 640), "length": 4, "cameras": ("Cr",), "all_views": False}
-    data = ContainerDataset("text", seed=1, transforms=text.strips_of, **options)
+    data = ContainerDataset(
+        "text",
+        seed=1,
+        length=4,
+        scenes=SceneSettings(cameras=("Cr",), all_views=False),
+        items=ItemSettings(transforms=text.strips_of),
+    )
     feed = Feed(data, 4, seed=1, workers=1)
     passes = [[batch for batch in feed.passed(number)] for number in (0, 1)]
     for images, texts in passes[0] + passes[1]:

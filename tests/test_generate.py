@@ -18,16 +18,18 @@ import yaml
 
 from fastgen.cli.main import main
 from fastgen.config.config import Config
-from fastgen.dataset import shards
 from fastgen.dataset.generate import generate
-from fastgen.dataset.shards import Job, Maker
+from fastgen.dataset.job import Job, manifest_path, shard_of
+from fastgen.dataset.shards import Maker
 from fastgen.dataset.storage import storage_of
 from fastgen.generator import Generator
+from fastgen.render.settings import RenderSettings
 from fastgen.sampling.scene import split_of
 from fastgen.scene import Scene
 from tests.backends import needs_osmesa
 from tests.folders import content
 
+SMALL = RenderSettings((64, 64))
 ARGUMENTS = ["--images", "14", "--size", "96x80", "--seed", "3"]
 
 
@@ -176,14 +178,14 @@ def test_a_stray_file_is_not_taken_for_a_shard(dataset, tmp_path):
     assert run(out) == 0
     assert (out / "shards/notes.txt").read_text() == "mine"
     for number in (0, 7, 999_999, 1_000_000):
-        assert shards.shard_of(shards.manifest_path(number)) == number
+        assert shard_of(manifest_path(number)) == number
     for astray in (
         "shards/notes.txt",
         "shards/7.json",
         "shards/0000007.json",
         "images/000007.json",
     ):
-        assert shards.shard_of(astray) is None
+        assert shard_of(astray) is None
 
 
 def test_more_images_extend_a_dataset(dataset, tmp_path):
@@ -259,8 +261,8 @@ def test_a_scene_that_always_fails_is_reported_and_the_rest_is_made(tmp_path, ca
         for task in tasks:
             maker(task)
 
-    monkeypatch.setattr(shards, "Generator", Broken)
-    job = Job(str(tmp_path / "out"), 6, Config.preset(), 0, (64, 64), ("A", "Cr"), None, "auto")
+    monkeypatch.setattr("fastgen.dataset.job.Generator", Broken)
+    job = Job(str(tmp_path / "out"), 6, cameras=("A", "Cr"), render=SMALL)
     made = generate(job, 1, runner=run_inside)
     assert asked.count(1) == 3
     (failed,) = made["failed"]
@@ -286,8 +288,8 @@ def test_a_run_whose_scenes_all_fail_still_ends_normally(tmp_path, monkeypatch):
         for task in tasks:
             maker(task)
 
-    monkeypatch.setattr(shards, "Generator", Broken)
-    job = Job(str(tmp_path / "out"), 2, Config.preset(), 0, (64, 64), ("A",), None, "auto")
+    monkeypatch.setattr("fastgen.dataset.job.Generator", Broken)
+    job = Job(str(tmp_path / "out"), 2, cameras=("A",), render=SMALL)
     made = generate(job, 1, runner=run_inside)
     assert [each["scene"] for each in made["failed"]] == [0, 1]
     assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
@@ -302,7 +304,7 @@ def test_a_large_run_does_not_list_all_its_shards_in_advance(tmp_path):
         raise Stopped
 
     def peak(images, name):
-        job = Job(str(tmp_path / name), images, Config.preset(), 0, (64, 64), ("A",), None, "auto")
+        job = Job(str(tmp_path / name), images, cameras=("A",), render=SMALL)
         tracemalloc.start()
         with pytest.raises(Stopped):
             generate(job, 1, runner=first)
@@ -319,7 +321,7 @@ def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):
     shutil.copytree(dataset, out)
     with storage_of(out).locked():
         assert run(out) == 2
-    assert "another run works on this folder" in capsys.readouterr().err
+    assert "another run uses this folder" in capsys.readouterr().err
     assert run(out) == 0
 
 

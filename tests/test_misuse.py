@@ -16,6 +16,7 @@ from fastgen.classes import SEGMENTATION_CLASSES
 from fastgen.cli.main import main
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.errors import OutputError
+from fastgen.formats import SEAFRONT, formats_of
 from fastgen.light.hdri import bundled_hdris
 from tests.folders import content
 
@@ -51,7 +52,7 @@ def test_repair_restores_damage_that_resuming_cannot_see(dataset, copy, capsys, 
     broken = name.startswith(("images", "scenes"))
     capsys.readouterr()
     assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
-    assert ("mended: " in capsys.readouterr().out) == broken
+    assert ("repaired: " in capsys.readouterr().out) == broken
     assert content(copy) == content(dataset)
 
 
@@ -137,16 +138,16 @@ def test_resuming_with_a_folder_of_the_shipped_hdris_is_refused(copy, tmp_path, 
     assert main([*command, "--hdri", str(tmp_path / "hdri")]) == 2
     error = capsys.readouterr().err
     assert re.search(r"made with other settings \(environments\.\w+\.weight was ", error)
-    assert "repeat them by --hdri to resume" in error
+    assert "to resume, repeat the old --hdri," in error
 
 
 @pytest.mark.parametrize("line", ["-1 0.1 0.1 0.2 0.2 0.1 0.2", "1 nan 0.1 0.2 0.2 0.1 0.2", "9 x"])
 def test_labels_that_the_contact_sheet_cannot_read_are_reported(copy, line):
     images = [(path.parent.name, path.stem) for path in copy.glob("images/*/*.jpg")]
-    contact_sheet(copy, images)
+    contact_sheet(copy, images, formats_of(SEAFRONT))
     next(copy.glob("damage/yolo/*/*.txt")).write_text(line)
-    with pytest.raises(OutputError, match=f"its labels are damaged; run fastgen verify {copy} --r"):
-        contact_sheet(copy, images)
+    with pytest.raises(OutputError, match=f"label files is damaged; run fastgen verify {copy} --r"):
+        contact_sheet(copy, images, formats_of(SEAFRONT))
 
 
 def test_a_damaged_image_of_the_contact_sheet_is_named(copy, capsys):
@@ -154,7 +155,7 @@ def test_a_damaged_image_of_the_contact_sheet_is_named(copy, capsys):
         path.write_bytes(bytes(path.stat().st_size))
     assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 2
     error = capsys.readouterr().err
-    assert "_A.jpg: it or its labels are damaged; run fastgen verify" in error
+    assert "_A.jpg: the image or one of its label files is damaged; run fastgen verify" in error
 
 
 def test_changed_settings_are_reported_with_both_values(copy, tmp_path, capsys):
@@ -176,12 +177,12 @@ def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
     more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "2", "--split", "val"]
     assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
     error = capsys.readouterr().err
-    told = error.partition("(")[2].partition("); repeat them by ")
+    told = error.partition("(")[2].partition("); to resume, repeat the old ")
     assert [each.split(" was ")[0] for each in told[0].split("; ")] == [
         *("formats", "seed", "size", "quality"),
         "and 4 more",  # shard_scenes, config.split.test, .train, .val
     ]
-    options = "--also, --seed, --size, --quality, --shard, --split, --config to resume,"
+    options = "--also, --seed, --size, --quality, --shard, --split, --config, or give"
     assert told[2].startswith(options)
 
 
@@ -198,7 +199,7 @@ def test_other_hdris_are_reported_with_their_option(copy, tmp_path, capsys):
     assert main(["generate", str(copy), *ARGUMENTS, "--hdri", str(tmp_path / "lights")]) == 2
     error = capsys.readouterr().err
     assert "environments.city was {'sha256'" in error
-    assert " more); repeat them by --hdri to resume" in error
+    assert " more); to resume, repeat the old --hdri," in error
 
 
 def test_reordered_formats_resume_and_other_formats_are_listed_in_full(tmp_path, capsys):

@@ -17,9 +17,10 @@ from ray.cluster_utils import Cluster
 from fastgen.cli.main import main
 from fastgen.config.config import Config
 from fastgen.dataset.generate import generate, run_here
+from fastgen.dataset.job import Job
 from fastgen.dataset.on_ray import run_on_ray
-from fastgen.dataset.shards import Job
 from fastgen.errors import OutputError
+from fastgen.render.settings import RenderSettings
 from tests.crash_run import FAULTY_SCENE, QuickMaker
 from tests.folders import content
 
@@ -68,7 +69,7 @@ class BrokenMaker(QuickMaker):
 
 def job_at(out, scenes):
     config = Config.preset()
-    return Job(str(out), scenes, config, 1, (64, 64), ("A",), None, "auto", shard_scenes=2)
+    return Job(str(out), scenes, config, 1, ("A",), RenderSettings((64, 64)), shard_scenes=2)
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from fastgen.config.config import Config
 from fastgen.dataset import storage
-from fastgen.dataset.shards import Job, Task
+from fastgen.dataset.job import Job, Task
 from fastgen.dataset.storage import Folder, storage_of
 from fastgen.dataset.workers import run
 from fastgen.errors import OutputError
@@ -45,9 +44,7 @@ def is_sound(out):
 
 def test_each_scene_and_each_image_is_reported_once(tmp_path):
     heard = []
-    job = Job(
-        str(tmp_path), 99, Config.preset(), 1, (64, 64), ("A", "B"), None, "auto", shard_scenes=3
-    )
+    job = Job(str(tmp_path), 99, seed=1, cameras=("A", "B"), shard_scenes=3)
     maker = QuickMaker(job, False, lambda *report: heard.append(report))
     maker(Task(0, {1: "given up"}))
     assert [value for kind, value in heard if kind == "at"] == [0, 2]

@@ -15,11 +15,19 @@ from torch.utils.data import DataLoader
 
 from fastgen import Config, Generator
 from fastgen.sampling.scene import split_of
-from fastgen.torch import ContainerDataset, ContainerStream, Loader, ShardSampler, collate_lists
+from fastgen.torch import (
+    ContainerDataset,
+    ContainerStream,
+    Loader,
+    RenderSettings,
+    SceneSettings,
+    ShardSampler,
+    collate_lists,
+)
 from fastgen.torch.plan import EPOCH_SCENES, positions
 
 ROOT = Path(__file__).parent.parent
-SMALL = (64, 64)
+SMALL = RenderSettings((64, 64))
 PERSISTENT = {"num_workers": 2, "persistent_workers": True, "multiprocessing_context": "fork"}
 
 
@@ -54,12 +62,14 @@ def seen(loader):
     return [position for batch in loader for position in batch[1]]
 
 
-def dataset(length=23, **options):
-    return ContainerDataset("imdg", seed=4, size=SMALL, length=length, **options)
+def dataset(length=23, **scenes):
+    return ContainerDataset(
+        "imdg", seed=4, length=length, render=SMALL, scenes=SceneSettings(**scenes)
+    )
 
 
 def stream(length=23, **options):
-    return ContainerStream("imdg", seed=4, size=SMALL, length=length, **options)
+    return ContainerStream(dataset(length), **options)
 
 
 @pytest.mark.parametrize("stop", [1, 2, 5, 24, 37])
@@ -175,13 +185,13 @@ def test_persistent_workers_see_the_epoch_and_the_position(make):
 
 @pytest.mark.usefixtures("bare")
 def test_an_endless_stream_continues_and_resumes():
-    loader = Loader(stream(length=None), batch_size=5, num_workers=2)
+    loader = Loader(stream(endless=True), batch_size=5, num_workers=2)
     batches = iter(loader)
     assert [p for _ in range(9) for p in next(batches)[1]] == list(range(45))
     assert loader.state_dict()["position"] == 45
     with pytest.raises(TypeError, match="no end"):
         len(loader)
-    again = Loader(stream(length=None), batch_size=5)
+    again = Loader(stream(endless=True), batch_size=5)
     again.load_state_dict(loader.state_dict())
     assert next(iter(again))[1] == [45, 46, 47, 48, 49]
 
@@ -253,10 +263,12 @@ def test_one_view_per_scene_takes_the_cameras_in_turn():
 def test_a_curriculum_sets_the_chance_of_damage_by_epoch():
     data = ContainerDataset(
         "damage",
-        size=SMALL,
         length=4,
-        all_views=False,
-        curriculum=lambda epoch: {"damage": {"probability": float(epoch > 0)}},
+        render=SMALL,
+        scenes=SceneSettings(
+            all_views=False,
+            curriculum=lambda epoch: {"damage": {"probability": float(epoch > 0)}},
+        ),
     )
     assert not any(data.sample(p).scene.damages for p in range(4))
     data.set_epoch(1)
@@ -267,10 +279,12 @@ def test_a_curriculum_sets_the_chance_of_damage_by_epoch():
 def test_a_curriculum_sets_the_label_thresholds_by_epoch():
     data = ContainerDataset(
         "imdg",
-        size=SMALL,
         length=4,
-        fixed=True,
-        curriculum=lambda epoch: {"labels": {"min_visible_px": 10**6 if epoch else 1}},
+        render=SMALL,
+        scenes=SceneSettings(
+            fixed=True,
+            curriculum=lambda epoch: {"labels": {"min_visible_px": 10**6 if epoch else 1}},
+        ),
     )
     counts = [[len(data.item(p, epoch)[1]["labels"]) for p in range(4)] for epoch in (0, 1)]
     assert min(counts[0]) > 0
@@ -281,7 +295,7 @@ def test_a_curriculum_sets_the_label_thresholds_by_epoch():
 @pytest.fixture(scope="module")
 def renders():
     """Images [3, H, W] of the first six positions, rendered by a Generator in this process."""
-    with Generator(seed=4, size=SMALL) as generator:
+    with Generator.of(None, 4, SMALL) as generator:
         cameras = list(generator.config.cameras)
         images = [generator.render(index=p // 4, camera=cameras[p % 4]).image for p in range(6)]
     return [image.transpose(2, 0, 1) for image in images]
@@ -302,7 +316,7 @@ def test_images_equal_plain_renders_after_gl_was_opened_here(renders, context, w
 
 
 def test_threads_have_contexts_of_their_own(renders):
-    data = dataset(length=6, split=None)
+    data = dataset(length=6)
 
     def in_thread(positions):
         images = [data[p][0].numpy() for p in positions]
@@ -330,6 +344,6 @@ def test_pinned_batches_keep_their_form(renders):
 
 
 def test_a_pickled_dataset_renders_the_same(renders):
-    data = pickle.loads(pickle.dumps(dataset(length=6, split=None)))
+    data = pickle.loads(pickle.dumps(dataset(length=6)))
     np.testing.assert_array_equal(data[1][0].numpy(), renders[1])
     data.close()

@@ -12,7 +12,9 @@ from fastgen.dataset.storage import Folder
 from fastgen.formats import SEAFRONT, Item, assemble, formats_of
 from fastgen.torch import (
     ContainerDataset,
+    ItemSettings,
     Loader,
+    RenderSettings,
     class_counts,
     class_names,
     class_weights,
@@ -22,9 +24,14 @@ from fastgen.torch import (
 SMALL = (64, 64)
 
 
-def view(task, position=0, size=(320, 320), **options):
+YOLO = ItemSettings(form="yolo")
+
+
+def view(task, position=0, size=(320, 320), config=None, **items):
     """Return a dataset's item and the Sample it was made from."""
-    data = ContainerDataset(task, seed=2, size=size, length=40, **options)
+    data = ContainerDataset(
+        task, config, seed=2, render=RenderSettings(size), items=ItemSettings(**items)
+    )
     made = data[position], data.sample(position)
     data.close()
     return made
@@ -92,7 +99,7 @@ def test_marker_targets_of_both_forms_equal_the_label_file(written):
 
 
 def test_yolo_batches_name_the_image_of_each_row():
-    data = ContainerDataset("imdg", seed=2, size=SMALL, length=40, form="yolo")
+    data = ContainerDataset("imdg", seed=2, render=RenderSettings(SMALL), items=YOLO)
     alone = [data[p][1] for p in range(3)]
     images, rows = next(iter(Loader(data, batch_size=3)))
     data.close()
@@ -103,7 +110,7 @@ def test_yolo_batches_name_the_image_of_each_row():
 
 def test_text_crops_and_strings_equal_the_files(written):
     lines = sorted((written / "text/train").glob("*.png"), key=lambda p: int(p.stem.split("_")[2]))
-    data = ContainerDataset("text", seed=2, size=(640, 640), length=40)
+    data = ContainerDataset("text", seed=2)
     position = 7
     crops, texts = data.collate([data[position]])
     sample = data.sample(position)
@@ -117,7 +124,7 @@ def test_text_crops_and_strings_equal_the_files(written):
 
 def test_door_labels_equal_those_of_an_image_folder(written):
     folders = sorted(p.name for p in (written / "door/train").iterdir())
-    data = ContainerDataset("door", seed=2, size=SMALL, length=4)
+    data = ContainerDataset("door", seed=2, render=RenderSettings(SMALL))
     labels = {data.locate(p)[1]: data[p][1] for p in range(4)}
     images, batch = data.collate([data[0], data[1]])
     data.close()
@@ -140,7 +147,7 @@ def test_transforms_get_image_and_target_and_floats_lie_in_0_to_1():
 
 
 def test_counts_without_gl_are_close_to_rendered_labels():
-    data = ContainerDataset("imdg", seed=6, length=24, form="yolo")
+    data = ContainerDataset("imdg", seed=6, items=YOLO)
     rendered = np.zeros(len(DETECTION_CLASSES))
     for position in range(24):
         np.add.at(rendered, data[position][1][:, 0].long().numpy(), 1)
@@ -153,7 +160,7 @@ def test_counts_without_gl_are_close_to_rendered_labels():
 
 def test_damage_counts_without_gl_are_close_to_rendered_masks():
     config = Config.from_values({"damage": {"probability": 1.0}})
-    data = ContainerDataset("damage", config, seed=6, size=(320, 320), length=80, form="yolo")
+    data = ContainerDataset("damage", config, seed=6, render=RenderSettings((320, 320)), items=YOLO)
     rendered = np.zeros(len(SEGMENTATION_CLASSES))
     for position in range(80):
         np.add.at(rendered, data[position][1][:, 0].long().numpy(), 1)
@@ -172,6 +179,6 @@ def test_weights_balance_the_classes():
 
 def test_classes_that_never_occur_are_named():
     config = Config.from_values({"damage": {"kinds": ["dented"], "probability": 1.0}})
-    with pytest.warns(UserWarning, match="axis, concave, perforation did not come in 5 scenes"):
+    with pytest.warns(UserWarning, match="axis, concave, perforation have no label in 5 scenes"):
         weights = class_weights("damage", config, scenes=5)
     assert torch.isfinite(weights).all()

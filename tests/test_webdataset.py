@@ -155,7 +155,7 @@ def test_a_store_without_credentials_gives_one_line(bucket, monkeypatch, capsys,
 
 def test_storage_in_process_memory_is_refused(capsys):
     assert main(["generate", "memory://made", *ARGUMENTS]) == 2
-    assert "memory://made: is the memory of this process" in capsys.readouterr().err
+    assert "memory://made: is memory of this process" in capsys.readouterr().err
 
 
 def test_stats_of_tar_files_equal_those_of_a_folder(out, tmp_path, capsys):

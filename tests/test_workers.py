@@ -9,10 +9,10 @@ from functools import partial
 
 import pytest
 
-from fastgen.config.config import Config
 from fastgen.dataset import workers
 from fastgen.dataset.generate import generate, run_here
-from fastgen.dataset.shards import Job
+from fastgen.dataset.job import Job
+from fastgen.render.settings import RenderSettings
 from tests.crash_run import QuickMaker
 
 
@@ -73,9 +73,13 @@ def threads_of_a_worker(whole_machine):
         raise AssertionError(ended)
 
     workers.run(
-        TellsItsThreads, (), [1], 1, lambda _, value: heard.append(value), on_death,
+        TellsItsThreads,
+        [1],
+        1,
+        lambda _, value: heard.append(value),
+        on_death,
         whole_machine=whole_machine,
-    )  # fmt: skip
+    )
     return heard[0]
 
 
@@ -107,7 +111,7 @@ def test_a_slow_start_that_reports_busy_is_no_hang(speaks):
         raise KeyboardInterrupt
 
     with contextlib.suppress(KeyboardInterrupt):
-        workers.run(StartsSlowly, (speaks,), [1], 1, lambda *_: None, on_death, hang_s=3.0)
+        workers.run(partial(StartsSlowly, speaks), [1], 1, lambda *_: None, on_death, hang_s=3.0)
     assert ends == ([] if speaks else ["no sign of life for 3 s"])
 
 
@@ -122,7 +126,7 @@ def test_a_worker_that_dies_between_tasks_loses_none(tasks):
     def on_death(task, place, ended):
         raise AssertionError(f"{task} at {place}: {ended}")
 
-    workers.run(DiesAfterItsTask, ("setup",), tasks, 1, slow, on_death)
+    workers.run(partial(DiesAfterItsTask, "setup"), tasks, 1, slow, on_death)
     assert heard == tasks
 
 
@@ -141,7 +145,7 @@ def test_tasks_are_fetched_only_when_a_worker_is_free():
     def on_death(task, place, ended):
         raise AssertionError(ended)
 
-    workers.run(Reports, (), tasks(), 2, hear, on_death)
+    workers.run(Reports, tasks(), 2, hear, on_death)
     assert sorted(done) == list(range(20))
 
 
@@ -159,8 +163,8 @@ def test_a_task_put_back_comes_next_and_no_task_is_fetched_early():
 @pytest.mark.parametrize(
     ("scenes", "count", "words"),
     [  # two scenes per shard
-        (2, 2, "no more than 1 of 2 workers have something to do, with 2 scenes a shard; in an"),
-        (3, 4, "no more than 2 of 4 workers"),
+        (2, 2, "only 1 of 2 workers have work, because each shard has 2 scenes"),
+        (3, 4, "only 2 of 4 workers"),
         (1, 2, ""),  # a single scene cannot be shared
         (3, 2, ""),
         (5, 4, ""),  # one of four workers would make two scenes anyway
@@ -168,13 +172,13 @@ def test_a_task_put_back_comes_next_and_no_task_is_fetched_early():
 )
 def test_idle_workers_are_reported(tmp_path, monkeypatch, capsys, scenes, count, words):
     monkeypatch.setattr("fastgen.dataset.generate.run_here", partial(run_here, maker=QuickMaker))
-    size, out = (64, 64), str(tmp_path / "out")
-    job = Job(out, scenes, Config.preset(), 1, size, ("A",), None, "auto", shard_scenes=2)
+    small = RenderSettings((64, 64))
+    job = Job(str(tmp_path / "out"), scenes, cameras=("A",), render=small, shard_scenes=2)
     generate(job, count)
     said = [line for line in capsys.readouterr().err.splitlines() if "images" not in line]
     assert len(said) == bool(words)
     for line in said:
         assert line.startswith(f"fastgen: {words}")
-        assert line.endswith("in another folder, --shard 1 shares the work")
+        assert line.endswith("use --shard 1 in another folder to share it")
     generate(replace(job, images=scenes + 2), count)
-    assert "shares the work" not in capsys.readouterr().err  # existing shards keep their size
+    assert "workers have work" not in capsys.readouterr().err  # existing shards keep their size

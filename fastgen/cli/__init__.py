@@ -1,1 +1,1 @@
-"""The `fastgen` command: argument parsing and printing."""
+"""The `fastgen` command: parsing of arguments and printing of results."""

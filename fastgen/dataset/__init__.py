@@ -1,1 +1,1 @@
-"""What generate.py is made of, and what is asked of a finished dataset: shards, storage, verify."""
+"""Generation of datasets by many processes, their storage, verification, repair and statistics."""

@@ -1,4 +1,4 @@
-"""Standard output and error: closed, full, or without the letters that we have."""
+"""Output to standard output and error that may be closed, full, or limited to ASCII."""
 
 import contextlib
 import io
@@ -9,8 +9,11 @@ from fastgen.errors import OutputError
 
 
 def mend_streams() -> None:
-    """What is printed to a stream that was closed goes nowhere; escapes stand for letters that
-    standard output has not, as standard error has it by itself."""
+    """Make both streams safe to print to.
+
+    Text for a closed stream goes to /dev/null. Standard output escapes characters that its encoding
+    lacks, as standard error does by default.
+    """
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_WRONLY), "w"))
@@ -19,8 +22,11 @@ def mend_streams() -> None:
 
 
 def drop_unprinted() -> None:
-    """Forget what can be printed nowhere: the interpreter would try again as it ends, and Python
-    3.13 puts an exit code of its own in place of ours where it fails."""
+    """Discard text that cannot be written to its stream.
+
+    Otherwise the interpreter tries again when it exits, and Python 3.13 replaces our exit code if
+    that fails.
+    """
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -29,8 +35,12 @@ def drop_unprinted() -> None:
 
 
 def tell(words: str, end: str = "\n") -> None:
-    """Print to standard output, with all that waits there. Raises OutputError where it takes no
-    more, BrokenPipeError where whoever read it has gone."""
+    """Print to standard output and flush it.
+
+    Raises:
+        OutputError: The stream cannot be written, for example because a disk is full.
+        BrokenPipeError: The reader of a pipe has exited.
+    """
     try:
         print(words, end=end, flush=True)
     except BrokenPipeError:
@@ -40,6 +50,6 @@ def tell(words: str, end: str = "\n") -> None:
 
 
 def say(words: str) -> None:
-    """A line on standard error, or none where that is a log on a full disk."""
+    """Print a line to standard error, or nothing if it cannot be written."""
     with contextlib.suppress(OSError):
         print(words, file=sys.stderr)

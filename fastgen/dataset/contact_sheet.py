@@ -1,6 +1,5 @@
-"""A contact sheet of a dataset, with boxes and outlines as its label files on disk have them."""
+"""Contact sheet: small copies of a dataset's images with the labels from its files drawn on."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,19 +7,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.errors import OutputError
-from fastgen.formats.yolo import pixel_box, rows
-from fastgen.labels.overlay import draw_box, draw_outline
+from fastgen.formats import Format
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
 
-def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.uint8]:
-    """Up to 24 of `images`, (split, stem) each, of the dataset in folder `out`.
+def contact_sheet(
+    out: Path, images: Sequence[tuple[str, str]], formats: Sequence[Format]
+) -> NDArray[np.uint8]:
+    """Draw up to 24 images of a dataset, evenly spread, as one picture.
 
-    At least one; they are spread evenly. Returns one picture uint8 [H, W, 3]. Raises OutputError
-    that names a file which is not as it was written.
+    Args:
+        out: Folder of the dataset.
+        images: Split and stem of each image, at least one. All have the same size.
+        formats: Formats whose labels are drawn, the first one on top.
+
+    Returns:
+        uint8 RGB [H, W, 3].
+
+    Raises:
+        OutputError: A file cannot be read; the message names its image.
     """
     by_camera: dict[str, list[Path]] = {}
     for split, stem in sorted(images, key=lambda image: image[1]):
@@ -38,12 +45,13 @@ def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.ui
     tiles = []
     for image_path in chosen:
         try:
-            tiles.append(_tile(out, image_path))
+            tiles.append(_tile(out, image_path, formats))
         except (cv2.error, OSError, ValueError, IndexError):
             raise OutputError(
-                f"{image_path}: it or its labels are damaged; run fastgen verify {out} --repair"
+                f"{image_path}: the image or one of its label files is damaged; "
+                f"run fastgen verify {out} --repair"
             ) from None
-    height, width = tiles[0].shape[:2]  # of all: a dataset has one size
+    height, width = tiles[0].shape[:2]
     columns = min(count, _COLUMNS)
     sheet = np.full((-(-count // columns) * height, columns * width, 3), 32, np.uint8)
     for i, tile in enumerate(tiles):
@@ -52,27 +60,15 @@ def contact_sheet(out: Path, images: Sequence[tuple[str, str]]) -> NDArray[np.ui
     return sheet
 
 
-def _tile(out: Path, path: Path) -> NDArray[np.uint8]:
-    # not imread, which ends the process at a path that is not UTF-8
+def _tile(out: Path, path: Path, formats: Sequence[Format]) -> NDArray[np.uint8]:
+    # cv2.imread ends the process if the path is not UTF-8
     stored = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     if stored is None:
-        raise ValueError
+        raise ValueError("not an image")
     image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
     tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    name = f"{path.parent.name}/{path.stem}.txt"
-    for index, numbers in _labels(out / "imdg/labels" / name):
-        draw_box(tile, pixel_box(numbers, size), DETECTION_CLASSES[index])
-    for index, numbers in _labels(out / "damage/yolo" / name):
-        if index:  # the container has its box
-            draw_outline(tile, np.reshape(numbers, (-1, 2)) * size, SEGMENTATION_CLASSES[index])
+    for each in reversed(formats):
+        each.draw(tile, lambda name: (out / name).read_bytes(), f"{path.parent.name}/{path.stem}")
     return tile
-
-
-def _labels(path: Path) -> list[tuple[int, list[float]]]:
-    """As yolo.rows. Raises ValueError for what cannot be drawn."""
-    found = rows(path.read_text(encoding="utf-8"))
-    if any(index < 0 or not all(map(math.isfinite, numbers)) for index, numbers in found):
-        raise ValueError
-    return found

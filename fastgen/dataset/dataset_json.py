@@ -1,6 +1,6 @@
-"""dataset.json: what a dataset was made with, and once it is finished the hashes of all of it.
+"""dataset.json: the settings a dataset was made with and, once finished, the hashes of its files.
 
-Shards' manifests bear a hash of these settings too, so they can tell whose they are without it.
+Shard manifests hold a hash of the same settings, so their run is known without dataset.json.
 """
 
 import json
@@ -8,20 +8,20 @@ import reprlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from fastgen.dataset.job import Job, manifest_path, shard_of
 from fastgen.dataset.seal import is_sealed
-from fastgen.dataset.shards import Job, manifest_path, shard_of
-from fastgen.dataset.storage import Folder, Remote
+from fastgen.dataset.storage import Storage
 from fastgen.errors import OutputError
 
 MANIFEST = "dataset.json"
 
 _words = reprlib.Repr()
-_words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: what differs may be the last
+_words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: the last may be what differs
 
 _MISSING = object()
 
 _SHOWN = 4
-"""Of settings that differ, so many are told with their values."""
+"""Number of differing settings that an error message lists with their values."""
 
 _OPTIONS = {
     "format": ("--format",),
@@ -34,55 +34,61 @@ _OPTIONS = {
     "shard_scenes": ("--shard",),
     "config": ("--preset", "--config"),
 }
-"""Which options of `fastgen generate` a setting comes from."""
+"""Options of `fastgen generate` that determine each setting."""
 
 
 def unsealed(manifest: Mapping[str, Any]) -> bytes:
-    """dataset.json of a run that is not finished."""
+    """Return the text of a dataset.json whose run is not finished."""
     return json.dumps(manifest, indent=1).encode()
 
 
-def known(storage: Folder | Remote, job: Job, settings: Mapping[str, Any]) -> dict[str, Any] | None:
-    """What dataset.json says of a dataset that a job with `settings` goes on with; None where it
-    says nothing to go by, and the place is empty or its shards say that they are the job's.
+def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the dataset.json of a dataset that a job with these settings can continue.
 
-    Raises OutputError where the place holds something else, or was made otherwise.
+    Returns:
+        Its content, or None if the place is empty or only shard manifests show that it is the
+        job's.
+
+    Raises:
+        OutputError: The place holds something else, or a dataset with other settings.
     """
     try:
         text = storage.read(MANIFEST)
-        lack = f"{MANIFEST} is damaged"
+        problem = f"{MANIFEST} is damaged"
     except FileNotFoundError:
-        text, lack = b"", f"no {MANIFEST}"
-    told = told_by(text)
-    if told is not None and _same({key: told.get(key) for key in settings}, settings):
-        return told
-    if told is not None and "digest" in told:
-        raise OutputError(_otherwise(job, settings, told))
-    # neither a finished dataset's nor this job's: the shards know better than what may be edited
+        text, problem = b"", f"no {MANIFEST}"
+    found = parsed(text)
+    if found is not None and _same({key: found.get(key) for key in settings}, settings):
+        return found
+    if found is not None and "digest" in found:
+        raise OutputError(_differ_message(job, settings, found))
+    # an unfinished dataset.json can be edited unnoticed, so the shards' manifests decide
     manifests = (read_manifest(storage, number) for number in shard_numbers(storage))
     made_with = {manifest["settings"] for manifest in manifests if manifest is not None}
     if made_with == {job.settings_digest}:
         return None
-    if told is not None and told.keys() >= settings.keys():
-        raise OutputError(_otherwise(job, settings, told))
+    if found is not None and found.keys() >= settings.keys():
+        raise OutputError(_differ_message(job, settings, found))
     if made_with:
         raise OutputError(
-            f"{job.out}: {lack}, and its shards were made with other settings; "
-            "repeat them, --hdri too, to resume, or give another folder"
+            f"{job.out}: {problem}, and its shards were made with other settings; "
+            "repeat those, --hdri too, to resume, or give another folder"
         )
     if any(not name.startswith(".") for name in storage.names()):
-        raise OutputError(f"{job.out}: holds something else ({lack}); give an empty or new place")
+        raise OutputError(
+            f"{job.out}: holds something else ({problem}); give an empty or new place"
+        )
     return None
 
 
-def shard_numbers(storage: Folder | Remote) -> list[int]:
-    """Of the shards that have a manifest, damaged or not."""
+def shard_numbers(storage: Storage) -> list[int]:
+    """Return the numbers of all shards that have a manifest, even a damaged one."""
     numbers = (shard_of(f"shards/{name}") for name in storage.names("shards"))
     return sorted(number for number in numbers if number is not None)
 
 
-def read_manifest(storage: Folder | Remote, shard: int) -> dict[str, Any] | None:
-    """A shard's manifest, None where it is missing, not as it was written, or another shard's."""
+def read_manifest(storage: Storage, shard: int) -> dict[str, Any] | None:
+    """Return a shard's manifest, or None if it is missing, changed, or another shard's."""
     try:
         text = storage.read(manifest_path(shard))
     except FileNotFoundError:
@@ -91,40 +97,42 @@ def read_manifest(storage: Folder | Remote, shard: int) -> dict[str, Any] | None
     return manifest if manifest.get("shard") == shard else None
 
 
-def told_by(text: bytes) -> dict[str, Any] | None:
-    """What a dataset.json says, None where it is damaged. A finished one has a "digest"."""
+def parsed(text: bytes) -> dict[str, Any] | None:
+    """Return the content of a dataset.json, or None if it is damaged.
+
+    A finished dataset has the key "digest".
+    """
     try:
-        told = json.loads(text)
+        content = json.loads(text)
     except (ValueError, RecursionError):
         return None
-    whole = isinstance(told, dict) and ("digest" not in told or is_sealed(text))
-    return told if whole else None
+    intact = isinstance(content, dict) and ("digest" not in content or is_sealed(text))
+    return content if intact else None
 
 
-def without_manifest(storage: Folder | Remote, out: str) -> OutputError:
-    """What to say where `out` has no dataset.json that could be read."""
+def without_manifest(storage: Storage, out: str) -> OutputError:
+    """Return the error for a place without a readable dataset.json."""
     again, other = "run generate again with the same settings", "give a dataset's folder"
     what = again if shard_numbers(storage) else other
     return OutputError(f"{out}: no readable {MANIFEST}; {what}")
 
 
 def _same(old: Any, new: Any) -> bool:
-    """Whether two settings are the same in the same order, which decides what is drawn."""
+    """Compare settings, including the order of keys, which decides what sampling draws."""
     return json.dumps(old) == json.dumps(new)
 
 
-def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -> str:
-    """In words, what of a dataset differs from what the job asks for."""
-    old = {key: told.get(key, _MISSING) for key in settings}
+def _differ_message(job: Job, settings: Mapping[str, Any], found: Mapping[str, Any]) -> str:
+    old = {key: found.get(key, _MISSING) for key in settings}
     unlike = [each for key in settings for each in _differences(key, old[key], settings[key])]
     shown = [f"{name} was {before}, is now {now}" for name, before, now in unlike[:_SHOWN]]
     if len(unlike) > _SHOWN:
         shown.append(f"and {len(unlike) - _SHOWN} more")
-    if "version" in told and not _same(told["version"], settings["version"]):
-        how = f"install fastgen {told['version']} to resume"
+    if "version" in found and not _same(found["version"], settings["version"]):
+        how = f"install fastgen {found['version']} to resume"
     else:
         options = dict.fromkeys(each for name, *_ in unlike for each in _options(name))
-        how = f"repeat them by {', '.join(options)} to resume"
+        how = f"to resume, repeat the old {', '.join(options)}"
     return (
         f"{job.out}: was made with other settings ({'; '.join(shown)}); "
         f"{how}, or give another folder"
@@ -132,21 +140,21 @@ def _otherwise(job: Job, settings: Mapping[str, Any], told: Mapping[str, Any]) -
 
 
 def _options(name: str) -> tuple[str, ...]:
-    """The options that a setting may come from."""
+    """Return the options that determine a setting."""
     if name.startswith("config.split"):
         return "--split", "--config"
     return _OPTIONS.get(name.split(".")[0], ())
 
 
 def _differences(name: str, old: Any, new: Any) -> Iterator[tuple[str, str, str]]:
-    """Settings that differ, by their names, with both of their values."""
+    """Yield name, old and new value of each setting that differs."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in sorted(old.keys() | new.keys()):
             both = (each.get(key, _MISSING) for each in (old, new))
             yield from _differences(f"{name}.{key}", *both)
         if old.keys() != new.keys():
             return
-        old, new = list(old), list(new)  # whose order decides what is drawn
+        old, new = list(old), list(new)  # their order decides what sampling draws
     if old is _MISSING or new is _MISSING or not _same(old, new):
         before, now = ("missing" if each is _MISSING else _words.repr(each) for each in (old, new))
         yield name, before, now

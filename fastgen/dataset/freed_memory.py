@@ -1,7 +1,7 @@
-"""Memory that was freed but not returned to the system.
+"""Return of freed memory to the operating system.
 
-glibc keeps freed blocks that lie between others in use. Frames and label files differ in size, so
-over thousands of images such gaps spread over ever more pages, though no more is in use.
+glibc keeps freed blocks that lie between blocks in use. Frames and label files differ in size, so
+over thousands of images these gaps spread over more and more pages without more memory in use.
 """
 
 import ctypes
@@ -11,7 +11,9 @@ _malloc_trim: Callable[[int], int] | None = getattr(ctypes.CDLL(None), "malloc_t
 
 
 def return_freed_memory() -> None:
-    """Return whole free pages to the system: about 2 ms. Nothing where the C library, as musl's,
-    cannot (malloc_trim(3))."""
+    """Return free pages to the system, which takes about 2 ms; see malloc_trim(3).
+
+    C libraries without this function, such as musl, do nothing.
+    """
     if _malloc_trim is not None:
         _malloc_trim(0)

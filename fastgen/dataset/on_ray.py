@@ -1,8 +1,8 @@
-"""Shards made by actors of a Ray cluster, one a CPU; actors and nodes may die at any moment.
+"""Shards made by actors of a Ray cluster, one per CPU. Actors and nodes may die at any time.
 
-An actor tells the board, an actor beside the driver, which scene it turns to before it does, so
-that the scene which ended an actor is known after its death. Files go straight from the actors to
-job.out; Ray carries shard numbers and reports alone.
+Before an actor renders a scene it reports the scene's index to the board, an actor on the driver's
+node. So the scene that killed an actor is known. Actors write files directly to job.out; Ray
+transfers only shard numbers and reports.
 """
 
 import logging
@@ -18,19 +18,20 @@ from typing import Any
 import fastgen
 from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.generate import Runner
+from fastgen.dataset.job import Job, Task
 from fastgen.dataset.seal import digest
-from fastgen.dataset.shards import ATTEMPTS, Job, Maker, Strikes, Task
+from fastgen.dataset.shards import ATTEMPTS, Maker, Strikes
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.workers import HANG_S, Waiting, in_words
 from fastgen.errors import OutputError
 
 Reports = list[tuple[str, Any]]
-"""What a maker reports, in order: see shards.Report."""
+"""Reports of a maker in order; see shards.Report."""
 
 _POLL_S = 1.0
 _CONNECT_S = 10.0
 _STORE_BYTES = 80 * 2**20
-"""Ray's object store, which holds nothing of ours, at about the smallest that it takes."""
+"""Size of Ray's object store, which we do not use: about the smallest that Ray accepts."""
 
 
 def run_on_ray(
@@ -39,17 +40,20 @@ def run_on_ray(
     hang_s: float = HANG_S,
     maker: Callable[..., Callable[[Task], None]] = Maker,
 ) -> Runner:
-    """A runner on a Ray cluster.
+    """Return a runner that makes shards on a Ray cluster.
 
-    address: 'auto' or 'host:port' of a running cluster; None starts Ray on this machine, for as
-    long as the run takes. A process that has joined a cluster already stays with it.
-    count: how many actors at most; None for one on each CPU, also of nodes that come later.
-    hang_s: an actor that has said nothing for so long is replaced.
-    maker: called in the actor with the job, whether all cores are in use, and a report function.
+    Args:
+        address: 'auto' or 'host:port' of a running cluster. None starts Ray on this machine for the
+            duration of the run. A process that has already joined a cluster keeps using it.
+        count: Largest number of actors; None for one on each CPU, including nodes that join later.
+        hang_s: Seconds without a report after which an actor is replaced.
+        maker: Called in the actor with the job, whether all cores are in use, and a report
+            function.
 
-    Raises OutputError where Ray is not installed. The runner raises it where no cluster answers, a
-    node has another fastgen or does not see job.out, and with an actor's own words where it met an
-    error that no repetition mends.
+    Raises:
+        OutputError: Ray is not installed. The runner raises it if no cluster answers, if a node
+            has another fastgen or does not see job.out, and with an actor's own words if another
+            attempt cannot fix its error.
     """
     _ray()
 
@@ -61,7 +65,7 @@ def run_on_ray(
             try:
                 crew.work()
             except ray.exceptions.RayError as error:
-                words = "--ray: the cluster is lost; run the same command again to go on"
+                words = "--ray: lost the cluster; run the same command again to continue"
                 raise OutputError(f"{words} ({error})") from None
             finally:
                 crew.dismiss()
@@ -81,13 +85,13 @@ def _ray() -> Any:
 
 
 def _joined(address: str | None, count: int | None) -> bool:
-    """Be part of a cluster; whether it is for us to leave it."""
+    """Join a cluster. Return whether it must be left at the end of the run."""
     ray = _ray()
     if ray.is_initialized():
         return False
     options: dict[str, Any] = {"address": address}
     if address is None:
-        # 'local' never joins another's cluster by accident
+        # 'local' never joins a cluster that happens to run here
         options = {"address": "local", "num_cpus": count or len(os.sched_getaffinity(0))}
         options |= {"include_dashboard": False, "object_store_memory": _STORE_BYTES}
     elif address != "auto":
@@ -96,37 +100,35 @@ def _joined(address: str | None, count: int | None) -> bool:
     try:
         ray.init(logging_level=logging.WARNING, **options)
     except (ConnectionError, RuntimeError, ValueError) as error:
-        raise OutputError(f"--ray {address or ''}: no Ray cluster joined: {error}") from None
+        raise OutputError(f"--ray {address or ''}: cannot join a Ray cluster: {error}") from None
     finally:
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGTERM, at_sigterm)  # Ray's own would end us in its way
+            signal.signal(signal.SIGTERM, at_sigterm)  # Ray replaces our handler
     return True
 
 
 def _probe(address: str) -> None:
-    """Fail at once where nobody listens, as Ray tries for minutes and then ends the process."""
+    """Raise OutputError if nothing listens: Ray tries for minutes and then ends the process."""
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or "/" in host:
         raise OutputError(
-            f"--ray {address}: is no address; give auto, or HOST:PORT as in head:6379"
+            f"--ray {address}: is not an address; give auto, or HOST:PORT as in head:6379"
         )
     try:
         socket.create_connection((host.strip("[]"), int(port)), _CONNECT_S).close()
     except (OSError, OverflowError) as error:
-        raise OutputError(f"--ray {address}: nobody answers there ({error})") from None
+        raise OutputError(f"--ray {address}: nothing answers at this address ({error})") from None
 
 
 def _everywhere(job: Job) -> Job:
-    """The job with paths that mean the same in every working folder."""
-    return replace(
-        job,
-        out=job.out if "://" in job.out else os.path.abspath(job.out),
-        hdri_dir=job.hdri_dir and os.path.abspath(job.hdri_dir),
-    )
+    """Return the job with absolute paths, which mean the same in every working directory."""
+    out = job.out if "://" in job.out else os.path.abspath(job.out)
+    hdri_dir = job.render.hdri_dir and os.path.abspath(job.render.hdri_dir)
+    return replace(job, out=out, render=replace(job.render, hdri_dir=hdri_dir))
 
 
 class _Board:
-    """An actor that keeps what the others report until the driver takes it."""
+    """Actor that keeps the reports of the others until the driver takes them."""
 
     def __init__(self) -> None:
         self._news: list[tuple[int, Reports]] = []
@@ -140,14 +142,15 @@ class _Board:
 
 
 def _mark(job: Job) -> str:
-    """Of dataset.json, by which a node knows the place that the driver sees."""
+    """Hash dataset.json, so that a node can check that it sees the same folder as the driver."""
     return digest(storage_of(job.out).read(MANIFEST))
 
 
 class _Actor:
-    """Makes shards in a process of its own on some node; GL opens with the first shard.
+    """Actor that makes shards in its own process on some node. The first shard opens OpenGL.
 
-    Its methods return reports and, where no repetition mends it, what went wrong, or ''.
+    Its methods return reports, and a description of an error that another attempt cannot fix, or
+    ''.
     """
 
     def __init__(self, maker: Any, job: Job, board: Any, number: int) -> None:
@@ -157,9 +160,9 @@ class _Actor:
         self._scene: int | None = None
 
     def begin(self, version: str, claimed: str) -> tuple[Reports, str]:
-        """Whether this node has the driver's fastgen and sees its dataset.json, by their marks."""
+        """Check that this node has the driver's fastgen version and sees its dataset.json."""
         if fastgen.__version__ != version:
-            return [], self._here(f"has fastgen {fastgen.__version__}, the driver {version}")
+            return [], self._here(f"has fastgen {fastgen.__version__}, the driver has {version}")
         try:
             seen = _mark(self._job)
         except (OSError, OutputError, ValueError) as error:
@@ -175,7 +178,7 @@ class _Actor:
         failure = ""
         try:
             if self._work is None:
-                # one actor a CPU, so that no core is idle
+                # True: with one actor per CPU, no core is idle
                 self._work = self._maker(self._job, True, self._report)
             self._work(task)
         except Exception as error:
@@ -185,7 +188,7 @@ class _Actor:
         return reports, failure
 
     def _report(self, kind: str, value: Any) -> None:
-        """Pass on at once that it turns to a scene or is busy; the rest goes along."""
+        """Send reports to the board when a scene begins or preparation takes long."""
         self._reports.append((kind, value))
         if kind == "at":
             self._scene = value
@@ -199,7 +202,7 @@ class _Actor:
 
 @dataclass(eq=False)
 class _Member:
-    """An actor as the driver sees it. call: what it is asked for, None while idle."""
+    """An actor as the driver sees it. `call` is its pending call, None while idle."""
 
     number: int
     actor: Any
@@ -215,7 +218,7 @@ class _Member:
 
 
 class _Crew:
-    """The actors of one run and what is left to do."""
+    """The actors of one run and the tasks that are left."""
 
     def __init__(
         self,
@@ -235,14 +238,14 @@ class _Crew:
         self._members: dict[int, _Member] = {}
         self._hired = 0
         self._false_starts = 0
-        # beside the driver, so that it dies with no other node
+        # on the driver's node, so that the loss of another node does not end it
         here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
             ray.get_runtime_context().get_node_id(), soft=False
         )
         self._board = ray.remote(num_cpus=0)(_Board).options(scheduling_strategy=here).remote()
 
     def work(self) -> None:
-        """Have every task done. Raises OutputError; see run_on_ray."""
+        """Let the actors do every task. Raises OutputError; see run_on_ray."""
         ray = _ray()
         counted = float("-inf")
         while self._waiting or self._busy():
@@ -270,7 +273,7 @@ class _Crew:
         return [member for member in self._members.values() if member.task is not None]
 
     def _hire(self, cpus: int) -> None:
-        """Have an actor for each CPU, but no more than find work."""
+        """Start actors until there is one per CPU, but no more than there are tasks."""
         most = min(cpus, self._count or cpus)
         wanted = min(most, self._waiting.up_to(most) + len(self._busy()))
         renderer = _ray().remote(num_cpus=1)(_Actor)
@@ -281,9 +284,9 @@ class _Crew:
             self._members[self._hired] = _Member(self._hired, actor, call)
 
     def _hear(self, done: set[Any]) -> None:
-        """Take in reports, results and deaths. done: the calls that ended, one way or another."""
+        """Handle reports, results and deaths. `done` holds the calls that have ended."""
         ray = _ray()
-        # news of an actor that died has been here since before it died
+        # an actor waits until the board has its report, so these include those of dead actors
         for number, reports in ray.get(self._board.take.remote()):
             if number in self._members:
                 self._take_in(self._members[number], reports)
@@ -313,7 +316,7 @@ class _Crew:
     def _bury(self, member: _Member, error: Exception) -> None:
         if not member.ready:
             self._false_starts += 1
-            # a node that dies takes all its beginners along, so a few failures mean nothing
+            # the loss of one node ends all its starting actors, so a few failures are normal
             hopeless = self._false_starts > ATTEMPTS * len(self._members)
             if hopeless or getattr(error, "actor_init_failed", False):
                 version = fastgen.__version__

@@ -1,4 +1,4 @@
-"""A progress line: images a second and time left, on a terminal; now and then a line elsewhere."""
+"""Progress line with images per second and time left: live on a terminal, now and then in a log."""
 
 import os
 import sys
@@ -6,11 +6,18 @@ import time
 from typing import TextIO
 
 _BAR = 28
-_QUIET_S = 15.0
+_LOG_S = 15.0
+"""Seconds between two lines in a log."""
 
 
 class Progress:
-    """Counts images toward a total. stream: where to draw, by default standard error."""
+    """Counts images toward a total and shows the count.
+
+    Args:
+        total: Number of images when all is done.
+        done: Number of images that exist already.
+        stream: Where to write; by default standard error.
+    """
 
     def __init__(self, total: int, done: int = 0, stream: TextIO | None = None) -> None:
         self._total, self._done, self._first = total, done, done
@@ -20,15 +27,17 @@ class Progress:
 
     @property
     def made(self) -> int:
-        """Images counted since it began."""
+        """Images counted so far, without those that existed."""
         return self._done - self._first
 
     def add(self, images: int) -> None:
-        """Count `images` more and redraw when it is time. What a worker that died had done is made
-        again, and counts twice, but nothing beyond the total does."""
+        """Count `images` more, up to the total, and redraw when it is time.
+
+        Images of a worker that died are made again and count twice.
+        """
         self._done = min(self._done + images, self._total)
         now = time.monotonic()
-        if now - self._shown >= (0.1 if self._live else _QUIET_S):
+        if now - self._shown >= (0.1 if self._live else _LOG_S):
             self._shown = now
             self._draw()
 
@@ -55,5 +64,5 @@ class Progress:
             self._stream.flush()
         except BrokenPipeError:
             raise
-        except OSError:  # such as a log on a full disk: no reason to lose a run
+        except OSError:  # for example a log on a full disk, which must not end the run
             self._stream = open(os.devnull, "w")  # noqa: SIM115

@@ -1,66 +1,82 @@
-"""`fastgen verify --repair`: what is damaged or missing made again, and nothing else."""
+"""`fastgen verify --repair`: make damaged and missing files again, and nothing else."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from fastgen.config.config import Config
 from fastgen.dataset.dataset_json import MANIFEST
-from fastgen.dataset.generate import check_count, check_goes_on, generate
-from fastgen.dataset.shards import Job
+from fastgen.dataset.generate import check_resumable, default_workers, generate
+from fastgen.dataset.job import Job
+from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
+from fastgen.formats import SEAFRONT
+from fastgen.render.settings import RenderSettings
 
 
 def repair(
     out: str,
-    worker_count: int,
+    worker_count: int | None = None,
     hdri_dir: str | Path | None = None,
     device_index: int | None = None,
 ) -> tuple[list[str], list[str]]:
-    """Make again every shard with a file that is not as it was written, and scenes that failed, or
-    finish what was begun.
+    """Make every shard again that has a changed or missing file or a failed scene.
 
-    hdri_dir: where the HDRIs are that the dataset was made with, None for the bundled ones.
-    device_index: which of EGL's devices draws.
-    Returns the faults that were mended and those that are left. Raises OutputError where
-    dataset.json does not tell what to make, or the settings that it names cannot be had here;
-    ConfigError for a count of workers that cannot be.
+    An unfinished dataset is finished.
+
+    Args:
+        out: Folder or address of the dataset.
+        worker_count: Number of processes; by default one per core.
+        hdri_dir: Folder of the HDRIs that the dataset was made with; None for the bundled ones.
+        device_index: EGL device to draw with; None takes the first that works.
+
+    Returns:
+        The faults that were repaired, and those that are left.
+
+    Raises:
+        OutputError: dataset.json is unusable, or its settings are not available here.
+        ConfigError: The number of workers is not valid.
     """
-    check_count("workers", worker_count)  # also where nothing is to be made
+    worker_count = default_workers() if worker_count is None else worker_count
+    check_count("workers", worker_count)  # even if there is nothing to make
     found = examine(out)
     if not found.manifest:
         raise OutputError(f"{out}: {found.faults[0]}")
-    finished = "digest" in found.manifest  # else this may be the rest of a repair
+    finished = "digest" in found.manifest  # otherwise this may be the rest of a repair
     if finished and not found.broken and not found.manifest["failed"]:
         return [], found.faults
-    job = replace(_job(out, found.manifest, hdri_dir), device_index=device_index)
-    check_goes_on(job, worker_count)  # before anything is removed
+    job = _job(out, found.manifest, hdri_dir, device_index)
+    check_resumable(job, worker_count)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():
         for path in sorted(found.broken):
-            storage.remove(path)  # `generate` makes what is missing, but reads no file's content
+            storage.remove(path)  # `generate` makes missing files, but does not check content
     generate(job, worker_count)
     left = examine(out).faults
     return [fault for fault in found.faults if finished and fault not in left], left
 
 
-def _job(out: str, manifest: dict[str, Any], hdri_dir: str | Path | None) -> Job:
-    """The job that made the dataset."""
+def _job(
+    out: str, manifest: dict[str, Any], hdri_dir: str | Path | None, device_index: int | None
+) -> Job:
+    """Return the job that made the dataset."""
     try:
         return Job(
             out=out,
             images=manifest["images"],
             config=Config.from_values(manifest["config"]),
             seed=manifest["seed"],
-            size=tuple(manifest["size"]),
             cameras=tuple(manifest["cameras"]),
-            hdri_dir=None if hdri_dir is None else str(hdri_dir),
-            backend=manifest.get("backend", "auto"),
-            fmt=manifest["format"],
-            formats=tuple(manifest["formats"]),
-            quality=manifest["quality"],
+            render=RenderSettings(
+                size=tuple(manifest["size"]),
+                quality=manifest["quality"],
+                backend=manifest.get("backend", "auto"),
+                device_index=device_index,
+                hdri_dir=hdri_dir,
+            ),
+            layout=manifest["format"],
+            also=tuple(name for name in manifest["formats"] if name not in SEAFRONT),
             shard_scenes=manifest["shard_scenes"],
         )
     except KeyError as error:

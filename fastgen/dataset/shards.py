@@ -1,7 +1,8 @@
-"""A shard: a few scenes in a row, made by one process and committed together.
+"""Shard: the images of a few consecutive scenes, made by one process and committed together.
 
-Its manifest, written last, lists each of its files with size and content hash, and holds the facts
-that files over the whole dataset are made from. What has no manifest was never made.
+A shard's manifest is written last. It lists each file with size and content hash, and holds the
+records of its images, from which the files over the whole dataset are made. A shard without a
+manifest counts as never made.
 """
 
 import io
@@ -11,114 +12,62 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import Any
 
 import cv2
 import orjson
 
-from fastgen.config.config import Config
 from fastgen.dataset.freed_memory import return_freed_memory
+from fastgen.dataset.job import Job, Task, manifest_path, stem_of
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
-from fastgen.generator import Generator
 from fastgen.sampling.scene import SPLITS, split_of
 
-SHARD_SCENES = {"seafront": 4, "webdataset": 64}
-"""Scenes that are committed together, by format of the whole."""
-
 _PRELOAD_IMAGES = 1000
-"""A run of more meets every light anyway; from the start, its memory does not grow later."""
+"""Runs with more images load all lights and shapes first, so that memory does not grow later."""
 
-FORMATS = tuple(SHARD_SCENES)
 MADE_BY = ("backend", "renderer")
-"""What manifests say of the process that made them."""
+"""Keys of a manifest that describe the process that made the shard."""
 
 _REPORT_S = 0.25
-"""Within a shard images are counted to the parent no more often: each report wakes it, on a core in
-use."""
+"""Shortest time between two reports of images: each report wakes the parent on a busy core."""
 
-_HOLD_IMAGES = 256
-"""From the next shard after so many on, freed memory is back with the system, which must clear each
+_TRIM_IMAGES = 256
+"""Freed memory goes back to the system after this many images, because the system must clear each
 page before it is used again."""
 
 ATTEMPTS = 3
-"""A scene that failed so often is given up."""
+"""A scene that fails this many times is given up."""
 
 Report = Callable[[str, Any], None]
-"""Tells the parent process: 'at' a scene's index, 'images' made; 'busy' with what precedes them."""
+"""Sends a report to the parent process.
 
-
-@dataclass(frozen=True)
-class Job:
-    """What to generate. out: a folder or an fsspec address. images counts images, not scenes; size
-    is (width, height). fmt: one of FORMATS; formats: names of what is written of each sample.
-    shard_scenes: scenes that are committed together. settings_digest: of all that makes the samples
-    what they are, so that shards can tell whose they are; '' before `generate` has filled it in."""
-
-    out: str
-    images: int
-    config: Config
-    seed: int
-    size: tuple[int, int]
-    cameras: tuple[str, ...]
-    hdri_dir: str | None
-    backend: str
-    device_index: int | None = None
-    fmt: str = "seafront"
-    formats: tuple[str, ...] = ()
-    quality: str = "balanced"
-    shard_scenes: int = 4
-    settings_digest: str = ""
-
-    @property
-    def shard_count(self) -> int:
-        """Shards that hold all images."""
-        return -(-self.images // (self.shard_scenes * len(self.cameras)))
-
-    def wanted(self, shard: int) -> list[tuple[int, str]]:
-        """Scene index and camera of each image of a shard."""
-        per_shard = self.shard_scenes * len(self.cameras)
-        numbers = range(shard * per_shard, min((shard + 1) * per_shard, self.images))
-        count = len(self.cameras)
-        return [(number // count, self.cameras[number % count]) for number in numbers]
-
-    def generator(self) -> Generator:
-        """What draws it. Raises ConfigError for values that cannot be."""
-        return Generator(
-            self.config,
-            self.seed,
-            self.size,
-            backend=self.backend,
-            hdri_dir=self.hdri_dir,
-            quality=self.quality,
-            device_index=self.device_index,
-        )
-
-
-@dataclass(frozen=True)
-class Task:
-    """One shard to make. skip: why scenes that are given up were, by index."""
-
-    shard: int
-    skip: dict[int, str] = field(default_factory=dict)
+Reports are "at" with the index of the scene that comes next, "images" with a number of finished
+images, and "busy" with None during preparations.
+"""
 
 
 class Strikes:
-    """Counts the deaths of processes by the scene that each was at; called for every death."""
+    """Counts how many processes died at each scene. Call it for every death."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self._deaths: Counter[int] = Counter()
 
     def __call__(self, task: Task, scene: int | None, ended: str) -> Task:
-        """The task to try instead: without a scene that has ended ATTEMPTS processes.
+        """Return the task to try next, without a scene that has ended ATTEMPTS processes.
 
-        scene: where the process was, None before the first one. ended: how it died. Raises
-        OutputError where processes die again and again before they come to a scene.
+        Args:
+            task: The task of the process that died.
+            scene: Index of the scene it was at; None before the first.
+            ended: How it died, in words.
+
+        Raises:
+            OutputError: Processes keep dying before they reach a scene.
         """
         first = self._job.wanted(task.shard)[0][0]
         blamed = first if scene is None else scene
@@ -127,43 +76,30 @@ class Strikes:
             return task
         if scene is None:
             raise OutputError(
-                f"worker processes die before they render anything ({ended}); try fastgen doctor, "
-                'and in a script call this under `if __name__ == "__main__":`; what is written '
-                "stays good"
+                f"worker processes die before they render anything ({ended}); run fastgen doctor, "
+                'and in a script call this under `if __name__ == "__main__":`; files written so '
+                "far stay valid"
             )
         reason = f"the process that rendered it died ({ended})"
         return replace(task, skip={**task.skip, scene: reason})
 
 
-def stem_of(index: int, camera: str) -> str:
-    """File name, without its ending, of scene `index` seen by `camera`."""
-    return f"{index:06d}_{camera}"
-
-
-def manifest_path(shard: int) -> str:
-    """Where a shard's manifest lies."""
-    return f"shards/{shard:06d}.json"
-
-
-def shard_of(path: str) -> int | None:
-    """Which shard's manifest lies at `path`, None where none does."""
-    name = path.removeprefix("shards/").removesuffix(".json")
-    return int(name) if name.isdecimal() and manifest_path(int(name)) == path else None
-
-
 class Maker:
-    """Makes shards of one job in one process; opens GL when it is made.
+    """Makes shards of one job in one process. The constructor opens OpenGL.
 
-    whole_machine: there is a process on every core, so neither the rasterizer nor OpenCV needs
-    threads.
+    Args:
+        job: The job, with its settings_digest.
+        whole_machine: There is a process on every core, so neither the software rasterizer nor
+            OpenCV needs threads.
+        report: Receives reports.
     """
 
-    _held = 0
+    _since_trim = 0
     """Images made since freed memory was returned."""
 
     def __init__(self, job: Job, whole_machine: bool, report: Report) -> None:
         if whole_machine:
-            # llvmpipe reads it at its first context
+            # llvmpipe reads this at its first context
             os.environ.setdefault("LP_NUM_THREADS", "0")
             cv2.setNumThreads(1)
         self._job = job
@@ -178,30 +114,30 @@ class Maker:
 
     def __call__(self, task: Task) -> None:
         """Render, encode and commit one shard."""
-        if self._held >= _HOLD_IMAGES:
-            return_freed_memory()  # of the shards before
-            self._held = 0
+        if self._since_trim >= _TRIM_IMAGES:
+            return_freed_memory()
+            self._since_trim = 0
         made: list[tuple[Files, Record]] = []
         skip = dict(task.skip)
-        at, untold, told = None, 0, time.monotonic()
+        at, unreported, reported = None, 0, time.monotonic()
         for index, camera in self._job.wanted(task.shard):
             if index in skip:
                 continue
             if index != at:
                 self._report("at", index)
                 at = index
-            sample = self._patiently(index, camera, skip)
+            sample = self._image_or_skip(index, camera, skip)
             if sample is not None:
                 made.append(sample)
-            self._held += 1
-            untold += 1
-            if time.monotonic() - told >= _REPORT_S:
-                self._report("images", untold)
-                untold, told = 0, time.monotonic()
-        if untold:
-            self._report("images", untold)
+            self._since_trim += 1
+            unreported += 1
+            if time.monotonic() - reported >= _REPORT_S:
+                self._report("images", unreported)
+                unreported, reported = 0, time.monotonic()
+        if unreported:
+            self._report("images", unreported)
         made = [(files, record) for files, record in made if _index(record) not in skip]
-        files = pack(made, task.shard) if self._job.fmt == "webdataset" else _joined(made)
+        files = pack(made, task.shard) if self._job.layout == "webdataset" else _joined(made)
         self._storage.commit(files, f"{task.shard:06d}")
         manifest = {
             "shard": task.shard,
@@ -214,16 +150,16 @@ class Maker:
         }
         self._storage.write(manifest_path(task.shard), [seal(orjson.dumps(manifest))])
 
-    def _patiently(
+    def _image_or_skip(
         self, index: int, camera: str, skip: dict[int, str]
     ) -> tuple[Files, Record] | None:
-        """One image; None, and why in `skip`, where it fails again and again."""
+        """Return one image, or None with the reason in `skip` if it fails repeatedly."""
         for attempt in range(ATTEMPTS):
             try:
                 return self._image(index, camera)
             except (AssetError, ContextError, OutputError, OSError):
-                raise  # no light, no driver, a full disk: trying again helps nobody
-            except FastgenError as error:  # this scene cannot be; others may
+                raise  # a missing HDRI, no driver, a full disk: another attempt cannot help
+            except FastgenError as error:  # this scene cannot be drawn; others may
                 skip[index] = f"camera {camera}: {error}"
                 return None
             except Exception as error:
@@ -234,9 +170,10 @@ class Maker:
 
     def _image(self, index: int, camera: str) -> tuple[Files, Record]:
         job = self._job
-        scene = self._generator.scene(index)
-        wanted = "normals" in job.formats
-        sample = self._generator.render(scene=scene, camera=camera, normals=wanted)
+        normals = any(each.needs_normals for each in self._formats)
+        sample = self._generator.render(
+            scene=self._generator.scene(index), camera=camera, normals=normals
+        )
         item = Item(
             sample,
             split_of(job.config, job.seed, index),
@@ -248,10 +185,10 @@ class Maker:
 
 
 def pack(made: Sequence[tuple[Files, Record]], shard: int) -> Files:
-    """The samples as WebDataset shards, a tar file for each split that occurs.
+    """Pack samples as WebDataset shards: one tar file for each split that occurs.
 
-    A sample's members share its stem; their endings are `jpg`, `json`, and for label files the
-    folder's name first, as in `damage.png` and `imdg.txt`.
+    Members of a sample share its stem. Their extensions are `jpg`, `json`, and for label files the
+    name of the folder and the file's extension, as in `damage.png` and `imdg.txt`.
     """
     packed: Files = {}
     for split in SPLITS:
@@ -280,7 +217,7 @@ def _member(path: str, stem: str) -> str:
     ending = pure.suffix[1:]
     if folder in ("images", "scenes"):
         return f"{stem}.{ending}"
-    # kitti has files of one name in folders of different names
+    # kitti has files with the same name in different folders
     inner = [part for part in between if folder == "kitti" and part not in SPLITS]
     part = pure.stem.removeprefix(stem).strip("_")
     return ".".join(filter(None, (stem, folder, *inner, part, ending)))
@@ -291,7 +228,7 @@ def _joined(made: Sequence[tuple[Files, Record]]) -> Files:
 
 
 def _entries(files: Files) -> dict[str, list[Any]]:
-    """Size and content hash of each file; what is the same as another comes after that."""
+    """Return size and content hash of each file. A `Same` comes after the file it refers to."""
     found: dict[str, list[Any]] = {}
     for path, content in files.items():
         if isinstance(content, Same):

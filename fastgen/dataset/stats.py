@@ -1,7 +1,7 @@
-"""What a dataset holds: the paper's Tables 1 to 3 and the sizes of its Fig. 8.
+"""Statistics of a dataset: Tables 1 to 3 of the SeaFront paper and the box sizes of its Fig. 8.
 
-Counted from the records in the shards' manifests, which the label files are made of, so that it
-works for every format and place.
+Labels are counted from the records in the shards' manifests, so this works for every layout and
+storage.
 """
 
 from collections import Counter
@@ -11,100 +11,98 @@ from pathlib import Path
 
 import numpy as np
 
-from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset.dataset_json import MANIFEST, read_manifest, told_by, without_manifest
+from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
+from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
-from fastgen.formats import Record
-from fastgen.formats.coco import trained_on
+from fastgen.formats import Format, Record, formats_of
 from fastgen.sampling.scene import SPLITS
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_FIRST_MARKER = DETECTION_CLASSES.index("text") + 1
 
 
 @dataclass
-class _Counts:
-    """Of one split. damages and markers: labels by class; the sizes are shares of the image."""
+class _Labels:
+    """Labels of one task in one split.
 
+    Attributes:
+        by_class: Number of labels by class name.
+        sizes: Width and height of each box, except containers and texts, as shares of the image.
+        images: Number of images that have such a box.
+    """
+
+    by_class: Counter[str] = field(default_factory=Counter)
+    sizes: list[tuple[float, float]] = field(default_factory=list)
     images: int = 0
-    damaged: int = 0
-    damages: Counter[str] = field(default_factory=Counter)
-    markers: Counter[str] = field(default_factory=Counter)
-    damage_sizes: list[tuple[float, float]] = field(default_factory=list)
-    marker_sizes: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, record: Record) -> None:
-        """Count one image."""
+    def add(self, task: Format, record: Record) -> None:
+        """Count the labels of one image."""
         image_width, image_height = record["size"]
-        damages, markers = (trained_on(record["facts"][task]) for task in ("damage", "imdg"))
-        self.images += 1
-        self.damaged += any(item["category_id"] > 1 for item in damages)
-        for item in damages:
-            self.damages[SEGMENTATION_CLASSES[item["category_id"] - 1]] += 1
-            if item["category_id"] > 1:
-                _, _, width, height = item["bbox"]
-                self.damage_sizes.append((width / image_width, height / image_height))
-        for item in markers:
-            number = item["category_id"] - 1
-            self.markers[DETECTION_CLASSES[number]] += 1
-            if number >= _FIRST_MARKER:
-                _, _, width, height = item["bbox"]
-                self.marker_sizes.append((width / image_width, height / image_height))
+        before = len(self.sizes)
+        for name, (_, _, width, height) in task.labels(record["facts"][task.name]):
+            self.by_class[name] += 1
+            if name in DAMAGE_CLASSES or name in MARKER_CLASSES:
+                self.sizes.append((width / image_width, height / image_height))
+        self.images += len(self.sizes) > before
 
 
 def report(out: str | Path) -> str:
-    """Tables as text, of the dataset in a folder or at an address.
+    """Return the tables of the dataset in a folder or at an address, as text.
 
-    Raises OutputError when `out` is no finished dataset.
+    Raises:
+        OutputError: `out` is not a finished dataset.
     """
-    counts = {split: _Counts() for split in SPLITS}
+    damage, imdg = formats_of(("damage", "imdg"))
+    images = dict.fromkeys(SPLITS, 0)
+    damages = {split: _Labels() for split in SPLITS}
+    markers = {split: _Labels() for split in SPLITS}
     for record in _records(str(out)):
-        counts[record["split"]].add(record)
-    images = sum(each.images for each in counts.values())
-    visible = sum((each.markers for each in counts.values()), Counter())
-    per_image = (visible.total() - visible["container"] - visible["text"]) / max(images, 1)
-    tables = (
-        ("damage", SEGMENTATION_CLASSES, [each.damages for each in counts.values()]),
-        ("marker", DETECTION_CLASSES, [each.markers for each in counts.values()]),
+        split = record["split"]
+        images[split] += 1
+        damages[split].add(damage, record)
+        markers[split].add(imdg, record)
+    count = max(sum(images.values()), 1)
+    marker_sizes = [size for each in markers.values() for size in each.sizes]
+    texts = sum(each.by_class["text"] for each in markers.values())
+    undamaged = [images[split] - damages[split].images for split in SPLITS]
+    damaged = [each.images for each in damages.values()]
+    return "\n\n".join(
+        [
+            "Table 1: images without and with visible damage",
+            _table({"No damage": undamaged, "Damaged": damaged}),
+            "Table 2: instances in the damage task",
+            _class_table(damage, damages),
+            "Table 3: instances in the marker task",
+            _class_table(imdg, markers),
+            f"Per image: {len(marker_sizes) / count:.2f} markers, {texts / count:.2f} texts",
+            "Fig. 8: box width and height as shares of the image, at quantiles "
+            + ", ".join(f"{q:g}" for q in _QUANTILES),
+            _sizes("damage", [size for each in damages.values() for size in each.sizes]),
+            _sizes("markers", marker_sizes),
+        ]
     )
-    sound = [each.images - each.damaged for each in counts.values()]
-    parts = [
-        "Table 1: images without and with visible damage",
-        _table({"No damage": sound, "Damaged": [each.damaged for each in counts.values()]}),
-    ]
-    for number, (task, classes, found) in enumerate(tables, start=2):
-        parts.append(f"Table {number}: instances in the {task} task")
-        parts.append(_table({name: [each[name] for each in found] for name in classes}))
-    damage_sizes = [size for each in counts.values() for size in each.damage_sizes]
-    marker_sizes = [size for each in counts.values() for size in each.marker_sizes]
-    parts += [
-        f"Per image: {per_image:.2f} markers, {visible['text'] / max(images, 1):.2f} texts",
-        "Fig. 8: box width and height as shares of the image, at quantiles "
-        + ", ".join(f"{q:g}" for q in _QUANTILES),
-        _sizes("damage", damage_sizes),
-        _sizes("markers", marker_sizes),
-    ]
-    return "\n\n".join(parts)
 
 
 def _records(out: str) -> Iterator[Record]:
-    """One of each image, shard by shard."""
     storage = storage_of(out)
     try:
-        told = told_by(storage.read(MANIFEST))
+        manifest = parsed(storage.read(MANIFEST))
     except FileNotFoundError:
         raise without_manifest(storage, out) from None
     damaged = OutputError(f"{out}: is damaged; run fastgen verify {out}")
-    if told is None:
+    if manifest is None:
         raise damaged
-    if "digest" not in told:
+    if "digest" not in manifest:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")
-    for number in told["shards"]:
-        manifest = read_manifest(storage, int(number))
-        if manifest is None:
+    for number in manifest["shards"]:
+        shard = read_manifest(storage, int(number))
+        if shard is None:
             raise damaged
-        yield from manifest["records"]
+        yield from shard["records"]
+
+
+def _class_table(task: Format, found: dict[str, _Labels]) -> str:
+    return _table({name: [each.by_class[name] for each in found.values()] for name in task.classes})
 
 
 def _table(rows: dict[str, list[int]]) -> str:

@@ -1,6 +1,6 @@
-"""Where a dataset lies: a folder, or any address that fsspec knows. Files arrive whole or not.
+"""Storage of a dataset: a folder, or an address that fsspec knows. Writes are all or nothing.
 
-Paths within it are relative, with forward slashes.
+Paths in a storage are relative, with forward slashes.
 """
 
 import contextlib
@@ -18,15 +18,15 @@ from fastgen.files.atomic_file import ASIDE_FILES, whole_file
 from fastgen.formats import Files, Same
 
 ASIDE = ".aside"
-"""Prefix of folders where files wait until all of their shard are on the disk."""
+"""Prefix of temporary folders, where files wait until all files of their shard are on the disk."""
 
 LOCK = ".lock"
 
 _RECOVERED = "lost+found"
-"""Where a file system keeps what it finds; a volume of its own has it from the start."""
+"""Folder that some file systems put into the root of a volume."""
 
 _BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
-"""Protocols of fsspec's object stores."""
+"""fsspec's protocols of object stores."""
 
 
 class Folder:
@@ -36,9 +36,14 @@ class Folder:
         self.root = root
 
     def commit(self, files: Files, name: str) -> None:
-        """Write aside, flush, rename. name: distinguishes this commit from others under way."""
+        """Write files to a temporary folder, flush them, then rename each into place.
+
+        Args:
+            files: Content by path.
+            name: Distinguishes this commit from others in progress.
+        """
         aside = self.root / f"{ASIDE}-{name}-{uuid.uuid4().hex}"
-        # text: paths that pathlib parses take longer than what is done with them
+        # strings, because parsing thousands of paths with pathlib takes longer than the rest
         places = {path: f"{aside}/{number}" for number, path in enumerate(files)}
         try:
             aside.mkdir()
@@ -52,56 +57,60 @@ class Folder:
             for folder in {os.path.dirname(path) for path in files}:
                 (self.root / folder).mkdir(parents=True, exist_ok=True)
             for path, place in places.items():
-                # POSIX leaves the old name where both are one file already; it goes with `aside`
+                # rename(2) keeps both names if they are the same file; rmtree removes the old one
                 os.replace(place, f"{self.root}/{path}")
         except FileNotFoundError as error:
-            raise OutputError(f"{self.root}: vanished while it was written ({error})") from None
+            raise OutputError(f"{self.root}: was removed during the run ({error})") from None
         except OSError as error:
             raise OutputError(f"{self.root}: cannot be written ({error.strerror})") from None
         finally:
             shutil.rmtree(aside, ignore_errors=True)
 
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Written aside, flushed, renamed."""
+        """Write one file: to a temporary name first, then flushed and renamed."""
         target = self.root / path
-        with _told(target, "written"):
+        with _named(target, "written"):
             target.parent.mkdir(parents=True, exist_ok=True)
             with whole_file(target) as stream:
                 stream.writelines(pieces)
 
     def make_folders(self, paths: Iterable[str]) -> None:
-        """Have these folders even where nothing is in them."""
+        """Make these folders unless they exist."""
         for path in paths:
-            with _told(self.root / path, "written"):
+            with _named(self.root / path, "written"):
                 (self.root / path).mkdir(parents=True, exist_ok=True)
 
     def read(self, path: str) -> bytes:
-        """Content of a file. Raises FileNotFoundError."""
+        """Return the content of a file. Raises FileNotFoundError."""
         place = self.root / path
-        with _told(place, "read"):
-            # a pipe would keep us waiting
+        with _named(place, "read"):
+            # reading a named pipe would block
             if not (place.is_file() or place.is_dir()) and place.exists():
-                raise OutputError(f"{place}: is no file")
+                raise OutputError(f"{place}: is not a regular file")
             return place.read_bytes()
 
     def remove(self, path: str) -> None:
-        """Be without a file, or an empty folder in its place, whether it was there or not."""
+        """Remove a file, or an empty folder with its name, if it exists."""
         place = self.root / path
-        with _told(place, "removed"), contextlib.suppress(NotADirectoryError):
+        with _named(place, "removed"), contextlib.suppress(NotADirectoryError):
             try:
                 place.unlink(missing_ok=True)
             except IsADirectoryError:
                 place.rmdir()
 
     def sizes(self) -> dict[str, int]:
-        """Every file with its size in bytes. Raises OutputError for a link to a folder: files could
-        not be renamed into one on another disk."""
-        with _told(self.root, "listed"):
+        """Return the size in bytes of every file by its path.
+
+        Raises:
+            OutputError: There is a link to a folder. It may lead to another disk, where files
+                could not be renamed into place.
+        """
+        with _named(self.root, "listed"):
             return dict(self._walk(self.root, ""))
 
     def names(self, folder: str = "") -> list[str]:
-        """What lies in the place itself, or in one of its folders; nothing where that is none."""
-        with _told(self.root, "listed"):
+        """Return the names in the root or in a folder; none if the folder does not exist."""
+        with _named(self.root, "listed"):
             try:
                 return [name for name in os.listdir(self.root / folder) if name != _RECOVERED]
             except (FileNotFoundError, NotADirectoryError):
@@ -112,7 +121,7 @@ class Folder:
             if not prefix and (entry.name.startswith(ASIDE) or entry.name in (LOCK, _RECOVERED)):
                 continue
             linked = entry.is_symlink() and os.path.isdir(entry.path)
-            if linked and "." not in entry.name:  # our files have endings, and our folders none
+            if linked and "." not in entry.name:  # only our files have extensions
                 raise OutputError(
                     f"{entry.path}: is a link to a folder; put the folder itself there, or "
                     "link the whole dataset"
@@ -125,24 +134,26 @@ class Folder:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the folder for one run, and clear away what a killed run left aside.
+        """Lock the folder for one run, and remove temporary files of a run that was killed.
 
-        The system lets go of the lock when the process dies. Raises OutputError while another run
-        holds it.
+        The system releases the lock when the process dies.
+
+        Raises:
+            OutputError: Another run holds the lock.
         """
         path = self.root / LOCK
-        with _told(path, "written"):
+        with _named(path, "written"):
             stream = path.open("w")
         with stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                # whoever held it before may have removed the file that we opened
+                # the previous holder may have removed the file after we opened it
                 held = os.path.samestat(os.fstat(stream.fileno()), path.stat())
             except OSError:
                 held = False
             if not held:
                 raise OutputError(
-                    f"{self.root}: another run works on this folder; wait for it, or stop it"
+                    f"{self.root}: another run uses this folder; wait for it, or stop it"
                 )
             try:
                 self._clear()
@@ -159,7 +170,7 @@ class Folder:
 
 
 class Remote:
-    """A dataset at an fsspec address such as s3://bucket/folder. A put there is all or nothing."""
+    """A dataset at an fsspec address such as s3://bucket/folder, where puts are atomic."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -176,26 +187,28 @@ class Remote:
 
     @property
     def lives_here(self) -> bool:
-        """Whether it is this process's memory, which no other process sees."""
-        return "memory" in self._system.protocol  # a name or several
+        """Whether the address is memory of this process, which no other process sees."""
+        return "memory" in self._system.protocol  # a string or a tuple of strings
 
     @property
     def _has_buckets(self) -> bool:
-        """Whether a path begins with a bucket: needs no folders, and asked for one, a mistyped
-        bucket would be made."""
+        """Whether paths begin with a bucket.
+
+        A bucket needs no folders, and making one would create a bucket from a mistyped name.
+        """
         protocol = self._system.protocol
         return not _BUCKETS.isdisjoint({protocol} if isinstance(protocol, str) else protocol)
 
     def commit(self, files: Files, name: str) -> None:
-        """Put one file after the other."""
+        """Write one file after the other. `name` is not used."""
         for path, content in files.items():
             data = files[content.path] if isinstance(content, Same) else content
             assert isinstance(data, bytes)
             self.write(path, [data])
 
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
-        """Put one file; it appears when all of it has arrived."""
-        with self._told(path, "written"):
+        """Write one file, which appears when its upload is complete."""
+        with self._named(path, "written"):
             if not self._has_buckets:
                 self._system.makedirs(self._path(path).rsplit("/", 1)[0], exist_ok=True)
             with self._system.open(self._path(path), "wb") as stream:
@@ -203,23 +216,22 @@ class Remote:
                     stream.write(piece)
 
     def make_folders(self, paths: Iterable[str]) -> None:
-        """Nothing: an address has no folders, only names with slashes."""
+        """Do nothing: object stores have no folders, only names with slashes."""
 
     def read(self, path: str) -> bytes:
-        """Content of a file. Raises FileNotFoundError."""
-        with self._told(path, "read"):
+        """Return the content of a file. Raises FileNotFoundError."""
+        with self._named(path, "read"):
             data: bytes = self._system.cat_file(self._path(path))
         return data
 
     def remove(self, path: str) -> None:
-        """Be without a file, whether it was there or not."""
-        with self._told(path, "removed"), contextlib.suppress(FileNotFoundError):
+        """Remove a file if it exists."""
+        with self._named(path, "removed"), contextlib.suppress(FileNotFoundError):
             self._system.rm_file(self._path(path))
 
     def sizes(self) -> dict[str, int]:
-        """Every file with its size in bytes. Raises OutputError for a link to a folder: files could
-        not be renamed into one on another disk."""
-        with self._told("", "listed"):
+        """Return the size in bytes of every file by its path."""
+        with self._named("", "listed"):
             self._system.invalidate_cache()
             if not self._system.exists(self._base):
                 return {}
@@ -228,8 +240,8 @@ class Remote:
         return {path[skip:]: int(entry["size"]) for path, entry in found.items()}
 
     def names(self, folder: str = "") -> list[str]:
-        """What lies in the place itself, or in one of its folders; nothing where that is none."""
-        with self._told("", "listed"):
+        """Return the names in the root or in a folder; none if the folder does not exist."""
+        with self._named("", "listed"):
             self._system.invalidate_cache()
             path = self._path(folder).rstrip("/")
             try:
@@ -240,45 +252,54 @@ class Remote:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Addresses have no locks that go when their holder dies: two runs make the same bytes."""
+        """Do nothing: object stores have no locks that end with their holder.
+
+        Two runs with the same settings write the same bytes, so they do no harm.
+        """
         yield
 
     def _path(self, path: str) -> str:
         return f"{self._base.rstrip('/')}/{path}"
 
-    def _told(self, path: str, deed: str) -> contextlib.AbstractContextManager[None]:
+    def _named(self, path: str, action: str) -> contextlib.AbstractContextManager[None]:
         # each store has errors of its own
-        return _told(f"{self.root}/{path}" if path else self.root, deed, Exception)
+        return _named(f"{self.root}/{path}" if path else self.root, action, Exception)
 
 
-def storage_of(out: str | Path) -> Folder | Remote:
-    """The storage at a path or an address with '://'; files of this machine are a folder's."""
+Storage = Folder | Remote
+
+
+def storage_of(out: str | Path) -> Storage:
+    """Return the storage at a path or at an address with '://'; file:// gives a Folder."""
     text = str(out).removeprefix("file://")
     return Remote(text) if "://" in text else Folder(Path(text))
 
 
 @contextlib.contextmanager
-def _told(place: Path | str, deed: str, errors: type[Exception] = OSError) -> Iterator[None]:
-    """Failures become OutputErrors that name the place; a file to be read may be missing."""
+def _named(place: Path | str, action: str, errors: type[Exception] = OSError) -> Iterator[None]:
+    """Turn errors into an OutputError that names the place.
+
+    A missing file that was to be read remains a FileNotFoundError.
+    """
     try:
         yield
     except FastgenError:
         raise
     except errors as error:
-        if deed == "read" and isinstance(error, FileNotFoundError | NotADirectoryError):
+        if action == "read" and isinstance(error, FileNotFoundError | NotADirectoryError):
             raise FileNotFoundError(str(place)) from None
-        raise OutputError(f"{place}: cannot be {deed} ({_words(error)})") from None
+        raise OutputError(f"{place}: cannot be {action} ({_words(error)})") from None
 
 
 def _words(error: Exception) -> str:
-    """What an error says of itself, without the place."""
+    """Return an error's message without the path."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     return str(error) or type(error).__name__
 
 
 def _link(source: str, target: str) -> None:
-    """A second name for `source`, or a copy where the file system has no links."""
+    """Make a hard link, or a copy if the file system has no hard links."""
     try:
         os.link(source, target)
     except OSError:
@@ -286,7 +307,7 @@ def _link(source: str, target: str) -> None:
 
 
 def _flush(folder: Path) -> None:
-    """Have the file system of `folder` write out what it holds back; Linux syncfs(2)."""
+    """Flush the file system that holds `folder` to disk; see syncfs(2)."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         if ctypes.CDLL(None, use_errno=True).syncfs(handle):

@@ -1,35 +1,36 @@
-"""`fastgen verify`: every file of a dataset present, unchanged, and consistent with its labels."""
+"""`fastgen verify`: check that every file of a dataset is present, unchanged and consistent."""
 
+import contextlib
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache, partial
 from typing import Any
 
-import cv2
-import numpy as np
 import simplejpeg
-from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_VALUES, DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, without_manifest
+from fastgen.dataset.job import manifest_path
 from fastgen.dataset.seal import digest, is_sealed
-from fastgen.dataset.shards import manifest_path
-from fastgen.dataset.storage import Folder, Remote, storage_of
+from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError
-from fastgen.formats import Record, coco
-from fastgen.formats.yolo import pixel_box, rows
+from fastgen.formats import Format, Read, Record, formats_of
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
 from fastgen.validation import from_plain
 
-Place = Folder | Remote
-
 
 @dataclass(frozen=True)
 class Findings:
-    """faults: a line each that names a file. broken: paths of files that are not as they were
-    written, or missing. manifest: what dataset.json says, {} where it cannot be trusted; without a
-    "digest" where the dataset is not finished."""
+    """Result of an examination.
+
+    Attributes:
+        faults: A line for each fault, which names a file.
+        broken: Paths of files that are missing or not as they were written.
+        manifest: Content of dataset.json; {} if it was changed. It has no "digest" if the dataset
+            is not finished.
+    """
 
     faults: list[str]
     broken: set[str] = field(default_factory=set)
@@ -37,9 +38,10 @@ class Findings:
 
 
 def examine(out: str) -> Findings:
-    """What is wrong with the dataset at `out`, and what a repair of it needs to know.
+    """Find the faults of the dataset at `out`.
 
-    Raises OutputError when `out` is no dataset.
+    Raises:
+        OutputError: `out` is not a dataset.
     """
     storage = storage_of(out)
     try:
@@ -61,37 +63,41 @@ def examine(out: str) -> Findings:
     present = dict(storage.sizes())
     present.pop(MANIFEST, None)
     shards = []
-    untold: set[int] = set()  # shards whose files nothing lists
+    unlisted: set[int] = set()  # shards whose files are not known
     for number, hashed in manifest["shards"].items():
         data = _intact(storage, present, manifest_path(int(number)), None, hashed, faults)
         if data is None:
-            untold.add(int(number))
+            unlisted.add(int(number))
         else:
             shards.append(json.loads(data))
-    broken = {manifest_path(number) for number in untold}
+    broken = {manifest_path(number) for number in unlisted}
     listed = [manifest["files"], *(shard["files"] for shard in shards)]
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
         if _intact(storage, present, path, size, hashed, faults) is None:
             broken.add(path)
-    astray = (path for path in sorted(present) if _shard_by_name(path, manifest) not in untold)
+    astray = (path for path in sorted(present) if _shard_by_name(path, manifest) not in unlisted)
     faults += [f"{path}: does not belong here" for path in astray]
     if manifest["format"] == "seafront":
         records = [record for shard in shards for record in shard["records"]]
-        faults += _samples(storage, records, broken)
-        if not untold:
-            faults += _lists(storage, records, broken)
+        formats = formats_of(manifest["formats"])
+        faults += _contradictions(storage, records, broken, formats)
+        if not unlisted:
+            faults += _split_contradictions(storage, records, broken, formats)
     return Findings(faults, broken, manifest)
 
 
 def _intact(
-    storage: Place,
+    storage: Storage,
     present: dict[str, int],
     path: str,
     size: int | None,
     hashed: str,
     faults: list[str],
 ) -> bytes | None:
-    """A file's content where it is as it was written, else None and a fault. Ticks it off."""
+    """Return a file's content if it is as it was written, else None after adding a fault.
+
+    The file is removed from `present`.
+    """
     if path not in present:
         faults.append(f"{path}: missing")
         return None
@@ -101,10 +107,10 @@ def _intact(
         return None
     try:
         data = storage.read(path)
-    except OutputError as error:  # one that cannot be read must not hide other faults
+    except OutputError as error:  # must not hide other faults
         faults.append(str(error))
         return None
-    except FileNotFoundError:  # a link to nowhere
+    except FileNotFoundError:  # a dangling link
         faults.append(f"{path}: missing")
         return None
     if digest(data) != hashed:
@@ -114,7 +120,7 @@ def _intact(
 
 
 def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
-    """Which shard a sample's file is of, None where its name tells of none."""
+    """Return the shard of a sample's file by its name, or None if the name has no number."""
     scenes: int = manifest["shard_scenes"]
     cameras = manifest["cameras"]
     if manifest["format"] == "webdataset":
@@ -128,109 +134,54 @@ def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
     return None if found is None else int(found[1]) // numbered
 
 
-def _samples(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
-    """Whether a sample's labels agree with one another, among files that are as they were
-    written."""
-    faults = []
+class _Broken(Exception):
+    """A file that a check wants to read is already known to be damaged."""
+
+
+def _contradictions(
+    storage: Storage, records: list[Record], broken: set[str], formats: list[Format]
+) -> Iterator[str]:
+    """Yield a line for each file of a sample that is intact but contradicts its other files."""
     for record in records:
-        split, stem = record["split"], record["stem"]
-        names = {
-            "image": f"images/{split}/{stem}.jpg",
-            "scene": f"scenes/{split}/{stem}.json",
-            "mask": f"damage/masks/{split}/{stem}.png",
-            "outlines": f"damage/yolo/{split}/{stem}.txt",
-            "boxes": f"imdg/labels/{split}/{stem}.txt",
-        }
-        if broken.isdisjoint(names.values()):
-            data = {key: storage.read(path) for key, path in names.items()}
-            faults += [f"{names[key]}: {fault}" for key, fault in _sample(data, record)]
-    return faults
+        read = cache(partial(_read_intact, storage, broken))
+        for check in (_check_image, _check_scene, *(each.check for each in formats)):
+            with contextlib.suppress(_Broken):
+                yield from check(record, read)
 
 
-def _lists(storage: Place, records: list[Record], broken: set[str]) -> list[str]:
-    """Whether the COCO files say what the records of all shards say."""
-    faults = []
+def _split_contradictions(
+    storage: Storage, records: list[Record], broken: set[str], formats: list[Format]
+) -> Iterator[str]:
+    """Yield a line for each file over a split that contradicts the records of its images."""
+    read = partial(_read_intact, storage, broken)
     for split in SPLITS:
-        name = f"damage/coco_{split}.json"
-        wanted = [
-            item for record in records if record["split"] == split
-            for item in record["facts"]["damage"]
-        ]  # fmt: skip
-        if name not in broken and not _annotates(storage.read(name), wanted):
-            faults.append(f"{name}: differs from the shards' records")
-    return faults
+        chosen = [record["facts"] for record in records if record["split"] == split]
+        for each in formats:
+            with contextlib.suppress(_Broken):
+                yield from each.check_split(split, [facts[each.name] for facts in chosen], read)
 
 
-def _annotates(text: bytes, wanted: list[dict[str, Any]]) -> bool:
-    found = json.loads(text)["annotations"]
-    return [{k: v for k, v in item.items() if k not in ("id", "image_id")} for item in found] == (
-        wanted
-    )
+def _read_intact(storage: Storage, broken: set[str], path: str) -> bytes:
+    if path in broken:
+        raise _Broken(path)
+    return storage.read(path)
 
 
-def _sample(data: dict[str, bytes], record: Record) -> list[tuple[str, str]]:
-    """Which of one sample's files says what it should not, and how."""
+def _check_image(record: Record, read: Read) -> Iterator[str]:
+    path = f"images/{record['split']}/{record['stem']}.jpg"
     width, height = record["size"]
-    faults = []
     try:
-        # strict: a file cut short is otherwise filled up with grey
-        whole = simplejpeg.decode_jpeg(data["image"], strict=True).shape == (height, width, 3)
+        # strict: otherwise the missing part of a truncated file becomes grey
+        complete = simplejpeg.decode_jpeg(read(path), strict=True).shape == (height, width, 3)
     except ValueError:
-        whole = False
-    if not whole:
-        faults.append(("image", f"not a whole JPEG of {width}x{height}"))
-    scene = json.loads(data["scene"])
+        complete = False
+    if not complete:
+        yield f"{path}: not a complete JPEG of {width}x{height}"
+
+
+def _check_scene(record: Record, read: Read) -> Iterator[str]:
+    path = f"scenes/{record['split']}/{record['stem']}.json"
     try:
-        from_plain(Scene, scene["scene"], "scene")
+        from_plain(Scene, json.loads(read(path))["scene"], "scene")
     except FastgenError as error:
-        faults.append(("scene", str(error)))
-    if not _same_boxes(rows(data["boxes"].decode()), scene):
-        faults.append(("boxes", "differs from the scene file's objects"))
-    faults += [("outlines", fault) for fault in _outline_faults(rows(data["outlines"].decode()))]
-    mask = cv2.imdecode(np.frombuffer(data["mask"], np.uint8), cv2.IMREAD_UNCHANGED)
-    if mask is None or mask.shape != (height, width) or mask.dtype != np.uint16:
-        faults.append(("mask", f"not a whole 16-bit PNG of {width}x{height}"))
-    elif not _same_masks(mask, record["facts"]["damage"]):
-        faults.append(("mask", "differs from the COCO annotations"))
-    return faults
-
-
-def _same_masks(mask: NDArray[Any], annotations: list[dict[str, Any]]) -> bool:
-    """Category, area, box and run lengths of every annotation, derived again from the mask."""
-    parts = [(1, mask > 0)] if mask.any() else []
-    parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
-    seen = []
-    for category, part in parts:
-        rows, columns = np.nonzero(part)
-        x, y = int(columns.min()), int(rows.min())
-        box = [x, y, int(columns.max()) + 1 - x, int(rows.max()) + 1 - y]
-        runs = coco.rle(part, (0, 0), (mask.shape[1], mask.shape[0]))["counts"]
-        seen.append((category, int(rows.size), box, runs))
-    held = [
-        (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
-        for item in annotations
-    ]
-    return sorted(seen, key=repr) == sorted(held, key=repr)
-
-
-def _same_boxes(found: list[tuple[int, list[float]]], scene: dict[str, Any]) -> bool:
-    """The marker labels are the visible boxes of the scene file's objects, to 0.1 pixel."""
-    held = [
-        (index, [round(v, 1) for v in pixel_box(values, scene["size"])]) for index, values in found
-    ]
-    wanted = [
-        (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
-        for item in scene["objects"]
-        if item["class_name"] in DETECTION_CLASSES and item["bbox"] and not item["ignored"]
-    ]
-    return sorted(held) == sorted(wanted)
-
-
-def _outline_faults(found: list[tuple[int, list[float]]]) -> list[str]:
-    faults = []
-    for index, values in found:
-        if not 0 <= index < len(SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:
-            faults.append(f"class {index} with {len(values)} numbers cannot be")
-        elif not (min(values) >= 0 and max(values) <= 1):
-            faults.append("a value lies outside 0..1")
-    return faults
+        yield f"{path}: {error}"

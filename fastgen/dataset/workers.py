@@ -1,6 +1,6 @@
-"""Processes that work on tasks, may crash or hang, and are then replaced.
+"""Processes that work on tasks and are replaced if they crash or hang.
 
-Each has a pipe of its own: a queue's lock dies with the process that holds it.
+Each process has its own pipe. A shared queue has a lock, which stays locked if its holder dies.
 """
 
 import contextlib
@@ -19,29 +19,31 @@ from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 
-Setup = Callable[..., Callable[[Any], None]]
-"""Called in the worker with its arguments and a `report` function; returns what does a task."""
+Setup = Callable[[Callable[[str, Any], None]], Callable[[Any], None]]
+"""Called in the worker with a report function; returns the function that does a task."""
 
 HANG_S = 300.0
-"""A worker that has said nothing for so long hangs; the slowest step known takes a hundredth."""
+"""A worker without a report for this many seconds hangs. Known steps take at most 1 % of it."""
 
 _POLL_S = 1.0
 _STOPS = {signal.SIGINT, signal.SIGTERM}
 
 _MATRIX_THREADS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
-"""OpenBLAS takes the first of these that is set when NumPy is imported, which is before any code of
-ours runs in a process that starts."""
+"""Variables with the number of OpenBLAS threads; the first that is set counts.
+
+OpenBLAS reads them when NumPy is imported, which is before any of our code runs in a new process.
+"""
 
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Stops that come meanwhile wait until the end: a process left half started says so loudly.
+    """Delay SIGINT and SIGTERM until the end of the block.
 
-    A mask does not keep them off. The system may give a signal to any thread, a matrix library's
-    too, and Python then runs its handler in the main one.
+    A process interrupted during its start prints a traceback. A signal mask is not enough: the
+    system may deliver a signal to any thread, and Python runs the handler in the main thread.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield  # no handler runs here
+        yield  # handlers run in the main thread only
         return
     held: list[int] = []
     before = {each: signal.signal(each, lambda number, _: held.append(number)) for each in _STOPS}
@@ -56,8 +58,10 @@ def undisturbed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _one_matrix_thread() -> Iterator[None]:
-    """Processes that start meanwhile multiply matrices in one thread, unless the user has set how
-    many. More of them spin while they wait, and take the cores of other workers."""
+    """Let processes started in the block use one OpenBLAS thread, unless the user has set a number.
+
+    Further threads spin while they wait, on the cores of other workers.
+    """
     set_by_user = any(name in os.environ for name in _MATRIX_THREADS)
     if not set_by_user:
         os.environ[_MATRIX_THREADS[0]] = "1"
@@ -69,8 +73,7 @@ def _one_matrix_thread() -> Iterator[None]:
 
 
 class Waiting:
-    """Tasks that wait to be done, taken from where they come from only as they are looked for: of a
-    large run there are millions."""
+    """Queue of tasks that takes them from an iterable only when needed: there may be millions."""
 
     def __init__(self, tasks: Iterable[Any]) -> None:
         self._rest = iter(tasks)
@@ -80,30 +83,30 @@ class Waiting:
         return self.up_to(1) > 0
 
     def up_to(self, count: int) -> int:
-        """How many there are, of which no more than `count` are looked for."""
+        """Return the number of tasks left, or `count` if there are more."""
         self._ahead.extend(islice(self._rest, max(count - len(self._ahead), 0)))
         return min(len(self._ahead), count)
 
     def take(self) -> Any:
-        """The next one; there must be one."""
+        """Return the next task. There must be one."""
         self.up_to(1)
         return self._ahead.popleft()
 
     def put_back(self, task: Any) -> None:
-        """Have this one done next."""
+        """Put a task at the front."""
         self._ahead.appendleft(task)
 
 
 class _Worker:
-    """One process, what it is at and when it last said something."""
+    """One process, its current task, and the time of its last report."""
 
-    def __init__(self, setup: Setup, arguments: tuple[Any, ...], whole_machine: bool) -> None:
-        # a context made before a fork hangs its children, so processes start afresh
+    def __init__(self, setup: Setup, whole_machine: bool) -> None:
+        # an OpenGL context made before a fork hangs the child
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, setup, arguments), daemon=True)
-        # a signal may reach the whole group, and the parent decides: a worker that is not ready
-        # yet takes this mask over and stays quiet. The tracker's own start would lift the mask
+        self.process = context.Process(target=_work, args=(theirs, setup), daemon=True)
+        # Ctrl-C reaches the whole process group, but the parent decides what happens. The worker
+        # inherits this mask until it is ready. Starting the tracker here would lift the mask.
         resource_tracker.ensure_running()
         with undisturbed(), _one_matrix_thread() if whole_machine else contextlib.nullcontext():
             before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
@@ -119,7 +122,7 @@ class _Worker:
     def give(self, task: Any) -> None:
         self.task, self.place = task, None
         self.heard = time.monotonic()
-        # one that has died meanwhile is found out when it is listened to
+        # a worker that has died is noticed when its pipe is read
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             self.pipe.send(task)
 
@@ -131,7 +134,6 @@ class _Worker:
 
 def run(
     setup: Setup,
-    arguments: tuple[Any, ...],
     tasks: Iterable[Any],
     count: int,
     on_report: Callable[[str, Any], None],
@@ -139,32 +141,40 @@ def run(
     hang_s: float = HANG_S,
     whole_machine: bool = False,
 ) -> None:
-    """Have `count` processes do all tasks, each of which is asked for when a process is free.
+    """Let `count` processes do all tasks. No process outlives the call.
 
-    on_report: gets what workers report, but for 'at', which names the place that a task is at.
-    on_death: gets the task of a worker that crashed or hung, its place and how it ended; returns
-    the task to try instead, or raises. whole_machine: there is a process on every core, so that
-    matrices need no threads. Raises OutputError with a worker's own words where it met an error
-    that no repetition mends. No process outlives the call.
+    Args:
+        setup: Called in each process; it must be picklable.
+        tasks: Taken one at a time, when a process is free.
+        count: Number of processes.
+        on_report: Called with the kind and value of each report, except "at", whose value names
+            the place a task has reached.
+        on_death: Called with the task of a worker that crashed or hung, its place, and how it
+            ended. Returns the task to try instead, or raises.
+        hang_s: Seconds without a report after which a worker is replaced.
+        whole_machine: There is a process on every core, so matrices need no threads.
+
+    Raises:
+        OutputError: A worker met an error that another attempt cannot fix; in its words.
     """
     waiting = Waiting(tasks)
     workers: list[_Worker] = []
     try:
         while waiting and len(workers) < count:
-            workers.append(_Worker(setup, arguments, whole_machine))
+            workers.append(_Worker(setup, whole_machine))
             workers[-1].give(waiting.take())
         while busy := [worker for worker in workers if worker.task is not None]:
             wait([worker.pipe for worker in busy], timeout=_POLL_S)
             for worker in busy:
                 ended = _listen(worker, on_report, hang_s)
                 if ended:
-                    if worker.task is not None:  # else it had just done its task
+                    if worker.task is not None:  # otherwise it had finished its task
                         waiting.put_back(on_death(worker.task, worker.place, ended))
                     worker.stop()
                     workers.remove(worker)
                     if not waiting:
                         continue
-                    worker = _Worker(setup, arguments, whole_machine)
+                    worker = _Worker(setup, whole_machine)
                     workers.append(worker)
                 if worker.task is None and waiting:
                     worker.give(waiting.take())
@@ -174,7 +184,7 @@ def run(
 
 
 def _listen(worker: _Worker, on_report: Callable[[str, Any], None], hang_s: float) -> str:
-    """Hear a worker out; how it ended, or '' while it lives."""
+    """Handle a worker's reports. Return how it ended, or '' if it is alive."""
     try:
         while worker.pipe.poll():
             kind, value = worker.pipe.recv()
@@ -197,17 +207,17 @@ def _listen(worker: _Worker, on_report: Callable[[str, Any], None], hang_s: floa
 
 
 def in_words(error: Exception, place: str) -> str:
-    """What stops a run, for its user. place: where it happened, for mistakes of ours."""
+    """Describe an error that stops a run. `place` says where it happened, for internal errors."""
     if isinstance(error, FastgenError | OSError):
         return str(error)
     if isinstance(error, MemoryError):
-        return f"{place}: out of memory; give fewer workers or a smaller size"
+        return f"{place}: out of memory; use fewer workers or a smaller size"
     traceback.print_exception(error)
-    return f"{place}: {error!r} (our mistake: please report it)"
+    return f"{place}: {error!r} (this is a bug in fastgen: please report it)"
 
 
-def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
-    """One worker process: tasks from the pipe until the parent ends it, or is no more."""
+def _work(pipe: Connection, setup: Setup) -> None:
+    """Main function of a worker: do tasks from the pipe until the parent kills it or exits."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -224,7 +234,7 @@ def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
         send(kind, value)
 
     try:
-        work = setup(*arguments, report)
+        work = setup(report)
         while True:
             with _gone_with_parent():
                 task = pipe.recv()
@@ -236,7 +246,7 @@ def _work(pipe: Connection, setup: Setup, arguments: tuple[Any, ...]) -> None:
 
 @contextlib.contextmanager
 def _gone_with_parent() -> Iterator[None]:
-    """End this process where its pipe turns out to have no other end: nobody is left to tell."""
+    """Exit if the pipe has no other end, because then nobody can receive an error."""
     try:
         yield
     except (EOFError, BrokenPipeError, ConnectionResetError):
@@ -244,7 +254,7 @@ def _gone_with_parent() -> Iterator[None]:
 
 
 def _end_with_parent() -> None:
-    """End this process where it stands once its parent has died, as a kill of both would."""
+    """Exit at once when the parent dies."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import Any
 
+import numpy as np
 import orjson
+from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
@@ -44,6 +46,12 @@ Record = dict[str, Any]
 
 Records = Callable[[], Iterable[Record]]
 """The records of one split in order; each call goes through them from the start."""
+
+Read = Callable[[str], bytes]
+"""Returns the content of a file of a dataset by its path relative to the dataset."""
+
+Label = tuple[str, Sequence[float]]
+"""Class name, and box as x, y, width and height in pixels."""
 
 DatasetFiles = Iterator[tuple[str, Iterable[str] | bytes]]
 """Files over a whole split: path, and text piece by piece or bytes."""
@@ -97,20 +105,73 @@ def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
 
 
 class Format(ABC):
-    """What every format does, in a subclass with one instance."""
+    """One label format: the files of each sample, and what dataset code needs to know of them.
+
+    A subclass has one instance, which its module calls FORMAT.
+
+    Attributes:
+        name: Name on the command line and key of `Record["facts"]`.
+        classes: Class names of its labels in order; empty where labels have no classes.
+        needs_normals: `sample_files` reads `Sample.normals`, which cost another draw.
+        fits_archives: The webdataset layout can hold this format, because `sample_files` alone
+            gives everything a reader needs.
+    """
 
     name: str
+    classes: tuple[str, ...] = ()
+    needs_normals: bool = False
+    fits_archives: bool = True
 
     @abstractmethod
     def sample_files(self, item: Item) -> tuple[Files, Any]:
-        """Files of one sample, and JSON facts that `dataset_files` will need of it."""
+        """Return the files of one sample, and facts about it as JSON values.
+
+        The shard's manifest keeps the facts; the other methods work on them.
+        """
 
     def dataset_files(self, split: str, records: Records) -> DatasetFiles:
-        """Files over all samples of a split: path, and text piece by piece or bytes."""
+        """Yield the path and content of each file that covers a whole split."""
         return iter(())
 
     def folders(self, split: str) -> Sequence[str]:
-        """Folders that readers expect even where nothing is in them."""
+        """Return folders that readers expect even when they are empty."""
+        return ()
+
+    def labels(self, facts: Any) -> Iterable[Label]:
+        """Return the labels to train on in one image with these facts, ignored ones left out."""
+        return ()
+
+    def counts(self, facts: Iterable[Any]) -> dict[str, int]:
+        """Count labels over the images with these facts, under the names used in dataset.json.
+
+        Without images, return every name with 0.
+        """
+        return {}
+
+    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:  # noqa: B027
+        """Draw the labels of one image, as its label file has them, into `picture` in place.
+
+        Args:
+            picture: uint8 RGB [H, W, 3], the image at any scale.
+            read: Returns the content of a file of the dataset by its path.
+            name: SPLIT/STEM of the image.
+
+        Raises:
+            ValueError, IndexError: The label file cannot be read.
+        """
+
+    def check(self, record: Record, read: Read) -> Iterable[str]:
+        """Return a line "PATH: FAULT" for each label file of one image that contradicts others."""
+        return ()
+
+    def check_split(self, split: str, facts: list[Any], read: Read) -> Iterable[str]:
+        """Return a line "PATH: FAULT" for each file of a split that contradicts the facts.
+
+        Args:
+            split: train, val or test.
+            facts: Facts of the split's images in order.
+            read: Returns the content of a file of the dataset by its path.
+        """
         return ()
 
 

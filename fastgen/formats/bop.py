@@ -14,9 +14,9 @@ import numpy as np
 from fastgen.files.images import png
 from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
-from fastgen.geometry.container import build_container
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.sampling.scene import SPLITS
-from fastgen.scene.container_kinds import KINDS, WallProfiles
+from fastgen.scene.container_kinds import KINDS
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
 """obj_id of each kind of container."""
@@ -27,6 +27,7 @@ _LENS_KEYS = ("distortion_model", "distortion")
 
 class _Bop(Format):
     name = "bop"
+    fits_archives = False  # poses are in one file for all images
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample = item.sample
@@ -83,7 +84,7 @@ def _models() -> Iterator[tuple[str, bytes]]:
 
     infos = {}
     for kind, number in OBJECT_IDS.items():
-        mesh = build_container(kind, WallProfiles())
+        mesh = SHAPES.container(kind)
         low, high = (np.asarray(bound, float) for bound in mesh.bounds_mm)
         infos[str(number)] = {
             "diameter": float(np.linalg.norm(high - low)),

@@ -85,6 +85,23 @@ def trained_on(annotations: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     return [item for item in annotations if not item["iscrowd"]]
 
 
+def labels(
+    annotations: Iterable[dict[str, Any]], classes: Sequence[str]
+) -> Iterator[tuple[str, Sequence[float]]]:
+    """Yield class name and box (x, y, width, height) of each annotation that is not ignored."""
+    for item in trained_on(annotations):
+        yield classes[item["category_id"] - 1], item["bbox"]
+
+
+def has_annotations(text: bytes, annotations: list[dict[str, Any]]) -> bool:
+    """Return whether a COCO file holds exactly these annotations, apart from their ids."""
+    found = json.loads(text)["annotations"]
+    return annotations == [
+        {key: value for key, value in item.items() if key not in ("id", "image_id")}
+        for item in found
+    ]
+
+
 def file_text(
     description: str,
     categories: Sequence[dict[str, Any]],

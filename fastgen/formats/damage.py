@@ -1,15 +1,27 @@
 """Damage detection and segmentation: 16-bit masks, COCO, and YOLO outlines."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_VALUES, SEGMENTATION_CLASSES
+from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, SEGMENTATION_CLASSES
 from fastgen.files.images import png
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, coco
-from fastgen.formats.yolo import line, outline
+from fastgen.formats import (
+    DatasetFiles,
+    Files,
+    Format,
+    Item,
+    Label,
+    Read,
+    Record,
+    Records,
+    coco,
+    yolo,
+)
+from fastgen.labels.overlay import draw_outline
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Sample
 
@@ -35,16 +47,17 @@ def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], boo
 
 class _Damage(Format):
     name = "damage"
+    classes = SEGMENTATION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         found = list(instances(item.sample))
         height, width = item.sample.damage.shape
         lines = []
         for category, box, mask, ignored in found:
-            polygon = outline(window(mask, box))
+            polygon = yolo.outline(window(mask, box))
             if len(polygon) > 2 and not ignored:
                 points = (polygon + box[:2]) / (width, height)
-                lines.append(line(category - 1, points.ravel().tolist()))
+                lines.append(yolo.line(category - 1, points.ravel().tolist()))
         files: Files = {
             f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),
             f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
@@ -56,6 +69,13 @@ class _Damage(Format):
             for category, box, mask, ignored in found
         ]
 
+    def labels(self, facts: Any) -> Iterable[Label]:
+        return coco.labels(facts, self.classes)
+
+    def counts(self, facts: Iterable[Any]) -> dict[str, int]:
+        names = (name for each in facts for name, _ in self.labels(each))
+        return {"damages": sum(name in DAMAGE_CLASSES for name in names)}
+
     def folders(self, split: str) -> Sequence[str]:
         return (f"damage/masks/{split}", f"damage/yolo/{split}")
 
@@ -63,6 +83,57 @@ class _Damage(Format):
         words = "Synthetic shipping containers with damage masks"
         text = coco.file_text(words, CATEGORIES, records, self.name)
         yield f"damage/coco_{split}.json", text
+
+    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
+        size = picture.shape[1::-1]
+        for index, values in yolo.finite_rows(read(f"damage/yolo/{name}.txt")):
+            if index:  # the container shows as a box already
+                draw_outline(picture, np.reshape(values, (-1, 2)) * size, self.classes[index])
+
+    def check(self, record: Record, read: Read) -> Iterator[str]:
+        name = f"{record['split']}/{record['stem']}"
+        outlines, mask = f"damage/yolo/{name}.txt", f"damage/masks/{name}.png"
+        for fault in _outline_faults(yolo.rows(read(outlines).decode())):
+            yield f"{outlines}: {fault}"
+        fault = _mask_fault(read(mask), record["size"], record["facts"][self.name])
+        if fault:
+            yield f"{mask}: {fault}"
+
+    def check_split(self, split: str, facts: list[Any], read: Read) -> Iterator[str]:
+        path = f"damage/coco_{split}.json"
+        if not coco.has_annotations(read(path), [item for each in facts for item in each]):
+            yield f"{path}: differs from the shards' records"
+
+
+def _outline_faults(found: list[tuple[int, list[float]]]) -> Iterator[str]:
+    for index, values in found:
+        if not 0 <= index < len(SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:
+            yield f"class {index} with {len(values)} numbers is not an outline"
+        elif not (min(values) >= 0 and max(values) <= 1):
+            yield "a value lies outside 0..1"
+
+
+def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str, Any]]) -> str:
+    """Compare a mask file with annotations; '' if it has the same parts."""
+    width, height = size
+    mask = cv2.imdecode(np.frombuffer(png_file, np.uint8), cv2.IMREAD_UNCHANGED)
+    if mask is None or mask.shape != (height, width) or mask.dtype != np.uint16:
+        return f"not a complete 16-bit PNG of {width}x{height}"
+    parts = [(1, mask > 0)] if mask.any() else []
+    parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
+    from_mask = []
+    for category, part in parts:
+        rows, columns = np.nonzero(part)
+        x, y = int(columns.min()), int(rows.min())
+        box = [x, y, int(columns.max()) + 1 - x, int(rows.max()) + 1 - y]
+        runs = coco.rle(part, (0, 0), (width, height))["counts"]
+        from_mask.append((category, int(rows.size), box, runs))
+    listed = [
+        (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
+        for item in annotations
+    ]
+    same = sorted(from_mask, key=repr) == sorted(listed, key=repr)
+    return "" if same else "differs from the COCO annotations"
 
 
 FORMAT = _Damage()

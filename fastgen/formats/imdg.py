@@ -1,11 +1,27 @@
 """Marker detection: YOLO with its data.yaml, and COCO with what YOLO cannot say."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, coco
-from fastgen.formats.yolo import detection_lines
+from fastgen.formats import (
+    DatasetFiles,
+    Files,
+    Format,
+    Item,
+    Label,
+    Read,
+    Record,
+    Records,
+    Same,
+    coco,
+    yolo,
+)
+from fastgen.labels.overlay import draw_box
 from fastgen.labels.visibility import window
 from fastgen.sampling.scene import SPLITS
 
@@ -14,10 +30,11 @@ CATEGORIES = [{"id": i + 1, "name": name} for i, name in enumerate(DETECTION_CLA
 
 class _Imdg(Format):
     name = "imdg"
+    classes = DETECTION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample, split, stem = item.sample, item.split, item.stem
-        labels = detection_lines(sample.objects, sample.view.size)
+        labels = yolo.detection_lines(sample.objects, sample.view.size)
         files: Files = {
             # trainers resolve this folder and look for labels where `images` reads `labels`: a link
             # in place of the folder would lead them out of imdg
@@ -40,6 +57,12 @@ class _Imdg(Format):
             )
         return files, found
 
+    def labels(self, facts: Any) -> Iterable[Label]:
+        return coco.labels(facts, self.classes)
+
+    def counts(self, facts: Iterable[Any]) -> dict[str, int]:
+        return {"objects": sum(len(coco.trained_on(each)) for each in facts)}
+
     def folders(self, split: str) -> Sequence[str]:
         return (f"imdg/images/{split}", f"imdg/labels/{split}")
 
@@ -51,6 +74,28 @@ class _Imdg(Format):
             # no `path`: trainers take it relative to this file
             head = "".join(f"{each}: images/{each}\n" for each in SPLITS)
             yield "imdg/data.yaml", f"{head}nc: {len(DETECTION_CLASSES)}\nnames:\n{names}".encode()
+
+    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
+        height, width = picture.shape[:2]
+        for index, values in yolo.finite_rows(read(f"imdg/labels/{name}.txt")):
+            draw_box(picture, yolo.pixel_box(values, (width, height)), self.classes[index])
+
+    def check(self, record: Record, read: Read) -> Iterator[str]:
+        name = f"{record['split']}/{record['stem']}"
+        path = f"imdg/labels/{name}.txt"
+        scene = json.loads(read(f"scenes/{name}.json"))
+        width, height = scene["size"]
+        listed = [  # the file has six digits: to 0.1 pixel
+            (index, [round(v, 1) for v in yolo.pixel_box(values, (width, height))])
+            for index, values in yolo.rows(read(path).decode())
+        ]
+        visible = [
+            (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
+            for item in scene["objects"]
+            if item["class_name"] in DETECTION_CLASSES and item["bbox"] and not item["ignored"]
+        ]
+        if sorted(listed) != sorted(visible):
+            yield f"{path}: differs from the scene file's objects"
 
 
 FORMAT = _Imdg()

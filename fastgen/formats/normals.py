@@ -11,6 +11,7 @@ from fastgen.formats import Files, Format, Item
 
 class _Normals(Format):
     name = "normals"
+    needs_normals = True
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         normals = item.sample.normals

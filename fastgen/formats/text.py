@@ -1,6 +1,6 @@
 """Text recognition: crops of legible identifiers, and a line `file<TAB>text` for each."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from fastgen.files.images import png
@@ -19,6 +19,9 @@ class _Text(Format):
             files[f"text/{item.split}/{name}"] = png(pixels)
             found.append({"file": name, "text": thing.text})
         return files, found
+
+    def counts(self, facts: Iterable[Any]) -> dict[str, int]:
+        return {"crops": sum(map(len, facts))}
 
     def folders(self, split: str) -> Sequence[str]:
         return (f"text/{split}",)

@@ -1,5 +1,6 @@
 """YOLO text labels, normalised to the image and clipped to it: trainers refuse values beyond 1."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 import cv2
@@ -51,6 +52,14 @@ def rows(text: str) -> list[tuple[int, list[float]]]:
     """Class and numbers of each `line` of a file. Raises ValueError for text that is none."""
     lines = [each.split() for each in text.splitlines()]
     return [(int(index), [float(v) for v in values]) for index, *values in lines]
+
+
+def finite_rows(text: bytes) -> list[tuple[int, list[float]]]:
+    """Return `rows` of a file. Raises ValueError for negative classes and infinite numbers."""
+    found = rows(text.decode())
+    if any(index < 0 or not all(map(math.isfinite, numbers)) for index, numbers in found):
+        raise ValueError("not a YOLO label file")
+    return found
 
 
 def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:

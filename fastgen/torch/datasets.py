@@ -1,11 +1,10 @@
-"""ContainerDataset and ContainerStream: positions of an epoch, rendered when they are asked for."""
+"""ContainerDataset and ContainerStream: items of an epoch, rendered when they are needed."""
 
 import contextlib
 import hashlib
 import json
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import torch
@@ -13,6 +12,7 @@ from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
+from fastgen.render.settings import RenderSettings
 from fastgen.sample import Sample
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Scene
@@ -20,37 +20,41 @@ from fastgen.torch.plan import (
     EPOCH_SCENES,
     MAX_EPOCH,
     Plan,
+    SceneSettings,
     chosen_cameras,
     config_of,
     positions,
     shard,
 )
 from fastgen.torch.rendering import LocalGenerator
-from fastgen.torch.targets import Collate, Item, check_form, collate_of, item_of
+from fastgen.torch.targets import Collate, Item, ItemSettings, check_form, collate_of, item_of
 from fastgen.validation import whole
 
-Curriculum = Callable[[int], Config | Mapping[str, Any]]
-Transforms = Callable[[Any, Any], Item]
-
 MAX_LENGTH = EPOCH_SCENES // 100
-"""Images of an epoch: a split of one in a hundred scenes still fits before the next epoch."""
+"""Most images in an epoch. A split with 1 % of the scenes still fits before the next epoch."""
 
 
 class ContainerDataset(Dataset[Item]):
-    """Map-style: item i of `length` is rendered when asked for, the same bytes in every process.
+    """Map-style dataset whose items are rendered on access, with the same bytes in every process.
 
-    task: damage, imdg, text or door; targets.item_of says what image and target hold. config,
-    seed, size, backend, hdri_dir, quality, device_index: as for Generator. length: images of
-    an epoch over all ranks. cameras: names, by default all of the rig that the task can use.
-    split: 'train', 'val' or 'test' as `fastgen generate` deals scenes out, None for all scenes.
-    fixed: whether every epoch has the same scenes, as a validation set should; else each has new
-    ones. all_views: whether each scene is seen by all cameras in turn, or by one. form:
-    'detection' or 'yolo'. as_float: images as float32 in 0..1 in place of uint8. transforms:
-    called with (image, target), returns both. curriculum: called with the epoch, returns the
-    epoch's Config, or values that replace those of `config`, as a file would hold them.
+    Example:
+        train = ContainerDataset("imdg", seed=1, length=20_000,
+                                 scenes=SceneSettings(split="train"),
+                                 items=ItemSettings(form="yolo"))
 
-    With workers that are spawned, transforms and curriculum must be functions of a module.
-    Raises ConfigError for a value that cannot be.
+    With spawned workers, `scenes.curriculum` and `items.transforms` must be functions of a module.
+
+    Args:
+        task: damage, imdg, text or door; `targets.item_of` describes image and target of each.
+        config: Distribution of the scenes; by default that of the preset seafront.
+        seed: Whole number of 0 or more.
+        length: Images per epoch, over all ranks.
+        render: How images are rendered: size, quality, backend, device and HDRIs.
+        scenes: Which scenes an epoch has, and which cameras see them.
+        items: What an item holds.
+
+    Raises:
+        ConfigError: A value is not valid.
     """
 
     def __init__(
@@ -58,110 +62,92 @@ class ContainerDataset(Dataset[Item]):
         task: str,
         config: Config | None = None,
         seed: int = 0,
-        size: tuple[int, int] = (640, 640),
         length: int = 1000,
-        cameras: Sequence[str] | None = None,
-        *,
-        split: str | None = None,
-        fixed: bool = False,
-        all_views: bool = True,
-        form: str = "detection",
-        as_float: bool = False,
-        transforms: Transforms | None = None,
-        curriculum: Curriculum | None = None,
-        backend: str = "auto",
-        hdri_dir: str | Path | None = None,
-        quality: str = "balanced",
-        device_index: int | None = None,
+        render: RenderSettings = RenderSettings(),  # noqa: B008
+        scenes: SceneSettings = SceneSettings(),  # noqa: B008
+        items: ItemSettings = ItemSettings(),  # noqa: B008
     ) -> None:
-        length = whole("length", length, 1, MAX_LENGTH)
-        seed = whole("seed", seed)
+        self.task = task
         self.config = Config.checked(config)
-        if not (transforms is None or callable(transforms)):
-            raise ConfigError(f"transforms: {transforms!r} is no function of image and target")
-        self.task, self.form, self.as_float = task, form, as_float
-        self.seed, self.length = seed, length
-        self.transforms, self.curriculum = transforms, curriculum
-        self.cameras = chosen_cameras(task, self.config, cameras)
-        check_form(task, form)
-        self._generator = LocalGenerator(
-            config=self.config,
-            seed=seed,
-            size=size,
-            backend=backend,
-            hdri_dir=hdri_dir,
-            quality=quality,
-            device_index=device_index,
-        )
-        self._plan = Plan(self.config, seed, self.cameras, split, fixed, all_views)
-        # workers that persist through epochs see it change, forked or spawned
+        self.seed = whole("seed", seed)
+        self.length = whole("length", length, 1, MAX_LENGTH)
+        self.render, self.scenes, self.items = render, scenes, items
+        self.cameras = chosen_cameras(task, self.config, scenes.cameras)
+        check_form(task, items.form)
+        self._generator = LocalGenerator(self.config, self.seed, render)
+        self._plan = Plan(self.config, self.seed, self.cameras, scenes)
+        # shared memory, so that persistent workers see it change, forked or spawned
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
-        self._epoch_config: tuple[int, Config] = (0, config_of(curriculum, self.config, 0))
+        self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
         self._scene: tuple[tuple[int, int], Scene] | None = None
         self._digests: dict[int, str] = {}
-        self._made: dict[str, Any] = {
-            "task": task,
-            "seed": seed,
-            "size": [int(side) for side in size],
-            "length": self.length,
-            "cameras": list(self.cameras),
-            "split": split,
-            "fixed": fixed,
-            "all_views": all_views,
-            "quality": quality,
-            "config": self.config.to_plain(),
-        }
+        self._environments: dict[str, Any] | None = None
 
     @property
     def description(self) -> dict[str, Any]:
-        """What decides the samples, as plain values; of files and of the curriculum, SHA-256.
-        HDRIs' weights in the draw are among them.
+        """Everything that decides the samples, as JSON values.
 
-        The curriculum stands here by what it gives for epochs 0 and 1 and the present one.
+        HDRIs appear with their SHA-256 and weight, the curriculum with the SHA-256 of its
+        configurations for epochs 0, 1 and the current one.
         """
-        if "hdri_dir" not in self._made:  # reads every HDRI
-            self._made["hdri_dir"] = self._generator.get().environment_record
-        epochs = sorted({0, 1, self.epoch})
-        return {**self._made, "curriculum": self.curriculum_digests(epochs)}
+        if self._environments is None:  # reads every HDRI
+            self._environments = self._generator.get().environment_record
+        return {
+            "task": self.task,
+            "seed": self.seed,
+            "size": list(self.render.size),
+            "length": self.length,
+            "cameras": list(self.cameras),
+            "split": self.scenes.split,
+            "fixed": self.scenes.fixed,
+            "all_views": self.scenes.all_views,
+            "quality": self.render.quality,
+            "config": self.config.to_plain(),
+            "hdri_dir": self._environments,
+            "curriculum": self.curriculum_digests(sorted({0, 1, self.epoch})),
+        }
 
     def curriculum_digests(self, epochs: Sequence[int]) -> dict[str, str]:
-        """Epoch, as text -> SHA-256 of its configuration; without epochs that there is none of."""
+        """Return the SHA-256 of each epoch's configuration, by the epoch as text.
+
+        Epochs for which the curriculum fails are left out.
+        """
         for epoch in epochs:
             with contextlib.suppress(Exception):  # one that indexes a list may end after epoch 0
                 if epoch not in self._digests:
-                    config = config_of(self.curriculum, self.config, epoch)
-                    # checked, so that 12 and 12.0 read the same
+                    config = config_of(self.scenes.curriculum, self.config, epoch)
+                    # checked, so that 12 and 12.0 have the same digest
                     plain = json.dumps(Config.checked(config).to_plain(), sort_keys=True)
                     self._digests[epoch] = hashlib.sha256(plain.encode()).hexdigest()
         return {str(epoch): self._digests[epoch] for epoch in epochs if epoch in self._digests}
 
     @property
     def epoch(self) -> int:
-        """The epoch that items are of; workers share it."""
+        """The current epoch; workers share it."""
         return int(self._epoch)
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch, 0 to plan.MAX_EPOCH, between two passes over the data."""
+        """Go to an epoch, 0 to plan.MAX_EPOCH. Call it between two passes over the data."""
         epoch = whole("epoch", epoch, 0, MAX_EPOCH)
-        config_of(self.curriculum, self.config, epoch)  # refused here, not in a worker
+        config_of(self.scenes.curriculum, self.config, epoch)  # fails here, not in a worker
         self._epoch.fill_(epoch)
 
     @property
     def collate(self) -> Collate:
-        """The collate function that fits this dataset's items; Loader uses it by itself."""
-        return collate_of(self.task, self.form)
+        """The collate function for this dataset's items. Loader uses it by default."""
+        return collate_of(self.task, self.items.form)
 
     def locate(self, position: int, epoch: int | None = None) -> tuple[int, str]:
-        """Scene index and camera name of a position; `epoch` by default the present one."""
+        """Return scene index and camera name at a position of an epoch, by default the current."""
         return self._plan.locate(self.epoch if epoch is None else epoch, position)
 
     def sample(self, position: int, epoch: int | None = None) -> Sample:
-        """The Sample that the item at a position is made from."""
+        """Return the Sample from which the item at a position is made."""
         epoch = self.epoch if epoch is None else epoch
         index, camera = self._plan.locate(epoch, position)
         generator = self._generator.get()
         last = self._scene
-        if last is None or last[0] != (epoch, index):  # cameras of a scene come one by one
+        if last is None or last[0] != (epoch, index):  # a scene's cameras mostly follow each other
             config = self.config_at(epoch)
             scene = sample_scene(config, self.seed, index, generator.environments)
             last = self._scene = ((epoch, index), scene)
@@ -169,16 +155,15 @@ class ContainerDataset(Dataset[Item]):
         return generator.render(scene=last[1], camera=camera, labels=labels)
 
     def item(self, position: int, epoch: int | None = None) -> Item:
-        """Image and target at a position, 0 or more, transforms applied; see targets.item_of."""
+        """Return image and target at a position, 0 or more, after transforms; see item_of."""
         epoch = self.epoch if epoch is None else epoch
         sample = self.sample(position, epoch)
         names = list(self.config.cameras)
         image_id = sample.scene.index * len(names) + names.index(sample.camera.name)
-        labels = self.config_at(epoch).labels
-        made = item_of(sample, self.task, self.form, labels, image_id, self.as_float)
-        if self.transforms is None:
+        made = item_of(sample, self.task, self.items, self.config_at(epoch).labels, image_id)
+        if self.items.transforms is None:
             return made
-        changed = self.transforms(*made)
+        changed = self.items.transforms(*made)
         if not isinstance(changed, tuple | list) or len(changed) != 2:
             what = type(changed).__name__
             raise ConfigError(f"transforms: gave {what}; return the pair (image, target)")
@@ -186,14 +171,15 @@ class ContainerDataset(Dataset[Item]):
         return image, target
 
     def config_at(self, epoch: int) -> Config:
-        """The configuration of an epoch, by the curriculum if there is one."""
+        """Return the configuration of an epoch."""
         last = self._epoch_config
         if last[0] != epoch:
-            last = self._epoch_config = (epoch, config_of(self.curriculum, self.config, epoch))
+            config = config_of(self.scenes.curriculum, self.config, epoch)
+            last = self._epoch_config = (epoch, config)
         return last[1]
 
     def close(self) -> None:
-        """Free what this process opened to render; the next item opens it again."""
+        """Free what this process opened for rendering. The next item opens it again."""
         self._generator.close()
 
     def __len__(self) -> int:
@@ -203,67 +189,72 @@ class ContainerDataset(Dataset[Item]):
         try:
             position = operator.index(position)
         except TypeError:
-            raise TypeError(f"position {position!r} is no whole number") from None
+            raise TypeError(f"position {position!r} is not a whole number") from None
         if not -self.length <= position < self.length:
             raise IndexError(f"position {position} is out of range; there are {self.length}")
         return self.item(position % self.length)
 
 
 class ContainerStream(IterableDataset[Item]):
-    """Iterable: the items of a ContainerDataset in order, by this rank and worker its share.
+    """Iterable dataset: the items of a ContainerDataset in order, divided among ranks and workers.
 
-    task, config, seed, size, cameras, options: as for ContainerDataset. length: images of an epoch
-    over all ranks; None for no end. rank, world_size: which part of the positions is ours, by
-    default torch.distributed's where it runs when the stream is made, else all. Each position comes
-    exactly once over all ranks and workers, so ranks may differ by one item at the end.
-    batch_size: the DataLoader's, so that items come in order whatever the number of workers;
-    Loader sets it by itself.
+    Each position occurs exactly once over all ranks and workers, so ranks may differ by one item.
+
+    Args:
+        dataset: The dataset.
+        endless: Continue after the dataset's length without an end.
+        rank: Rank of this process; by default that of torch.distributed if it runs when the stream
+            is made, otherwise 0.
+        world_size: Number of ranks; give both or neither.
+        batch_size: Batch size of the DataLoader, so that items come in order with any number of
+            workers. Loader sets it.
+
+    Raises:
+        ConfigError: A value is not valid.
     """
 
     def __init__(
         self,
-        task: str,
-        config: Config | None = None,
-        seed: int = 0,
-        size: tuple[int, int] = (640, 640),
-        length: int | None = None,
-        cameras: Sequence[str] | None = None,
+        dataset: ContainerDataset,
         *,
+        endless: bool = False,
         rank: int | None = None,
         world_size: int | None = None,
         batch_size: int = 1,
-        **options: Any,
     ) -> None:
-        known = MAX_LENGTH if length is None else length
-        self.items = ContainerDataset(task, config, seed, size, known, cameras, **options)
-        self.length = None if length is None else int(length)
+        if not isinstance(dataset, ContainerDataset):
+            raise ConfigError(
+                f"dataset: {type(dataset).__name__} is not a ContainerDataset; give one"
+            )
+        self.dataset = dataset
+        self.length = None if endless else len(dataset)
         self.part = shard(rank, world_size)
         self.batch_size = whole("batch_size", batch_size, 1)
         self._start = torch.zeros(1, dtype=torch.int64).share_memory_()
 
     @property
     def epoch(self) -> int:
-        """The epoch that items are of; workers share it."""
-        return self.items.epoch
+        """The current epoch; workers share it."""
+        return self.dataset.epoch
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch, 0 to plan.MAX_EPOCH, between two passes over the data."""
-        self.items.set_epoch(epoch)
+        """Go to an epoch, 0 to plan.MAX_EPOCH. Call it between two passes over the data."""
+        self.dataset.set_epoch(epoch)
 
     def start_at(self, position: int) -> None:
         """Let passes begin at a position of the epoch, counted over all ranks."""
         self._start.fill_(whole("position", position))
 
     def __len__(self) -> int:
-        """Items of this rank in an epoch. Raises TypeError where there is no end."""
+        """Return the number of items of this rank in an epoch. Raises TypeError if endless."""
         if self.length is None:
-            raise TypeError("this stream has no end; give it a length")
+            raise TypeError("this stream has no end; make it with endless=False")
         rank, world_size = self.part
         return len(range(rank, self.length, world_size))
 
     def __iter__(self) -> Iterator[Item]:
         worker = get_worker_info()
         share = (worker.id, worker.num_workers) if worker else (0, 1)
-        epoch = self.epoch  # read once: a pass is of one epoch
+        epoch = self.epoch  # read once: a pass stays in one epoch
         places = positions(int(self._start), self.length, self.part, share, self.batch_size)
-        return (self.items.item(position, epoch) for position in places)
+        return (self.dataset.item(position, epoch) for position in places)

@@ -1,4 +1,4 @@
-"""Loader: a DataLoader that shares positions among ranks and resumes at the very next sample."""
+"""Loader: a DataLoader that divides positions among ranks and resumes at the next sample."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -9,16 +9,20 @@ from fastgen.errors import ConfigError
 from fastgen.sampling.scene import stream
 from fastgen.torch.datasets import ContainerDataset, ContainerStream
 from fastgen.torch.plan import MAX_EPOCH, shard
-from fastgen.torch.targets import Collate
 from fastgen.validation import whole
 
 
 class ShardSampler(Sampler[int]):
-    """Positions of one rank: each position comes exactly once over all ranks, none is padded.
+    """Sampler of one rank. Each position occurs once over all ranks; none is repeated as padding.
 
-    dataset: decides length, epoch and seed. rank, world_size: by default torch.distributed's where
-    it runs, else all is ours. shuffle: a new order each epoch, the same on all ranks.
-    start: where passes begin in this order, counted over all ranks.
+    Args:
+        dataset: Its length, epoch and seed decide the positions.
+        rank: Rank of this process; by default that of torch.distributed if it runs, otherwise 0.
+        world_size: Number of ranks; give both or neither.
+        shuffle: Use a new order in each epoch, the same on all ranks.
+
+    Attributes:
+        start: Place in this order where passes begin, counted over all ranks.
     """
 
     def __init__(
@@ -33,7 +37,7 @@ class ShardSampler(Sampler[int]):
         self._dataset, self._shuffle = dataset, shuffle
 
     def __len__(self) -> int:
-        """Positions of this rank in a whole epoch."""
+        """Return the number of positions of this rank in a whole epoch."""
         rank, world_size = self.part
         return len(range(rank, len(self._dataset), world_size))
 
@@ -48,17 +52,25 @@ class ShardSampler(Sampler[int]):
 
 
 class Loader:
-    """Batches of a ContainerDataset or ContainerStream, and where in the epoch they have come to.
+    """Batches of a ContainerDataset or ContainerStream, with a position that can be saved.
 
-    batch_size: items of this rank in a batch. shuffle: for datasets; a stream has its order.
-    drop_last: leave out an incomplete last batch. rank, world_size: for datasets, as for
-    ShardSampler; a stream has its own. collate_fn: by default the one that fits the task.
-    options: what else DataLoader takes: num_workers, persistent_workers, pin_memory,
-    prefetch_factor, multiprocessing_context, timeout, worker_init_fn, generator.
+    `state_dict` counts the samples handed out, not those that workers have prepared. After
+    `load_state_dict`, a Loader with the same dataset continues with the next sample. Batch size,
+    number of workers and number of ranks may differ. All ranks may load the state of rank 0.
 
-    `state_dict` counts what was handed out, not what workers have fetched ahead; loading it into a
-    Loader made alike goes on with the next sample. Batch size, workers and number of ranks may
-    differ then. All ranks may load the state of rank 0.
+    Args:
+        dataset: The dataset or stream.
+        batch_size: Items per batch on this rank.
+        shuffle: Use a new order in each epoch; not for a stream.
+        drop_last: Leave out an incomplete last batch.
+        rank: Rank of this process, as for ShardSampler; a stream has its own.
+        world_size: Number of ranks; give both or neither.
+        options: Further options of DataLoader: collate_fn (by default the one for the task),
+            num_workers, persistent_workers, pin_memory, prefetch_factor, multiprocessing_context,
+            timeout, worker_init_fn, generator.
+
+    Raises:
+        ConfigError: A value is not valid.
     """
 
     def __init__(
@@ -70,7 +82,6 @@ class Loader:
         drop_last: bool = False,
         rank: int | None = None,
         world_size: int | None = None,
-        collate_fn: Collate | None = None,
         **options: Any,
     ) -> None:
         self.dataset = dataset
@@ -81,7 +92,7 @@ class Loader:
             if shuffle or rank is not None or world_size is not None:
                 raise ConfigError("shuffle, rank, world_size: a stream has its own; leave them out")
             dataset.batch_size = self.batch_size
-            self._items, self._part = dataset.items, dataset.part
+            self._items, self._part = dataset.dataset, dataset.part
             self._length = dataset.length
         elif not isinstance(dataset, ContainerDataset):
             raise ConfigError(
@@ -99,23 +110,22 @@ class Loader:
             batch_size=self.batch_size,
             sampler=self._sampler,
             drop_last=drop_last,
-            collate_fn=collate_fn or self._items.collate,
-            **options,
+            **{**options, "collate_fn": options.get("collate_fn") or self._items.collate},
         )
 
     @property
     def epoch(self) -> int:
-        """The epoch that batches are of."""
+        """The current epoch."""
         return self._items.epoch
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch before a pass; going to the one that was loaded keeps the place in it."""
+        """Go to an epoch before a pass. The epoch of a loaded state keeps the position in it."""
         if epoch != self.epoch:
             self._start = self._position = 0
             self._items.set_epoch(epoch)
 
     def state_dict(self) -> dict[str, Any]:
-        """Plain values: epoch, position after the last sample handed out, and what was made."""
+        """Return epoch, position after the last sample and description of the samples as JSON."""
         return {
             "epoch": self.epoch,
             "position": self._position,
@@ -123,9 +133,11 @@ class Loader:
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Let the next pass go on where `state` was taken.
+        """Let the next pass continue where `state` was taken.
 
-        Raises ConfigError where it is of a loader that makes other samples, naming what differs.
+        Raises:
+            ConfigError: The state belongs to a loader with other samples; the message names what
+                differs.
         """
         if not isinstance(state, Mapping) or not isinstance(state.get("made", {}), Mapping):
             raise ConfigError(f"state: {state!r} is not what state_dict returned")
@@ -140,15 +152,17 @@ class Loader:
             ours["curriculum"] = self._items.curriculum_digests([int(each) for each in taught])
         for key, value in ours.items():
             if made.get(key) != value:
-                raise ConfigError(f"state: was taken with another {key}; make the loader alike")
+                raise ConfigError(
+                    f"state: was taken with another {key}; make the loader in the same way"
+                )
         position = whole("state.position", state["position"], 0, most)
         self._items.set_epoch(epoch)
         self._start = self._position = position
 
     def __len__(self) -> int:
-        """Batches of this rank in a whole epoch. Raises TypeError where there is no end."""
+        """Return the batches of this rank in a whole epoch. Raises TypeError if there is no end."""
         if self._length is None:
-            raise TypeError("this loader has no end; give its stream a length")
+            raise TypeError("this loader has no end; make its stream with endless=False")
         return self._batches_in(0)
 
     def __iter__(self) -> Iterator[Any]:
@@ -168,7 +182,7 @@ class Loader:
             yield batch
 
     def _batches_in(self, start: int) -> int:
-        """Batches of this rank from a position on to the epoch's end."""
+        """Return the number of batches of this rank from a position to the end of the epoch."""
         assert self._length is not None
         items = len(range(start + self._part[0], self._length, self._part[1]))
         return items // self.batch_size if self.drop_last else -(-items // self.batch_size)

@@ -1,7 +1,8 @@
-"""Which scene and camera stand at each position of an epoch, on every rank and in every worker."""
+"""Plan of an epoch: scene and camera at each position, the same on every rank and worker."""
 
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -14,44 +15,71 @@ from fastgen.torch.targets import class_names
 from fastgen.validation import check_known, nearest, whole
 
 EPOCH_SCENES = 10**9
-"""Scenes of epoch e count up from e times this, so that no two epochs share one."""
+"""Epoch e starts at scene index e times this, so that no two epochs share a scene."""
 
 MAX_EPOCH = 2**63 // EPOCH_SCENES - 1
-"""The last epoch all of whose scene numbers a Scene can have."""
+"""The last epoch whose scene indices all fit into a Scene."""
+
+Curriculum = Callable[[int], Config | Mapping[str, Any]]
+"""Returns the configuration of an epoch, or values that replace those of the dataset's."""
+
+
+@dataclass(frozen=True)
+class SceneSettings:
+    """Which scenes an epoch has, and which cameras see them.
+
+    Attributes:
+        cameras: Names of the cameras; None takes all of the configuration that suit the task.
+        split: "train", "val" or "test" for the scenes that `fastgen generate` puts there; None for
+            all scenes.
+        fixed: Every epoch has the scenes of epoch 0, as a validation set should. Otherwise each
+            epoch has new scenes.
+        all_views: Each scene is seen by all cameras in turn. Otherwise each scene is seen by one
+            camera, and the next scene by the next camera.
+        curriculum: Called with the epoch. Returns the epoch's Config, or values that replace those
+            of the dataset's Config, nested as in a configuration file.
+    """
+
+    cameras: Sequence[str] | None = None
+    split: str | None = None
+    fixed: bool = False
+    all_views: bool = True
+    curriculum: Curriculum | None = None
 
 
 class Plan:
-    """Position in an epoch -> scene index and camera; plain arithmetic, no GL.
+    """Scene index and camera at each position of an epoch.
 
-    split: only scenes of 'train', 'val' or 'test' by config.split, as `fastgen generate` deals
-    them out; None for all. fixed: every epoch has the scenes of epoch 0. all_views: each scene is
-    seen by all cameras in turn, else by one, the next scene by the next.
-    Raises ConfigError for cameras or a split that cannot be.
+    Args:
+        config: Configuration, whose fractions decide the split of a scene.
+        seed: Seed of the dataset.
+        cameras: Names of the cameras to use.
+        scenes: The remaining settings; `scenes.cameras` is not used.
+
+    Raises:
+        ConfigError: The split is unknown or has no scenes.
     """
 
     def __init__(
-        self,
-        config: Config,
-        seed: int,
-        cameras: Sequence[str],
-        split: str | None,
-        fixed: bool,
-        all_views: bool,
+        self, config: Config, seed: int, cameras: Sequence[str], scenes: SceneSettings
     ) -> None:
+        split = scenes.split
         if split is not None:
             check_known("split", split, SPLITS)
             if not getattr(config.split, split):
-                raise ConfigError(f"split: config.split gives {split} no scenes; raise its share")
+                raise ConfigError(
+                    f"split: config.split gives {split} no scenes; raise its fraction"
+                )
         self.cameras = tuple(cameras)
         self._config, self._seed, self._split = config, seed, split
-        self._fixed, self._all_views = fixed, all_views
+        self._fixed, self._all_views = scenes.fixed, scenes.all_views
         self._epoch = -1
         self._scenes: list[int] = []
         self._following = 0
         self._lock = threading.Lock()
 
     def locate(self, epoch: int, position: int) -> tuple[int, str]:
-        """Scene index and camera name of one position, 0 or more, of an epoch."""
+        """Return scene index and camera name at a position, 0 or more, of an epoch."""
         position = whole("position", position)
         camera = self.cameras[position % len(self.cameras)]
         number = position // len(self.cameras) if self._all_views else position
@@ -75,14 +103,15 @@ class Plan:
 
 
 def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> tuple[str, ...]:
-    """The cameras that a task's images come from; None takes all of the rig that it can use.
+    """Return the cameras of a dataset: `cameras`, or all of the configuration that suit the task.
 
-    Raises ConfigError for an unknown task or camera, or one that says nothing about the task.
+    Raises:
+        ConfigError: The task or a camera is unknown, or a camera does not suit the task.
     """
     class_names(task)
     rig = config.cameras
     if isinstance(cameras, str) or not (cameras is None or isinstance(cameras, Iterable)):
-        raise ConfigError(f"cameras: {cameras!r} is no list; give [{cameras!r}]")
+        raise ConfigError(f"cameras: {cameras!r} is not a list; give [{cameras!r}]")
     usable = [name for name in rig if task != "door" or always_at_an_end(rig[name])]
     if not usable:
         raise ConfigError(f"cameras: none of {', '.join(rig)} looks at an end of the container")
@@ -92,24 +121,31 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
             why = nearest(name, usable)
             if task == "door" and name in rig:
                 why = (
-                    "; it takes those at the container's ends whose azimuth_deg and elevation_deg "
-                    "keep them, taken together, within 45 degrees of its length"
+                    "; it needs a camera at an end of the container whose azimuth_deg and "
+                    "elevation_deg together keep it within 45 degrees of the long axis"
                 )
-            raise ConfigError(f"cameras: {name!r} is none of the {task} task's{why}")
+            raise ConfigError(f"cameras: {name!r} does not suit the {task} task{why}")
     if not chosen or len(set(chosen)) != len(chosen):
-        raise ConfigError("cameras: name at least one, and each only once")
+        raise ConfigError("cameras: give at least one name, and each only once")
     return chosen
 
 
 def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
-    """The configuration of an epoch: what curriculum(epoch) gives, a Config or values over `base`.
+    """Return the configuration of an epoch.
 
-    Raises ConfigError where it changes what must stay the same through a training.
+    Args:
+        curriculum: As in SceneSettings.
+        base: Configuration that the curriculum's values change.
+        epoch: The epoch, from 0.
+
+    Raises:
+        ConfigError: The curriculum gives no configuration, or changes a value that must stay the
+            same during training.
     """
     if curriculum is None:
         return base
     if not callable(curriculum):
-        raise ConfigError(f"curriculum: {curriculum!r} is no function of the epoch")
+        raise ConfigError(f"curriculum: {curriculum!r} is not a function of the epoch")
     made = curriculum(epoch)
     if not isinstance(made, Config | Mapping):
         raise ConfigError(f"curriculum: epoch {epoch} gives {made!r}, not a Config or a mapping")
@@ -126,9 +162,10 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
 
 
 def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
-    """(rank, world size) as given, else of torch.distributed where it runs, else (0, 1).
+    """Return (rank, world size): as given, else of torch.distributed if it runs, else (0, 1).
 
-    Raises ConfigError for one without the other, or a rank that is not below the world size.
+    Raises:
+        ConfigError: One is given without the other, or the rank is not below the world size.
     """
     if rank is None and world_size is None:
         if torch.distributed.is_available() and torch.distributed.is_initialized():
@@ -138,18 +175,26 @@ def shard(rank: int | None, world_size: int | None) -> tuple[int, int]:
         raise ConfigError("rank, world_size: give both or neither")
     rank, world_size = whole("rank", rank), whole("world_size", world_size, 1)
     if rank >= world_size:
-        raise ConfigError(f"rank: {rank} is out of range; world_size {world_size} has 0 and up")
+        raise ConfigError(
+            f"rank: {rank} is out of range; world_size {world_size} has ranks 0 to {world_size - 1}"
+        )
     return rank, world_size
 
 
 def positions(
     start: int, stop: int | None, part: tuple[int, int], worker: tuple[int, int], block: int
 ) -> Iterator[int]:
-    """Positions from `start` to before `stop` (None: no end) that one worker of one rank renders.
+    """Yield the positions that one worker of one rank renders.
 
-    part: (rank, world size); ranks take positions in turn. worker: (number, count); the workers of
-    a rank take its positions in turn too, in blocks. Where a block is the loader's batch, which it
-    fetches from worker after worker, batches come in the same order whatever the count.
+    Ranks take positions in turn, and the workers of a rank take its positions in turn in blocks. If
+    a block is the loader's batch, batches come in the same order with any number of workers.
+
+    Args:
+        start: First position over all ranks.
+        stop: End of the positions; None for no end.
+        part: Rank and world size.
+        worker: Number of the worker and number of workers.
+        block: Positions of this rank that a worker takes at a time.
     """
     rank, world_size = part
     number, count = worker

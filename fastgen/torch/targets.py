@@ -1,10 +1,11 @@
-"""Sample -> image and target tensors for each task of the paper, and their collate functions.
+"""Image and target tensors for each task of the paper, and collate functions.
 
-What is labelled at all is decided where the files are written: formats.damage.instances,
+The same functions as in label files decide what is labelled: formats.damage.instances,
 yolo.detections, text_crops and door_class.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from fastgen.sample import Box, Sample
 from fastgen.validation import check_known
 
 Item = tuple[Any, Any]
-"""(image, target) of one sample; what each holds depends on task and form, see `item_of`."""
+"""Image and target of one sample; `item_of` describes both for each task and form."""
 
 Collate = Callable[[Sequence[Item]], Any]
 
@@ -37,49 +38,89 @@ _NAMES: dict[str, tuple[str, ...]] = {
 FORMS = ("detection", "yolo")
 
 
-def class_names(task: str) -> tuple[str, ...]:
-    """Classes of a task in label order; none for text. Detection labels count them from 1.
+@dataclass(frozen=True)
+class ItemSettings:
+    """What an item of a dataset holds.
 
-    Raises ConfigError for an unknown task.
+    Attributes:
+        form: Form of box targets: "detection" for torchvision's dictionaries, "yolo" for rows of
+            class and normalized box.
+        as_float: Images are float32 in 0..1 instead of uint8.
+        transforms: Called with image and target. Returns both, changed.
+
+    Raises:
+        ConfigError: A value is not valid.
+    """
+
+    form: str = FORMS[0]
+    as_float: bool = False
+    transforms: Callable[[Any, Any], Item] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        check_known("form", self.form, FORMS)
+        if not (self.transforms is None or callable(self.transforms)):
+            raise ConfigError(
+                f"transforms: {self.transforms!r} is not a function of image and target"
+            )
+
+
+def class_names(task: str) -> tuple[str, ...]:
+    """Return the class names of a task in label order; none for text.
+
+    Labels of the detection form are 1 higher, because 0 is the background.
+
+    Raises:
+        ConfigError: The task is unknown.
     """
     check_known("task", task, _NAMES)
     return _NAMES[task]
 
 
 def check_form(task: str, form: str) -> None:
-    """Raise ConfigError where `form` is unknown or means nothing to `task`."""
-    check_known("form", form, FORMS)
+    """Raise ConfigError if a task has no targets of this form."""
     if form == "yolo" and task not in ("damage", "imdg"):
-        raise ConfigError(f"form: 'yolo' holds boxes, which the {task} task has not; leave it out")
+        raise ConfigError(f"form: 'yolo' is for boxes, and the {task} task has none; leave it out")
 
 
 def image_tensor(pixels: NDArray[np.uint8], as_float: bool = False) -> torch.Tensor:
-    """sRGB uint8 [H, W, 3] as a tensor [3, H, W] of its own: uint8, or float32 in 0..1."""
+    """Copy an sRGB image, uint8 [H, W, 3], to a tensor [3, H, W]: uint8, or float32 in 0..1."""
     image = torch.from_numpy(np.ascontiguousarray(pixels.transpose(2, 0, 1)))
     return image.float() / 255 if as_float else image
 
 
 def item_of(
-    sample: Sample, task: str, form: str, labels: LabelConfig, image_id: int, as_float: bool
+    sample: Sample, task: str, items: ItemSettings, labels: LabelConfig, image_id: int
 ) -> Item:
-    """Image and target of one sample.
+    """Make image and target of one sample.
 
-    damage, imdg: image [3, H, W]; target in torchvision's detection form, a dict of boxes
-    (float32 [N, 4], x0, y0, x1, y1 in pixels), labels (int64 [N], from 1: 0 is the background),
-    area (float32 [N], visible pixels), iscrowd (int64 [N], zeros), image_id (int) and, for damage,
-    masks (uint8 [N, H, W]); or in form 'yolo' float32 [N, 5]: class from 0, then centre x, y,
-    width and height as shares of the image.
-    text: a list of crops [3, h, w]; target a dict of texts (list of str), boxes (float32 [N, 4] of
-    the visible texts) and image_id.
-    door: image [3, H, W]; target an int, which of DOOR_CLASSES.
+    Args:
+        sample: The sample.
+        task: damage, imdg, text or door.
+        items: Form of the target and dtype of the image; transforms are not applied.
+        labels: Decides which texts are legible.
+        image_id: Number of the image, for evaluation.
+
+    Returns:
+        For damage and imdg, image [3, H, W] and a target in torchvision's detection form: a dict of
+        boxes (float32 [N, 4], x0, y0, x1, y1 in pixels), labels (int64 [N] from 1; 0 is the
+        background), area (float32 [N], visible pixels), iscrowd (int64 [N], zeros), image_id (int)
+        and, for damage, masks (uint8 [N, H, W]). In the form "yolo" the target is float32 [N, 5]:
+        class from 0, then center x, center y, width and height as fractions of the image.
+
+        For text, a list of crops [3, h, w], and a dict of texts (list of str), boxes (float32
+        [N, 4] of the visible texts) and image_id.
+
+        For door, image [3, H, W] and an int, the index in DOOR_CLASSES.
     """
+    as_float = items.as_float
     if task == "text":
         return _text_item(sample, labels, image_id, as_float)
     image = image_tensor(sample.image, as_float)
     if task == "door":
         return image, door_number(sample.camera)
     found = _damages(sample) if task == "damage" else _markers(sample)
-    if form == "yolo":
+    if items.form == "yolo":
         size = sample.view.size
         rows = [(index, *yolo.normalised(box, size)) for index, box, _, _ in found]
         return image, torch.tensor(rows, dtype=torch.float32).reshape(-1, 5)
@@ -97,12 +138,12 @@ def item_of(
 
 
 def collate_lists(batch: Sequence[Item]) -> tuple[list[Any], list[Any]]:
-    """Images and targets as two lists, as torchvision's detectors take them."""
+    """Collate to a list of images and a list of targets, as torchvision's detectors take them."""
     return [image for image, _ in batch], [target for _, target in batch]
 
 
 def collate_yolo(batch: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Images [B, 3, H, W], and targets float32 [M, 6]: number in the batch, then `item_of`'s."""
+    """Collate to images [B, 3, H, W] and rows float32 [M, 6] that begin with the image index."""
     rows = [
         torch.cat([torch.full((len(target), 1), float(number)), target], dim=1)
         for number, (_, target) in enumerate(batch)
@@ -111,19 +152,19 @@ def collate_yolo(batch: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def collate_text(batch: Sequence[Item]) -> tuple[list[torch.Tensor], list[str]]:
-    """All crops of the batch's images, [3, h, w] of differing sizes, and what each reads."""
+    """Collate to all crops of the images, [3, h, w] of different sizes, and the text of each."""
     crops = [crop for image, _ in batch for crop in image]
     return crops, [text for _, target in batch for text in target["texts"]]
 
 
 def collate_door(batch: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor]:
-    """Images [B, 3, H, W] and labels int64 [B]."""
+    """Collate to images [B, 3, H, W] and labels int64 [B]."""
     labels = torch.tensor([target for _, target in batch], dtype=torch.int64)
     return torch.stack([image for image, _ in batch]), labels
 
 
 def collate_of(task: str, form: str) -> Collate:
-    """The collate function that fits a task's items."""
+    """Return the collate function for the items of a task."""
     if form == "yolo":
         return collate_yolo
     return {"text": collate_text, "door": collate_door}.get(task, collate_lists)
@@ -133,7 +174,7 @@ _Found = tuple[int, Box, int, NDArray[np.bool_] | None]
 
 
 def _damages(sample: Sample) -> list[_Found]:
-    """Class from 0, box, visible pixels and mask of the container and each damage."""
+    """Return class from 0, box, visible pixels and mask of the container and each damage."""
     return [
         (category - 1, box, int(np.count_nonzero(mask)), mask)
         for category, box, mask, ignored in instances(sample)
@@ -142,7 +183,7 @@ def _damages(sample: Sample) -> list[_Found]:
 
 
 def _markers(sample: Sample) -> list[_Found]:
-    """Class from 0, box and visible pixels of what the marker task labels."""
+    """Return class from 0, box and visible pixels of each label of the marker task."""
     found = yolo.detections(sample.objects)
     return [(index, box, thing.area, None) for index, thing, box in found]
 

@@ -1,0 +1,117 @@
+"""Options that several commands share, and the objects they describe."""
+
+import argparse
+import re
+from pathlib import Path
+
+from fastgen.config.config import PRESETS, Config
+from fastgen.errors import ConfigError
+from fastgen.render.gl import BACKENDS
+from fastgen.render.settings import QUALITY, RenderSettings
+
+
+def add_config(command: argparse.ArgumentParser) -> None:
+    """Add --preset and --config, which `config_of` reads."""
+    group = command.add_argument_group("scenes")
+    group.add_argument(
+        "--preset",
+        default="seafront",
+        metavar="|".join(PRESETS),
+        help="built-in configuration to start from; default: %(default)s",
+    )
+    group.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="YAML or JSON file with values that replace those of the preset; "
+        "`fastgen config` prints all keys",
+    )
+
+
+def add_seed(command: argparse.ArgumentParser) -> None:
+    """Add --seed."""
+    command.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        metavar="S",
+        help="random seed, 0 or more; the same seed gives the same scenes; default: %(default)s",
+    )
+
+
+def add_index(command: argparse.ArgumentParser) -> None:
+    """Add --index."""
+    command.add_argument(
+        "--index", type=int, required=True, metavar="I", help="number of the scene, from 0"
+    )
+
+
+def add_render(command: argparse.ArgumentParser, quality: bool = True) -> None:
+    """Add the options that `render_settings` reads; --quality only if `quality`."""
+    group = command.add_argument_group("rendering")
+    group.add_argument(
+        "--size",
+        default="640x640",
+        metavar="WxH",
+        help="width and height of the images in pixels, each 64 to 4096; default: %(default)s",
+    )
+    if quality:
+        group.add_argument(
+            "--quality",
+            default="balanced",
+            metavar="|".join(QUALITY),
+            help="speed against image quality: draft is fastest and aliased, fine takes the most "
+            "samples per pixel, high adds ray-traced light; default: %(default)s",
+        )
+    add_hdri(group)
+    group.add_argument(
+        "--backend",
+        default="auto",
+        metavar="|".join(BACKENDS),
+        help="OpenGL backend; auto takes the first that works; default: %(default)s",
+    )
+    add_device(group)
+
+
+def add_hdri(command: argparse._ActionsContainer, note: str = "") -> None:
+    """Add --hdri. `note` follows the description."""
+    command.add_argument(
+        "--hdri",
+        metavar="DIR",
+        help=f"folder of .hdr and .exr panoramas that replace the bundled ones as lights{note}",
+    )
+
+
+def add_device(command: argparse._ActionsContainer, note: str = "") -> None:
+    """Add --device-index. `note` follows the description."""
+    command.add_argument(
+        "--device-index",
+        type=int,
+        metavar="N",
+        help=f"EGL device to render on, numbered as by `fastgen doctor`{note}; "
+        "default: the first that works",
+    )
+
+
+def config_of(options: argparse.Namespace) -> Config:
+    """Return the configuration that --preset and --config describe."""
+    preset = Config.preset(options.preset)
+    return Config.load(options.config, preset) if options.config else preset
+
+
+def render_settings(options: argparse.Namespace) -> RenderSettings:
+    """Return the settings that the options of `add_render` describe."""
+    return RenderSettings(
+        size=_size(options.size),
+        quality=getattr(options, "quality", "balanced"),
+        backend=options.backend,
+        device_index=options.device_index,
+        hdri_dir=options.hdri,
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match:
+        raise ConfigError(f"size: {text!r} is not a size; write WIDTHxHEIGHT, as in 640x640")
+    return int(match[1]), int(match[2])

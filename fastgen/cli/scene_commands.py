@@ -1,0 +1,93 @@
+"""Commands about single scenes: show and export."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fastgen.cli.options import (
+    add_config,
+    add_index,
+    add_render,
+    add_seed,
+    config_of,
+    render_settings,
+)
+from fastgen.errors import ConfigError
+from fastgen.export import export_glb
+from fastgen.files.images import jpeg, png, write
+from fastgen.generator import Generator, find_camera
+from fastgen.preview import PREVIEW_LAYERS, preview
+
+
+def add_show(commands: Any) -> None:
+    """Add `fastgen show`."""
+    command = commands.add_parser(
+        "show",
+        help="render one image to a file",
+        description="Render one image to a PNG or JPEG file, also a single material layer or the "
+        "labels.",
+    )
+    add_index(command)
+    add_seed(command)
+    command.add_argument(
+        "--camera", help="name of the camera; default: the first of the configuration"
+    )
+    command.add_argument(
+        "--layer",
+        default="all",
+        metavar="|".join(PREVIEW_LAYERS),
+        help="what to show; default: all, the finished image. A material layer appears without "
+        "lighting on white. reflection shows roughness as grey. normals shows x, y, z in the "
+        "container's frame as red, green, blue. ids and damage show the label images",
+    )
+    command.add_argument(
+        "--overlay", action="store_true", help="draw boxes, class names and damage outlines"
+    )
+    command.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
+    add_config(command)
+    add_render(command)
+    command.set_defaults(run=_show)
+
+
+def add_export(commands: Any) -> None:
+    """Add `fastgen export`."""
+    command = commands.add_parser(
+        "export",
+        help="write one scene as a GLB file for Blender and other programs",
+        description="Write one scene as a GLB file for Blender and other programs: container and "
+        "spreader with baked textures, cameras, and the name of the environment.",
+    )
+    add_index(command)
+    add_seed(command)
+    command.add_argument("--camera", help="name of the only camera to write; default: all")
+    command.add_argument(
+        "--texel-mm",
+        type=float,
+        default=4.0,
+        metavar="MM",
+        help="width of a texel of the textures in millimetres; default: %(default)g",
+    )
+    command.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
+    add_config(command)
+    add_render(command, quality=False)
+    command.set_defaults(run=_export)
+
+
+def _show(options: argparse.Namespace) -> int:
+    encode = {".png": png, ".jpg": jpeg, ".jpeg": jpeg}.get(options.file.suffix.lower())
+    if encode is None:
+        raise ConfigError(f"{options.file}: give a file name that ends in .png or .jpg")
+    with Generator.of(config_of(options), options.seed, render_settings(options)) as generator:
+        picture = preview(generator, options.index, options.camera, options.layer, options.overlay)
+    write(options.file, encode(picture))
+    return 0
+
+
+def _export(options: argparse.Namespace) -> int:
+    if options.file.suffix.lower() != ".glb":
+        raise ConfigError(f"{options.file}: give a file name that ends in .glb")
+    with Generator.of(config_of(options), options.seed, render_settings(options)) as generator:
+        scene = generator.scene(options.index)
+        cameras = None if options.camera is None else [find_camera(scene, options.camera)]
+        export_glb(generator, scene, options.file, cameras, options.texel_mm)
+    return 0

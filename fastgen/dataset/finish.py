@@ -1,0 +1,113 @@
+"""Last step of a run: files that cover whole splits, the contact sheet, and dataset.json."""
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from fastgen.dataset.console import say
+from fastgen.dataset.contact_sheet import contact_sheet
+from fastgen.dataset.dataset_json import MANIFEST, unsealed
+from fastgen.dataset.job import Job, manifest_path
+from fastgen.dataset.seal import digest, seal
+from fastgen.dataset.shards import MADE_BY
+from fastgen.dataset.storage import Folder, Storage
+from fastgen.files.images import png
+from fastgen.formats import Format, Record, formats_of
+from fastgen.sampling.scene import SPLITS
+
+CONTACT_SHEET = "contact_sheet.png"
+
+
+def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, Any]:
+    """Write the files that cover all samples, and dataset.json, which seals them, last.
+
+    Returns:
+        The content of dataset.json.
+    """
+    formats = formats_of(job.formats)
+    shards: dict[str, str] = {}
+    makers: list[dict[str, str]] = []
+    failed: list[dict[str, Any]] = []
+    images: list[tuple[str, str]] = []
+    counts = {split: _count(formats, []) for split in SPLITS}
+    for shard in range(job.shard_count):
+        data = storage.read(manifest_path(shard))
+        shards[str(shard)] = digest(data)
+        manifest = json.loads(data)
+        made_by = {name: manifest[name] for name in MADE_BY}
+        if made_by not in makers:
+            makers.append(made_by)
+        failed += manifest["failed"]
+        for split in SPLITS:
+            records = [record for record in manifest["records"] if record["split"] == split]
+            counts[split].update(_count(formats, records))
+            if job.layout == "seafront":
+                images += [(split, record["stem"]) for record in records]
+    files: dict[str, list[Any]] = {}
+
+    def put(path: str, pieces: Iterable[bytes]) -> None:
+        sums = _Sums(pieces)
+        storage.write(path, sums)
+        files[path] = sums.entry()
+
+    if job.layout == "seafront":
+        for split in SPLITS:
+            storage.make_folders([f"images/{split}", f"scenes/{split}"])
+            for each in formats:
+                storage.make_folders(each.folders(split))
+                for path, content in each.dataset_files(split, _records(job, storage, split)):
+                    put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
+        if isinstance(storage, Folder) and images:
+            put(CONTACT_SHEET, [png(contact_sheet(storage.root, images, formats))])
+    result = {
+        **settings,
+        **makers[0],
+        "images": job.images,
+        "counts": {split: dict(count) for split, count in counts.items()},
+        "failed": failed,
+        "files": files,
+        "shards": shards,
+    }
+    storage.write(MANIFEST, [seal(unsealed(result))])
+    if len(makers) > 1:
+        names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
+        say(
+            f"fastgen: {job.out} was rendered by {names}, which may round differently; to get the "
+            "same bytes everywhere, generate it anew with one of them"
+        )
+    return result
+
+
+def _count(formats: Iterable[Format], records: list[Record]) -> Counter[str]:
+    """Count images and labels; every name has a value, without records 0."""
+    found = Counter(images=len(records))
+    for each in formats:
+        found.update(each.counts(record["facts"][each.name] for record in records))
+    return found
+
+
+def _records(job: Job, storage: Storage, split: str) -> Callable[[], Iterator[Record]]:
+    def through() -> Iterator[Record]:
+        for shard in range(job.shard_count):
+            manifest = json.loads(storage.read(manifest_path(shard)))
+            yield from (record for record in manifest["records"] if record["split"] == split)
+
+    return through
+
+
+class _Sums:
+    """Iterator that passes pieces of a file on and adds up their size and hash."""
+
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        self._pieces, self._size, self._hash = pieces, 0, hashlib.sha256()
+
+    def __iter__(self) -> Iterator[bytes]:
+        for piece in self._pieces:
+            self._size += len(piece)
+            self._hash.update(piece)
+            yield piece
+
+    def entry(self) -> list[Any]:
+        return [self._size, self._hash.hexdigest()]

@@ -1,0 +1,112 @@
+"""Checks of a job before it runs, and the settings of it that dataset.json keeps."""
+
+import json
+from dataclasses import asdict, replace
+from typing import Any
+
+from fastgen.config.config import Config, SplitConfig
+from fastgen.dataset.dataset_json import unsealed
+from fastgen.dataset.job import LAYOUTS, Job
+from fastgen.dataset.seal import digest
+from fastgen.errors import ConfigError
+from fastgen.formats import formats_of
+from fastgen.light.environment import load_environment
+from fastgen.light.hdri import find_hdris
+from fastgen.sampling.scene import SPLITS
+from fastgen.validation import check_known, nearest
+
+_MOST = 10**9
+"""Limit of counts. Epochs of fastgen.torch also have this many scene indices."""
+
+
+def settled(job: Job, worker_count: int) -> tuple[Job, dict[str, Any]]:
+    """Check a job and complete it.
+
+    Returns:
+        The job with its settings_digest, and the settings that decide its samples as JSON values.
+
+    Raises:
+        ConfigError: A value is not valid.
+        AssetError: An HDRI cannot be read.
+    """
+    _check(job, worker_count)
+    settings = _settings(job)
+    return replace(job, settings_digest=digest(unsealed(settings))), settings
+
+
+def check_count(name: str, value: int) -> None:
+    """Raise ConfigError that names `name` unless `value` is in 1 to 10^9."""
+    if not 1 <= value <= _MOST:
+        raise ConfigError(f"{name}: {value} is out of range; give 1 to {_MOST}")
+
+
+def parse_split(text: str | None, config: Config) -> Config:
+    """Return `config` with the option --split applied.
+
+    Args:
+        text: A split that gets all scenes, three fractions "TRAIN,VAL,TEST", or None for no change.
+        config: The configuration.
+
+    Raises:
+        ConfigError: `text` is neither.
+    """
+    if text is None:
+        return config
+    shares = {name: float(name == text) for name in SPLITS}
+    if text not in SPLITS:
+        parts = text.split(",")
+        try:
+            values = [float(part) for part in parts]
+        except ValueError:
+            raise ConfigError(f"split: {text!r} is unknown{nearest(text, SPLITS)}") from None
+        if len(values) != 3 or min(values) < 0 or max(values) > 1 or sum(values) <= 0:
+            raise ConfigError(
+                f"split: {text!r}: give three fractions of 0 to 1, as in 0.7,0.15,0.15"
+            )
+        shares = dict(zip(SPLITS, values, strict=True))
+    plain = config.to_plain()
+    return Config.from_values({**plain, "split": asdict(SplitConfig(**shares))})
+
+
+def _check(job: Job, worker_count: int) -> None:
+    check_count("images", job.images)
+    check_count("workers", worker_count)
+    check_count("shard", job.scenes_per_shard)
+    check_known("format", job.layout, LAYOUTS)
+    for name in job.cameras:
+        check_known("cameras", name, job.config.cameras)
+    if len(set(job.cameras)) != len(job.cameras):
+        raise ConfigError("cameras: a name occurs twice; give each only once")
+    also = formats_of(job.also)
+    if len(set(job.also)) != len(job.also):
+        raise ConfigError("also: a name occurs twice; give each only once")
+    for each in also:
+        if job.layout == "webdataset" and not each.fits_archives:
+            raise ConfigError(
+                f"also: {each.name} keeps poses in files that cover all images, which the "
+                "webdataset format does not have; each sample's json has the pose too, or use "
+                "the seafront format"
+            )
+
+
+def _settings(job: Job) -> dict[str, Any]:
+    from fastgen import __version__
+
+    generator = job.generator()  # checks seed and lenses without opening GL
+    generator.scene(0)  # some values are refused only by sampling: before anything is written
+    for path in find_hdris(job.render.hdri_dir) if job.render.hdri_dir else ():
+        load_environment(path)  # reports a broken file now, and caches the light for the workers
+    settings = {
+        "version": __version__,
+        "format": job.layout,
+        "formats": list(job.formats),
+        "seed": job.seed,
+        "size": list(job.render.size),
+        "quality": job.render.quality,
+        "cameras": list(job.cameras),
+        "environments": generator.environment_record,
+        "shard_scenes": job.scenes_per_shard,
+        "config": generator.config.to_plain(),
+    }
+    plain: dict[str, Any] = json.loads(json.dumps(settings))
+    return plain
