@@ -16,8 +16,8 @@ from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
 from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
-from fastgen.geometry.shape_library import SHAPES
 from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.light.hdri import hours_of
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.markings import sample_decals
