@@ -245,10 +245,10 @@ ELEMENTS = (
         "shadow of the sun",
         text=(
             (
-                "sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);",
-                "sun_seen[0] = 1.0;",
+                "light_seen[0] = filtered_light_visibility(from_eye, normal, depth * pixel_angle);",
+                "light_seen[0] = 1.0;",
             ),
-            ("sun_seen[i] = sun_at(from_eye, i);", "sun_seen[i] = 1.0;"),
+            ("light_seen[i] = light_visibility(from_eye, i);", "light_seen[i] = 1.0;"),
         ),
     ),
     Element(
@@ -266,8 +266,8 @@ ELEMENTS = (
         "light",
         "the sun's light from walls in recesses",
         text=(
-            ("sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky, 0);", ""),
-            ("sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);", ""),
+            ("sky.occluder_light = sky.bounces * occluder_light(from_eye, normal, sky, 0);", ""),
+            ("sky.occluder_light += sky.bounces * occluder_light(from_eye, normal, sky, i);", ""),
         ),
     ),
     Element(
@@ -280,7 +280,7 @@ ELEMENTS = (
         "occlusion of reflections",
         text=(
             (
-                "float open = open_lobe(sky, mirror, m.roughness);",
+                "float open = lobe_visibility(sky, mirror, m.roughness);",
                 "float open = 1.0;",
             ),
         ),

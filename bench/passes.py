@@ -30,9 +30,11 @@ from results import parse_size
 from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
-from fastgen.render.passes.shading import Shading
+from fastgen.render.passes.background import BackgroundPass
+from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.settings import QUALITY
+from fastgen.render.visibility_buffer import VisibilityBuffer
 
 
 class PassTimer:
@@ -56,9 +58,8 @@ class PassTimer:
         self._wrap(
             GpuMesh, "draw", lambda program, _: "inside" if program == "holed" else "geometry"
         )
-        self._wrap(Shading, "_draw_sky", lambda *_: "sky")
-        self._wrap(Shading, "_store_sky", lambda *_: "sky")
-        self._wrap(Shading, "_classify", lambda *_: "classify")
+        self._wrap(BackgroundPass, "run", lambda *_: "background")
+        self._wrap(ShadingPass, "_classify", lambda *_: "classify")
         self._wrap(PixelLists, "dispatch", lambda name, *_: name)
         return self
 

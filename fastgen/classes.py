@@ -1,4 +1,4 @@
-"""Class names, their order in each label format, and the numbers that stand for them in masks."""
+"""Class names with their order in the label formats, and the values of masks and id targets."""
 
 MARKER_CLASSES = (
     *("C1.1", "C1.2", "C1.3", "C1.4", "C2.1", "C2.2", "C2.3", "C2.4", "C2.5", "C3.1", "C3.2"),
@@ -8,21 +8,21 @@ MARKER_CLASSES = (
 """The 26 dangerous-goods markers; SeaFront paper, Fig. 3 and Table 9."""
 
 DETECTION_CLASSES = ("container", "text", *MARKER_CLASSES)
-"""YOLO order of the marker task, 28 classes."""
+"""The 28 classes of the marker task, in the order of YOLO labels."""
 
 DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 """COCO category i + 1 is SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance."""
 
-SOUND_CONTAINER = 101
-"""Mask value of undamaged container surface: category 1, instance 1 (SeaFront paper, 3.3.4)."""
+UNDAMAGED_CONTAINER = 101
+"""Mask value of the undamaged container: category 1, instance 1 (SeaFront paper, 3.3.4)."""
 
 DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
-"""Mask values of damages: category * 100 + instance, which are their ids as well."""
+"""Mask values of damages: category * 100 + instance. They are also the ids of damages."""
 
 CONTAINER_ID = 1
-"""In the id target, where 0 is the void and decals count up from 2."""
+"""Id of the container. In the id target 0 is the surroundings, and decals count up from 2."""
 
 SPREADER_ID = 60000
-"""Above all decals."""
+"""Id of the spreader, above those of all decals."""

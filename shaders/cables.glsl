@@ -31,8 +31,8 @@ float cables_cover(vec2 pixel) {
     vec2 last = vec2(1.0, 0.0);   // Strip of the previous cable; empty at first.
     int i = 0;
     do {
-        vec3 foot = cable_foot[i].xyz;
-        float pixels = cable_foot[i].w;
+        vec3 foot = cable_lower_end[i].xyz;
+        float pixels = cable_lower_end[i].w;
         float aside = turned(foot.xy, ray.xy);
         float height = dot(foot.xy, rise) - foot.z;
         bool there = dot(foot.xy, ray.xy) > 0.0 && height > 0.0 && height < CABLE_LENGTH_M;

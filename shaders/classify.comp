@@ -21,7 +21,7 @@
 #include "damage.glsl"
 #include "rest.glsl"
 #endif
-#if CABLES_NEAR
+#if WITH_CABLES
 #include "lens.glsl"
 #include "view_ray.glsl"
 #include "cables.glsl"
@@ -30,15 +30,15 @@
 layout(local_size_x = LIST_GROUP) in;
 
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
-uniform sampler2D sheet_points;
-uniform sampler2D sheet_depths;
+uniform sampler2D atlas_positions;
+uniform sampler2D surface_depths;
 
 #if DAMAGED
 // 2 near a hole, 1 near another damage, else 0.
 int damage_near(vec3 rest_mm) {
     int near = 0;
-    for (int i = next_near(0, damage_count, rest_mm); i < damage_count;
-         i = next_near(i + 1, damage_count, rest_mm))
+    for (int i = next_damage_near(0, damage_count, rest_mm); i < damage_count;
+         i = next_damage_near(i + 1, damage_count, rest_mm))
         if (within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
     return near;
 }
@@ -57,13 +57,13 @@ ivec2 in_turn(ivec2 size) {
 }
 
 void write_labels(ivec2 pixel, uint key, float depth) {
-    uint labels = key_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (SOUND_CONTAINER << 16);
+    uint labels = id_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (UNDAMAGED_CONTAINER << 16);
     imageStore(label_image, pixel, uvec4(labels));
     imageStore(depth_image, pixel, vec4(depth));
 }
 
-#if CABLES_NEAR
-bool sky_or_cable(uint key) { return key == 0u || float(key_zone(key)) == cable_zone; }
+#if WITH_CABLES
+bool sky_or_cable(uint key) { return key == 0u || float(id_zone(key)) == cable_zone; }
 
 // Whether cables cover a part of the pixel, more than about a step of 255. bare: the pixel shows
 // nothing but sky and cables.
@@ -98,37 +98,37 @@ void main() {
     ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
     if (in_region.y >= region.w) return;
     ivec2 block = region.xy + in_region;
-    vec2 middle = vec2(block + 1) / vec2(textureSize(surface_keys, 0));
+    vec2 middle = vec2(block + 1) / vec2(textureSize(surface_ids, 0));
     // The swizzle .wzxy reorders the texels of textureGather as in_group counts them.
-    uvec4 key = textureGather(surface_keys, middle).wzxy;
-    vec4 sheet_x = textureGather(sheet_points, middle, 0).wzxy;
-    vec4 sheet_y = textureGather(sheet_points, middle, 1).wzxy;
-    vec4 depth = textureGather(sheet_depths, middle).wzxy;
+    uvec4 key = textureGather(surface_ids, middle).wzxy;
+    vec4 sheet_x = textureGather(atlas_positions, middle, 0).wzxy;
+    vec4 sheet_y = textureGather(atlas_positions, middle, 1).wzxy;
+    vec4 depth = textureGather(surface_depths, middle).wzxy;
 #if DAMAGED
     vec4 rest_mm[3] = vec4[3](textureGather(rest_x, middle).wzxy, textureGather(rest_y, middle).wzxy,
                               textureGather(rest_z, middle).wzxy);
 #endif
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // One bit per pixel and class.
-#if CABLES_NEAR
+#if WITH_CABLES
     uint cables = 0u;
-    uvec4 left = textureGatherOffset(surface_keys, middle, ivec2(-1, 0)).wzxy;
-    uvec4 right = textureGatherOffset(surface_keys, middle, ivec2(1, 0)).wzxy;
-    uvec4 over = textureGatherOffset(surface_keys, middle, ivec2(0, -1)).wzxy;
-    uvec4 under = textureGatherOffset(surface_keys, middle, ivec2(0, 1)).wzxy;
+    uvec4 left = textureGatherOffset(surface_ids, middle, ivec2(-1, 0)).wzxy;
+    uvec4 right = textureGatherOffset(surface_ids, middle, ivec2(1, 0)).wzxy;
+    uvec4 over = textureGatherOffset(surface_ids, middle, ivec2(0, -1)).wzxy;
+    uvec4 under = textureGatherOffset(surface_ids, middle, ivec2(0, 1)).wzxy;
 #endif
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
         bool outside = any(greaterThanEqual(pixel - region.xy, region.zw));
         if (outside) key[i] = 0u;
         uint bit = 1u << i;
-#if CABLES_NEAR
+#if WITH_CABLES
         bool bare = seen_bare(pixel, key[i], uvec4(left[i], right[i], over[i], under[i]));
         bool covered = !outside && covered_in_part(pixel, bare);
         if (covered) cables |= bit;
 #endif
         if (key[i] == 0u) continue;
         write_labels(pixel, key[i], depth[i]);
-#if CABLES_NEAR
+#if WITH_CABLES
         if (covered) continue;
 #endif
 #if DAMAGED
@@ -137,11 +137,11 @@ void main() {
         if (near == 1) damaged |= bit;
         if (near > 0) bit = 0u;
 #endif
-        if (near_decals(key_zone(key[i]), vec2(sheet_x[i], sheet_y[i]))) decals |= bit;
+        if (near_decals(id_zone(key[i]), vec2(sheet_x[i], sheet_y[i]))) decals |= bit;
         else plain |= bit;
     }
     list_each(LIST_DECAL, block, decals);
-#if CABLES_NEAR
+#if WITH_CABLES
     list_each(LIST_CABLE, block, cables);
 #endif
 #if DAMAGED
@@ -173,8 +173,8 @@ void main() {
     ivec2 in_region = in_turn(region.zw);
     if (in_region.y >= region.w) return;
     ivec2 pixel = region.xy + in_region;
-    ivec2 middle = middle_of(pixel);
-    uint keys[FILTER_NEAR] = keys_near(middle);
+    ivec2 middle = center_texel(pixel);
+    uint keys[FILTER_NEAR] = near_surface_ids(middle);
     uint key = keys[0];
     bool mixed = false;
     // Test three zones for decals: that of the centre, and the first and the last other one. Few
@@ -183,7 +183,7 @@ void main() {
     ivec2 first_at = middle, last_at = middle;
     for (int i = 1; i < FILTER_NEAR; ++i) {
         mixed = mixed || keys[i] != key;
-        if (key_zone(keys[i]) == key_zone(key)) continue;
+        if (id_zone(keys[i]) == id_zone(key)) continue;
         last = keys[i];
         last_at = middle + FILTER_OFFSET[i];
         if (first == key) { first = last; first_at = last_at; }
@@ -192,8 +192,8 @@ void main() {
     ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
     bool decal = false;
     for (int i = 0; i < (SAMPLES_PER_AXIS > 1 ? 3 : 1); ++i)
-        decal = decal || (part[i] != 0u && near_decals(key_zone(part[i]), texelFetch(sheet_points, part_at[i], 0).xy));
-    if (key != 0u) write_labels(pixel, key, texelFetch(sheet_depths, middle, 0).r);
+        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]), texelFetch(atlas_positions, part_at[i], 0).xy));
+    if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
     uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
 #if SAMPLES_PER_AXIS > 1
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
@@ -207,11 +207,11 @@ void main() {
 #endif
     if (near > 1) list = LIST_HOLED;
 #endif
-#if CABLES_NEAR
+#if WITH_CABLES
     // All samples of a pixel may miss a cable, or all may hit it; its exact coverage decides.
 #if SAMPLES_PER_AXIS == 1
-    bool bare = seen_bare(pixel, key, uvec4(key_at(middle - ivec2(1, 0)), key_at(middle + ivec2(1, 0)),
-                                            key_at(middle - ivec2(0, 1)), key_at(middle + ivec2(0, 1))));
+    bool bare = seen_bare(pixel, key, uvec4(surface_id_at(middle - ivec2(1, 0)), surface_id_at(middle + ivec2(1, 0)),
+                                            surface_id_at(middle - ivec2(0, 1)), surface_id_at(middle + ivec2(0, 1))));
 #else
     bool bare = true;
     for (int i = 0; i < FILTER_NEAR; ++i) bare = bare && sky_or_cable(keys[i]);

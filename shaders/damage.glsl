@@ -1,7 +1,7 @@
 // vec3 deformed(vec3 p): position of rest point p after all damages; mm in the container frame.
 // int hole_at(vec3 p): index of the perforation that removed p, -1 for none.
-// Damaged damage_at(vec3 p): derivative of the deformation, wear of the steel and mask value at p.
-// vec3 bent_normal(mat3 bend, vec3 n): normal n of the rest surface after the deformation.
+// DamageSample damage_at(vec3 p): derivative of the deformation, wear of the steel and mask value at p.
+// vec3 deformed_normal(mat3 bend, vec3 n): normal n of the rest surface after the deformation.
 // Damage i displaces p along its inward axis. damage_law.py is the reference implementation in numpy;
 // section 3.3.2 of the SeaFront paper describes the four kinds.
 
@@ -22,7 +22,7 @@ vec3 damage_local(int i, vec3 p) {
 // Index of the first damage from i on, before `end`, whose bounding sphere contains p; `end` if there
 // is none. The sphere includes the margin of within_reach. Loops skip distant damages by this
 // function, because llvmpipe executes both sides of a branch in a loop's body.
-int next_near(int i, int end, vec3 p) {
+int next_damage_near(int i, int end, vec3 p) {
     for (; i < end; ++i) {
         vec3 q = p - damage_origin[i].xyz;
         if (dot(q, q) < damage_origin[i].w) break;
@@ -56,10 +56,10 @@ bool in_hole(int i, vec3 p) {
 
 int hole_at(vec3 p) {
     int found = -1;
-    int i = next_near(0, hole_count, p);
+    int i = next_damage_near(0, hole_count, p);
     do {
         if (in_hole(i, p) && i < hole_count) found = i;
-        i = next_near(i + 1, hole_count, p);
+        i = next_damage_near(i + 1, hole_count, p);
     } while (i < hole_count);
     return found;
 }
@@ -74,11 +74,11 @@ bool within_reach(int i, vec3 p) {
         vec4 shape = damage_shape[3 * i];
         reach.y = max(reach.y, shape.x) + shape.z;   // The fold swings to both sides.
     }
-    else if (i >= bowl_end) reach.z = reach.y;
+    else if (i >= concave_end) reach.z = reach.y;
     return all(lessThan(q, reach + REACH_MARGIN_MM));
 }
 
-struct Field {
+struct DamageField {
     float amount;   // Displacement along the inward axis, mm.
     // Gradient of `amount` in local coordinates. It is approximate along folds and hole outlines. It
     // leaves out the inward fade, which tilts neither the damaged sheet nor sheets perpendicular to it.
@@ -88,7 +88,7 @@ struct Field {
 
 // Displacement field of damage i at p. Its kind follows from its index: perforations, dents, concave
 // damages, bent edges. The weights of `scar` are artistic choices.
-Field damage_field(int i, vec3 p) {
+DamageField damage_field(int i, vec3 p) {
     vec3 q = damage_local(i, p);
     float half_length = damage_along[i].w;
     float half_width = damage_across[i].w;
@@ -97,18 +97,18 @@ Field damage_field(int i, vec3 p) {
     float hill = bump(q.x / half_length);
     float hill_slope = bump_slope(q.x / half_length) / half_length;
     float fade = 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(q.z));
-    if (i >= bowl_end) {
+    if (i >= concave_end) {
         float r = max(length(q.yz), 1e-3);
         float reach = bump(r / half_width);
         float reach_slope = bump_slope(r / half_width) / half_width;
         vec3 slope = depth * vec3(hill_slope * reach, hill * reach_slope * q.yz / r);
-        return Field(depth * hill * reach, slope, 0.35 * hill * hill * reach * reach);
+        return DamageField(depth * hill * reach, slope, 0.35 * hill * hill * reach * reach);
     }
     if (i >= dent_end) {
         float across = bump(q.y / half_width);
         float across_slope = bump_slope(q.y / half_width) / half_width;
         vec3 slope = depth * fade * vec3(hill_slope * across, hill * across_slope, 0.0);
-        return Field(depth * hill * across * fade, slope, 0.0);
+        return DamageField(depth * hill * across * fade, slope, 0.0);
     }
     if (i >= hole_count) {
         vec4 more = damage_shape[3 * i + 1];
@@ -124,7 +124,7 @@ Field damage_field(int i, vec3 p) {
             mix(-1.5 * sqrt(rest) / shape.x, bump_slope(away / half_width) / half_width, shape.y);
         vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
                           taper * profile_slope * side, 0.0);
-        return Field(depth * taper * fade * profile, depth * fade * slope,
+        return DamageField(depth * taper * fade * profile, depth * fade * slope,
                      0.7 * fade * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
     }
     float r = max(length(q.xy), 1e-3);
@@ -132,7 +132,7 @@ Field damage_field(int i, vec3 p) {
     float rim = clamp(1.0 - outside / shape.x, 0.0, 1.0);
     float rim_slope = rim < 1.0 ? -2.0 * rim / shape.x : 0.0;
     float scar = clamp(1.0 - outside / (0.7 * shape.x), 0.0, 1.0);
-    return Field(depth * rim * rim * fade, depth * fade * rim_slope * vec3(q.xy / r, 0.0),
+    return DamageField(depth * rim * rim * fade, depth * fade * rim_slope * vec3(q.xy / r, 0.0),
                  scar * scar * step(0.5, fade));
 }
 
@@ -145,13 +145,13 @@ float sheet_fade(float w) {
 // the work of four kinds per damage on llvmpipe, which executes both sides of every branch.
 vec3 deformed(vec3 p) {
     vec3 moved = p;
-    for (int i = next_near(0, hole_count, p); i < hole_count; i = next_near(i + 1, hole_count, p)) {
+    for (int i = next_damage_near(0, hole_count, p); i < hole_count; i = next_damage_near(i + 1, hole_count, p)) {
         vec3 q = damage_local(i, p);
         float outside = length(q.xy) - hole_radius(i, atan(q.y, q.x));
         float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
         moved += damage_inward[i].w * rim * rim * sheet_fade(q.z) * damage_inward[i].xyz;
     }
-    for (int i = next_near(hole_count, dent_end, p); i < dent_end; i = next_near(i + 1, dent_end, p)) {
+    for (int i = next_damage_near(hole_count, dent_end, p); i < dent_end; i = next_damage_near(i + 1, dent_end, p)) {
         vec3 q = damage_local(i, p);
         vec4 shape = damage_shape[3 * i];
         float away = abs(q.y - fold_path(shape, damage_shape[3 * i + 1], q.x));
@@ -161,10 +161,10 @@ vec3 deformed(vec3 p) {
         float depth = damage_inward[i].w * max(1.0 - along * along, 0.0) * sheet_fade(q.z);
         moved += depth * profile * damage_inward[i].xyz;
     }
-    for (int i = next_near(dent_end, damage_count, p); i < damage_count;
-         i = next_near(i + 1, damage_count, p)) {
+    for (int i = next_damage_near(dent_end, damage_count, p); i < damage_count;
+         i = next_damage_near(i + 1, damage_count, p)) {
         vec3 q = damage_local(i, p);
-        bool axis = i >= bowl_end;
+        bool axis = i >= concave_end;
         float reach = (axis ? length(q.yz) : q.y) / damage_across[i].w;
         float depth = damage_inward[i].w * bump(q.x / damage_along[i].w) * bump(reach);
         moved += (axis ? depth : depth * sheet_fade(q.z)) * damage_inward[i].xyz;
@@ -172,19 +172,19 @@ vec3 deformed(vec3 p) {
     return moved;
 }
 
-struct Damaged {
+struct DamageSample {
     mat3 bend;      // Derivative of the deformed position by the rest position.
     float scar;
     uint value;     // Mask value of the damage with the largest displacement; 0 below the threshold.
 };
 
-Damaged damage_at(vec3 p) {
-    Damaged d = Damaged(mat3(1.0), 0.0, 0u);
+DamageSample damage_at(vec3 p) {
+    DamageSample d = DamageSample(mat3(1.0), 0.0, 0u);
     float most = damage_threshold_mm;
     // There is at least one damage, and a distant one adds nothing.
-    int i = min(next_near(0, damage_count, p), damage_count - 1);
+    int i = min(next_damage_near(0, damage_count, p), damage_count - 1);
     do {
-        Field f = damage_field(i, p);
+        DamageField f = damage_field(i, p);
         vec3 slope = f.slope.x * damage_along[i].xyz + f.slope.y * damage_across[i].xyz +
                      f.slope.z * damage_inward[i].xyz;
         d.bend += outerProduct(damage_inward[i].xyz, slope);
@@ -193,13 +193,13 @@ Damaged damage_at(vec3 p) {
             most = abs(f.amount);
             d.value = uint(damage_shape[3 * i + 2].w);
         }
-        i = next_near(i + 1, damage_count, p);
+        i = next_damage_near(i + 1, damage_count, p);
     } while (i < damage_count);
     return d;
 }
 
 // Normals transform by the cofactor matrix of the derivative.
-vec3 bent_normal(mat3 bend, vec3 n) {
+vec3 deformed_normal(mat3 bend, vec3 n) {
     return normalize(n.x * cross(bend[1], bend[2]) + n.y * cross(bend[2], bend[0]) +
                      n.z * cross(bend[0], bend[1]));
 }

@@ -6,11 +6,11 @@
 
 // Cells of decals_near.py, one byte each. Four are packed into a texel, the first in the lowest byte,
 // because llvmpipe fetches one-byte texels one by one.
-uniform usampler2D decal_cells;
+uniform usampler2D decal_proximity;
 
 bool near_decals(uint zone, vec2 sheet_mm) {
     bool bears = zone < SPREADER_ZONE;   // The cells span the container's atlas only.
     ivec2 cell = ivec2(sheet_mm / NEAR_CELL_MM);
-    uint four = texelFetch(decal_cells, ivec2(cell.x >> 2, cell.y), 0).r;
+    uint four = texelFetch(decal_proximity, ivec2(cell.x >> 2, cell.y), 0).r;
     return bears && (four & 0xffu << 8 * (cell.x & 3)) != 0u;
 }

@@ -17,14 +17,14 @@ layout(location = 0) in vec3 in_position_mm;
 layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_atlas_mm;
 layout(location = 3) in uint in_zone;
-layout(location = 5) in vec3 in_cone;
-layout(location = 6) in vec4 in_light;
-layout(location = 7) in uvec3 in_open_to;   // One bit per direction of sky_visibility.py.
+layout(location = 5) in vec3 in_sky_cone;
+layout(location = 6) in vec4 in_sky_light;
+layout(location = 7) in uvec3 in_visible_directions;   // One bit per direction of sky_visibility.py.
 
 out vec2 atlas_mm;
 out vec4 openness;   // Cone; share of open sky about the mirror direction.
 out vec4 sky_light;
-flat out uint surface_key;
+flat out uint surface_id;
 #if DAMAGED
 out vec3 rest_mm;
 #endif
@@ -36,29 +36,29 @@ invariant gl_Position;
 uniform usampler2D lobe_masks;   // See lobe_masks in sky_visibility.py.
 
 // Bit mask of the directions about `direction`, or of the hemisphere about it if below = LOBE_CELLS.
-uvec3 lobe_mask(vec3 direction, int below) {
+uvec3 direction_mask(vec3 direction, int below) {
     ivec2 cell = min(ivec2(octahedral(direction) * float(LOBE_CELLS)), ivec2(LOBE_CELLS - 1));
     return texelFetch(lobe_masks, cell + ivec2(0, below), 0).xyz;
 }
 
 // Share of open sky about the mirror direction of the view ray.
-float open_about_mirror(vec3 position_m, vec3 normal) {
+float mirror_visibility(vec3 position_m, vec3 normal) {
     vec3 mirror = reflect(position_m - eye_m, normal);
-    uvec3 lobe = lobe_mask(mirror, 0) & lobe_mask(normal, LOBE_CELLS);
-    ivec3 whole = bitCount(lobe), open = bitCount(lobe & in_open_to);
+    uvec3 lobe = direction_mask(mirror, 0) & direction_mask(normal, LOBE_CELLS);
+    ivec3 whole = bitCount(lobe), open = bitCount(lobe & in_visible_directions);
     return float(open.x + open.y + open.z) / float(max(whole.x + whole.y + whole.z, 1));
 }
 
 void main() {
     atlas_mm = in_atlas_mm;
-    sky_light = in_light;
-    surface_key = pack_surface_key(in_zone, in_normal);
+    sky_light = in_sky_light;
+    surface_id = pack_surface_id(in_zone, in_normal);
     vec3 position_mm = in_position_mm;
 #if DAMAGED
     rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
 #endif
-    openness = vec4(in_cone, open_about_mirror(position_mm * MM, in_normal));
+    openness = vec4(in_sky_cone, mirror_visibility(position_mm * MM, in_normal));
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // Viewport 1 holds the inner view, which holes reveal. It is mirrored: that swaps front and back

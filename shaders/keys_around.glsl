@@ -1,42 +1,42 @@
-// uint key_at(ivec2 middle): surface id of one sample in the visibility buffer; 0 is sky.
-// uint[] keys_near(ivec2 middle): ids of the first FILTER_NEAR samples of the pixel filter.
-// uint[] keys_around(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
+// uint surface_id_at(ivec2 middle): surface id of one sample in the visibility buffer; 0 is sky.
+// uint[] near_surface_ids(ivec2 middle): ids of the first FILTER_NEAR samples of the pixel filter.
+// uint[] filter_surface_ids(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
 // middle: Texel of the sample at the pixel's centre.
 
 #include "samples.constants"
 
-uniform usampler2D surface_keys;
+uniform usampler2D surface_ids;
 
-uint key_at(ivec2 middle) { return texelFetch(surface_keys, middle, 0).r; }
+uint surface_id_at(ivec2 middle) { return texelFetch(surface_ids, middle, 0).r; }
 
 #if SAMPLES_PER_AXIS == 2 || SAMPLES_PER_AXIS == 3
 // Near samples are at most a texel from the centre. Two gathers return most ids at half the cost
 // of single fetches.
-uint[FILTER_NEAR] keys_near(ivec2 middle) {
-    vec2 corner = 1.0 / vec2(textureSize(surface_keys, 0));
-    uvec4 low = textureGather(surface_keys, vec2(middle) * corner);
-    uvec4 high = textureGather(surface_keys, vec2(middle + 1) * corner);
+uint[FILTER_NEAR] near_surface_ids(ivec2 middle) {
+    vec2 corner = 1.0 / vec2(textureSize(surface_ids, 0));
+    uvec4 low = textureGather(surface_ids, vec2(middle) * corner);
+    uvec4 high = textureGather(surface_ids, vec2(middle + 1) * corner);
     uint beside[9] = uint[9](
-        low.w, low.z, key_at(middle + ivec2(1, -1)),
+        low.w, low.z, surface_id_at(middle + ivec2(1, -1)),
         low.x, low.y, high.z,
-        key_at(middle + ivec2(-1, 1)), high.x, high.y);
+        surface_id_at(middle + ivec2(-1, 1)), high.x, high.y);
     uint keys[FILTER_NEAR];
     for (int i = 0; i < FILTER_NEAR; ++i)
         keys[i] = beside[3 * (FILTER_OFFSET[i].y + 1) + FILTER_OFFSET[i].x + 1];
     return keys;
 }
 #else
-uint[FILTER_NEAR] keys_near(ivec2 middle) {
+uint[FILTER_NEAR] near_surface_ids(ivec2 middle) {
     uint keys[FILTER_NEAR];
-    for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = key_at(middle + FILTER_OFFSET[i]);
+    for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = surface_id_at(middle + FILTER_OFFSET[i]);
     return keys;
 }
 #endif
 
-uint[FILTER_SAMPLES] keys_around(ivec2 middle) {
-    uint near[FILTER_NEAR] = keys_near(middle);
+uint[FILTER_SAMPLES] filter_surface_ids(ivec2 middle) {
+    uint near[FILTER_NEAR] = near_surface_ids(middle);
     uint keys[FILTER_SAMPLES];
     for (int i = 0; i < FILTER_NEAR; ++i) keys[i] = near[i];
-    for (int i = FILTER_NEAR; i < FILTER_SAMPLES; ++i) keys[i] = key_at(middle + FILTER_OFFSET[i]);
+    for (int i = FILTER_NEAR; i < FILTER_SAMPLES; ++i) keys[i] = surface_id_at(middle + FILTER_OFFSET[i]);
     return keys;
 }

@@ -1,5 +1,5 @@
 // vec4 bent(vec4 clip): clip position after the lens distortion.
-// vec2 straightened(vec2 pixel): undistorted position of a pixel of the image; the inverse of bent().
+// vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; the inverse of bent().
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
 // the radial polynomial continues as a straight line; see lens.py.
 
@@ -18,19 +18,19 @@ vec4 bent(vec4 clip) {
     vec2 ideal = inverse(to_clip) * clip.xy / clip.w;
     float radius = max(length(ideal), 1e-6);
     float t = lens_model == 2.0 ? atan(radius) : radius;
-    float inner = min(t, lens_end.x);
+    float inner = min(t, lens_linear_from.x);
     float q = inner * inner;
     float curve = 1.0 + q * (lens_radial.x + q * (lens_radial.y + q * (lens_radial.z + q * lens_radial.w)));
-    float seen = inner * curve + lens_end.y * (t - inner);
-    vec2 moved = ideal * (seen / radius) + tangential(ideal * min(1.0, lens_end.x / radius));
+    float seen = inner * curve + lens_linear_from.y * (t - inner);
+    vec2 moved = ideal * (seen / radius) + tangential(ideal * min(1.0, lens_linear_from.x / radius));
     return vec4(to_clip * moved * clip.w, clip.zw);
 }
 
 // Ratio of the undistorted to the distorted radius: the reciprocal of a polynomial in the squared
 // radius, which lens.py fits.
-float stretched(vec2 seen) {
+float undistortion_ratio(vec2 seen) {
     float q = dot(seen, seen);
-    vec4 high = lens_back[1], low = lens_back[0];
+    vec4 high = lens_inverse[1], low = lens_inverse[0];
     float ratio = ((high.w * q + high.z) * q + high.y) * q + high.x;
     return 1.0 / ((((ratio * q + low.w) * q + low.z) * q + low.y) * q + low.x);
 }
@@ -38,15 +38,15 @@ float stretched(vec2 seen) {
 const int TANGENTIAL_STEPS = 6;   // Each leaves a third of the error or less.
 
 // The tangential term depends on the undistorted point, which fixed-point iteration finds.
-vec2 straightened(vec2 pixel) {
+vec2 undistorted(vec2 pixel) {
     if (lens_model == 0.0) return pixel;
     vec2 seen = (pixel - lens_center) / lens_focal;
-    vec2 ideal = seen * stretched(seen);
+    vec2 ideal = seen * undistortion_ratio(seen);
     int steps = lens_tangential == vec2(0.0) ? 1 : TANGENTIAL_STEPS;
     int i = 0;
     do {
         vec2 radial = seen - tangential(ideal);
-        ideal = radial * stretched(radial);
+        ideal = radial * undistortion_ratio(radial);
     } while (++i < steps);
     return lens_center + lens_focal * ideal;
 }

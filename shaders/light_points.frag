@@ -12,8 +12,8 @@
 uniform int point_rows;     // Rows of cells over the image.
 uniform ivec2 last_pixel;   // Column and row of the image's last pixel.
 
-layout(location = 0) out uint out_key;    // 0 for no point.
-layout(location = 1) out vec4 out_place;  // Position relative to the eye in m; perceptual roughness.
+layout(location = 0) out uint out_surface_id;    // 0 for no point.
+layout(location = 1) out vec4 out_position;  // Position relative to the eye in m; perceptual roughness.
 layout(location = 2) out vec4 out_normal;
 
 void main() {
@@ -21,8 +21,8 @@ void main() {
     bool other = cell.y >= point_rows;
     if (other) cell.y -= point_rows;
     ivec2 pixel = cell * point_step + point_step / 2;
-    ivec2 sample_at = middle_of(pixel);
-    uint key = key_at(sample_at);
+    ivec2 sample_at = center_texel(pixel);
+    uint key = surface_id_at(sample_at);
     if (other) {
         uint first = key;
         bool last = ((cell.x + cell.y) & 1) == 1;
@@ -33,8 +33,8 @@ void main() {
         ivec2 after = min(ivec2(min((point_step - 1) / 2, 1)), last_pixel - pixel);
         for (int y = before.y; y <= after.y; ++y) {
             for (int x = before.x; x <= after.x; ++x) {
-                ivec2 middle = middle_of(pixel + ivec2(x, y));
-                uint keys[FILTER_NEAR] = keys_near(middle);
+                ivec2 middle = center_texel(pixel + ivec2(x, y));
+                uint keys[FILTER_NEAR] = near_surface_ids(middle);
                 for (int i = 0; i < FILTER_NEAR; ++i) {
                     if (keys[i] == 0u || keys[i] == first || (key != 0u && !last)) continue;
                     key = keys[i];
@@ -43,16 +43,16 @@ void main() {
             }
         }
     }
-    vec3 ray = view_ray(place_of(sample_at));
+    vec3 ray = view_ray(sample_position(sample_at));
     Part p = part_at(sample_at, key, -normalize(ray));
-    vec3 normal = key_normal(key);
+    vec3 normal = id_normal(key);
 #if WITH_DAMAGE
-    normal = bent_normal(p.bend, normal);
+    normal = deformed_normal(p.bend, normal);
 #endif
 #if HOLED
-    if (hole_at(rest_at(sample_at)) >= 0 && !before_sheet(key_zone(key))) key = 0u;
+    if (hole_at(rest_at(sample_at)) >= 0 && !before_sheet(id_zone(key))) key = 0u;
 #endif
-    out_key = key;
-    out_place = vec4(p.depth * ray, p.surface.material.roughness);
+    out_surface_id = key;
+    out_position = vec4(p.depth * ray, p.surface.material.roughness);
     out_normal = vec4(normal, 0.0);
 }

@@ -4,7 +4,6 @@
 #include "pixel_list.constants"
 #include "samples.constants"
 #include "variant.constants"
-#include "zones.constants"
 #include "damage.block"
 #include "octahedral.glsl"
 #include "samples.glsl"
@@ -22,22 +21,22 @@ layout(rgba32f, binding = 0) writeonly uniform image2D normal_image;
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
 
 vec3 normal_of(ivec2 sample_at) {
-    uint key = key_at(sample_at);
+    uint key = surface_id_at(sample_at);
     if (key == 0u) return vec3(0.0);
-    vec3 normal = key_normal(key);
+    vec3 normal = id_normal(key);
 #if WITH_DAMAGE
     vec3 rest_mm = rest_at(sample_at);
 #if WITH_HOLES
-    if (hole_at(rest_mm) >= 0 && !before_sheet(key_zone(key))) {
+    if (hole_at(rest_mm) >= 0 && !before_sheet(id_zone(key))) {
         // The interior, seen from behind; the sky through another hole has no normal.
-        ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
-        key = key_at(inner_at);
+        ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
+        key = surface_id_at(inner_at);
         if (key == 0u) return vec3(0.0);
-        normal = -key_normal(key);
+        normal = -id_normal(key);
         rest_mm = rest_at(inner_at);
     }
 #endif
-    normal = bent_normal(damage_at(rest_mm).bend, normal);
+    normal = deformed_normal(damage_at(rest_mm).bend, normal);
 #endif
     return normal;
 }
@@ -46,7 +45,7 @@ void main() {
     ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
     if (in_region.x >= region.z) return;
     ivec2 pixel = region.xy + in_region;
-    ivec2 middle = middle_of(pixel);
+    ivec2 middle = center_texel(pixel);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < FILTER_SAMPLES; ++i) sum += FILTER_WEIGHT[i] * normal_of(middle + FILTER_OFFSET[i]);
     imageStore(normal_image, pixel, vec4(sum, 0.0));

@@ -1,4 +1,4 @@
-// Reflector reflector(Material m, vec3 normal, vec3 view): terms of the BRDF shared by all lights.
+// BrdfTerms reflector(Material m, vec3 normal, vec3 view): terms of the BRDF shared by all lights.
 // float fresnel_climb(float cosine): Fresnel reflectance, rescaled from F0..1 to 0..1.
 // Split sum of Karis 2013, Real Shading in Unreal Engine 4. Directions are in the world frame.
 
@@ -12,7 +12,7 @@ struct Material {
     float metallic;
 };
 
-struct Reflector {
+struct BrdfTerms {
     Material material;
     vec3 normal;
     vec3 view;         // Unit, toward the eye.
@@ -33,11 +33,11 @@ float fresnel_climb(float cosine) {
     return (0.5 * away * away * (1.0 + ratio * ratio) - DIELECTRIC_F0) / (1.0 - DIELECTRIC_F0);
 }
 
-Reflector reflector(Material m, vec3 normal, vec3 view) {
+BrdfTerms reflector(Material m, vec3 normal, vec3 view) {
     float n_dot_v = clamp(dot(normal, view), 0.0, 1.0);
     vec2 dfg = textureLod(dfg_table, vec2(n_dot_v, m.roughness), 0.0).rg;
     float gain = 1.0 / (dfg.x + dfg.y) - 1.0;
     float dielectric = (DIELECTRIC_F0 * dfg.x + dfg.y) * (1.0 + DIELECTRIC_F0 * gain);
     vec3 diffuse = m.albedo * ((1.0 - dielectric) * (1.0 - m.metallic));
-    return Reflector(m, normal, view, n_dot_v, dfg, gain, dielectric, diffuse);
+    return BrdfTerms(m, normal, view, n_dot_v, dfg, gain, dielectric, diffuse);
 }

@@ -25,7 +25,7 @@
 #include "tone.glsl"
 #include "reflector.glsl"
 #include "ibl.glsl"
-#if SUNS
+#if LIGHTS
 #include "sun.glsl"
 #endif
 #include "layers.glsl"
@@ -48,9 +48,9 @@
 #include "rest.glsl"
 #endif
 
-uniform sampler2D sheet_points;
-uniform sampler2D sheet_depths;
-uniform usampler2D openness_points;   // Four bytes per texel.
+uniform sampler2D atlas_positions;
+uniform sampler2D surface_depths;
+uniform usampler2D sky_visibility_cones;   // Four bytes per texel.
 uniform usampler2D light_points;
 
 struct Shaded {
@@ -62,29 +62,29 @@ struct Shaded {
 };
 
 // 2x2 coarse shading evaluates several pixels once, midway between the first and the last pixel.
-// to_last: Offset of the last pixel from the first. shaded_at_once: Number of pixels.
+// coarse_offset: Offset of the last pixel from the first. coarse_pixels: Number of pixels.
 #if WITH_COARSE
-ivec2 to_last;
-float shaded_at_once;
+ivec2 coarse_offset;
+float coarse_pixels;
 #else
-const ivec2 to_last = ivec2(0);
-const float shaded_at_once = 1.0;
+const ivec2 coarse_offset = ivec2(0);
+const float coarse_pixels = 1.0;
 #endif
 
 // Value of a visibility-buffer texture at that midpoint; sample_at belongs to the first pixel.
-vec4 mean_of(sampler2D values, ivec2 sample_at) {
+vec4 coarse_mean(sampler2D values, ivec2 sample_at) {
     vec4 first = texelFetch(values, sample_at, 0);
 #if WITH_COARSE
-    return 0.5 * (first + texelFetch(values, sample_at + to_last, 0));
+    return 0.5 * (first + texelFetch(values, sample_at + coarse_offset, 0));
 #else
     return first;
 #endif
 }
 
-vec4 mean_of_bytes(usampler2D values, ivec2 sample_at) {
+vec4 coarse_mean_bytes(usampler2D values, ivec2 sample_at) {
     vec4 first = unpackUnorm4x8(texelFetch(values, sample_at, 0).r);
 #if WITH_COARSE
-    return 0.5 * (first + unpackUnorm4x8(texelFetch(values, sample_at + to_last, 0).r));
+    return 0.5 * (first + unpackUnorm4x8(texelFetch(values, sample_at + coarse_offset, 0).r));
 #else
     return first;
 #endif
@@ -92,16 +92,16 @@ vec4 mean_of_bytes(usampler2D values, ivec2 sample_at) {
 
 // Decodes what sky_visibility.py encodes. On the spreader the light includes indirect light already;
 // see indirect_light.py.
-Openness openness_at(ivec2 sample_at, uint zone) {
-    vec4 stored = mean_of_bytes(openness_points, sample_at);
+SkyVisibility sky_visibility_at(ivec2 sample_at, uint zone) {
+    vec4 stored = coarse_mean_bytes(sky_visibility_cones, sample_at);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec4 encoded = mean_of_bytes(light_points, sample_at);
+    vec4 encoded = coarse_mean_bytes(light_points, sample_at);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);
-    return Openness(cone / size, rim, light, stored.w, bounces, 0.0, vec3(0.0), vec3(0.0),
-                    NO_RAYS);
+    return SkyVisibility(cone / size, rim, light, stored.w, bounces, 0.0, vec3(0.0), vec3(0.0),
+                    NO_TRACED_LIGHT);
 }
 
 // Must run after the pixel filter, because a pixel averages light, not encoded values.
@@ -114,14 +114,14 @@ vec3 displayed(vec3 color) {
     return srgb_encode(color);
 }
 
-// sun_seen: Unshadowed share of each directional light.
-vec3 layer_color(Material m, vec3 normal, vec3 view, Openness sky, vec4 sun_seen) {
+// light_seen: Unshadowed share of each directional light.
+vec3 layer_color(Material m, vec3 normal, vec3 view, SkyVisibility sky, vec4 light_seen) {
 #if LAYER == LAYER_ALL
-    Reflector r = reflector(m, normal, view);
+    BrdfTerms r = reflector(m, normal, view);
     vec3 radiance = lit(r, sky);
-#if SUNS
-    for (int i = 0; i < SUNS; ++i)
-        if (sun_seen[i] > 0.0) radiance += sun_seen[i] * sunlit(r, i);
+#if LIGHTS
+    for (int i = 0; i < LIGHTS; ++i)
+        if (light_seen[i] > 0.0) radiance += light_seen[i] * light_reflection(r, i);
 #endif
     return exposure * radiance;
 #elif LAYER == LAYER_NORMALS
@@ -141,7 +141,7 @@ Shaded sky(vec3 ray) {
 #else
     vec3 color = vec3(1.0);
 #endif
-    return Shaded(color, 0u, 0u, VOID_DEPTH, 0.0);
+    return Shaded(color, 0u, 0u, NO_DEPTH, 0.0);
 }
 
 // A part is one zone within a pixel. All its samples share these values, taken at one point.
@@ -158,26 +158,26 @@ struct Part {
 };
 
 Part part_at(ivec2 sample_at, uint key, vec3 view) {
-    vec2 sheet_mm = mean_of(sheet_points, sample_at).xy;
-    vec3 normal = key_normal(key);
+    vec2 sheet_mm = coarse_mean(atlas_positions, sample_at).xy;
+    vec3 normal = id_normal(key);
     Part p;
-    p.damage = SOUND_CONTAINER;
-    p.depth = mean_of(sheet_depths, sample_at).r;
+    p.damage = UNDAMAGED_CONTAINER;
+    p.depth = coarse_mean(surface_depths, sample_at).r;
     p.scar = 0.0;
 #if WITH_DAMAGE
-    Damaged d = damage_at(rest_at(sample_at));
+    DamageSample d = damage_at(rest_at(sample_at));
     if (d.value != 0u) p.damage = d.value;
     p.scar = d.scar;
     p.bend = d.bend;
-    normal = bent_normal(d.bend, normal);
+    normal = deformed_normal(d.bend, normal);
 #endif
     float facing = dot(normal, view);
     // Geometric mean of the footprint's two axes on the surface.
-    p.footprint_mm = sqrt(shaded_at_once) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
+    p.footprint_mm = sqrt(coarse_pixels) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
                      inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(key_zone(key), sheet_mm, p.footprint_mm, p.scar);
+    p.surface = surface_at(id_zone(key), sheet_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
-    if (key_zone(key) >= SPREADER_ZONE) {
+    if (id_zone(key) >= SPREADER_ZONE) {
         p.id = SPREADER_ID;
         p.damage = 0u;
     }
@@ -203,60 +203,60 @@ void add_layers(inout SurfacePoint sum, Part p, uint zone, vec2 sheet_mm, float 
 #endif
 
 vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
-    vec3 normal = key_normal(key);
-    Openness sky = openness_at(sample_at, key_zone(key));
+    vec3 normal = id_normal(key);
+    SkyVisibility sky = sky_visibility_at(sample_at, id_zone(key));
 #if WITH_DAMAGE
-    normal = bent_normal(p.bend, normal);
-    sky.direction = bent_normal(p.bend, sky.direction);
+    normal = deformed_normal(p.bend, normal);
+    sky.bent_normal = deformed_normal(p.bend, sky.bent_normal);
 #endif
     // Occluders are assumed to have the local albedo, because heavy rust is rarely isolated. A decal
     // says nothing about them, so the sheet's paint replaces it.
-    sky.beside = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
+    sky.occluder_albedo = mix(p.surface.material.albedo, material_base[SHEET_MATERIAL].rgb, p.surface.printed);
     // Above a roof the occluder is the spreader.
-    sky.hung = above.a * sky.bounces * max(p.surface.outward.z, 0.0);
-    sky.beside = mix(sky.beside, above.rgb, sky.hung);
-    vec4 sun_seen = vec4(0.0);
-    float depth = mean_of(sheet_depths, sample_at).r;
-    vec2 place = place_of(sample_at) + 0.5 * vec2(to_last);
+    sky.overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
+    sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, sky.overhead);
+    vec4 light_seen = vec4(0.0);
+    float depth = coarse_mean(surface_depths, sample_at).r;
+    vec2 place = sample_position(sample_at) + 0.5 * vec2(coarse_offset);
     vec3 from_eye = depth * view_ray(place);
 #if TRACED
-    sky.rays = traced_at(place, key, from_eye, normal);
+    sky.traced = traced_light_at(place, key, from_eye, normal);
 #endif
-#if SUNS && LAYER == LAYER_ALL
+#if LIGHTS && LAYER == LAYER_ALL
     // The whole container blocks a light behind the panel, but it is too close to a groove for the
     // shadow map to show that.
-    if (dot(p.surface.outward, sun_toward[0].xyz) >= 0.0) {
-        sun_seen[0] = first_sun_share(from_eye, normal, depth * pixel_angle);
-        sky.sun = sky.bounces * sun_thrown(from_eye, normal, sky, 0);
+    if (dot(p.surface.outward, light_direction[0].xyz) >= 0.0) {
+        light_seen[0] = filtered_light_visibility(from_eye, normal, depth * pixel_angle);
+        sky.occluder_light = sky.lacks_indirect * occluder_light(from_eye, normal, sky, 0);
     }
-    for (int i = 1; i < SUNS; ++i) {
-        if (i < sun_count && dot(p.surface.outward, sun_toward[i].xyz) >= 0.0) {
-            sun_seen[i] = sun_at(from_eye, i);
-            sky.sun += sky.bounces * sun_thrown(from_eye, normal, sky, i);
+    for (int i = 1; i < LIGHTS; ++i) {
+        if (i < light_count && dot(p.surface.outward, light_direction[i].xyz) >= 0.0) {
+            light_seen[i] = light_visibility(from_eye, i);
+            sky.occluder_light += sky.lacks_indirect * occluder_light(from_eye, normal, sky, i);
         }
     }
 #endif
-    return layer_color(p.surface.material, normal, view, sky, sun_seen);
+    return layer_color(p.surface.material, normal, view, sky, light_seen);
 }
 
 // A pixel whose near samples all see the same surface.
 Shaded single_surface(ivec2 pixel) {
-    ivec2 middle = middle_of(pixel);
-    uint key = key_at(middle);
-    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 + 0.5 * vec2(to_last)));
+    ivec2 middle = center_texel(pixel);
+    uint key = surface_id_at(middle);
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 + 0.5 * vec2(coarse_offset)));
     Part p = part_at(middle, key, view);
 #if LOOKUPS > 1
     // The surface is nearly flat between the centre sample and two other near samples, so the atlas
     // position is linear in the pixel.
     const ivec2 one = ivec2(FILTER_STEP), other = ivec2(FILTER_STEP, -FILTER_STEP);
     const mat2 pixels = mat2(from_center(vec2(one)), from_center(vec2(other)));
-    vec2 sheet_mm = texelFetch(sheet_points, middle, 0).xy;
-    mat2 moved_mm = mat2(texelFetch(sheet_points, middle + one, 0).xy - sheet_mm,
-                         texelFetch(sheet_points, middle + other, 0).xy - sheet_mm);
+    vec2 sheet_mm = texelFetch(atlas_positions, middle, 0).xy;
+    mat2 moved_mm = mat2(texelFetch(atlas_positions, middle + one, 0).xy - sheet_mm,
+                         texelFetch(atlas_positions, middle + other, 0).xy - sheet_mm);
     mat2 mm_of_pixel = moved_mm * inverse(pixels);
     SurfacePoint mean = no_layers(p.surface);
     for (int i = 0; i < LOOKUPS; ++i)
-        add_layers(mean, p, key_zone(key), sheet_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
+        add_layers(mean, p, id_zone(key), sheet_mm + mm_of_pixel * LOOKUP_PLACE[i], float(LOOKUPS));
     p.surface = mean;
 #endif
     return Shaded(part_color(p, middle, key, view), p.id, p.damage, p.depth, 1.0);
@@ -265,15 +265,15 @@ Shaded single_surface(ivec2 pixel) {
 #if WITH_HOLES
 // Shows the interior of the container, or the sky through another hole.
 Shaded through_hole(ivec2 sample_at, uint key, vec3 ray) {
-    ivec2 inner_at = ivec2(textureSize(surface_keys, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
-    uint inner_key = key_at(inner_at);
+    ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
+    uint inner_key = surface_id_at(inner_at);
     vec3 rest_mm = rest_at(inner_at);
-    float depth = texelFetch(sheet_depths, inner_at, 0).r;
+    float depth = texelFetch(surface_depths, inner_at, 0).r;
     Shaded s = sky(ray);
     if (inner_key != 0u) {
-        vec3 normal = -key_normal(inner_key);   // The inner view sees surfaces from behind.
+        vec3 normal = -id_normal(inner_key);   // The inner view sees surfaces from behind.
 #if LAYER == LAYER_NORMALS
-        vec3 seen = bent_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5;
+        vec3 seen = deformed_normal(damage_at(rest_mm).bend, normal) * 0.5 + 0.5;
 #elif LAYER == LAYER_ALL
         vec3 seen = exposure * inside(normal, rest_mm);
 #elif LAYER == LAYER_REFLECTION

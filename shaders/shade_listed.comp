@@ -13,13 +13,13 @@
 #include "shade.glsl"
 #include "images.glsl"
 #include "pixel_list.glsl"
-#if OF_CABLES
+#if CABLE_CLASS
 #include "cables.glsl"
 #endif
 
 layout(local_size_x = LIST_GROUP) in;
 
-#if OF_CABLES
+#if CABLE_CLASS
 // A pixel that cables cover in part: steel with its mean rust, mixed with the sky by coverage. The eye
 // sees two of a cable's four axis-aligned sides, each in proportion to how it faces the eye.
 Shaded cable(vec2 center) {
@@ -28,17 +28,17 @@ Shaded cable(vec2 center) {
     vec4 base = material_base[CABLE_MATERIAL];
     Material steel = Material(base.rgb, base.a, material_trait[CABLE_MATERIAL].x);
 #if SHOWN_RUST
-    steel.albedo = cable_rusted.rgb;
-    steel.roughness = mix(steel.roughness, rust_roughness, cable_rusted.a);
-    steel.metallic *= 1.0 - cable_rusted.a;
+    steel.albedo = cable_mean_rust.rgb;
+    steel.roughness = mix(steel.roughness, rust_roughness, cable_mean_rust.a);
+    steel.metallic *= 1.0 - cable_mean_rust.a;
 #endif
     wet(steel.albedo, steel.roughness, steel.metallic, 0.8 * wetness);   // The mean in material.glsl.
     vec3 color = vec3(0.0);
     for (int axis = 0; axis < 2; ++axis) {
         vec3 normal = vec3(0.0);
         normal[axis] = view[axis] < 0.0 ? -1.0 : 1.0;
-        Openness whole = Openness(normal, 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), steel.albedo,
-                                  NO_RAYS);
+        SkyVisibility whole = SkyVisibility(normal, 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), steel.albedo,
+                                  NO_TRACED_LIGHT);
         color += abs(view[axis]) * layer_color(steel, normal, view, whole, vec4(1.0));
     }
     color /= max(abs(view.x) + abs(view.y), 1e-6);
@@ -58,15 +58,15 @@ void main() {
     int first = findLSB(group);
     ivec2 block = pixel;
     pixel += in_group(first);
-    to_last = in_group(findMSB(group)) - in_group(first);
-    shaded_at_once = float(bitCount(group));
+    coarse_offset = in_group(findMSB(group)) - in_group(first);
+    coarse_pixels = float(bitCount(group));
 #endif
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
-    ivec2 middle = middle_of(pixel);
+    ivec2 middle = center_texel(pixel);
     // Among the samples of the pixel filter, the material is evaluated once per zone, and lighting
     // once per surface id, which is an orientation within a zone.
-    uint keys[FILTER_SAMPLES] = keys_around(middle);
+    uint keys[FILTER_SAMPLES] = filter_surface_ids(middle);
     uint left = 0u;   // One bit per sample that is still to be shaded.
     float sky_weight = 0.0;
     for (int i = 0; i < FILTER_SAMPLES; ++i) {
@@ -74,8 +74,8 @@ void main() {
         else left |= 1u << i;
 #if WITH_HOLES
         int hole = hole_at(rest_at(middle + FILTER_OFFSET[i]));
-        if (keys[i] != 0u && hole >= 0 && !before_sheet(key_zone(keys[i])))
-            keys[i] = (PORTAL_ZONE + 1u) | (uint(hole) << 10);
+        if (keys[i] != 0u && hole >= 0 && !before_sheet(id_zone(keys[i])))
+            keys[i] = (HOLE_ZONE + 1u) | (uint(hole) << 10);
 #endif
     }
     bool sees_sky = keys[0] == 0u;
@@ -90,10 +90,10 @@ void main() {
         ivec2 offset = ivec2(0);
         for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
             if ((left & 1u << i) != 0u) { first_key = keys[i]; offset = FILTER_OFFSET[i]; }
-        uint zone = key_zone(first_key);
+        uint zone = id_zone(first_key);
         uint of_part = 0u;
         for (int i = 0; i < FILTER_SAMPLES; ++i)
-            if (key_zone(keys[i]) == zone) of_part |= 1u << i;
+            if (id_zone(keys[i]) == zone) of_part |= 1u << i;
         of_part &= left;
         vec3 ray = view_ray(center + from_center(vec2(offset)));
         vec3 view = -normalize(ray);
@@ -110,7 +110,7 @@ void main() {
             for (int i = FILTER_SAMPLES - 1; i >= 0; --i)
                 if ((others & 1u << i) != 0u) at = FILTER_OFFSET[i];
             others &= others - 1u;   // Clears the lowest bit.
-            add_layers(mean, p, zone, texelFetch(sheet_points, middle + at, 0).xy, float(lookups));
+            add_layers(mean, p, zone, texelFetch(atlas_positions, middle + at, 0).xy, float(lookups));
         } while (++lookup < lookups);
         p.surface = mean;
 #endif
@@ -130,7 +130,7 @@ void main() {
             left &= ~of_side;
             vec3 lit_color = part_color(p, middle + side_offset, key, view);
 #if WITH_HOLES
-            if (zone == PORTAL_ZONE) {
+            if (zone == HOLE_ZONE) {
                 Shaded through = through_hole(middle + offset, key, ray);
                 lit_color = through.color;
                 if (through.cover == 0.0) sky_weight += weight;
@@ -139,11 +139,11 @@ void main() {
 #endif
             color += weight * lit_color;
             done += weight;
-        } while (++side < MAX_SIDES && of_part != 0u);
+        } while (++side < MAX_ORIENTATIONS && of_part != 0u);
     } while (++part < MAX_PARTS && left != 0u);
-    color /= done;   // Surfaces beyond MAX_PARTS and MAX_SIDES look like the rest.
+    color /= done;   // Surfaces beyond MAX_PARTS and MAX_ORIENTATIONS look like the rest.
     s.cover = 1.0 - sky_weight / done;
-#elif OF_CABLES
+#elif CABLE_CLASS
     Shaded s = cable(vec2(pixel) + 0.5);
     vec3 color = s.color;
 #else

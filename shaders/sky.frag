@@ -5,14 +5,14 @@
 #include "view.block"
 #include "tone.glsl"
 
-uniform sampler2D background_light;   // As in ibl.glsl.
+uniform sampler2D environment_map;   // As in ibl.glsl.
 
 in vec2 map_uv;
 
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    vec3 radiance = textureLod(background_light, map_uv, 0.0).rgb;
+    vec3 radiance = textureLod(environment_map, map_uv, 0.0).rgb;
 #if RADIANCE
     out_color = vec4(exposure * radiance, 0.0);
 #else

@@ -4,6 +4,6 @@
 #include "view.block"
 
 vec3 view_ray(vec2 pixel) {
-    pixel = straightened(pixel);
+    pixel = undistorted(pixel);
     return fma(vec3(pixel.x), ray_right, fma(vec3(pixel.y), ray_down, ray_corner));
 }

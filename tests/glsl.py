@@ -13,7 +13,7 @@ HEAD = "#version 430 core\n" + "".join(
 )
 
 
-def run(gl, body, inputs, textures=None, damage="sound"):
+def run(gl, body, inputs, textures=None, damage="undamaged"):
     """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4]."""
     ctx = gl.ctx
     main = (

@@ -43,7 +43,7 @@ def test_a_spreader_has_the_container_texel_size_unless_its_atlas_would_be_too_l
         generator, "bake_spreader", lambda scene, mm: asked.append(mm) or baked(scene, mm)
     )
     for most in (4000, int(max(container.atlas_size_mm) / 16)):
-        monkeypatch.setattr("fastgen.render.bake.MAX_ATLAS", most)
+        monkeypatch.setattr("fastgen.render.passes.bake.MAX_ATLAS", most)
         export_glb(generator, scene, tmp_path / "box.glb", [], 16.1)
     widest = max(build_spreader(scene.container.kind).atlas_size_mm)
     assert asked[0] == 16.1
@@ -52,8 +52,8 @@ def test_a_spreader_has_the_container_texel_size_unless_its_atlas_would_be_too_l
 
 
 def test_a_dent_marks_its_own_wall_and_not_the_opposite_one(generator):
-    sound = replace(generator.scene(0), damages=())
-    mesh = build_container(sound.container.kind, sound.container.profiles)
+    undamaged = replace(generator.scene(0), damages=())
+    mesh = build_container(undamaged.container.kind, undamaged.container.profiles)
     (_, low, _), (_, _, high) = mesh.bounds_mm
     dent = next(d for i in range(40) for d in generator.scene(i).damages if d.kind == "dented")
     dent = replace(
@@ -64,7 +64,7 @@ def test_a_dent_marks_its_own_wall_and_not_the_opposite_one(generator):
         across=(0.0, 0.0, 1.0),
         inward=(0.0, 1.0, 0.0),
     )
-    without, dented = (generator.bake(replace(sound, damages=d), 16.0) for d in ((), (dent,)))
+    without, dented = (generator.bake(replace(undamaged, damages=d), 16.0) for d in ((), (dent,)))
     levels = [atlas.base_color.astype(int) for atlas in (without, dented)]
     changed = np.abs(levels[0] - levels[1]).max(axis=2) > 1  # shader variants may round differently
     found = {}

@@ -10,7 +10,7 @@ from fastgen.render import settings
 
 SIZE = (501, 333)  # odd, so blocks at the borders are incomplete
 SCENES = {
-    "sound": {},
+    "undamaged": {},
     "damaged": {"damage": {"probability": 1, "count": [3, 5]}},
     "holed": {"damage": {"probability": 1, "count": [2, 3], "kinds": ["perforation"]}},
 }

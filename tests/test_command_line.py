@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
+from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
 from fastgen.cli.main import main
 from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 
@@ -109,7 +109,7 @@ def test_show_writes_every_layer(tmp_path):
     [
         ([*range(70), SPREADER_ID], ID_GREYS),
         ([0, 101, *(100 * kind + n for kind in (2, 3, 4, 5) for n in range(1, 10))], DAMAGE_GREYS),
-        ([CONTAINER_ID, SOUND_CONTAINER], ID_GREYS),  # as an id, 101 is a decal
+        ([CONTAINER_ID, UNDAMAGED_CONTAINER], ID_GREYS),  # as an id, 101 is a decal
     ],
 )
 def test_shown_labels_have_clearly_different_colours(labels, greys):

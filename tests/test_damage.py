@@ -230,9 +230,9 @@ def test_deformed_steel_is_dulled_and_rusts(generator):
     paint = replace(surface.paint, albedo=(0.02, 0.05, 0.4))
     rust = replace(surface.rust, coverage=0.0)
     scene = replace(scene, surface=replace(surface, paint=paint, rust=rust), decals=())
-    sound = replace(scene, damages=())
+    undamaged = replace(scene, damages=())
     dented, whole = (
-        generator.render(scene=one, camera="close", layer="rust") for one in (scene, sound)
+        generator.render(scene=one, camera="close", layer="rust") for one in (scene, undamaged)
     )
     marked = dented.damage == damage_law.mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
@@ -277,9 +277,9 @@ def test_undamaged_places_do_not_change(generator):
     scene = generator.scene(3)
     camera = scene.cameras[1]
     damaged = generator.render(scene=scene, camera=camera)
-    sound = generator.render(scene=replace(scene, damages=()), camera=camera)
-    far = damaged.damage == sound.damage
-    same = (damaged.image == sound.image).all(axis=-1)
+    undamaged = generator.render(scene=replace(scene, damages=()), camera=camera)
+    far = damaged.damage == undamaged.damage
+    same = (damaged.image == undamaged.image).all(axis=-1)
     assert far.mean() > 0.5
     assert same[far].mean() > 0.9
 

@@ -13,8 +13,8 @@ from fastgen.geometry.damage_law import (
     local_coordinates,
     reach_mm,
 )
+from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.gl import open_context
-from fastgen.render.programs import REACH_MARGIN_MM
 from fastgen.render.surface_values import damage_values
 from fastgen.scene.object_ids import mask_values
 from tests.glsl import blocks, run
@@ -94,7 +94,8 @@ def test_next_near_skips_no_damage_that_reaches_a_point(gl, damages):
     body = (
         "vec4 f(vec4 x) { vec4 n = vec4(0.0); for (int i = 0; i < damage_count; ++i)"
         " if (within_reach(i, x.xyz)) {"
-        " n.x += 1.0; n.y += next_near(i, damage_count, x.xyz) == i ? 0.0 : 1.0; } return n; }"
+        " n.x += 1.0;"
+        " n.y += next_damage_near(i, damage_count, x.xyz) == i ? 0.0 : 1.0; } return n; }"
     )
     for scene, points in damages:
         out, _ = asked(gl, scene, body, points)

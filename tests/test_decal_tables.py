@@ -8,8 +8,8 @@ import pytest
 from fastgen import Config
 from fastgen.decals.artwork import art_images, glyph_tiles
 from fastgen.geometry.container import build_container
+from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.decal_tables import CELL_SLOTS, MARGIN_MM, SceneError, pack_decals
-from fastgen.render.programs import DECAL_CELL_MM
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Decal
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from fastgen.render.constants import NEAR_CELL_MM
 from fastgen.render.decal_tables import MARGIN_MM
 from fastgen.render.decals_near import decals_near
 from fastgen.render.gl import open_context
-from fastgen.render.programs import NEAR_CELL_MM, SPREADER_ZONE
 from fastgen.render.textures import data_texture
+from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene.limits import DECAL_KINDS
 from tests.glsl import blocks, run
 
@@ -89,7 +90,7 @@ def test_the_shader_reads_each_cell():
     )
     with open_context() as gl:
         held = blocks(gl)
-        textures = {"decal_cells": data_texture(gl.ctx, near[..., None])}
+        textures = {"decal_proximity": data_texture(gl.ctx, near[..., None])}
         for zone, shown in ((0, expected), (SPREADER_ZONE, 0 * expected)):
             inputs = np.c_[points, np.full(len(points), zone), np.zeros(len(points))]
             found = run(gl, body, inputs, textures)[:, 0].reshape(rows, columns)

@@ -33,7 +33,7 @@ def resident_mib():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"config": {}}, "config: dict is no Config"),
+        ({"config": {}}, "config: dict is not a Config"),
         ({"config": Config(labels=LabelConfig(min_visible_px=math.nan))}, "labels.min_visible_px"),
         ({"config": Config(labels=None)}, "labels: expected a mapping"),
         ({"seed": "x"}, "seed: 'x' is not a whole number of 0 or more"),
@@ -82,7 +82,7 @@ def generator():
             {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), "x")},
             "camera.focal_mm: expected a number, got 'x'",
         ),
-        ({"scene": {}}, "scene: dict is no Scene"),
+        ({"scene": {}}, "scene: dict is not a Scene"),
     ],
 )
 def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
@@ -125,7 +125,7 @@ def test_a_hundred_damages_of_one_kind_are_refused():
     values = {"damage": {"probability": 1, "kinds": ["axis"], "count": [1, 1]}}
     generator = Generator(Config.from_values(values), size=SIZE)
     scene = generator.scene(0)
-    with pytest.raises(ConfigError, match="100 of kind axis; mask values tell 99 apart"):
+    with pytest.raises(ConfigError, match="100 of kind axis; mask values distinguish only 99"):
         generator.render(scene=replace(scene, damages=scene.damages * 100))
 
 

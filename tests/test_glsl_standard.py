@@ -87,7 +87,7 @@ def add_all(programs, variant):
     for damage, cables in itertools.product(DAMAGE_VARIANTS, (False, True)):
         programs.add(("classify.comp",), replace(variant, damage=damage, cables=cables))
     for name, lights in itertools.product(listed_classes(variant.samples_per_axis), LIGHTS):
-        damage = "holed" if "damaged" in name or name == "holed" else "sound"
+        damage = "holed" if "damaged" in name or name == "holed" else "undamaged"
         shaded = replace(variant, pixel_class=name, damage=damage, lights=lights)
         programs.add(("shade_listed.comp",), shaded)
 
@@ -96,12 +96,12 @@ def test_all_other_shaders_are_standard_glsl(programs):
     for damage in DAMAGE_VARIANTS:
         programs.add(("geometry.vert", "geometry.frag"), ShaderVariant(damage=damage))
         of_points = ShaderVariant(
-            pixel_class="decal" if damage == "sound" else "damaged", damage=damage
+            pixel_class="decal" if damage == "undamaged" else "damaged", damage=damage
         )
         for samples in (1, 2, 3, 5):
             variant = replace(of_points, samples_per_axis=samples)
             programs.add(("fullscreen.vert", "light_points.frag"), variant)
-            traits = {"sound": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
+            traits = {"undamaged": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
             if samples > 1 or damage == "holed":
                 normals = replace(variant, pixel_class=traits[damage])
                 programs.add(("normals.comp",), normals)

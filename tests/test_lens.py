@@ -109,7 +109,7 @@ def test_the_shader_removes_the_distortion(lens, focal_mm):
     view = view_of(camera(lens, focal_mm), SIZE)
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
     seen = np.stack([x, y], axis=-1).reshape(-1, 2)
-    body = '#include "lens.glsl"\nvec4 f(vec4 x) { return vec4(straightened(x.xy), 0.0, 0.0); }'
+    body = '#include "lens.glsl"\nvec4 f(vec4 x) { return vec4(undistorted(x.xy), 0.0, 0.0); }'
     with open_context() as gl:
         kept = blocks(
             gl,

@@ -170,11 +170,11 @@ def test_points_do_not_depend_on_earlier_images(monkeypatch, coarse):
             position = target - 2500 * toward
             plain = replace(holed.cameras[0], focal_mm=150.0, roll_deg=0.0)
             views.append(replace(plain, position_mm=tuple(position), target_mm=tuple(target)))
-        sound = replace(holed, damages=())
+        undamaged = replace(holed, damages=())
 
         def points():
             for view in views:
-                generator.render(scene=sound, camera=view)
+                generator.render(scene=undamaged, camera=view)
             return np.concatenate([each.place_mm for each in asked[-len(views) :]])
 
         before = points()

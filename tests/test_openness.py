@@ -106,7 +106,7 @@ def test_a_wall_halves_sky_visibility_and_tilts_the_bent_normal():
 def half_open(normals, side):
     """Return the sky visibility of surfaces that see only the half sphere around `side` [3]."""
     open_to = np.tile(sky_directions() @ side > 0, (len(normals), 1))
-    return SkyVisibility(normals, np.packbits(open_to, axis=1), encoded_cones(normals, open_to))
+    return SkyVisibility.of(normals, np.packbits(open_to, axis=1), encoded_cones(normals, open_to))
 
 
 def facing(count):
@@ -151,9 +151,9 @@ def test_equal_vertices_are_lit_as_when_alone():
         DirectionalLight((0.0, 0.8, 0.6), (9, 9, 9), 0.01),
     )
     sky = Sky(replace(light_of(sunset), lights=suns), 40.0)
-    alone = [SkyVisibility(*(part[[i]] for part in (normals, bits, cones))) for i in range(12)]
+    alone = [SkyVisibility.of(*(part[[i]] for part in (normals, bits, cones))) for i in range(12)]
     mixed = rng.integers(0, 12, 500)
-    together = SkyVisibility(normals[mixed], bits[mixed], cones[mixed])
+    together = SkyVisibility.of(normals[mixed], bits[mixed], cones[mixed])
     np.testing.assert_array_equal(together.visible, open_to[mixed])
     light, sun = together.irradiance(sky), together.directional_irradiance(sky)
     for found, of_one in ((light, "irradiance"), (sun, "directional_irradiance")):
@@ -172,7 +172,7 @@ def test_equal_vertices_are_lit_as_when_alone():
 def test_a_fully_visible_sky_gives_full_light():
     normals = facing(100)
     bits = np.full((100, 12), 255, np.uint8)
-    whole = SkyVisibility(normals, bits, open_sky(normals)[:, :3])
+    whole = SkyVisibility.of(normals, bits, open_sky(normals)[:, :3])
     for radiance in (even, sunset):
         assert (whole.vertex_bytes(Sky(light_of(radiance), 30.0)) == open_sky(normals)).all()
 
@@ -330,13 +330,13 @@ def test_backends_compute_the_same_sky_visibility(even_sky):
 def test_sky_visibility_of_reflections_is_close_to_ray_casts(camera, index):
     """Rays from visible points are spread by about 17 degrees around the mirror direction."""
     size = (120, 90)
-    sound = Config.from_values({"damage": {"probability": 0.0}})
-    with Generator(sound, 8, size, quality="draft") as g:
+    undamaged = Config.from_values({"damage": {"probability": 0.0}})
+    with Generator(undamaged, 8, size, quality="draft") as g:
         scene = g.scene(index)
         sample = g.render(scene=scene, camera=camera, normals=True)
         targets = g.gpu.renderer().draw(PreparedScene(scene), scene.camera(camera), size)
         stored = np.frombuffer(
-            targets.samples.textures["openness_points"].read(), np.uint8
+            targets.samples.textures["sky_visibility_cones"].read(), np.uint8
         ).reshape(*size[::-1], 4)
         found = stored[..., 3] / 255
         mesh = PreparedScene(scene).container

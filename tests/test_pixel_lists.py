@@ -6,10 +6,11 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render import pixel_lists
+from fastgen.render.visibility_buffer import VisibilityBuffer
 
 SIZE = (201, 150)
 KINDS = {
-    "sound": {"damage": {"probability": 0}},
+    "undamaged": {"damage": {"probability": 0}},
     "holed": {"damage": {"probability": 1, "count": [2, 4], "kinds": ["perforation", "concave"]}},
 }
 
@@ -79,7 +80,8 @@ def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
     def spoil(targets, damage, *rest):
         targets._make_room(damage)
         origin = origins[len(spoilt) % len(origins)]
-        for texture, value in zip(targets.rest, origin, strict=False):
+        rest = [t for name, t in targets.textures.items() if name.startswith("rest_")]
+        for texture, value in zip(rest, origin, strict=False):
             texture.write(np.full(texture.size[::-1], value, np.float32).tobytes())
             spoilt.append(value)
         begin(targets, damage, *rest)

@@ -64,9 +64,9 @@ def test_rust_streaks_run_down_a_wall(wall):
 
 def test_most_streaks_start_at_the_top_of_a_wall(wall):
     """Rust stains more of the paint below the upper edge than above the lower one."""
-    sound = np.where(wall < 0.3, np.nan, wall)
+    undamaged = np.where(wall < 0.3, np.nan, wall)
     rows = int(300 / TEXEL_MM)
-    top, bottom = np.nanmean(sound[-rows:]), np.nanmean(sound[:rows])
+    top, bottom = np.nanmean(undamaged[-rows:]), np.nanmean(undamaged[:rows])
     assert top < bottom - 0.02
 
 

@@ -27,10 +27,10 @@ def white_light(gl):
     layers = len(ROUGHNESS_LEVELS)
     table = dfg_table()
     made = {
-        "specular_light": ctx.texture_array(
+        "specular_map": ctx.texture_array(
             (SPECULAR_SIZE, SPECULAR_SIZE, layers), 4, ones(SPECULAR_SIZE, layers), dtype="f2"
         ),
-        "irradiance_light": ctx.texture(
+        "irradiance_map": ctx.texture(
             (IRRADIANCE_SIZE, IRRADIANCE_SIZE), 4, ones(IRRADIANCE_SIZE, 1), dtype="f2"
         ),
         "dfg_table": ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4"),
@@ -49,8 +49,8 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
-        " NO_RAYS)), 1.0); }"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
+        " NO_TRACED_LIGHT)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     np.testing.assert_allclose(out[:, :3], 1.0, atol=0.01)
@@ -65,8 +65,8 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         '#include "reflector.glsl"\n#include "ibl.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
-        " NO_RAYS)), 1.0); }"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
+        " NO_TRACED_LIGHT)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
     assert (out[:, 0] <= 1.01).all()
@@ -87,16 +87,16 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
         body = (
             '#include "reflector.glsl"\n#include "ibl.glsl"\n'
             "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
-            f" vec3 open = vec3(x.z); Traced rays = {rays};"
+            f" vec3 open = vec3(x.z); TracedLight rays = {rays};"
             " return vec4(lit(reflector(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
-            " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, 0.0, vec3(0.1), vec3(0.3),"
-            " rays)), 1.0); }"
+            " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, 0.0, vec3(0.1),"
+            " vec3(0.3), rays)), 1.0); }"
         )
         return run(gl, body, rows, white_light(gl))[:, :3]
 
-    all_open = lit("Traced(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 1.0)")
+    all_open = lit("TracedLight(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 1.0)")
     bright = lit("Traced(open, 1.0 - open, open, 1.0 - open, 1.0)")
-    dark = lit("Traced(open, vec3(0.0), open, vec3(0.0), 1.0)")
+    dark = lit("TracedLight(open, vec3(0.0), open, vec3(0.0), 1.0)")
     np.testing.assert_allclose(bright, all_open, rtol=1e-4)
     np.testing.assert_allclose(dark, rows[:, 2:3] * all_open, rtol=1e-3, atol=1e-4)
     del kept
@@ -112,8 +112,8 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " float share = 1.0 - x.w * x.w;"
         " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
-        " Openness(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, 0.0, vec3(0.0),"
-        " vec3(0.0, 0.5, 1.0), NO_RAYS)), 1.0); }"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, 0.0, vec3(0.0),"
+        " vec3(0.0, 0.5, 1.0), NO_TRACED_LIGHT)), 1.0); }"
     )
     black, grey, white = run(gl, body, rows, white_light(gl))[:, :3].T
     assert (black <= grey + 1e-6).all()
@@ -153,7 +153,7 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
     body = (
         '#include "reflector.glsl"\n#include "ibl.glsl"\n#include "sun.glsl"\n'
         f"vec4 f(vec4 x) {{ Material black = Material(vec3(0.0), {roughness}, 0.0);"
-        " return vec4(sunlit(reflector(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
+        " return vec4(light_reflection(reflector(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
     )
     radiance = run(gl, body, np.c_[views, np.zeros(len(views))], white_light(gl))[:, 0]
     cell = np.sin(theta).ravel() * (np.pi / 2 / steps) * (2 * np.pi / steps)
@@ -186,8 +186,8 @@ def test_packed_surface_ids_keep_zone_and_normal(gl):
     directions[:6] = np.r_[np.eye(3), -np.eye(3)]
     charts = np.arange(400) * 2
     body = (
-        "vec4 f(vec4 x) { uint key = pack_surface_key(uint(x.w), x.xyz);"
-        " return vec4(key_normal(key), float(key_zone(key))); }"
+        "vec4 f(vec4 x) { uint key = pack_surface_id(uint(x.w), x.xyz);"
+        " return vec4(id_normal(key), float(id_zone(key))); }"
     )
     out = run(gl, body, np.c_[directions, charts])
     np.testing.assert_array_equal(out[:, 3], charts)

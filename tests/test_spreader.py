@@ -247,13 +247,13 @@ def test_damage_neither_moves_nor_marks_the_spreader():
             scene = generator.scene(index)
             for camera in scene.cameras:
                 damaged = generator.render(scene=scene, camera=camera)
-                sound = generator.render(scene=replace(scene, damages=()), camera=camera)
+                undamaged = generator.render(scene=replace(scene, damages=()), camera=camera)
                 spreader = damaged.ids == oracle.SPREADER
                 assert (damaged.damage[spreader] == 0).all()
-                both = spreader & (sound.ids == oracle.SPREADER)
+                both = spreader & (undamaged.ids == oracle.SPREADER)
                 assert both.sum() >= 0.99 * spreader.sum()
-                np.testing.assert_allclose(damaged.depth[both], sound.depth[both], rtol=1e-5)
-                same = (damaged.image == sound.image).all(axis=-1)
+                np.testing.assert_allclose(damaged.depth[both], undamaged.depth[both], rtol=1e-5)
+                same = (damaged.image == undamaged.image).all(axis=-1)
                 inner.append(same[both & ~oracle.near_edge(damaged.ids)])
     assert np.concatenate(inner).mean() > 0.99
 

@@ -9,10 +9,10 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.damage_law import deform
+from fastgen.geometry.solids import without_cables
 from fastgen.geometry.spreader import CABLE_TIER, build_spreader, tier_of_vertices
-from fastgen.light.occluders import without_cables
 from fastgen.render.gl import open_context
-from fastgen.render.programs import link
+from fastgen.render.program import link
 from fastgen.render.shadow_map import ShadowMap
 from fastgen.render.sky_visibility_probe import probe_points
 from fastgen.scene import Damage

@@ -268,10 +268,10 @@ def test_holes_do_not_cut_the_locking_bars():
         camera = Camera("straight", (length / 2 + 3000, 275.0, 1500.0), hole.origin_mm, 60.0)
         scene = replace(scene, damages=(hole,), cameras=(camera,), decals=())
         sample = generator.render(scene=scene, camera="straight")
-        sound = replace(scene, damages=())
+        undamaged = replace(scene, damages=())
         rusty, paint = (
             generator.render(scene=one, camera="straight", layer="rust").image.astype(float)
-            for one in (scene, sound)
+            for one in (scene, undamaged)
         )
         mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view)

@@ -38,10 +38,10 @@ _FIT_TERMS = 8
 PINHOLE: Mapping[str, ArrayLike] = MappingProxyType(
     {
         "lens_radial": np.zeros(4),
-        "lens_back": np.zeros((2, 4)),
+        "lens_inverse": np.zeros((2, 4)),
         "lens_tangential": (0.0, 0.0),
         "lens_model": 0.0,
-        "lens_end": (0.0, 0.0),
+        "lens_linear_from": (0.0, 0.0),
     }
 )
 """Uniforms of shaders/lens.glsl without distortion, see Distortion.shader_values."""
@@ -163,10 +163,10 @@ class Distortion:
         fit, *_ = np.linalg.lstsq(basis, seen / ideal, rcond=None)
         return {
             "lens_radial": self._k,
-            "lens_back": fit.reshape(2, 4),
+            "lens_inverse": fit.reshape(2, 4),
             "lens_tangential": self._p,
             "lens_model": 2.0 if self._fisheye else 1.0,
-            "lens_end": (self._end, self._end_slope),
+            "lens_linear_from": (self._end, self._end_slope),
         }
 
     def _curve(self, t: Array) -> Array:

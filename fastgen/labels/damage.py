@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_VALUES, SOUND_CONTAINER
+from fastgen.classes import DAMAGE_VALUES, UNDAMAGED_CONTAINER
 from fastgen.geometry.damage_law import amount_mm, in_hole, may_be_seen
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
@@ -103,7 +103,7 @@ def _damaged(
     depth, drawn = shot.frame.depth.ravel().take(place), shot.frame.damage.ravel().take(place)
     # where the sheet is visible, the damage target has the answer
     known = points.within & (points.depth_m <= depth * (1 + _DEPTH_SLACK))
-    known &= (drawn == SOUND_CONTAINER) | (drawn == value)
+    known &= (drawn == UNDAMAGED_CONTAINER) | (drawn == value)
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm

@@ -13,8 +13,8 @@ from fastgen.classes import (
     DAMAGE_CLASSES,
     DAMAGE_VALUES,
     MARKER_CLASSES,
-    SOUND_CONTAINER,
     SPREADER_ID,
+    UNDAMAGED_CONTAINER,
 )
 from fastgen.sample import Sample
 
@@ -24,7 +24,7 @@ _LINE_PX = 1000
 """Side of an image for each pixel of a line's width."""
 
 ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
-DAMAGE_GREYS = MappingProxyType({SOUND_CONTAINER: 200})
+DAMAGE_GREYS = MappingProxyType({UNDAMAGED_CONTAINER: 200})
 
 _GOLDEN = (5**0.5 - 1) / 2
 

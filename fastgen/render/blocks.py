@@ -16,9 +16,9 @@ SCENE_BLOCK = Block(
     "SceneBlock",
     0,
     (
-        ("vec4", "material_base", len(MATERIALS)),
-        ("vec4", "material_trait", len(MATERIALS)),
-        ("vec4", "noise_lost", 2 * NOISE_LEVELS),
+        ("vec4", "material_base", len(MATERIALS)),  # albedo, roughness
+        ("vec4", "material_trait", len(MATERIALS)),  # metallic, rust proneness, layers, unused
+        ("vec4", "noise_lost", 2 * NOISE_LEVELS),  # NoiseTiles.lost_deviation
         ("vec3", "dirt_albedo"),
         ("float", "dirt_strength"),
         ("vec3", "rust_albedo"),
@@ -34,8 +34,8 @@ SCENE_BLOCK = Block(
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
         ("float", "wetness"),
-        ("float", "background_size"),
-        ("vec4", "above"),  # albedo of what hangs above the container, and whether anything does
+        ("float", "background_size"),  # texels along a side of the environment map
+        ("vec4", "above"),  # albedo of the spreader above the container; 1 if there is one
     ),
 )
 
@@ -43,34 +43,35 @@ VIEW_BLOCK = Block(
     "ViewBlock",
     1,
     (
-        ("mat4", "world_to_clip"),
-        ("vec3", "ray_corner"),
-        ("float", "pixel_angle"),
+        ("mat4", "world_to_clip"),  # without lens distortion, to the visibility buffer
+        ("vec3", "ray_corner"),  # view ray of the image's upper left corner, depth 1
+        ("float", "pixel_angle"),  # 1 / focal length in pixels
         ("vec3", "eye_m"),
-        ("vec3", "ray_right"),
+        ("vec3", "ray_right"),  # change of the view ray per pixel to the right
         ("float", "exposure"),
         ("vec3", "ray_down"),
-        ("vec2", "yaw"),
-        ("int", "point_step"),  # pixels between points that rays are cast from
+        ("vec2", "yaw"),  # cosine and sine of the environment's rotation
+        ("int", "point_step"),  # pixels between the points from which rays are cast
         ("vec4", "lens_radial"),
-        ("vec4", "lens_back", 2),
+        ("vec4", "lens_inverse", 2),  # polynomial of the inverse distortion
         ("vec2", "lens_tangential"),
-        ("vec4", "lens_to_clip"),  # columns of the matrix that takes the image plane there
+        ("vec4", "lens_to_clip"),  # columns of the matrix from the image plane to clip space
         ("vec2", "lens_center"),
-        ("vec2", "lens_end"),  # where its formula ends, and the slope there
+        ("vec2", "lens_linear_from"),  # radius beyond which the distortion is linear, slope there
         ("float", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
         ("mat4", "ray_to_shadow", MAX_LIGHTS),  # vector from the eye in m to (u, v, depth)
-        ("vec4", "sun_tile", MAX_LIGHTS),  # the part of the map that is its own, centres of texels
-        ("vec4", "to_end_tile"),  # from a place in the first sun's tile: scale, offset
-        ("vec4", "end_tile"),  # from and up to where it is asked for the end that it shines on:
-        ("vec2", "end_from"),  # toward 1 or -1 along x, and that much farther than the eye, in m
-        ("vec4", "sun_toward", MAX_LIGHTS),  # unit vector to it, angular radius
-        ("vec4", "sun_light", MAX_LIGHTS),  # irradiance / pi on what faces it
-        ("int", "sun_count"),
-        ("float", "cable_zone"),
-        ("vec4", "cable_rusted"),  # mean albedo under rust, and its share
-        ("vec4", "cable_foot", CABLES),  # lower end, from the eye in m; pixels a unit of `aside`
+        ("vec4", "shadow_tile", MAX_LIGHTS),  # (u, v) of the first and the last texel of its tile
+        # the first light has a finer tile for the end of the container that it shines on
+        ("vec4", "shadow_end_transform"),  # from the coarse tile to the fine one: scale, offset
+        ("vec4", "shadow_end_bounds"),  # least and greatest (u, v) to look up in the fine tile
+        ("vec2", "shadow_end_plane"),  # sign along x; x from the eye in m where the tile begins
+        ("vec4", "light_direction", MAX_LIGHTS),  # unit vector toward it; angular radius
+        ("vec4", "light_irradiance", MAX_LIGHTS),  # irradiance / pi on a surface that faces it
+        ("int", "light_count"),
+        ("float", "cable_zone"),  # zone of the cables, -1 without
+        ("vec4", "cable_mean_rust"),  # mean albedo under rust; share of rust
+        ("vec4", "cable_lower_end", CABLES),  # from the eye in m; pixels per unit of `aside`
     ),
 )
 
@@ -78,20 +79,20 @@ DAMAGE_BLOCK = Block(
     "DamageBlock",
     2,
     (
-        ("vec4", "damage_origin", MAX_DAMAGES),  # position, squared reach
-        ("vec4", "damage_along", MAX_DAMAGES),  # axis, half length
-        ("vec4", "damage_across", MAX_DAMAGES),  # axis, half width
-        ("vec4", "damage_inward", MAX_DAMAGES),  # axis, depth
-        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape, and last the mask value
+        ("vec4", "damage_origin", MAX_DAMAGES),  # position; squared reach
+        ("vec4", "damage_along", MAX_DAMAGES),  # axis; half length
+        ("vec4", "damage_across", MAX_DAMAGES),  # axis; half width
+        ("vec4", "damage_inward", MAX_DAMAGES),  # axis; depth
+        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape; the mask value comes last
         ("int", "damage_count"),
-        ("int", "hole_count"),  # perforations come first,
-        ("int", "dent_end"),  # then dents up to here,
-        ("int", "bowl_end"),  # and what is concave; bent edges are the rest
+        # damages are sorted by kind: perforation, dented, concave, axis
+        ("int", "hole_count"),
+        ("int", "dent_end"),
+        ("int", "concave_end"),
         ("float", "damage_threshold_mm"),
-        ("int", "inner_row"),  # first row of the inner view in the sample targets
+        ("int", "inner_row"),  # first row of the interior in the visibility buffer
     ),
 )
-
 
 BLOCKS: Mapping[str, Block] = {"scene": SCENE_BLOCK, "view": VIEW_BLOCK, "damage": DAMAGE_BLOCK}
 """The blocks by the name that shaders include."""

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from fastgen.camera import tone_curve
-from fastgen.classes import CONTAINER_ID, SOUND_CONTAINER, SPREADER_ID
+from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry import damage_law
 from fastgen.geometry.mesh import MATERIALS
@@ -24,7 +24,7 @@ from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_t
 from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattice
 from fastgen.render.variant import LAYERS, PIXEL_TRAITS, ShaderVariant, listed_classes
 from fastgen.render.zone_codes import (
-    PORTAL_ZONE,
+    HOLE_ZONE,
     SPREADER_ZONE,
     ZONE_GEAR,
     ZONE_LEVEL,
@@ -98,13 +98,13 @@ def _variant(v: ShaderVariant) -> Defines:
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},
         **{f"WITH_{trait}": int(trait in v.traits) for trait in PIXEL_TRAITS},
         "LAYER": LAYERS.index(v.layer),
-        "DAMAGED": int(v.damage != "sound"),
+        "DAMAGED": int(v.damage != "undamaged"),
         "HOLED": int(v.damage == "holed"),
-        "SUNS": v.lights,
+        "LIGHTS": v.lights,
         "TRACED": int(v.traced),
         "COARSE": int(v.coarse),
-        "CABLES_NEAR": int(v.cables),
-        "OF_CABLES": int(v.pixel_class == "cable"),
+        "WITH_CABLES": int(v.cables),
+        "CABLE_CLASS": int(v.pixel_class == "cable"),
         "RADIANCE": int(v.radiance),
     }
 
@@ -147,7 +147,7 @@ def _lookups(v: ShaderVariant) -> Defines:
         "LOOKUP_PLACE": _Array("vec2", places),
         # surfaces beyond these numbers look like the rest of their pixel
         "MAX_PARTS": 3,
-        "MAX_SIDES": 4,
+        "MAX_ORIENTATIONS": 4,
     }
 
 
@@ -174,11 +174,11 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
     "units": lambda _: {
         "MM": "0.001",
         "PI": f"{math.pi:.8f}",
-        "VOID_DEPTH": "uintBitsToFloat(0x7f800000u)",
+        "NO_DEPTH": "uintBitsToFloat(0x7f800000u)",
         "SKY_DEPTH": _SKY_DEPTH,
     },
     "labels": lambda _: {
-        "SOUND_CONTAINER": f"{SOUND_CONTAINER}u",
+        "UNDAMAGED_CONTAINER": f"{UNDAMAGED_CONTAINER}u",
         "CONTAINER_ID": f"{CONTAINER_ID}u",
         "SPREADER_ID": f"{SPREADER_ID}u",
     },
@@ -188,7 +188,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
     },
     "zones": lambda _: {
         "SPREADER_ZONE": f"{SPREADER_ZONE}u",
-        "PORTAL_ZONE": f"{PORTAL_ZONE}u",
+        "HOLE_ZONE": f"{HOLE_ZONE}u",
         "ZONE_MATERIAL": ZONE_TURN - 1,
         "ZONE_TURN": ZONE_TURN,
         "ZONE_GEAR": ZONE_GEAR,

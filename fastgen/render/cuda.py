@@ -1,8 +1,8 @@
-"""Frames as CUDA memory: what GL drew, for PyTorch or CuPy, without a way through the host.
+"""Rendered frames as CUDA memory for PyTorch or CuPy, without a copy through the host.
 
-The drawn textures are copied on the GPU into GL buffers that are registered with CUDA's driver
-(libcuda.so.1, nothing else is needed). Tests have a stand-in for that; on a GPU bench/gpu.py
-compares frames with those that are read back.
+The rendered textures are copied on the GPU to OpenGL buffers that are registered with the CUDA
+driver. Only libcuda.so.1 is needed. Tests replace it by a stand-in; on a GPU, bench/gpu.py compares
+the frames with frames that are read back.
 """
 
 import ctypes
@@ -20,7 +20,7 @@ from fastgen.scene import Camera, Scene
 _LIBRARY = "libcuda.so.1"
 _VENDOR = "NVIDIA Corporation"
 
-# names as cuda.h and cudaGL.h define them: _v2 is the version with 64-bit addresses
+# names of cuda.h and cudaGL.h; _v2 is the version with 64-bit addresses
 _CALLS = (
     "cuInit",
     "cuGetErrorName",
@@ -36,15 +36,20 @@ _CALLS = (
     "cuGraphicsResourceGetMappedPointer_v2",
 )
 _ALL_DEVICES = 1  # CU_GL_DEVICE_LIST_ALL
-_READ_AND_WRITE = 0  # CU_GRAPHICS_REGISTER_FLAGS_NONE: consumers may work in place
-_LEGACY_STREAM = 1  # of the CUDA array interface; the driver calls it NULL
+_READ_AND_WRITE = 0  # CU_GRAPHICS_REGISTER_FLAGS_NONE: consumers may write
+_LEGACY_STREAM = 1  # value of the CUDA array interface; the driver uses NULL
 
 
 class CudaArray:
-    """An array in GPU memory, for `torch.as_tensor` or `cupy.asarray`, which do not copy it.
+    """Array in GPU memory for `torch.as_tensor` or `cupy.asarray`, which do not copy it.
 
-    shape: rows first, no padding. typestr: NumPy's, such as '<f4'. Ready on CUDA's default stream,
-    the one that PyTorch uses unless told otherwise; work on another stream has to wait for that.
+    The data are ready on CUDA's default stream, which PyTorch uses by default. Work on another stream
+    has to wait for the default stream.
+
+    Args:
+        pointer: device address.
+        shape: array shape, rows first, without padding.
+        typestr: NumPy type string, such as '<f4'.
     """
 
     def __init__(self, pointer: int, shape: tuple[int, ...], typestr: str) -> None:
@@ -54,9 +59,9 @@ class CudaArray:
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
-        """Version 3 of the interface. Raises ContextError once GL has the memory back."""
+        """Version 3 of the interface. Raises ContextError after the memory went back to OpenGL."""
         if not self._pointer:
-            raise ContextError("this frame's memory went back to GL; clone a frame to keep it")
+            raise ContextError("this frame's memory went back to OpenGL; clone a frame to keep it")
         return {
             "data": (self._pointer, False),
             "shape": self.shape,
@@ -67,17 +72,23 @@ class CudaArray:
         }
 
     def expire(self) -> None:
-        """Give no address from now on."""
+        """Invalidate the address."""
         self._pointer = 0
 
 
 @dataclass(frozen=True, eq=False)
 class CudaFrame:
-    """One draw in GPU memory, row 0 at the top; good until the next `Generator.render_cuda`.
+    """One rendered frame in GPU memory, row 0 at the top; valid until the next `render_cuda`.
 
-    image: uint8 [H, W, 4], sRGB and Frame.cover. labels: uint32 [H, W], id | damage << 16, see
-    Frame. depth: float32 [H, W], metres along the optical axis, inf where void. Objects are worked
-    out from ids on the host, so there are none here: `Generator.render` gives them.
+    There are no objects, because they are computed on the host; `Generator.render` has them.
+
+    Attributes:
+        image: uint8 [H, W, 4], sRGB and Frame.cover.
+        labels: uint32 [H, W], id | damage << 16, see Frame.
+        depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
+        scene: the scene.
+        camera: the camera.
+        view: projection of the camera.
     """
 
     image: CudaArray
@@ -89,7 +100,7 @@ class CudaFrame:
 
 
 def cuda_reason(gl: GLContext) -> str:
-    """Why CUDA cannot reach what `gl`, which is current, draws; '' where it can."""
+    """Return why CUDA cannot access frames of the current context `gl`, '' if it can."""
     if gl.vendor != _VENDOR:
         return f"OpenGL runs on {gl.renderer} ({gl.vendor}), not on an NVIDIA GPU"
     try:
@@ -100,15 +111,20 @@ def cuda_reason(gl: GLContext) -> str:
 
 
 class CudaFrames:
-    """GPU memory for one frame of (width, height) = size, shared by GL and CUDA.
+    """GPU memory for one frame, shared by OpenGL and CUDA.
 
-    gl: a current context; it stays the caller's. Raises ContextError where `cuda_reason` gives one.
+    Args:
+        gl: current context; the caller owns it.
+        size: (width, height) in pixels.
+
+    Raises:
+        ContextError: CUDA cannot access the frames, see `cuda_reason`.
     """
 
     def __init__(self, gl: GLContext, size: tuple[int, int]) -> None:
         reason = cuda_reason(gl)
         if reason:
-            raise ContextError(f"cuda: {reason}; take Generator.render, or see fastgen doctor")
+            raise ContextError(f"cuda: {reason}; use Generator.render, or see fastgen doctor")
         width, height = size
         self._gl = gl
         self._layouts = (
@@ -119,7 +135,7 @@ class CudaFrames:
         self._driver = _Driver()
         self._device = self._driver.device()
         self._context = ctypes.c_void_p()
-        # the primary context is the one that PyTorch and CuPy work in
+        # PyTorch and CuPy use the primary context
         self._driver("cuDevicePrimaryCtxRetain", ctypes.byref(self._context), self._device)
         self._buffers = [gl.ctx.buffer(reserve=4 * width * height) for _ in self._layouts]
         self._resources: list[ctypes.c_void_p] = []
@@ -134,10 +150,13 @@ class CudaFrames:
             raise
 
     def take(self, targets: ImageTargets) -> tuple[CudaArray, CudaArray, CudaArray]:
-        """Image, labels and depth of what was drawn into `targets`, see CudaFrame.
+        """Return image, labels and depth of a rendered frame, see CudaFrame.
 
-        Ends the life of those that the last call gave, once CUDA's default stream is through
-        with them.
+        The arrays of the previous call become invalid once CUDA's default stream has finished with
+        them.
+
+        Args:
+            targets: the rendered frame.
         """
         self._unmap()
         targets.copy_to(*self._buffers)
@@ -152,7 +171,7 @@ class CudaFrames:
         return image, labels, depth
 
     def release(self) -> None:
-        """Free the memory on both sides."""
+        """Free the memory in OpenGL and CUDA."""
         self._gl.make_current()
         self._unmap()
         with self._current():
@@ -171,7 +190,7 @@ class CudaFrames:
                 self._driver("cuGraphicsUnmapResources", *self._all())
 
     def _all(self) -> tuple[Any, ...]:
-        """Count, resources and stream, as map and unmap take them."""
+        """Return count, resources and stream, the arguments of map and unmap."""
         count = len(self._resources)
         handles = (ctypes.c_void_p * count)(*[resource.value for resource in self._resources])
         return ctypes.c_uint(count), handles, None
@@ -190,7 +209,7 @@ class CudaFrames:
 
     @contextmanager
     def _current(self) -> Iterator[None]:
-        """The primary context is the thread's within; afterwards that which was before."""
+        """Make the primary context current inside the with block."""
         self._driver("cuCtxPushCurrent_v2", self._context)
         try:
             yield
@@ -199,7 +218,7 @@ class CudaFrames:
 
 
 class _Driver:
-    """CUDA's driver: call it with a function's name and arguments, all of them ctypes objects.
+    """The CUDA driver: call it with the name of a function and its arguments as ctypes objects.
 
     Failures become ContextErrors that name the function.
     """
@@ -219,7 +238,7 @@ class _Driver:
             raise ContextError(f"{name} failed: {(text.value or b'error').decode()} ({code})")
 
     def device(self) -> ctypes.c_int:
-        """The CUDA device on which the current GL context draws: CUDA's order, not EGL's."""
+        """Return the CUDA device of the current OpenGL context, in CUDA's order, not EGL's."""
         count, device = ctypes.c_uint(), ctypes.c_int()
         found = ctypes.byref(count), ctypes.byref(device)
         self("cuGLGetDevices_v2", *found, ctypes.c_uint(1), ctypes.c_int(_ALL_DEVICES))

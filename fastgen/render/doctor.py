@@ -1,4 +1,4 @@
-"""Which OpenGL backends work on this machine, and what to install if none does."""
+"""Diagnosis of the OpenGL backends of a machine, behind `fastgen doctor`."""
 
 import multiprocessing
 import signal
@@ -10,14 +10,20 @@ from fastgen.errors import FastgenError
 from fastgen.render.gl import egl_devices, open_context
 
 _START_S = 60.0
-"""For a new process to import what it needs; then its driver's time begins."""
+"""Time limit for a new process to import its modules, before the driver is tried."""
 
 _TIMEOUT_S = 30.0
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One backend or device: whether it works, and its renderer string or why it failed."""
+    """Result for one backend or device.
+
+    Attributes:
+        name: backend or device.
+        works: whether a context could be opened.
+        words: renderer string, or the reason of the failure.
+    """
 
     name: str
     works: bool
@@ -25,11 +31,11 @@ class Finding:
 
 
 def diagnose() -> list[Finding]:
-    """Try every EGL device and OSMesa, each in a process of its own: drivers crash and hang."""
+    """Try every EGL device and OSMesa, each in its own process, because drivers crash and hang."""
     listed, answer = _isolated(_egl_device_names)
     if not listed:
         findings = [Finding("egl", False, answer)]
-    elif not answer:  # then there is Mesa's surfaceless platform at most
+    elif not answer:  # only Mesa's surfaceless platform may work
         findings = [Finding("egl", *_isolated(_renderer, "egl", None))]
     else:
         findings = [
@@ -39,7 +45,7 @@ def diagnose() -> list[Finding]:
 
 
 def report() -> tuple[str, bool]:
-    """What `fastgen doctor` prints, and whether anything works."""
+    """Return the text that `fastgen doctor` prints, and whether any backend works."""
     findings = diagnose()
     width = max(len(finding.name) for finding in findings)
     lines = [f"{'ok  ' if f.works else 'FAIL'}  {f.name:{width}}  {f.words}" for f in findings]
@@ -62,7 +68,7 @@ def _renderer(backend: str, index: int | None) -> str:
 
 
 def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
-    """True and what `attempt` returns in a new process, or False and why it returned nothing."""
+    """Run `attempt` in a new process; return True and its result, or False and an error text."""
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_answer, args=(sender, attempt, arguments), daemon=True)

@@ -1,10 +1,9 @@
-"""OpenGL contexts without a screen: EGL, or OSMesa where the system still has it.
+"""Headless OpenGL contexts with EGL or OSMesa.
 
-Mesa dropped OSMesa in version 25.1; EGL with the software device does the same job there.
+Mesa removed OSMesa in version 25.1. The software device of EGL replaces it there.
 """
 
 import ctypes
-import os
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -21,20 +20,27 @@ from fastgen.validation import check_known
 BACKENDS = ("auto", "egl", "osmesa")
 
 MIN_VERSION = 440
-"""Textures cleared in part: OpenGL 4.4 core."""
+"""Version that has glClearTexSubImage: OpenGL 4.4 core."""
 
 
 class GLContext:
-    """A current OpenGL context. A context manager: leaving it releases the context.
+    """A current OpenGL context, and a context manager that releases it.
 
-    ctx: moderngl.Context. backend: 'egl' or 'osmesa'. renderer, vendor, version: the driver's
-    own words. software: whether it is one of Mesa's rasterizers on the processor. One thread at a
-    time uses it: `let_go` hands it on. Several may live at once, of both backends: call
-    `make_current` before going on with one, and before freeing what was made through `ctx`.
+    One thread at a time can use a context; `let_go` makes it available to another thread. Several
+    contexts of both backends may exist. Call `make_current` before continuing with one of them and
+    before freeing objects made through `ctx`.
+
+    Attributes:
+        ctx: moderngl.Context.
+        backend: 'egl' or 'osmesa'.
+        renderer: GL_RENDERER of the driver.
+        vendor: GL_VENDOR of the driver.
+        version: GL_VERSION of the driver.
+        software: whether it is one of Mesa's CPU rasterizers.
     """
 
     def __init__(self, native: NativeContext, backend: str) -> None:
-        foreign: Any = native  # moderngl's annotation knows no foreign contexts
+        foreign: Any = native  # moderngl's type annotation excludes foreign contexts
         try:
             self.ctx = moderngl.create_context(
                 require=MIN_VERSION, standalone=True, context=foreign
@@ -50,10 +56,17 @@ class GLContext:
         self._native = native
 
     def function(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-        """The GL function `name` as a ctypes call, which lets other threads run meanwhile.
+        """Return an OpenGL function as a ctypes function, which releases the GIL.
 
-        result, arguments: ctypes types. It acts on whichever context is current.
-        Raises ContextError when the driver lacks it.
+        The function acts on the context that is current when it is called.
+
+        Args:
+            name: name of the function, such as 'glClearTexSubImage'.
+            result: ctypes type of the result, None for void.
+            *arguments: ctypes types of the arguments.
+
+        Raises:
+            ContextError: the driver does not have the function.
         """
         address = self._native.load_opengl_function(name)
         if not address:
@@ -61,24 +74,22 @@ class GLContext:
         return ctypes.CFUNCTYPE(result, *arguments)(address)
 
     def make_current(self) -> None:
-        """Make this the thread's context again, after another one was used.
+        """Make this context current in the calling thread; costs nothing if it already is.
 
-        Costs nothing where it is current already. Raises ContextError after a release.
+        Raises:
+            ContextError: the context was released.
         """
         self._native.__enter__()
 
     def let_go(self) -> None:
-        """Leave this thread without it, so that another may make it current.
-
-        Does nothing where it is not current.
-        """
+        """Release the context from this thread, if it is current, for use in another thread."""
         self._native.__exit__()
 
     def release(self) -> None:
         """Free the context; a second call does nothing.
 
-        No context is current afterwards if this one was; another that was current stays so.
-        Objects made through `ctx` are the caller's: free them first, or not at all.
+        If another context is current, it stays current. The caller owns the objects made through
+        `ctx`: free them first, or not at all.
         """
         self.ctx.release()
 
@@ -90,28 +101,23 @@ class GLContext:
 
 
 def is_software(renderer: str) -> bool:
-    """Whether a driver of this name draws on the processor, or has one that does draw for it."""
+    """Return whether the GL_RENDERER string names one of Mesa's CPU rasterizers."""
     return any(name in renderer for name in ("llvmpipe", "softpipe"))
 
 
-def open_context(
-    backend: str = "auto", device_index: int | None = None, threads: int | None = None
-) -> GLContext:
-    """A new context, current in this thread.
+def open_context(backend: str = "auto", device_index: int | None = None) -> GLContext:
+    """Open a context that is current in this thread.
 
-    backend: 'egl', 'osmesa', or 'auto' for the first that works in this order. device_index:
-    which device in EGL's own order, so never OSMesa; None takes the first whose context comes
-    up, hardware before software. threads: rasterizer threads of llvmpipe, 0 for none but the
-    caller's. It sets the environment's LP_NUM_THREADS, which wins when set already; llvmpipe
-    reads that once a process and backend, at the first context, so later values change nothing.
-    Raises ContextError naming the packages to install when nothing works, ConfigError for an
-    unknown backend or a value out of range.
+    Args:
+        backend: 'egl', 'osmesa', or 'auto' for the first that works in this order.
+        device_index: index of a device in the order of EGL; excludes OSMesa. None uses the first
+            device that works, hardware before software.
+
+    Raises:
+        ContextError: nothing works; the message names the packages to install.
+        ConfigError: unknown backend, or a device index for OSMesa.
     """
     check_known("backend", backend, BACKENDS)
-    if threads is not None:
-        if threads < 0:
-            raise ConfigError(f"threads: {threads} is no count; give 0 or more")
-        os.environ.setdefault("LP_NUM_THREADS", str(threads))
     check_device(backend, device_index)
     if device_index is not None:
         backend = "egl"
@@ -128,15 +134,16 @@ def open_context(
 
 
 def check_device(backend: str, device_index: int | None) -> None:
-    """Raise ConfigError where `backend` has no devices to choose from."""
+    """Raise ConfigError if a device index is given for a backend without devices."""
     if device_index is not None and backend == "osmesa":
         raise ConfigError(f"device_index: {device_index}: osmesa has no devices; use egl")
 
 
 def egl_devices() -> list[EglDevice]:
-    """The devices that EGL lists, in the order that `device_index` counts; [] where it cannot.
+    """Return the devices that EGL lists, in the order of `device_index`; [] if it cannot list them.
 
-    Raises ContextError where libEGL is missing.
+    Raises:
+        ContextError: libEGL is missing.
     """
     return Egl().devices()
 
@@ -152,7 +159,7 @@ def _open_egl(device_index: int | None) -> GLContext:
     else:
         raise ContextError(
             f"egl: device_index: there is no device {device_index} among the {len(devices)} "
-            f"that EGL lists; fastgen doctor shows them"
+            f"devices of EGL; fastgen doctor lists them"
         )
     failures = []
     for device in tries:
@@ -161,7 +168,7 @@ def _open_egl(device_index: int | None) -> GLContext:
         if not gl_forks.usable(f"egl {where}"):
             failures.append(f"{where}: {gl_forks.REASON}")
             if software:
-                continue  # the same rasterizer is reached by another display
+                continue  # another display gives the same rasterizer
             break
         gl_forks.opened(f"egl {where}", software)
         try:

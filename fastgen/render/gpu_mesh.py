@@ -85,7 +85,7 @@ class GpuMesh:
         self._commands = ctx.buffer(reserve=_COMMAND.itemsize * most)
         names = ("in_position_mm", "in_normal", "in_atlas_mm", "in_zone")
         content = (self._vertices, "3f 3f 2f 1u", *names)
-        seen = ("in_cone", "in_light", "in_open_to")
+        seen = ("in_sky_cone", "in_sky_light", "in_visible_directions")
         contents = [content, (self._sky_visibility, "3f1 1x 4f1 3u", *seen)]
         self._arrays = {
             damage: ctx.vertex_array(program, contents, self._indices)

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
 
+VERSION = 1  # raise when the stored arrays change
+
 NOISE_SIZE = 1024
 """Width and height of a tile in texels."""
 
@@ -150,7 +152,7 @@ def noise_tiles() -> NoiseTiles:
     Returns:
         Both layers with their mip levels.
     """
-    arrays = disk_cache.computed("noise", _SEED, _baked)
+    arrays = disk_cache.cached("noise", VERSION, _SEED, _baked)
     levels = tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1))
     return NoiseTiles(levels, float((levels[0][1, ..., 0] > 0).mean()), arrays["lost_deviation"])
 

@@ -183,7 +183,7 @@ class Renderer:
             prepared, resources.materials, lens, light.ambient
         )
         self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
-        if damage != "sound":
+        if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
             self._set(DAMAGE_BLOCK, damage_values(scene, damages, threshold_mm, row))
         return DrawInputs(
@@ -206,9 +206,9 @@ class Renderer:
             ),
             textures={
                 **self._material_textures(resources, container, spreader),
-                "specular_light": light.specular,
-                "irradiance_light": light.irradiance,
-                "background_light": light.background,
+                "specular_map": light.specular,
+                "irradiance_map": light.irradiance,
+                "environment_map": light.background,
             },
         )
 
@@ -223,7 +223,7 @@ class Renderer:
         container = prepared.container if scene.damages else outline  # only fine triangles bend
         solid = None if spreader is None else spreader.solid
         self.shadow_map.cast(container, solid, toward, scene.damages, outline)
-        inputs.textures["sun_shadow"] = self.shadow_map.depth
+        inputs.textures["shadow_map"] = self.shadow_map.depth
 
     def _set_view(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> None:
         """Fill the uniform block of the view."""
@@ -272,7 +272,7 @@ class Renderer:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""
         scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
-        if damage != "sound":
+        if damage != "undamaged":
             values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
         self._set(SCENE_BLOCK, scene_values(scene, 0))
@@ -288,7 +288,7 @@ class Renderer:
         self._set(SCENE_BLOCK, scene_values(prepared.scene, 0))
         container = self._shapes.container(prepared)
         textures = self._material_textures(self._resources(prepared), container, spreader)
-        program = bake_program(self._programs, "sound")
+        program = bake_program(self._programs, "undamaged")
         return bake_atlas(
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )

@@ -41,7 +41,7 @@ class SceneResources:
             "decal_grid": data_texture(ctx, tables.grid),
             "decal_table": data_texture(ctx, tables.table),
             "glyph_table": data_texture(ctx, tables.glyphs),
-            "decal_cells": data_texture(ctx, near[..., None]),
+            "decal_proximity": data_texture(ctx, near[..., None]),
         }
 
     def release(self) -> None:

@@ -364,11 +364,13 @@ def light_values(
     end = _NO_END if shadow is None else shadow.end
     return {
         "ray_to_shadow": np.zeros((0, 4, 4)) if shadow is None else shadow.from_ray(eye_m),
-        "sun_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
-        "to_end_tile": end.to_tile,
-        "end_tile": end.inner,
-        "end_from": (end.side, MM * end.from_mm - end.side * eye_m[0]),
-        "sun_toward": np.array([[*toward, each.radius] for toward, each in lit]).reshape(-1, 4),
-        "sun_light": np.array([[*each.light, 0.0] for _, each in lit]).reshape(-1, 4),
-        "sun_count": len(lit),
+        "shadow_tile": np.zeros((0, 4)) if shadow is None else shadow.tiles,
+        "shadow_end_transform": end.to_tile,
+        "shadow_end_bounds": end.inner,
+        "shadow_end_plane": (end.side, MM * end.from_mm - end.side * eye_m[0]),
+        "light_direction": np.array([[*toward, each.radius] for toward, each in lit]).reshape(
+            -1, 4
+        ),
+        "light_irradiance": np.array([[*each.light, 0.0] for _, each in lit]).reshape(-1, 4),
+        "light_count": len(lit),
     }

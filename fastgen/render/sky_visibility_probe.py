@@ -7,6 +7,7 @@ has a face in front of it.
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -29,8 +30,7 @@ from fastgen.light.sky_visibility import (
 from fastgen.render.depth_map import DepthMap, DrawnBody, MapView, occluder_program
 from fastgen.render.recent_cache import Recent
 
-_VERSION = 4
-"""Part of the key in the disk cache; increase it whenever the sky visibility changes."""
+VERSION = 1  # raise when the stored arrays change
 
 _MAP_SIZE = (2048, 512)
 """Texels along and across a container, 6 mm wide for the longest container."""
@@ -110,7 +110,6 @@ class SkyVisibilityProbe:
         # depth maps, and so the results, depend on the driver
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = occluder_program(ctx)
-        self._own: Recent[NDArray[np.uint8]] = Recent(_CAPACITY)
         self._found: Recent[SkyVisibility] = Recent(_CAPACITY)
         self._factors: Recent[FormFactors] = Recent(_CAPACITY)
         self._cells: Recent[Cells] = Recent(_CAPACITY)
@@ -185,18 +184,16 @@ class SkyVisibilityProbe:
     def _stored(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
     ) -> SkyVisibility:
-        shapes = [mesh.shape_digest if mesh else "" for mesh in key]
-        digest = hashlib.sha256(f"{_VERSION} {self._driver} {shapes}".encode())
         normals = key[0].normals
 
-        def make() -> NDArray[np.uint8]:
+        def make() -> dict[str, NDArray[Any]]:
             bits = measure()
-            directions = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
-            return np.concatenate([encoded_cones(normals, directions), bits], axis=1)
+            visible = np.unpackbits(bits, axis=1, count=DIRECTIONS).astype(bool)
+            return vars(SkyVisibility.of(normals, bits, encoded_cones(normals, visible)))
 
-        shape = (len(normals), 3 + DIRECTIONS // 8)
-        stored = _from_disk(digest.hexdigest(), shape, make)
-        return SkyVisibility(normals, stored[:, 3:], stored[:, :3])
+        shapes = [mesh.shape_digest if mesh else "" for mesh in key]
+        inputs = self._driver, shapes
+        return SkyVisibility(**disk_cache.cached("sky-visibility", VERSION, inputs, make))
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
         points = _spreader_points(spreader)
@@ -207,7 +204,7 @@ class SkyVisibilityProbe:
     def _of_container(self, container: Mesh, spreader: Mesh | None) -> NDArray[np.uint8]:
         points = probe_points(container)
         whole: list[Solid] = [container, core_of(container)]
-        visible = self._own.get(container, lambda: self._cached(whole, points, _MAP_SIZE))
+        visible = self._cached(whole, points, _MAP_SIZE)
         if spreader is not None:
             visible = visible & self._cached([without_cables(spreader)], points, _COARSE_SIZE)
         return visible
@@ -216,16 +213,18 @@ class SkyVisibilityProbe:
         self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
     ) -> NDArray[np.uint8]:
         """Return _visible packed along the directions, from the disk cache if possible."""
-        about = f"{_VERSION} {DIRECTIONS} {size} {self._driver}".encode()
-        digest = hashlib.sha256(about)
+        digest = hashlib.sha256()
         arrays = [array for body in bodies for array in (body.positions_mm, body.triangles)]
         for array in (*arrays, points_mm):
             digest.update(np.ascontiguousarray(array).tobytes())
-        return _from_disk(
-            digest.hexdigest(),
-            (len(points_mm), DIRECTIONS // 8),
-            lambda: np.packbits(self._visible(bodies, points_mm, size), axis=1),
+        inputs = self._driver, DIRECTIONS, size, digest.hexdigest()
+        found = disk_cache.cached(
+            "sky-directions",
+            VERSION,
+            inputs,
+            lambda: {"bits": np.packbits(self._visible(bodies, points_mm, size), axis=1)},
         )
+        return found["bits"]
 
     def _visible(
         self, bodies: Sequence[Solid], points_mm: Array, size: tuple[int, int]
@@ -255,22 +254,3 @@ class SkyVisibilityProbe:
     def release(self) -> None:
         """Free the program."""
         self._program.release()
-
-
-def _from_disk(
-    key: str, shape: tuple[int, int], make: Callable[[], NDArray[np.uint8]]
-) -> NDArray[np.uint8]:
-    """Return the array of a key from the disk cache, or make it if none has the right shape."""
-    entry = disk_cache.default_folder() / f"openness-{key[:32]}.npz"
-
-    def kept() -> NDArray[np.uint8] | None:
-        stored = disk_cache.read(entry).get("values")
-        fits = stored is not None and stored.shape == shape and stored.dtype == np.uint8
-        return stored.astype(np.uint8) if stored is not None and fits else None
-
-    def made() -> NDArray[np.uint8]:
-        values = make()
-        disk_cache.write(entry, {"values": values}, compress=True)
-        return values
-
-    return disk_cache.once(entry, kept, made)

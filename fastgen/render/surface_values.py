@@ -149,7 +149,7 @@ def damage_values(
         "damage_count": len(damages),
         "hole_count": sum(damage.kind == "perforation" for damage in damages),
         "dent_end": sum(damage.kind in ("perforation", "dented") for damage in damages),
-        "bowl_end": sum(damage.kind != "axis" for damage in damages),
+        "concave_end": sum(damage.kind != "axis" for damage in damages),
         "damage_threshold_mm": threshold_mm,
         "inner_row": inner_row,
     }
@@ -173,8 +173,8 @@ def cable_values(
     """
     scene = prepared.scene
     if mesh is None:
-        none: dict[str, ArrayLike] = {"cable_zone": -1.0, "cable_rusted": np.zeros(4)}
-        return {**none, "cable_foot": np.zeros((CABLES, 4))}
+        none: dict[str, ArrayLike] = {"cable_zone": -1.0, "cable_mean_rust": np.zeros(4)}
+        return {**none, "cable_lower_end": np.zeros((CABLES, 4))}
     feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
     from_eye = np.array(feet) / 1000 - view.position_m
     right, down = view.rotation[:2] / view.focal_px
@@ -184,6 +184,6 @@ def cable_values(
     zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
     return {
         "cable_zone": float(SPREADER_ZONE + zone),
-        "cable_rusted": materials.rusted_cables,
-        "cable_foot": np.column_stack([from_eye, 1 / np.maximum(moved, 1e-9)]),
+        "cable_mean_rust": materials.rusted_cables,
+        "cable_lower_end": np.column_stack([from_eye, 1 / np.maximum(moved, 1e-9)]),
     }

@@ -8,7 +8,7 @@ LAYERS = (
 )
 """Material layers that can be rendered. `ids` and `damage` of `fastgen show` are label targets."""
 
-DAMAGE_VARIANTS = ("sound", "damaged", "holed")
+DAMAGE_VARIANTS = ("undamaged", "damaged", "holed")
 """Programs for scenes without damage, with damage, and with at least one perforation."""
 
 PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
@@ -50,7 +50,7 @@ class ShaderVariant:
     lookups: int = 1
     layer: str = "all"
     pixel_class: str = "plain"
-    damage: str = "sound"
+    damage: str = "undamaged"
     lights: int = 0
     traced: bool = False
     coarse: bool = False

@@ -65,7 +65,13 @@ class VisibilityBuffer:
     @property
     def textures(self) -> dict[str, moderngl.Texture]:
         """The textures by sampler name; valid until a scene makes the buffer grow."""
-        names = ("surface_keys", "sheet_points", "sheet_depths", "openness_points", "light_points")
+        names = (
+            "surface_ids",
+            "atlas_positions",
+            "surface_depths",
+            "sky_visibility_cones",
+            "light_points",
+        )
         usual = (self._keys, self._points, self._depths, self._visibility, self._light)
         rest = zip(("rest_x", "rest_y", "rest_z"), self._rest, strict=False)
         return {**dict(zip(names, usual, strict=True)), **dict(rest)}
@@ -92,7 +98,7 @@ class VisibilityBuffer:
         outer = [None] if self.per_axis == 1 else seen
         for box in (*map(self._texels, outer), *map(self._texels_inside, holes)):
             self._clear(self.depth_buffer, box, DEPTHS, 1.0)
-        for box in map(self._texels, rest) if damage != "sound" else ():
+        for box in map(self._texels, rest) if damage != "undamaged" else ():
             for texture in self._rest:
                 self._clear(texture, box, FLOATS, _OUT_OF_REACH_MM)
         self._use(self._undamaged)
@@ -119,7 +125,7 @@ class VisibilityBuffer:
             self._light = self._texture(1, "u4")
             self.depth_buffer = self._own(self._ctx.depth_texture((self._fine[0], rows)))
             self._undamaged = self._framebuffer()
-        if damage != "sound" and not self._rest:
+        if damage != "undamaged" and not self._rest:
             self._rest = [self._texture(1, "f4") for _ in range(3)]
             self._damaged = self._framebuffer()
 

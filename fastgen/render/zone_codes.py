@@ -5,7 +5,7 @@ from fastgen.geometry.mesh import MAX_ZONES
 SPREADER_ZONE = MAX_ZONES
 """First zone number of the spreader. The container's zones have smaller numbers."""
 
-PORTAL_ZONE = 1000
+HOLE_ZONE = 1000
 """Zone number of sheet that a perforation tore away. Real zones have smaller numbers."""
 
 ZONE_TURN, ZONE_GEAR, ZONE_SMALL, ZONE_LEVEL = 16, 64, 128, 256

@@ -1,1 +1,1 @@
-"""OpenGL contexts without a screen: EGL and OSMesa."""
+"""Headless OpenGL contexts: EGL and OSMesa."""

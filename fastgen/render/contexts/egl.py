@@ -1,4 +1,9 @@
-"""EGL: devices without a screen, and contexts on them."""
+"""Headless OpenGL contexts on EGL devices.
+
+The calls are typed here and not taken from PyOpenGL, which supports one platform per process. Its EGL
+modules fail to import if PYOPENGL_PLATFORM is osmesa, and its OSMesa module fails otherwise, while
+contexts of both kinds may be open at once. It also requires libEGL at import time.
+"""
 
 import ctypes
 from collections.abc import Callable
@@ -15,13 +20,24 @@ EGL_LIBRARY = "libEGL.so.1"
 _EGL_NONE = 0x3038
 _EGL_EXTENSIONS = 0x3055
 _EGL_OPENGL_API = 0x30A2
-_EGL_PLATFORM_DEVICE = 0x313F
-_EGL_PLATFORM_SURFACELESS = 0x31DD
-# EGL_SURFACE_TYPE: EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE: EGL_OPENGL_BIT
-_EGL_CONFIG = (0x3033, 0x0001, 0x3040, 0x0008, _EGL_NONE)
-# EGL_CONTEXT_MAJOR_VERSION, _MINOR_VERSION, _OPENGL_PROFILE_MASK: core
-_EGL_CONTEXT = (0x3098, 4, 0x30FB, 4, 0x30FD, 0x0001, _EGL_NONE)
-_EGL_ERRORS = {  # EGL 1.5 section 3.1, those that creating a context gives
+_EGL_PLATFORM_DEVICE_EXT = 0x313F
+_EGL_PLATFORM_SURFACELESS_MESA = 0x31DD
+_EGL_SURFACE_TYPE, _EGL_PBUFFER_BIT = 0x3033, 0x0001
+_EGL_RENDERABLE_TYPE, _EGL_OPENGL_BIT = 0x3040, 0x0008
+_EGL_CONTEXT_MAJOR_VERSION, _EGL_CONTEXT_MINOR_VERSION = 0x3098, 0x30FB
+_EGL_CONTEXT_OPENGL_PROFILE_MASK, _EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT = 0x30FD, 0x0001
+_CONFIG = (
+    *(_EGL_SURFACE_TYPE, _EGL_PBUFFER_BIT),
+    *(_EGL_RENDERABLE_TYPE, _EGL_OPENGL_BIT),
+    _EGL_NONE,
+)
+_CONTEXT = (
+    *(_EGL_CONTEXT_MAJOR_VERSION, 4),
+    *(_EGL_CONTEXT_MINOR_VERSION, 4),
+    *(_EGL_CONTEXT_OPENGL_PROFILE_MASK, _EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT),
+    _EGL_NONE,
+)
+_EGL_ERRORS = {  # EGL 1.5 section 3.1, possible errors of context creation
     0x3001: "EGL_NOT_INITIALIZED",
     0x3002: "EGL_BAD_ACCESS: the context is in use by another thread; open one in each",
     0x3003: "EGL_BAD_ALLOC",
@@ -35,14 +51,14 @@ _POINTER, _INT, _UINT = ctypes.c_void_p, ctypes.c_int, ctypes.c_uint
 
 @dataclass(frozen=True)
 class EglDevice:
-    """One device that EGL lists. software: whether it is Mesa's rasterizer on the processor."""
+    """One device that EGL lists. software: whether it is Mesa's CPU rasterizer."""
 
     handle: int
     software: bool
 
 
 class Egl:
-    """libEGL with its calls typed. Failures become ContextErrors that name the call."""
+    """Typed calls of libEGL. Failures become ContextErrors that name the call."""
 
     def __init__(self) -> None:
         try:
@@ -59,10 +75,10 @@ class Egl:
         self._destroy = self._call("eglDestroyContext", _UINT, _POINTER, _POINTER)
 
     def devices(self) -> list[EglDevice]:
-        """What eglQueryDevicesEXT lists; [] where EGL lacks device enumeration."""
-        known = (self._text(None, _EGL_EXTENSIONS) or b"").split()
-        if b"EGL_EXT_platform_device" not in known or not (
-            {b"EGL_EXT_device_base", b"EGL_EXT_device_enumeration"} & set(known)
+        """Return the devices of eglQueryDevicesEXT; [] without device enumeration."""
+        supported = (self._text(None, _EGL_EXTENSIONS) or b"").split()
+        if b"EGL_EXT_platform_device" not in supported or not (
+            {b"EGL_EXT_device_base", b"EGL_EXT_device_enumeration"} & set(supported)
         ):
             return []
         query = self._extension("eglQueryDevicesEXT", _UINT, _INT, _POINTER, _POINTER)
@@ -78,27 +94,36 @@ class Egl:
         ]
 
     def create(self, device: EglDevice | None) -> tuple[int, int]:
-        """Display and a new 4.4 core context on `device`, or on no device: Mesa's surfaceless."""
+        """Create an OpenGL 4.4 core context.
+
+        Args:
+            device: device to draw on, or None for Mesa's surfaceless platform.
+
+        Returns:
+            Handles of the display and of the context.
+        """
         get = self._extension("eglGetPlatformDisplayEXT", _POINTER, _UINT, _POINTER, _POINTER)
-        platform = _EGL_PLATFORM_DEVICE if device else _EGL_PLATFORM_SURFACELESS
-        display = self._got("eglGetPlatformDisplayEXT", get(platform, device and device.handle, 0))
-        # never eglTerminate: a device has one display, which other contexts may be using
+        platform = _EGL_PLATFORM_DEVICE_EXT if device else _EGL_PLATFORM_SURFACELESS_MESA
+        display = self._checked(
+            "eglGetPlatformDisplayEXT", get(platform, device and device.handle, 0)
+        )
+        # never call eglTerminate: other contexts may use the display, which is unique per device
         initialize = self._call("eglInitialize", _UINT, *[_POINTER] * 3)
-        self._got("eglInitialize", initialize(display, None, None))
-        self._got("eglBindAPI", self._call("eglBindAPI", _UINT, _UINT)(_EGL_OPENGL_API))
+        self._checked("eglInitialize", initialize(display, None, None))
+        self._checked("eglBindAPI", self._call("eglBindAPI", _UINT, _UINT)(_EGL_OPENGL_API))
         config, count = _POINTER(), _INT(0)
         choose = self._call("eglChooseConfig", _UINT, *[_POINTER] * 3, _INT, _POINTER)
-        wanted = (_INT * len(_EGL_CONFIG))(*_EGL_CONFIG)
-        choose(display, wanted, ctypes.byref(config), 1, ctypes.byref(count))
-        self._got("eglChooseConfig (an OpenGL configuration)", count.value)
+        required = (_INT * len(_CONFIG))(*_CONFIG)
+        choose(display, required, ctypes.byref(config), 1, ctypes.byref(count))
+        self._checked("eglChooseConfig (an OpenGL configuration)", count.value)
         create = self._call("eglCreateContext", _POINTER, *[_POINTER] * 4)
-        attributes = (_INT * len(_EGL_CONTEXT))(*_EGL_CONTEXT)
+        attributes = (_INT * len(_CONTEXT))(*_CONTEXT)
         context = create(display, config, None, attributes)
-        return display, self._got("eglCreateContext (OpenGL 4.4 core)", context)
+        return display, self._checked("eglCreateContext (OpenGL 4.4 core)", context)
 
     def make_current(self, display: int, context: int | None) -> None:
-        """Bind `context` to this thread without a surface; None binds no context."""
-        self._got("eglMakeCurrent", self._make_current(display, None, None, context))
+        """Bind a context to this thread without a surface; None binds no context."""
+        self._checked("eglMakeCurrent", self._make_current(display, None, None, context))
 
     def destroy(self, display: int, context: int) -> None:
         self._destroy(display, context)
@@ -109,9 +134,11 @@ class Egl:
         return call
 
     def _extension(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-        return ctypes.CFUNCTYPE(result, *arguments)(self._got(name, self.address(name.encode())))
+        return ctypes.CFUNCTYPE(result, *arguments)(
+            self._checked(name, self.address(name.encode()))
+        )
 
-    def _got(self, call: str, value: Any) -> Any:
+    def _checked(self, call: str, value: Any) -> Any:
         if value:
             return value
         code = self._error()
@@ -119,7 +146,7 @@ class Egl:
 
 
 class EglContext(NativeContext):
-    """A context on a device, or on Mesa's surfaceless platform."""
+    """OpenGL context on an EGL device, or on Mesa's surfaceless platform."""
 
     def __init__(self, egl: Egl, device: EglDevice | None) -> None:
         self._egl = egl

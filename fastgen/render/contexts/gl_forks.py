@@ -1,28 +1,28 @@
-"""Which of a driver's displays a process may use after it was forked.
+"""Record of the driver displays that a process opened, to detect unusable ones after a fork.
 
-A fork copies a driver's memory but not its threads, so that a display opened before it hangs the
-child at its first read, through a new context too. What is open is a matter of the process, not of
-any object in it, and so is this record.
+A fork copies the memory of a driver but not its threads. A display opened before the fork hangs the
+child at its first read-back, even through a new context. Displays belong to the process, so the
+record is global.
 """
 
 import os
 
 REASON = (
-    "was opened before this process was forked, and its driver's threads did not come along; "
+    "was opened before this process was forked, and the fork has none of its driver's threads; "
     "start the process with spawn or forkserver"
 )
 
 _opened: dict[str, int | None] = {}
-"""Display -> the process that opened it first; None where it has no threads to lose."""
+"""Display -> id of the process that opened it first, None if the driver has no threads."""
 
 
 def opened(display: str, software: bool) -> None:
-    """Note that this process opens `display`. software: Mesa's rasterizer on the processor."""
-    # llvmpipe reads this when the first context of a display is made
+    """Record that this process opens a display. software: it uses Mesa's CPU rasterizer."""
+    # llvmpipe reads this variable when it creates the first context of a display
     threadless = software and os.environ.get("LP_NUM_THREADS") == "0"
     _opened.setdefault(display, None if threadless else os.getpid())
 
 
 def usable(display: str) -> bool:
-    """Whether `display` works here: no parent opened it, with threads, before the fork."""
+    """Return whether a display works: no parent process opened it with threads before a fork."""
     return _opened.get(display) in (None, os.getpid())

@@ -1,4 +1,4 @@
-"""What EGL's and OSMesa's contexts have in common."""
+"""Common base of EGL and OSMesa contexts."""
 
 from abc import ABC, abstractmethod
 from typing import Self
@@ -7,9 +7,13 @@ from fastgen.errors import ContextError
 
 
 class NativeContext(ABC):
-    """A context of one backend, with what moderngl asks of it; current from the start.
+    """OpenGL context of one backend, with the interface that moderngl requires.
 
-    backend: its name. handle: of the context, which this owns from now on.
+    The context is current after construction.
+
+    Args:
+        backend: name of the backend, for error messages.
+        handle: native context; this object owns it.
     """
 
     def __init__(self, backend: str, handle: int) -> None:
@@ -23,23 +27,23 @@ class NativeContext(ABC):
 
     @abstractmethod
     def load_opengl_function(self, name: str) -> int:
-        """Address of a GL function, 0 where there is none."""
+        """Return the address of an OpenGL function, 0 if it does not exist."""
 
     @abstractmethod
     def _is_current(self, handle: int) -> bool:
-        """Whether it is this thread's context."""
+        """Return whether the context is current in this thread."""
 
     @abstractmethod
     def _bind(self, handle: int) -> None:
-        """Make it this thread's context."""
+        """Make the context current in this thread."""
 
     @abstractmethod
     def _unbind(self) -> None:
-        """Leave this thread, whose context it is, without one."""
+        """Release the context from this thread, in which it is current."""
 
     @abstractmethod
     def _destroy(self, handle: int) -> None:
-        """Free it."""
+        """Free the context."""
 
     def __enter__(self) -> Self:
         if self._handle is None:

@@ -1,4 +1,4 @@
-"""OSMesa: contexts in memory, where the system still has it."""
+"""Off-screen OpenGL contexts in memory with OSMesa."""
 
 import ctypes
 import os
@@ -12,32 +12,42 @@ OSMESA_PACKAGES = "libosmesa6"
 
 _OSMESA_NAMES = ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
 
-# GL/osmesa.h: OSMESA_FORMAT: OSMESA_RGBA, OSMESA_DEPTH_BITS, OSMESA_PROFILE: OSMESA_CORE_PROFILE
-_OSMESA_ATTRIBUTES = (0x22, 0x1908, 0x30, 24, 0x33, 0x34)
-_OSMESA_MAJOR, _OSMESA_MINOR = 0x36, 0x37
+# GL/osmesa.h
+_OSMESA_FORMAT, _OSMESA_RGBA = 0x22, 0x1908
+_OSMESA_DEPTH_BITS = 0x30
+_OSMESA_PROFILE, _OSMESA_CORE_PROFILE = 0x33, 0x34
+_OSMESA_CONTEXT_MAJOR_VERSION, _OSMESA_CONTEXT_MINOR_VERSION = 0x36, 0x37
+_ATTRIBUTES = (
+    *(_OSMESA_FORMAT, _OSMESA_RGBA),
+    *(_OSMESA_DEPTH_BITS, 24),
+    *(_OSMESA_PROFILE, _OSMESA_CORE_PROFILE),
+    *(_OSMESA_CONTEXT_MAJOR_VERSION, 4),
+)
 _GL_UNSIGNED_BYTE = 0x1401
 
 _POINTER, _INT, _UINT = ctypes.c_void_p, ctypes.c_int, ctypes.c_uint
 
 
 class OSMesaContext(NativeContext):
-    """A context that draws into a buffer of its own."""
+    """OpenGL context that draws to memory."""
 
     def __init__(self) -> None:
         if not gl_forks.usable("osmesa"):
             raise ContextError(f"osmesa: {gl_forks.REASON}")
         gl_forks.opened("osmesa", software=True)
         self._library = _osmesa_library()
-        # OSMesa binds no context without a buffer; nothing is ever drawn into this one
+        # OSMesa requires a buffer to bind a context; nothing is drawn to this one
         self._pixels = ctypes.create_string_buffer(16 * 16 * 4)
         for minor in (5, 4):
-            flat = (*_OSMESA_ATTRIBUTES, _OSMESA_MAJOR, 4, _OSMESA_MINOR, minor, 0)
+            flat = (*_ATTRIBUTES, _OSMESA_CONTEXT_MINOR_VERSION, minor, 0)
             attributes = (_INT * len(flat))(*flat)
             handle = self._library.OSMesaCreateContextAttribs(attributes, None)
             if handle:
                 break
         else:
-            raise ContextError("osmesa: this Mesa gives no OpenGL 4.4 core context; update it")
+            raise ContextError(
+                "osmesa: this version of Mesa has no OpenGL 4.4 core context; update it"
+            )
         super().__init__("osmesa", handle)
 
     def load_opengl_function(self, name: str) -> int:
@@ -81,10 +91,10 @@ def _osmesa_library() -> ctypes.CDLL:
 
 
 def _unbind_egl() -> None:
-    """Tell EGL that its context of this thread gives way to OSMesa.
+    """Release EGL's context from this thread before OSMesa binds its own.
 
-    Both share Mesa's dispatch table. Without this EGL would take its context for current still,
-    skip the next eglMakeCurrent, and its calls would land in OSMesa's context.
+    Both share Mesa's dispatch table. Otherwise EGL would still consider its context current and skip
+    the next eglMakeCurrent, and OpenGL calls would go to the context of OSMesa.
     """
     try:
         library = ctypes.CDLL(EGL_LIBRARY, mode=os.RTLD_NOLOAD)

@@ -1,21 +1,21 @@
-"""Mesa's cache of compiled shaders, kept off a disk that is too full for it."""
+"""Guard against Mesa's shader cache on a full disk."""
 
 import contextlib
 import os
 from pathlib import Path
 
 _ROOM_BYTES = 32 << 20
-"""What it may grow by in a run, several times over."""
+"""Free space required for the cache, several times its growth in one run."""
 
 
 def spare_full_disk() -> None:
-    """Switch the cache off for this process where its disk is nearly full.
+    """Disable Mesa's shader cache in this process if its disk is nearly full.
 
-    Mesa maps an index file into memory that is allocated as it is written to: where that fails, the
-    process dies by SIGBUS. Call before the first context of a process.
+    Mesa maps a sparse index file into memory. If the disk is full when a page is written, the process
+    is killed by SIGBUS. Call this before the process opens its first context.
     """
     folder = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    with contextlib.suppress(OSError, RuntimeError):  # a folder that is not there, or no home
+    with contextlib.suppress(OSError, RuntimeError):  # a missing folder or no home directory
         place = Path(folder) if folder else Path.home()
         while not place.exists():
             place = place.parent

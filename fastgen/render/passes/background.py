@@ -46,7 +46,7 @@ class BackgroundPass:
         single_layer = inputs.variant.layer != "all"
         per_pixel = single_layer or inputs.view.distortion is not None
         stages = ("fullscreen.vert", "bent_sky.frag") if per_pixel else ("sky.vert", "sky.frag")
-        program = self._programs.get(stages, replace(inputs.variant, damage="sound", lights=0))
+        program = self._programs.get(stages, replace(inputs.variant, damage="undamaged", lights=0))
         self._ctx.scissor = None
         only_sky = inputs.targets.begin()
         self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
@@ -56,7 +56,7 @@ class BackgroundPass:
     def _store(self, inputs: DrawInputs) -> None:
         """Shade all pixels as sky, and store their labels and depth."""
         program = self._programs.get(
-            ("sky.comp",), replace(inputs.variant, damage="sound", lights=0)
+            ("sky.comp",), replace(inputs.variant, damage="undamaged", lights=0)
         )
         program.bind(inputs.textures)
         width, height = inputs.targets.size

@@ -139,8 +139,8 @@ def bake_atlas(
 
 def bake_program(programs: Programs, damage: str) -> ShaderProgram:
     """Return the program that bakes a mesh of one of DAMAGE_VARIANTS; holes are not cut out."""
-    if damage == "sound":
-        variant = ShaderVariant(damage="sound", pixel_class="decal")
+    if damage == "undamaged":
+        variant = ShaderVariant(damage="undamaged", pixel_class="decal")
     else:
         variant = ShaderVariant(damage="damaged", pixel_class="damaged")
     return programs.get(("bake.vert", "bake.frag"), variant)

@@ -47,9 +47,11 @@ class GeometryPass:
         samples.begin(damage, drawn, rest, regions.holes)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
-        self._programs["sound"].bind({"lobe_masks": self._lobes})  # all three read it from unit 0
+        self._programs["undamaged"].bind(
+            {"lobe_masks": self._lobes}
+        )  # all three read it from unit 0
         if inputs.spreader is not None:
-            inputs.spreader.draw("sound", inputs.spreader.seen_from(inputs.eye_mm))
+            inputs.spreader.draw("undamaged", inputs.spreader.seen_from(inputs.eye_mm))
         # a dent may tilt a face into view that the rest mesh turns away
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}
@@ -58,11 +60,11 @@ class GeometryPass:
         if damages:
             boxes = [corners_mm(item) for item in damages]
             seen, touched = container.clusters.parted(seen, boxes, REACH_MARGIN_MM)
-            container.draw("sound", seen)
+            container.draw("undamaged", seen)
             samples.begin_damaged()
             container.draw("damaged", touched)
         else:
-            container.draw("sound", seen)
+            container.draw("undamaged", seen)
         moved_mm = sum(abs(d.depth_mm) for d in damages)
         for region in regions.holes:
             samples.limit_inside(region)

@@ -30,10 +30,10 @@ class NormalsPass:
         undamaged = outside(within(inputs.regions.surfaces, whole), near)
         targets.bind_normals()
         self._ctx.memory_barrier()
-        for regions, kind in ((undamaged, "sound"), (near, damage)):
+        for regions, kind in ((undamaged, "undamaged"), (near, damage)):
             if not regions:
                 continue
-            traits = {"sound": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
+            traits = {"undamaged": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
             variant = replace(inputs.variant, damage=kind, pixel_class=traits[kind], lights=0)
             program = self._programs.get(("normals.comp",), variant)
             program.bind(inputs.textures)

@@ -70,9 +70,9 @@ class RayPass:
         """
         points = self.read(inputs)
         self._store(points, traced_light(points, bodies, sky, yaw_deg))
-        inputs.textures["point_keys"] = self._keys
-        inputs.textures["point_places"] = self._places
-        inputs.textures["point_light"] = self._light
+        inputs.textures["ray_point_ids"] = self._keys
+        inputs.textures["ray_point_positions"] = self._places
+        inputs.textures["ray_point_light"] = self._light
 
     def read(self, inputs: DrawInputs) -> Points:
         """Return the points of the visible surfaces in the world frame."""
@@ -106,7 +106,7 @@ class RayPass:
             lookups=1,
             coarse=False,
             radiance=False,
-            pixel_class="decal" if damage == "sound" else "damaged",
+            pixel_class="decal" if damage == "undamaged" else "damaged",
         )
         program = self._programs.get(("fullscreen.vert", "light_points.frag"), variant)
         program["point_rows"] = self._rows

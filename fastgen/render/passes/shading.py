@@ -53,7 +53,7 @@ class ShadingPass:
             return
         variant = replace(
             inputs.variant,
-            damage=inputs.variant.damage if damaged else "sound",
+            damage=inputs.variant.damage if damaged else "undamaged",
             cables=cables,
             lights=0,
         )
@@ -70,7 +70,7 @@ class ShadingPass:
         for name in listed_classes(inputs.variant.samples_per_axis):
             if _occurs(name, inputs.variant, cables):
                 # scenes with and without damage share the programs
-                damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "sound"
+                damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "undamaged"
                 variant = replace(inputs.variant, pixel_class=name, damage=damage)
                 program = self._programs.get(("shade_listed.comp",), variant)
                 program.bind(inputs.textures)
@@ -86,4 +86,4 @@ def _occurs(name: str, variant: ShaderVariant, cables: bool) -> bool:
     traits = PIXEL_CLASSES[name]
     if "HOLES" in traits:
         return variant.damage == "holed"
-    return variant.damage != "sound" or "DAMAGE" not in traits
+    return variant.damage != "undamaged" or "DAMAGE" not in traits
