@@ -43,7 +43,14 @@ def add_show(commands: Any) -> None:
     command.add_argument(
         "--overlay", action="store_true", help="draw boxes, class names and damage outlines"
     )
-    command.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.png")
+    command.add_argument(
+        "-o",
+        dest="file",
+        type=Path,
+        required=True,
+        metavar="FILE.png",
+        help="file to write, .png or .jpg",
+    )
     add_config(command)
     add_render(command)
     command.set_defaults(run=_show)
@@ -67,7 +74,9 @@ def add_export(commands: Any) -> None:
         metavar="MM",
         help="width of a texel of the textures in millimetres; default: %(default)g",
     )
-    command.add_argument("-o", dest="file", type=Path, required=True, metavar="FILE.glb")
+    command.add_argument(
+        "-o", dest="file", type=Path, required=True, metavar="FILE.glb", help="file to write"
+    )
     add_config(command)
     add_render(command, quality=False)
     command.set_defaults(run=_export)

@@ -1,4 +1,4 @@
-"""Checks of a job before it runs, and the settings of it that dataset.json keeps."""
+"""Checks of a job before it runs, and its settings as dataset.json stores them."""
 
 import json
 from dataclasses import asdict, replace

@@ -187,12 +187,12 @@ class Remote:
 
     @property
     def lives_here(self) -> bool:
-        """Whether the address is memory of this process, which no other process sees."""
+        """True for memory of this process, which no other process sees."""
         return "memory" in self._system.protocol  # a string or a tuple of strings
 
     @property
     def _has_buckets(self) -> bool:
-        """Whether paths begin with a bucket.
+        """True if paths begin with a bucket.
 
         A bucket needs no folders, and making one would create a bucket from a mistyped name.
         """

@@ -23,7 +23,7 @@ Setup = Callable[[Callable[[str, Any], None]], Callable[[Any], None]]
 """Called in the worker with a report function; returns the function that does a task."""
 
 HANG_S = 300.0
-"""A worker without a report for this many seconds hangs. Known steps take at most 1 % of it."""
+"""A worker without a report for this many seconds hangs. Known steps take at most 3 s."""
 
 _POLL_S = 1.0
 _STOPS = {signal.SIGINT, signal.SIGTERM}

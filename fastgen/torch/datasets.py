@@ -110,7 +110,7 @@ class ContainerDataset(Dataset[Item]):
     def curriculum_digests(self, epochs: Sequence[int]) -> dict[str, str]:
         """Return the SHA-256 of each epoch's configuration, by the epoch as text.
 
-        Epochs for which the curriculum fails are left out.
+        The result has no epochs for which the curriculum fails.
         """
         for epoch in epochs:
             with contextlib.suppress(Exception):  # one that indexes a list may end after epoch 0

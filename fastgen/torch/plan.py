@@ -26,7 +26,7 @@ Curriculum = Callable[[int], Config | Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Which scenes an epoch has, and which cameras see them.
+    """Scenes of an epoch, and the cameras that see them.
 
     Attributes:
         cameras: Names of the cameras; None takes all of the configuration that suit the task.

@@ -40,7 +40,7 @@ FORMS = ("detection", "yolo")
 
 @dataclass(frozen=True)
 class ItemSettings:
-    """What an item of a dataset holds.
+    """Content of an item of a dataset.
 
     Attributes:
         form: Form of box targets: "detection" for torchvision's dictionaries, "yolo" for rows of
