@@ -332,7 +332,7 @@ def test_baking_does_not_change_the_next_frame(generator, torn):
         (["-o", "box.glb", "--texel-mm", "nan"], "texel_mm: nan is not a size"),
         (["-o", "box.glb", "--texel-mm", "0.5"], "or more for this container"),
         (["-o", "none/box.glb"], "no folder none"),
-        (["-o", "box.glb", "--size", "9x9"], "size: 9x9 cannot be"),
+        (["-o", "box.glb", "--size", "9x9"], "size: 9x9 is out of range"),
     ],
 )
 def test_bad_input_gets_one_line(arguments, named, tmp_path, monkeypatch, capsys):

@@ -1,1 +1,1 @@
-"""Bytes: images, YAML and glTF to and from them, and files that are there whole or not at all."""
+"""Atomic file writes, image encoders and decoders, and the disk cache."""

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all: written aside, then renamed into place."""
+"""Atomic file writes: into a temporary file, which is then renamed to the target."""
 
 import contextlib
 import os
@@ -8,17 +8,23 @@ from pathlib import Path
 from typing import BinaryIO
 
 ASIDE_FILES = ".*.part"
-"""Glob of what a process that was killed may leave beside its files."""
+"""Glob of the temporary files that a killed process may leave behind."""
 
 
 @contextlib.contextmanager
 def whole_file(target: Path, durable: bool = True) -> Iterator[BinaryIO]:
-    """A stream to write; what went into it stands at `target` once the block ends well, and
-    nothing has changed where it does not.
+    """Open a binary stream whose content replaces `target` when the block ends without an error.
 
-    durable: whether it is on the disk before it bears its name. Raises OSError.
+    After an error `target` is unchanged.
+
+    Args:
+        target: The file.
+        durable: Flush the content to disk before the file gets its name.
+
+    Raises:
+        OSError: The file cannot be written.
     """
-    # several processes may write the same file: each its own, and the last rename wins
+    # processes may write the same file at the same time: the last rename wins
     aside = target.with_name(f".{uuid.uuid4().hex}.part")
     try:
         with aside.open("wb") as stream:
