@@ -202,10 +202,10 @@ def test_a_frame_is_valid_until_the_next_render_cuda(generator, driver):
     np.testing.assert_array_equal(on_host(first.image), before)
     second = generator.render_cuda(index=1)
     for array in (first.image, first.labels, first.depth):
-        with pytest.raises(ContextError, match="went back to GL; clone"):
+        with pytest.raises(ContextError, match="went back to OpenGL; clone"):
             on_host(array)
     generator.close()
-    with pytest.raises(ContextError, match="went back to GL"):
+    with pytest.raises(ContextError, match="went back to OpenGL"):
         on_host(second.depth)
 
 
@@ -261,7 +261,7 @@ def test_the_reason_names_another_vendors_driver_and_suggests_render(generator):
     reason = generator.cuda_reason()
     assert "OpenGL runs on llvmpipe" in reason
     assert "\n" not in reason
-    with pytest.raises(ContextError, match=r"not on an NVIDIA GPU; take Generator\.render"):
+    with pytest.raises(ContextError, match=r"not on an NVIDIA GPU; use Generator\.render"):
         generator.render_cuda(index=0)
 
 

@@ -167,26 +167,6 @@ def spawned(work, *arguments):
         return pool.submit(work, *arguments).result()
 
 
-def threads_added(backend, counts):
-    """Return the number of threads added by opening a context with each of `counts` in turn."""
-    os.environ.pop("LP_NUM_THREADS", None)  # set by importing the tests
-    added = []
-    for count in counts:
-        before = len(os.listdir("/proc/self/task"))
-        gl.open_context(backend, threads=count)
-        added.append(len(os.listdir("/proc/self/task")) - before)
-    return added
-
-
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_the_first_thread_count_of_a_process_is_final(backend):
-    runs = [(backend, (0,)), (backend, (3, 0, 9))]
-    with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
-        (alone,), (with_three, *later) = pool.starmap(threads_added, runs, chunksize=1)
-    assert with_three >= alone + 3
-    assert later == [0, 0]
-
-
 def test_hardware_is_tried_first_and_software_is_the_fallback(monkeypatch):
     (software,) = (device for device in gl.egl_devices() if device.software)
     broken = EglDevice(handle=64, software=False)
@@ -219,11 +199,9 @@ def test_a_device_that_does_not_exist_is_named_and_not_replaced(index):
     assert "osmesa" not in str(caught.value)
 
 
-def test_a_device_for_osmesa_and_negative_threads_are_refused():
+def test_a_device_for_osmesa_is_refused():
     with pytest.raises(ConfigError, match="device_index: 0: osmesa has no devices"):
         gl.open_context("osmesa", device_index=0)
-    with pytest.raises(ConfigError, match="threads: -1"):
-        gl.open_context("egl", threads=-1)
 
 
 def test_without_libraries_the_error_names_the_packages(monkeypatch):

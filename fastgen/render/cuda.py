@@ -43,8 +43,8 @@ _LEGACY_STREAM = 1  # value of the CUDA array interface; the driver uses NULL
 class CudaArray:
     """Array in GPU memory for `torch.as_tensor` or `cupy.asarray`, which do not copy it.
 
-    The data are ready on CUDA's default stream, which PyTorch uses by default. Work on another stream
-    has to wait for the default stream.
+    The data are ready on CUDA's default stream, which PyTorch uses by default. Work on another
+    stream has to wait for the default stream.
 
     Args:
         pointer: device address.

@@ -1,8 +1,8 @@
 """Headless OpenGL contexts on EGL devices.
 
-The calls are typed here and not taken from PyOpenGL, which supports one platform per process. Its EGL
-modules fail to import if PYOPENGL_PLATFORM is osmesa, and its OSMesa module fails otherwise, while
-contexts of both kinds may be open at once. It also requires libEGL at import time.
+The calls are typed here and not taken from PyOpenGL, which supports one platform per process. Its
+EGL modules fail to import if PYOPENGL_PLATFORM is osmesa, and its OSMesa module fails to import
+otherwise, but contexts of both kinds may be open at once.
 """
 
 import ctypes

@@ -93,8 +93,8 @@ def _osmesa_library() -> ctypes.CDLL:
 def _unbind_egl() -> None:
     """Release EGL's context from this thread before OSMesa binds its own.
 
-    Both share Mesa's dispatch table. Otherwise EGL would still consider its context current and skip
-    the next eglMakeCurrent, and OpenGL calls would go to the context of OSMesa.
+    Both share Mesa's dispatch table. Otherwise EGL would still consider its context current and
+    skip the next eglMakeCurrent, and OpenGL calls would go to the context of OSMesa.
     """
     try:
         library = ctypes.CDLL(EGL_LIBRARY, mode=os.RTLD_NOLOAD)

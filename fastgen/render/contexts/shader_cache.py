@@ -11,8 +11,8 @@ _ROOM_BYTES = 32 << 20
 def spare_full_disk() -> None:
     """Disable Mesa's shader cache in this process if its disk is nearly full.
 
-    Mesa maps a sparse index file into memory. If the disk is full when a page is written, the process
-    is killed by SIGBUS. Call this before the process opens its first context.
+    Mesa maps a sparse index file into memory. If the disk is full when a page is written, the
+    process is killed by SIGBUS. Call this before the process opens its first context.
     """
     folder = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     with contextlib.suppress(OSError, RuntimeError):  # a missing folder or no home directory
