@@ -1,9 +1,9 @@
-"""Damage as displacement fields: a handful of parameters each, no mesh surgery.
+"""Damages as displacement fields with a few parameters each; meshes keep their triangles.
 
-A damage moves a rest point p (mm, container frame) by amount(p) along its `inward` direction. The
-shader evaluates the same fields (shaders/damage.glsl); this module is its slow, obvious twin and
-the one that labels, tests and the exporter use. Local coordinates of p: u along the damage, v
-across it, w inward from its origin. Section 3.3.2 of the SeaFront paper describes the four kinds.
+A damage moves a point p at rest (mm, container frame) by amount(p) along its `inward` direction.
+The shader evaluates the same fields (shaders/damage_law.glsl). This module is its plain equivalent for
+labels, tests and the exporter. Local coordinates of p are u along the damage, v across it and w
+inward, from its origin. Section 3.3.2 of the SeaFront paper describes the four kinds.
 """
 
 import numpy as np
@@ -16,25 +16,32 @@ from fastgen.scene.limits import LOBE_LIMIT, LOBES
 Array = NDArray[np.floating]
 
 FADE_START_MM, FADE_END_MM = 260.0, 520.0
-"""A field acts on what lies within this depth behind its face: not on the opposite wall."""
+"""Distances |w| from the face between which a field fades to 0, so that it spares the opposite
+wall."""
 
 SLACK_MM = 150.0
-"""Corrugation and castings let a face be seen from this little behind its plane."""
+"""Distance behind a face's plane from which parts of the face can still be visible, because of
+corrugation and castings."""
 
 HOLE_REACH = 1 + LOBES * LOBE_LIMIT
-"""No outline strays farther than this many mean radii."""
+"""Largest distance of a perforation's outline from its centre, in mean radii."""
 
 
 def local_coordinates(damage: Damage, points_mm: Array) -> tuple[Array, Array, Array]:
-    """(u, v, w) of points [..., 3], each [...] in mm."""
+    """Return local coordinates u, v and w, each [...] in mm, of points [..., 3] in mm."""
     q = np.asarray(points_mm, np.float64) - np.array(damage.origin_mm)
     return q @ np.array(damage.along), q @ np.array(damage.across), q @ np.array(damage.inward)
 
 
 def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
-    """How far the damage moves rest points [..., 3] along its inward direction, mm [...].
+    """Return the displacement of points at rest along the damage's inward direction.
 
-    Negative for a concave damage that bulges outward.
+    Args:
+        damage: The damage.
+        points_mm: Points [..., 3] at rest, in mm in the container frame.
+
+    Returns:
+        float64 [...] in mm; negative where a concave damage bulges outward.
     """
     u, v, w = local_coordinates(damage, points_mm)
     half_length, half_width = damage.size_mm[0] / 2, damage.size_mm[1] / 2
@@ -56,15 +63,16 @@ def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
 
 
 def fold_path_mm(damage: Damage, u: Array) -> Array:
-    """Where a dent's fold runs: v [...] in mm at u [...], by turns straight and sinusoidal."""
+    """Return v [...] in mm of a dent's fold at u [...]; it alternates between straight and
+    sinusoidal stretches."""
     _, _, amplitude_mm, wavelength_mm, phase, stretch_mm = damage.shape[:6]
-    # a stretch is straight where this is 0 and sinusoidal where it is 1
+    # 0 on straight stretches, 1 on sinusoidal ones
     turn = _smoothstep(-0.25, 0.25, np.sin(np.pi * u / stretch_mm + phase))
     return amplitude_mm * turn * np.sin(2 * np.pi * u / wavelength_mm)
 
 
 def hole_radius_mm(damage: Damage, angle: Array) -> Array:
-    """Radius [...] in mm of a perforation's outline toward `angle` [...] in radians."""
+    """Return the radius [...] in mm of a perforation's outline at angles [...] in radians."""
     ratio = np.ones_like(np.asarray(angle, np.float64))
     for k in range(LOBES):
         size, phase = damage.shape[1 + 2 * k], damage.shape[2 + 2 * k]
@@ -73,7 +81,8 @@ def hole_radius_mm(damage: Damage, angle: Array) -> Array:
 
 
 def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
-    """Which rest points [..., 3] a perforation has torn away, bool [...], but for door gear."""
+    """Test which points [..., 3] at rest a perforation tears away; bool [...]. It spares door gear,
+    which the caller must exclude."""
     if damage.kind != "perforation":
         return np.zeros(np.shape(points_mm)[:-1], bool)
     u, v, w = local_coordinates(damage, points_mm)
@@ -82,12 +91,12 @@ def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
 
 
 def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]:
-    """Rest points [..., 3] to where all damages together move them, mm [..., 3]."""
+    """Return the positions [..., 3] in mm to which all damages together move points at rest."""
     rest = np.asarray(points_mm, np.float64).reshape(-1, 3)
     moved = rest.copy()
     for damage in damages:
         away = sum((x - at) ** 2 for x, at in zip(rest.T, damage.origin_mm, strict=True))
-        # what lies farther away than all it reaches does not move
+        # points beyond its reach do not move
         near = np.flatnonzero(away < np.square(reach_mm(damage)).sum())
         if len(near):
             amount = amount_mm(damage, rest.take(near, axis=0))
@@ -97,17 +106,18 @@ def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]
 
 
 def reach_mm(damage: Damage) -> tuple[float, float, float]:
-    """How far from its origin a damage may move or tear what is at rest: along, across, inward."""
+    """Return the distances from the origin, along, across and inward, within which a damage acts on
+    points at rest."""
     u, v = damage.size_mm[0] / 2, damage.size_mm[1] / 2
     if damage.kind == "perforation":
         u = v = u * HOLE_REACH + damage.shape[0]
     if damage.kind == "dented":
-        v = max(v, damage.shape[0]) + damage.shape[2]  # its path swings
+        v = max(v, damage.shape[0]) + damage.shape[2]  # the fold swings aside
     return u, v, v if damage.kind == "axis" else FADE_END_MM
 
 
 def corners_mm(damage: Damage) -> NDArray[np.float64]:
-    """Corners [8, 3] in mm of a box that holds all that a damage touches, before and after."""
+    """Return the corners [8, 3] in mm of a box around a damage, before and after displacement."""
     u, v, inward = reach_mm(damage)
     depth = abs(damage.depth_mm) + 60.0
     low, high = -depth, inward + max(damage.depth_mm, 0.0)
@@ -119,36 +129,42 @@ def corners_mm(damage: Damage) -> NDArray[np.float64]:
 
 
 def variant(damages: tuple[Damage, ...]) -> str:
-    """Which of programs.DAMAGE_VARIANTS draws these damages."""
+    """Return the shader variant that draws these damages, see render/variant.py."""
     if not damages:
-        return "sound"
+        return "undamaged"
     return "holed" if any(damage.kind == "perforation" for damage in damages) else "damaged"
 
 
 def may_be_seen(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) -> bool:
-    """Whether a camera outside at `position_mm` may see what the damage did from outside.
+    """Test whether a camera may see a damage from outside the container.
 
-    A sheet pushed in is hidden from behind its plane; an edge from behind both of its faces. What
-    bulges of the damages `beside` it may push out with it.
+    A dented sheet is hidden from behind its plane, an edge from behind both of its faces.
+
+    Args:
+        damage: The damage.
+        position_mm: Position of the camera, outside the container.
+        beside: Damages of the scene; those that bulge outward may move this damage with them.
     """
     if damage.depth_mm < 0:
         return True
     toward = np.array(position_mm) - np.array(damage.origin_mm)
-    # an edge's inward axis lies between two coordinate axes, a sheet's on one
+    # the inward axis is a coordinate axis for a sheet, and lies between two for an edge
     outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
     pushed_mm = sum(max(-other.depth_mm, 0.0) for other in beside)
     return max(outward) > -SLACK_MM - pushed_mm
 
 
 def seen_damages(damages: tuple[Damage, ...], position_mm: Vec3) -> tuple[Damage, ...]:
-    """The damages that a frame from `position_mm` must draw; all of them where a hole shows the
-    inside, which every damage may have moved."""
+    """Return the damages that an image from a position must draw.
+
+    If a hole is visible, these are all damages, because each may change the visible inside.
+    """
     seen = tuple(damage for damage in damages if may_be_seen(damage, position_mm, damages))
     return damages if variant(seen) == "holed" else seen
 
 
 def _bump(t: Array) -> Array:
-    """Smooth hill: 1 at 0, flat there, 0 from 1 on with zero slope."""
+    """Return a smooth bump: 1 at t = 0, 0 for |t| >= 1, with zero slope at both."""
     return np.maximum(1 - t * t, 0.0) ** 2
 
 

@@ -1,8 +1,8 @@
-"""A damaged container as plain triangles: dents bent, holes cut open; for export, not for drawing.
+"""A damaged container as plain triangles, with bent dents and cut holes, for export.
 
-The renderer bends the vertices of one mesh and leaves out the pixels of holes; its normals follow
-the field at every pixel. Here triangles near damage are cut small, still within the planes that
-the renderer draws, so that vertex normals can follow the field and outlines of holes be cut.
+The renderer bends the vertices of the same mesh, discards the pixels of holes, and computes normals
+of the displacement field at each pixel. For export, triangles near damages are divided, so that
+vertex normals can follow the field and the outlines of holes can be cut.
 """
 
 from dataclasses import dataclass
@@ -22,26 +22,29 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage
 
 BENT_EDGE_MM = 45.0
-"""Longest edge near a damage: a fold is some 60 mm wide."""
+"""Longest edge near a damage; a fold is about 60 mm wide."""
 
 HOLE_EDGE_MM = 15.0
-"""Longest edge near a hole: a chord this long stays within 0.6 mm of an arc of 50 mm."""
+"""Longest edge near a hole; a chord of this length is within 0.6 mm of an arc of radius 50 mm."""
 
 _SLOPE_STEP_MM = 0.5
 
 _REST, _MOVED, _NORMAL, _ATLAS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 11)
 _SPARED = 11
-"""Columns of the corner arrays [T, 3, 12] in this module; spared is 1 where holes tear nothing."""
+"""Columns of the corner arrays [T, 3, 12] in this module; `spared` is 1 for parts without holes."""
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class DamagedMesh:
-    """Triangles counter-clockwise from outside.
+    """Triangles of a damaged container.
 
-    positions_mm: float64 [V, 3]. normals: float64 [V, 3], unit. atlas_mm: float64 [V, 2].
-    triangles: uint32 [T, 3].
+    Attributes:
+        positions_mm: float64 [V, 3] in the container frame.
+        normals: float64 [V, 3], unit length.
+        atlas_mm: float64 [V, 2].
+        triangles: uint32 [T, 3], counter-clockwise from outside.
     """
 
     positions_mm: Array
@@ -51,7 +54,7 @@ class DamagedMesh:
 
 
 def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
-    """`mesh` with all `damages` done to it."""
+    """Apply damages to the mesh of a container."""
     rest = mesh.positions_mm.astype(np.float64)
     spared = np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart, None]
     moved = deform(damages, rest)
@@ -62,7 +65,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     for damage in damages:
         near = kept & _within_reach(damage, corners)
         kept &= ~near
-        # what is cut for one damage stays whole for the next: it is small already
+        # pieces that one damage has divided are small enough for the next
         part = _refined(corners[near], BENT_EDGE_MM)
         made.append(part)
     fine = np.concatenate([np.empty((0, 3, vertices.shape[1])), *made])
@@ -84,7 +87,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
 
 
 def _within_reach(damage: Damage, corners: Array) -> NDArray[np.bool_]:
-    """Which triangles, bool [T], a damage may move or tear."""
+    """Test which triangles a damage may move or tear; bool [T]."""
     local = np.stack(local_coordinates(damage, corners[..., _REST]), axis=-1)
     reach = np.array(reach_mm(damage))
     touches: NDArray[np.bool_] = ((local.min(1) < reach) & (local.max(1) > -reach)).all(axis=1)
@@ -92,7 +95,7 @@ def _within_reach(damage: Damage, corners: Array) -> NDArray[np.bool_]:
 
 
 def _refined(corners: Array, max_edge_mm: float) -> Array:
-    """The same triangles, cut into four until no edge at rest is longer than max_edge_mm."""
+    """Divide triangles into four until no edge at rest is longer than max_edge_mm."""
     done = []
     while len(corners):
         rest = corners[..., _REST]
@@ -107,7 +110,7 @@ def _refined(corners: Array, max_edge_mm: float) -> Array:
 
 
 def _cut(hole: Damage, corners: Array) -> Array:
-    """What a perforation leaves of small triangles, cut along straight pieces of its outline."""
+    """Cut a perforation out of small triangles, along straight pieces of its outline."""
     u, v, w = local_coordinates(hole, corners[..., _REST])
     outside_mm = np.hypot(u, v) - hole_radius_mm(hole, np.arctan2(v, u))
     level = np.maximum(outside_mm, np.abs(w) - FADE_START_MM)
@@ -125,7 +128,7 @@ def _cut(hole: Damage, corners: Array) -> Array:
 
 
 def _turned(corners: Array, level: Array, first: NDArray[np.intp]) -> tuple[Array, ...]:
-    """Corners a, b, c [T, 12] and levels [T, 3], each triangle turned to begin at `first`."""
+    """Return corners a, b, c [T, 12] and levels [T, 3], rotated so that `first` is corner a."""
     order = (first[:, None] + np.arange(3)) % 3
     rows = np.arange(len(corners))[:, None]
     turned = corners[rows, order]
@@ -133,13 +136,13 @@ def _turned(corners: Array, level: Array, first: NDArray[np.intp]) -> tuple[Arra
 
 
 def _crossing(a: Array, other: Array, level: Array, corner: int) -> Array:
-    """Where the level is 0 between corner 0 and `corner`, [T, 12]."""
+    """Interpolate the points [T, 12] of level 0 between corner 0 and another corner."""
     share = level[:, :1] / (level[:, :1] - level[:, corner : corner + 1])
     return a + share * (other - a)
 
 
 def _bent_normals(damages: tuple[Damage, ...], rest_mm: Array, normals: Array) -> Array:
-    """Unit normals [V, 3] after damage: rest normals turn with the cofactors of the deformation."""
+    """Return unit normals [V, 3] after damage, by the cofactor matrix of the deformation."""
     steps = np.eye(3) * _SLOPE_STEP_MM
     x, y, z = (
         (deform(damages, rest_mm + step) - deform(damages, rest_mm - step)) / (2 * _SLOPE_STEP_MM)

@@ -1,4 +1,4 @@
-"""Rows of an array that differ: what np.unique(rows, axis=0) finds, in a fifth of its time."""
+"""Distinct rows of an array in a fifth of the time of np.unique(rows, axis=0)."""
 
 from typing import Any
 
@@ -6,14 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 _ODD = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
-"""Multipliers of Fibonacci hashing and of xxHash64: odd, so no bit is lost."""
+"""Multipliers of Fibonacci hashing and of xxHash64. They are odd, so no bit is lost."""
 
 
 def distinct_rows(rows: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where each of the rows that differ occurs first [D], and which of them each row is [V].
+    """Find the distinct rows of an array.
 
-    rows: [V, 3] of finite numbers, 4 or 8 bytes each. Their order means nothing, but is always
-    the same.
+    Args:
+        rows: [V, 3], finite numbers of 4 or 8 bytes.
+
+    Returns:
+        Indices [D] of the first occurrence of each distinct row, in an order without meaning that
+        depends on the rows only; and the number [V] of each row among the distinct ones.
     """
     unsigned = {4: np.uint32, 8: np.uint64}[rows.dtype.itemsize]
     bits = np.ascontiguousarray(rows + rows.dtype.type(0)).view(unsigned)  # -0 becomes 0

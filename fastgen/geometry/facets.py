@@ -1,4 +1,4 @@
-"""Flat pieces of surfaces in the world, whole and cut by planes.
+"""Convex polygons of surfaces in the world, and clipping by planes.
 
 Sutherland and Hodgman 1974, "Reentrant Polygon Clipping".
 """
@@ -23,12 +23,14 @@ Number = TypeVar("Number", bound=np.generic)
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Convex polygons in the world, counter-clockwise from outside, by the points they share.
+    """Convex polygons that share points.
 
-    points_mm: float64 [P, 3]. owner: int [P], ascending, which object each point is of.
-    corners: int [K, M], which points a polygon joins, all of one owner; where it has fewer than M
-    the last one repeats. rest_mm: float64 [P, 3], the points before damage, None where that is not
-    asked for.
+    Attributes:
+        points_mm: float64 [P, 3] in the container frame.
+        owner: int [P], ascending, index of the object that each point belongs to.
+        corners: int [K, M], indices into points_mm, counter-clockwise from outside. A
+            polygon has one owner. With fewer than M corners, its last corner repeats.
+        rest_mm: float64 [P, 3], the points before damage, None if they are not needed.
     """
 
     points_mm: Array
@@ -38,8 +40,13 @@ class Facets:
 
     @staticmethod
     def of(polygons: Array, owner: Ints) -> "Facets":
-        """From polygons [K, M, 3], or with their rest positions [K, M, 6], and whose they are [K],
-        ascending. Where a polygon has fewer than M corners the last one repeats."""
+        """Create facets from separate polygons.
+
+        Args:
+            polygons: float64 [K, M, 3], or [K, M, 6] with the positions before damage. The last
+                corner of a polygon with fewer than M corners repeats.
+            owner: int [K], ascending, index of each polygon's object.
+        """
         count, most, channels = polygons.shape
         new = np.ones((count, most), bool)
         new[:, 1:] = reduce(
@@ -51,7 +58,7 @@ class Facets:
         return Facets(points[:, :3], owner, corners, points[:, 3:] if channels > 3 else None)
 
     def beyond(self, distance: Array) -> "Facets":
-        """What of them is left where the points' signed distances [P] to a plane are positive."""
+        """Clip to the side of a plane where the points' signed distances [P] are positive."""
         points = [self.points_mm] if self.rest_mm is None else [self.points_mm, self.rest_mm]
         polygons = np.concatenate(points, axis=1).take(self.corners, axis=0)
         cut, left = clip(polygons, distance.take(self.corners))
@@ -59,13 +66,13 @@ class Facets:
 
 
 def damage_facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
-    """The triangles that `damage` may have touched, whole, and where they were at rest."""
+    """Return the whole triangles that a damage may have moved, with their positions at rest."""
     axes = np.array([damage.along, damage.across, damage.inward])
     origin = np.array(damage.origin_mm)
     within = corners_mm(damage)
     lowest_mm, highest_mm = mesh.triangle_bounds_mm
     index = np.arange(len(mesh.triangles))
-    # few triangles come near even along the world's axes
+    # a box along the coordinate axes excludes most triangles
     for axis, (least, most) in enumerate(zip(within.min(axis=0), within.max(axis=0), strict=True)):
         high, low = highest_mm[:, axis].take(index), lowest_mm[:, axis].take(index)
         index = index[(high >= least) & (low <= most)]
@@ -81,19 +88,22 @@ def damage_facets(scene: Scene, mesh: Mesh, damage: Damage) -> Facets:
 
 
 def mesh_facets(mesh: Mesh, damages: Sequence[Damage] = ()) -> Facets:
-    """All triangles of a mesh, as damages moved them, each point once."""
+    """Return all triangles of a mesh after damage, with each point once."""
     first, which = distinct_rows(mesh.positions_mm)
     points = deform(tuple(damages), mesh.positions_mm.take(first, axis=0))
     return Facets(points, np.zeros(len(points), np.int64), which.take(mesh.triangles))
 
 
 def in_fours(facets: Facets) -> Facets:
-    """The same surface of fewer polygons: of triangles 2 i and 2 i + 1 one with four corners where
-    that is flat and convex, as of a box's side. All facets: triangles of one owner."""
+    """Join pairs of triangles into polygons with four corners.
+
+    Triangles 2 i and 2 i + 1, such as the two halves of a box's side, become one polygon if it is
+    flat and convex. All facets must be triangles of one owner.
+    """
     triangles = facets.corners
     even = len(triangles) // 2 * 2
     first, second = (facets.points_mm.take(triangles[i:even:2], axis=0) for i in (0, 1))
-    # the corner of the second that the first lacks, before or behind the two that it shares
+    # the corner that only the second triangle has comes before or after the two shared ones
     ahead = (second[:, 1] == first[:, 0]) & (second[:, 2] == first[:, 2])
     behind = (second[:, 0] == first[:, 0]) & (second[:, 1] == first[:, 2])
     fits = ahead.all(axis=1) | behind.all(axis=1)
@@ -110,18 +120,22 @@ def in_fours(facets: Facets) -> Facets:
 
 
 def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Cut convex polygons by a plane each.
+    """Clip convex polygons by one plane each.
 
-    corners: [K, M, C], padded by repeating the last one. inside: [K, M], the corners' signed
-    distances, kept where not negative. Returns what is left, [K', M + 1 or fewer, C], and bool [K]:
-    which polygons something is left of.
+    Args:
+        corners: [K, M, C], positions and other linear values, padded by repeating the last corner.
+        inside: [K, M], signed distances of the corners from the plane; parts with distances of 0 or
+            more are kept.
+
+    Returns:
+        The parts that are kept [K', up to M + 1, C], and bool [K]: polygons with such a part.
     """
     keep = inside >= 0
     inner = keep.sum(axis=1)
     left = inner > 0
     kept = corners if left.all() else corners.take(np.flatnonzero(left), axis=0)
     crossed = np.flatnonzero(left & (inner < keep.shape[1]))
-    if len(crossed):  # most polygons lie on one side
+    if len(crossed):  # most polygons are on one side
         pieces = _cut(corners.take(crossed, axis=0), inside.take(crossed, axis=0))
         kept, pieces = padded(kept, pieces.shape[1]), padded(pieces, kept.shape[1])
         kept[left.cumsum()[crossed] - 1] = pieces
@@ -129,25 +143,25 @@ def clip(corners: Array, inside: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def padded(corners: NDArray[Number], most: int) -> NDArray[Number]:
-    """Polygons [K, M, ...] with at least `most` corners, the last one repeated; a copy."""
+    """Return a copy of polygons [K, M, ...] with at least `most` corners, the last one repeated."""
     more = max(most - corners.shape[1], 0)
     return np.concatenate([corners, *[corners[:, -1:]] * more], axis=1)
 
 
 def _cut(corners: Array, inside: Array) -> Array:
-    """As `clip`, of polygons with corners on both sides."""
+    """Clip polygons that have corners on both sides, see `clip`."""
     count, most, channels = corners.shape
     after = np.arange(1, most + 1) % most
     following, ahead = corners.take(after, axis=1), inside.take(after, axis=1)
     span = inside - ahead
     share = np.divide(inside, span, out=np.zeros_like(span), where=span != 0)
     keep = inside >= 0
-    # each corner gives itself where inside, then the crossing of the edge that it starts
+    # two slots per corner: the corner if it is inside, and the crossing of its outgoing edge
     slots = np.empty((count, most, 2, channels))
     slots[:, :, 0] = corners
     slots[:, :, 1] = corners + share[..., None] * (following - corners)
     valid = np.stack([keep, keep != (ahead >= 0)], axis=2).reshape(count, 2 * most)
-    # which slot comes first, second and so on; sorting takes ten times as long
+    # used slots move to the front; sorting takes ten times as long
     used = valid.sum(axis=1)
     slot = np.flatnonzero(valid)
     column = np.minimum(np.arange(max(int(used.max()), 3)), used[:, None] - 1)
@@ -156,10 +170,10 @@ def _cut(corners: Array, inside: Array) -> Array:
 
 
 def lowest(values: NDArray[Number]) -> NDArray[Number]:
-    """Least of [K, M, ...] over M; NumPy's own reduction is slow along so short an axis."""
+    """Return the minimum of [K, M, ...] over M; NumPy's reduction is slow along short axes."""
     return reduce(np.minimum, np.moveaxis(values, 1, 0))
 
 
 def highest(values: NDArray[Number]) -> NDArray[Number]:
-    """Greatest of [K, M, ...] over M, as `lowest`."""
+    """Return the maximum of [K, M, ...] over M; see `lowest`."""
     return reduce(np.maximum, np.moveaxis(values, 1, 0))

@@ -1,7 +1,7 @@
-"""Seams between parts: one vertex list along each, so that rasterizers leave no gap.
+"""Seams between parts: both parts get the same vertices, so that rasterizers leave no gap.
 
-Where a vertex of one part lies within an edge of its neighbour, a T-junction, rounding opens a
-crack that a pixel centre now and then falls into. Such edges are split at the vertex.
+At a T-junction a vertex of one part lies within an edge of its neighbour. Rounding opens a crack
+there that a few pixel centres fall into. Such edges are split at the vertex.
 """
 
 from collections import defaultdict
@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 
 _SAME_MM = 0.02
 _SHIFT_MM = 0.0073
-"""No coordinate in use lies on a border of cells that begin here."""
+"""Offset of the grid of cells; no coordinate in use lies on the border of a cell."""
 
 _ON_EDGE_MM = 0.05
-"""Vertices this near to an edge and to neither of its ends split it."""
+"""Largest distance from an edge of a vertex that splits it, and least distance from its ends."""
 
 
 def merged(positions_mm: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Positions [V, 3] with those that coincide made equal, and int [V]: which point each is."""
+    """Make positions [V, 3] that coincide equal; also return the number int [V] of each point."""
     cells = np.floor((positions_mm + _SHIFT_MM) / _SAME_MM + 0.5).astype(np.int64)
     first, point = distinct_rows(cells)
     return positions_mm[first][point], point
@@ -32,10 +32,16 @@ def merged(positions_mm: Array) -> tuple[Array, NDArray[np.int64]]:
 def junctions(
     positions_mm: Array, point: NDArray[np.int64], triangles: NDArray[np.int64]
 ) -> dict[tuple[int, int], list[int]]:
-    """Vertices within the edges that have a triangle on one side only.
+    """Find vertices within edges that have a triangle on one side only.
 
-    point: int [V], equal for vertices that coincide. Returns, by triangle and edge (0 from its
-    first corner to its second, and so on), vertices in order along the edge.
+    Args:
+        positions_mm: float64 [V, 3].
+        point: int [V], equal for vertices that coincide.
+        triangles: int [T, 3].
+
+    Returns:
+        Vertices in order along the edge, by (triangle, edge). Edge 0 leads from the first to the
+        second corner, and so on.
     """
     from scipy.spatial import cKDTree  # takes 0.3 s, and finished meshes are kept on disk
 
@@ -73,11 +79,16 @@ def junctions(
 def stitched(
     positions_mm: Array, values: Array, triangles: NDArray[np.int64]
 ) -> tuple[Array, Array, NDArray[np.int64], NDArray[np.int64]]:
-    """The same surface without T-junctions.
+    """Split edges at T-junctions.
 
-    positions_mm: [V, 3]. values: [V, C], what else vertices bear; linear on each triangle.
-    Returns positions and values with new vertices at the end, triangles, and of each triangle the
-    number of that it was cut from.
+    Args:
+        positions_mm: float64 [V, 3].
+        values: float64 [V, C], other values of the vertices, linear on each triangle.
+        triangles: int [T, 3].
+
+    Returns:
+        Positions and values with new vertices at the end, triangles, and for each triangle the
+        index of the triangle that it was cut from.
     """
     positions_mm, point = merged(positions_mm)
     found = junctions(positions_mm, point, triangles)
@@ -85,7 +96,7 @@ def stitched(
     more_values: list[Array] = []
 
     def cut(corners: list[int], inner: list[list[int]]) -> list[list[int]]:
-        """Triangles in place of one whose edge k has the vertices inner[k] within it."""
+        """Split a triangle whose edge k contains the vertices inner[k]."""
         side = next((k for k in range(3) if inner[k]), None)
         if side is None:
             return [corners]

@@ -1,6 +1,6 @@
-"""Flat-faceted parts that are born with their unfolding: swept profiles, polygons, prisms.
+"""Flat-faceted parts with their unfolding: swept profiles, polygons and prisms.
 
-A Sheet is one chart before it has a place in the atlas; `assemble` packs sheets into a Mesh.
+A Sheet is a chart without a place in the atlas; `assemble` packs sheets into a Mesh.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,19 +20,25 @@ from fastgen.scene.faces import FACE_AXES, FACES
 Array = NDArray[np.float64]
 
 GUTTER_MM = 16.0
-"""Between charts: mip level 3 of a 2 mm texel does not mix neighbours."""
+"""Space between charts: mip level 3 of a 2 mm texel does not mix neighbours."""
 
 _CLOSEST_MM = 0.01
-"""Stations closer than this are one."""
+"""Stations closer than this count as one."""
 
 _SPACE_MM = 4.0
-"""Between the pieces of one chart, which share a material."""
+"""Space between the pieces of one chart, which share a material."""
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Triangles with their unfolding. positions_mm, normals: [V, 3]; sheet_mm: [V, 2];
-    triangles: int [T, 3], counter-clockwise both in space from outside and on the sheet."""
+    """Triangles with their unfolding.
+
+    Attributes:
+        positions_mm: float64 [V, 3] in the container frame.
+        normals: float64 [V, 3], unit length.
+        sheet_mm: float64 [V, 2], coordinates on the sheet.
+        triangles: int [T, 3], counter-clockwise both from outside and on the sheet.
+    """
 
     positions_mm: Array
     normals: Array
@@ -45,18 +51,26 @@ class Patch:
         return np.asarray(np.ptp(self.sheet_mm, axis=0))
 
     def at(self, x: float, y: float) -> "Patch":
-        """The same with the sheet's lower left corner at (x, y)."""
+        """Move the sheet's lower left corner to (x, y)."""
         return replace(self, sheet_mm=self.sheet_mm - self.sheet_mm.min(axis=0) + (x, y))
 
     def turned(self) -> "Patch":
-        """The same with the sheet turned by 90 degrees."""
+        """Turn the sheet by 90 degrees."""
         return replace(self, sheet_mm=self.sheet_mm @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A chart-to-be. group: the face group its triangles belong to, or "frame", where outermost
-    facets still go to their face (see Mesh.groups)."""
+    """A chart without a place in the atlas.
+
+    Attributes:
+        name: Name of the chart.
+        face: Its face, see Chart.
+        material: Its material.
+        group: Face group of its triangles, or "frame". The outermost facets of "frame" go to the
+            group of their face, see Mesh.groups.
+        patch: Its triangles.
+    """
 
     name: str
     face: str
@@ -66,7 +80,8 @@ class Sheet:
 
 
 def breaks(low: float, high: float, step: float, extra: Iterable[float] = ()) -> Array:
-    """Ascending stations from low to high, at most `step` apart, that meet all `extra` between."""
+    """Return ascending stations from low to high, at most `step` apart, that include all `extra`
+    stations in between."""
     knots = [low]
     for knot in sorted(extra):
         if knots[-1] + _CLOSEST_MM < knot < high - _CLOSEST_MM:
@@ -80,7 +95,7 @@ def breaks(low: float, high: float, step: float, extra: Iterable[float] = ()) ->
 
 
 def coarsened(stations: Array, step: float) -> Array:
-    """A subset of ascending stations, both ends in it, with gaps of at most `step` if it can."""
+    """Return a subset of ascending stations with both ends and, if possible, gaps up to `step`."""
     kept = [0]
     for i in range(1, len(stations) - 1):
         if stations[i + 1] - stations[kept[-1]] > step:
@@ -97,12 +112,16 @@ def sweep(
     keep: Callable[[Array], NDArray[np.bool_]] | None = None,
     arc_mm: ArrayLike | None = None,
 ) -> Patch:
-    """The surface that a polyline [K, 3] sweeps at stations [R] along a unit direction.
+    """Sweep a polyline along a direction.
 
-    upright: the sheet's x runs along the polyline and y along the direction; otherwise the other
-    way round. Outward is x's direction cross y's. keep: which cells exist, from their centres
-    [K-1, R-1, 3]. arc_mm: [K], sheet coordinates of the polyline's points, instead of its arc
-    length.
+    Args:
+        profile_mm: Polyline [K, 3].
+        stations_mm: Stations [R] along the direction.
+        direction: Unit vector [3].
+        upright: True if the sheet's x runs along the polyline and y along the direction, False for
+            the opposite. The cross product of x's and y's directions faces outward.
+        keep: Returns which cells exist, bool [K-1, R-1], from their centres [K-1, R-1, 3].
+        arc_mm: Sheet coordinates [K] of the polyline's points; by default its arc length.
     """
     profile, stations = np.asarray(profile_mm, np.float64), np.asarray(stations_mm, np.float64)
     along = np.asarray(direction, np.float64)
@@ -139,13 +158,13 @@ def sweep(
 
 
 def _crossed(vectors: Array, axis: Array) -> Array:
-    """Cross products of vectors [..., 3] with one [3]; np.cross takes five times as long."""
+    """Return vectors [..., 3] cross one axis [3], in a fifth of the time of np.cross."""
     x, y, z = axis.tolist()
     return vectors @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def flat(points_mm: ArrayLike, triangles: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
-    """Coplanar points [N, 3] as they are seen with the unit vectors right and up."""
+    """Return triangles [T, 3] of coplanar points [N, 3], seen with unit vectors right and up."""
     points = np.asarray(points_mm, np.float64)
     x, y = np.asarray(right, np.float64), np.asarray(up, np.float64)
     sheet = np.stack([points @ x, points @ y], axis=1)
@@ -159,23 +178,23 @@ def flat(points_mm: ArrayLike, triangles: ArrayLike, right: ArrayLike, up: Array
 
 
 def polygon(points_mm: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:
-    """A convex polygon [N, 3] in either sense, seen with right and up."""
+    """Return a convex polygon [N, 3] of either winding, seen with unit vectors right and up."""
     count = len(np.asarray(points_mm))
     fan = [(0, i, i + 1) for i in range(1, count - 1)]
     return flat(points_mm, fan, right, up)
 
 
 def regular(center: tuple[float, float], radius: float, sides: int) -> Array:
-    """Corners [sides, 2] of a regular polygon, counter-clockwise, for `prism`.
+    """Return the corners [sides, 2] of a regular polygon for `prism`, counter-clockwise.
 
-    Corners, not edges, lie on the radius: nothing stands out farther.
+    All corners are at distance `radius`, so no point is farther away.
     """
     turn = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     return np.array(center) + radius * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def beside(patches: Sequence[Patch]) -> Patch:
-    """Patches on one sheet, upright and side by side."""
+    """Put patches side by side on one sheet, each upright."""
     x = 0.0
     parts = []
     for patch in patches:
@@ -186,7 +205,7 @@ def beside(patches: Sequence[Patch]) -> Patch:
 
 
 def joined(patches: Sequence[Patch]) -> Patch:
-    """Patches that already share one sheet's coordinates, as one."""
+    """Join patches that already share the coordinates of one sheet."""
     first = np.cumsum([0, *(len(p.positions_mm) for p in patches[:-1])])
     return Patch(
         np.concatenate([p.positions_mm for p in patches]),
@@ -199,10 +218,14 @@ def joined(patches: Sequence[Patch]) -> Patch:
 def prism(
     outline_mm: ArrayLike, stations_mm: ArrayLike, axis: int, *, capped: tuple[bool, bool]
 ) -> Patch:
-    """A convex outline [N, 2] swept along axis 0, 1 or 2, with caps at its (low, high) end or not.
+    """Sweep a convex outline along a coordinate axis.
 
-    The outline is in the two following axes (y, z for x; z, x for y; x, y for z),
-    counter-clockwise seen from the axis' tip.
+    Args:
+        outline_mm: Outline [N, 2] in the two following axes (y, z for x; z, x for y; x, y for z),
+            counter-clockwise seen from the tip of the axis.
+        stations_mm: Stations along the axis.
+        axis: 0, 1 or 2.
+        capped: Whether the low and the high end have a cap.
     """
     outline = np.asarray(outline_mm, np.float64)
     stations = np.asarray(stations_mm, np.float64)
@@ -217,8 +240,10 @@ def prism(
 
 
 def box(low_mm: ArrayLike, high_mm: ArrayLike, step_mm: float = np.inf) -> Patch:
-    """All six faces of an axis-aligned box, unfolded around its longest edge and cut across it
-    every step_mm."""
+    """Return the six faces of an axis-aligned box.
+
+    They are unfolded around the longest edge, and cut across it every step_mm.
+    """
     low, high = np.asarray(low_mm, np.float64), np.asarray(high_mm, np.float64)
     axis = int(np.argmax(high - low))
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -231,10 +256,16 @@ def assemble(
     outer_size_mm: tuple[float, float, float] | None = None,
     flats: Mapping[str, tuple[tuple[float, float], ...]] | None = None,
 ) -> Mesh:
-    """Pack the sheets into one atlas and join them into a Mesh, triangles sorted by group.
+    """Pack sheets into one atlas and join them into a Mesh.
 
-    outer_size_mm: length, width and height of the container, whose planes the groups refer to;
-    without it, all sheets keep the group they name.
+    Args:
+        sheets: The parts.
+        outer_size_mm: Length, width and height of the container, whose planes Mesh.groups refer
+            to. Without it, all sheets keep their group.
+        flats: Mesh.flats.
+
+    Returns:
+        A mesh whose triangles are sorted by group.
     """
     assert all(s.material in MATERIALS and s.face in FACES for s in sheets)
     packing = _packed(np.array([s.patch.size_mm for s in sheets]))
@@ -271,7 +302,7 @@ def assemble(
 def _zones(
     patches: Sequence[Patch], panels: Sequence[bool]
 ) -> tuple[tuple[Zone, ...], NDArray[np.int64]]:
-    """The zones of charts that have their place, and which of them each vertex is in."""
+    """Return the zones of placed charts, and the zone number of each vertex."""
     zones: list[Zone] = []
     of_vertices = []
     for chart, (patch, panel) in enumerate(zip(patches, panels, strict=True)):
@@ -284,10 +315,10 @@ def _zones(
 
 
 def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> NDArray[np.int64]:
-    """Index into (*FACES, "frame") of each triangle.
+    """Return the index into (*FACES, "frame") of each triangle.
 
-    A facet of the frame that looks straight out of a face, no deeper than the slack, is seen only
-    from in front of its own plane, so it belongs to that face.
+    A facet of the frame is visible only from in front of its own plane. If it is parallel to a face
+    and no deeper than GROUP_SLACK_MM, it belongs to the group of that face.
     """
     patch = sheet.patch
     if sheet.group != "frame":
@@ -308,7 +339,13 @@ def _groups(sheet: Sheet, outer_size_mm: tuple[float, float, float] | None) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Packing:
-    """corners: lower left [N, 2]. turned: bool [N], which lie on their side. size: of it all."""
+    """Places of boxes in the atlas.
+
+    Attributes:
+        corners: Lower left corners [N, 2].
+        turned: bool [N], True for boxes turned by 90 degrees.
+        size: Width and height of the atlas.
+    """
 
     corners: Array
     turned: NDArray[np.bool_]
@@ -316,7 +353,7 @@ class _Packing:
 
 
 def _packed(sizes: Array) -> _Packing:
-    """Places for boxes [N, 2], of a few atlas widths the one nearest a square."""
+    """Return places for boxes [N, 2]; the atlas has the shortest longer side of several widths."""
     padded = np.ceil(sizes + GUTTER_MM)
     widest = float(padded.max())
     tries = [_shelves(padded, width) for width in np.linspace(widest, 2 * widest, 31)]
@@ -325,10 +362,10 @@ def _packed(sizes: Array) -> _Packing:
 
 
 def _shelves(padded: Array, limit: float) -> _Packing:
-    """First fit on shelves of falling height, no wider than `limit`.
+    """Place boxes on shelves no wider than `limit`.
 
-    First-fit decreasing height (Coffman, Garey, Johnson and Tarjan 1980), but a long part that
-    finds no room upright beside others lies down and waits for its new turn.
+    First-fit decreasing height (Coffman, Garey, Johnson and Tarjan 1980), except that a long part
+    that fits on no shelf upright is turned and queued again by its new height.
     """
     corners = np.empty_like(padded)
     turned = np.zeros(len(padded), bool)

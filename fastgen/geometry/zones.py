@@ -1,7 +1,7 @@
-"""Zones of a chart: what wears by itself, for water knows edges and which way is down.
+"""Zones of a chart: parts with their own edges and their own direction of running water.
 
-A chart may hold many sides of many beams, laid out as there was room. Rust and dirt sit along the
-edges of each side, and run-off runs down it.
+A chart may contain many sides of many beams, packed as space allowed. Rust and dirt collect along
+the edges of each side, and water runs down each side.
 """
 
 import numpy as np
@@ -12,21 +12,21 @@ from fastgen.geometry.mesh import Zone
 Array = NDArray[np.float64]
 
 _LEVEL = 0.8
-"""Mean rise, of a slope of 53 degrees, below which a zone counts as level."""
+"""Mean rise below which a zone counts as level; the rise of a slope of 53 degrees."""
 
 _CREASE = 0.3
-"""Cosine of the angle, 73 degrees, from which on a fold is an edge: that of a box, not of a bar of
-eight sides."""
+"""Cosine of the smallest angle, 73 degrees, of folds that are edges. The folds of a box are edges,
+those of a bar with eight sides are not."""
 
 _ANY_FOLD = -1.1
-"""Less than any cosine."""
+"""A limit below every cosine, which joins triangles across all folds."""
 
 _SMALL_MM = 100.0
-"""What is narrower shares a zone with the rest of its chart that stands as it does: it is near an
-edge all over, as rust reaches some 90 mm in."""
+"""Width below which all parts of a chart with one orientation share a zone. They are near an edge
+everywhere, because rust reaches about 90 mm from edges."""
 
 _POINTS_A_MM = 20.0
-"""Corners on the sheet that are closer than the inverse of this are one."""
+"""Grid cells per mm in which corners on the sheet count as one point."""
 
 
 def zones_of(
@@ -37,11 +37,19 @@ def zones_of(
     triangles: NDArray[np.int64],
     panel: bool = False,
 ) -> tuple[list[Zone], NDArray[np.int64]]:
-    """The zones of chart number `chart`, widest first, and which of them each triangle is in, [T].
+    """Divide a chart into zones.
 
-    sheet_mm: [V, 2], where vertices lie in the atlas. heights_mm: [V], their z in the world.
-    normals: [V, 3]. triangles: [T, 3]. Triangles that share a vertex share a zone. panel: whether
-    it is rolled from one sheet, which has no edge within, however sharp its waves are.
+    Args:
+        chart: Index of the chart.
+        sheet_mm: float64 [V, 2], atlas coordinates of the vertices.
+        heights_mm: float64 [V], z of the vertices in the container frame.
+        normals: float64 [V, 3].
+        triangles: int [T, 3]. Triangles that share a vertex share a zone.
+        panel: True for a part rolled from one sheet, which has no inner edges even if its waves are
+            sharp.
+
+    Returns:
+        The zones, largest first, and the number [T] of each triangle's zone.
     """
     piece = _connected(sheet_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
     turns, level = (
@@ -71,9 +79,15 @@ def zones_of(
 def _quarter_turns(
     corners: Array, heights: Array, piece: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Zone.quarter_turns [P] of pieces and whether they are level, by their mean rise: a corrugated
-    roof goes down as often as up. corners: of triangles on the sheet, [T, 3, 2]. heights: [T, 3].
-    piece: [T]."""
+    """Return Zone.quarter_turns [P] and Zone.level [P] of pieces, from their mean rise.
+
+    The mean over a piece makes a corrugated roof level: it falls as often as it rises.
+
+    Args:
+        corners: Corners [T, 3, 2] of triangles on the sheet.
+        heights: Heights [T, 3] of the corners.
+        piece: Piece [T] of each triangle.
+    """
     sides, rises = corners[:, 1:] - corners[:, :1], heights[:, 1:] - heights[:, :1]
     area = np.abs(np.linalg.det(sides))
     gradient = np.linalg.solve(sides, rises[..., None])[..., 0]
@@ -91,8 +105,11 @@ def _quarter_turns(
 def _connected(
     sheet_mm: Array, normals: Array, triangles: NDArray[np.int64], crease: float
 ) -> NDArray[np.int64]:
-    """Number of the piece of each triangle [T]: those that meet along an edge of the sheet, their
-    normals' cosine greater than `crease`, are one."""
+    """Return the piece [T] of each triangle.
+
+    Triangles that share an edge on the sheet belong to one piece if the cosine of the angle between
+    their normals is greater than `crease`.
+    """
     from scipy.sparse import coo_array  # takes 0.3 s, and finished meshes are kept on disk
     from scipy.sparse.csgraph import connected_components
 
@@ -112,7 +129,7 @@ def _connected(
 
 
 def _bounds(corners: Array, piece: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Lowest and highest sheet coordinates [P, 2] of pieces with triangles of corners [T, 3, 2]."""
+    """Return the lowest and highest sheet coordinates [P, 2] of pieces, from corners [T, 3, 2]."""
     low = np.full((piece.max() + 1, 2), np.inf)
     high = -low
     np.minimum.at(low, piece, corners.min(axis=1))

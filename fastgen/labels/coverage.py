@@ -1,7 +1,7 @@
-"""What objects would cover alone in an unbounded image: exact boxes, and pixels by scan conversion.
+"""Pixels that objects cover alone in an unbounded image, and their exact boxes.
 
-A pixel is covered when its centre lies in one of the object's facets that face the camera; centres
-on an edge go to one side only, as rasterizers have it (OpenGL 4.5 core specification, 14.6.1).
+A pixel is covered if its centre lies in one of the object's facets that face the camera. A centre
+on an edge belongs to one side only, as in rasterizers (OpenGL 4.5 core specification, 14.6.1).
 """
 
 from dataclasses import dataclass
@@ -18,18 +18,21 @@ from fastgen.scene.limits import NEAR_M
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Runs = tuple[Ints, Ints, Ints, Ints]
-"""Runs of pixels, int [R] each: whose they are, row, first column, and the one past the last."""
+"""Runs of pixels, int [R] each: owner, row, first column, and the column after the last."""
 
 _MOST_ROWS = 100_000
-"""Objects that cross more rows than this are counted on a coarser grid, to a thousandth."""
+"""Objects over more rows than this are counted on a coarser grid, accurate to a thousandth."""
 
 
 @dataclass(frozen=True, eq=False)
 class Covered:
-    """Pixels that each of some objects covers alone.
+    """Pixels that each of several objects covers alone.
 
-    within: runs of those in the image, `width` pixels across, each object's once, ascending by
-    owner, row and column. beyond: int [count], how many more each object covers outside the image.
+    Attributes:
+        within: Runs of pixels in the image, ascending by owner, row and column. The runs of one
+            object do not overlap.
+        width: Width of the image in pixels.
+        beyond: int [count], number of pixels that each object covers outside the image.
     """
 
     within: Runs
@@ -38,11 +41,11 @@ class Covered:
 
     @property
     def area(self) -> Ints:
-        """How many pixels of each object are within, int [count]."""
+        """Number of pixels of each object in the image, int [count]."""
         return _lengths(self.within, len(self.beyond))
 
     def pixels(self) -> tuple[Ints, Ints]:
-        """Of each pixel within, row * width + column and whose it is, int [P] each."""
+        """Return row * width + column and the owner of each pixel in the image, int [P] each."""
         whose, row, left, right = self.within
         length = right - left
         before = length.cumsum() - length
@@ -51,12 +54,12 @@ class Covered:
         return pixel, whose.repeat(length)
 
     def shown(self, mask: NDArray[np.bool_]) -> Ints:
-        """How many of each object's pixels `mask` [H, W] shows, int [count]."""
+        """Count the pixels of each object in a mask [H, W]; int [count]."""
         whose, row, left, right = self.within
         if not len(row):
             return np.zeros(len(self.beyond), np.int64)
         x0, y0, x1, y1 = left.min(), row.min(), right.max(), row.max() + 1
-        # how many pixels are shown above and to the left of each corner between pixels
+        # number of mask pixels above and to the left of each pixel corner
         shown = cv2.integral(mask[y0:y1, x0:x1].view(np.uint8))
         counts = (shown[1:] - shown[:-1]).ravel()
         start = (row - y0) * shown.shape[1] - x0
@@ -66,7 +69,13 @@ class Covered:
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """Facets in the image. pixels: float64 [P, 2] and depth_m: [P], of their points."""
+    """Facets in the image.
+
+    Attributes:
+        facets: The facets in the world.
+        pixels: float64 [P, 2], image positions of their points.
+        depth_m: float64 [P], depths of their points.
+    """
 
     facets: Facets
     pixels: Array
@@ -79,7 +88,7 @@ class Projected:
 
 
 def project(facets: Facets, view: View) -> Projected:
-    """The part of the facets beyond the near plane, as `view` sees it."""
+    """Project the part of the facets beyond the near plane."""
     pixels, depth = view.project(facets.points_mm)
     if depth.size and depth.min() < NEAR_M:
         facets = facets.beyond(depth - NEAR_M)
@@ -88,18 +97,25 @@ def project(facets: Facets, view: View) -> Projected:
 
 
 def facing(polygons: Array) -> NDArray[np.bool_]:
-    """Which of polygons [K, M, 2] in the image, counter-clockwise from outside, face the camera."""
+    """Test which polygons [K, M, 2], counter-clockwise from outside, face the camera; bool [K]."""
     x, y = polygons[..., 0], polygons[..., 1]
     most = range(polygons.shape[1])
     area = sum((x[:, k - 1] * y[:, k] - x[:, k] * y[:, k - 1] for k in most), np.zeros(len(x)))
-    # they turn the other way where y points down
+    # y points down in the image, which reverses the winding
     return np.asarray(area < 0)
 
 
 def boxes(pixels: Array, owner: Ints, count: int) -> Array:
-    """Exact bounds (x0, y0, x1, y1) float64 [count, 4] of each owner's points [P, 2].
+    """Return the exact bounds of each owner's points.
 
-    owner: int [P], ascending. One without points gets (inf, inf, -inf, -inf).
+    Args:
+        pixels: float64 [P, 2].
+        owner: int [P], ascending.
+        count: Number of owners.
+
+    Returns:
+        Bounds (x0, y0, x1, y1) float64 [count, 4]; (inf, inf, -inf, -inf) for owners without
+        points.
     """
     found = np.tile([np.inf, np.inf, -np.inf, -np.inf], (count, 1))
     if len(owner):
@@ -117,14 +133,19 @@ def covered(
     size: tuple[int, int],
     asked: Box | None = None,
 ) -> Covered:
-    """What each owner's polygons [K, M, 2] cover, their union, in an image of `size`.
+    """Return the pixels that the union of each owner's polygons covers.
 
-    owner: int [K]. asked: the part of the image whose pixels are asked for; all of it by default.
+    Args:
+        polygons: Convex polygons float64 [K, M, 2] in pixels.
+        owner: int [K].
+        count: Number of owners.
+        size: Width and height of the image.
+        asked: Part of the image to return pixels of; by default the whole image.
     """
     width, height = size
     rows = np.ptp(polygons[..., 1]) if polygons.size else 0.0
     step = max(int(np.ceil(rows / _MOST_ROWS)), 1)
-    if step > 1:  # of something enormous the image sees a small part, which is counted as it is
+    if step > 1:  # only the part in the image is counted at full resolution
         whole = _lengths(_merged(spans(polygons / step), owner), count) * step**2
         runs = _merged(spans(polygons, height), owner)
     else:
@@ -136,20 +157,20 @@ def covered(
 
 
 def _merged(runs: Runs, owner: Ints) -> Runs:
-    """Each owner's runs where polygons have some, the union of them, ascending."""
+    """Return the union of the polygons' runs of each owner, ascending."""
     polygon, row, left, right = runs
     if not len(row):
         return runs
-    # one long line of all rows of all owners, with a pixel between them that none has
+    # all rows of all owners on one line, separated by one uncovered pixel
     low, top = int(left.min()), int(row.min())
     width, height = int(right.max()) - low + 1, int(row.max()) - top + 1
     line = (owner.take(polygon) * height + (row - top)) * width - low
     start, end = line + left, line + right
-    if end.max() < 2**31:  # they are sorted in half the time
+    if end.max() < 2**31:  # sorting takes half the time
         start, end = start.astype(np.int32), end.astype(np.int32)
     start.sort()
     end.sort()
-    # as many have ended as have begun: a gap follows
+    # a gap follows where as many runs have ended as have begun
     gap = np.flatnonzero(start[1:] > end[:-1])
     start, end = start[np.append(0, gap + 1)], end[np.append(gap, len(end) - 1)]
     line = start.astype(np.int64) // width
@@ -159,7 +180,7 @@ def _merged(runs: Runs, owner: Ints) -> Runs:
 
 
 def _inside(runs: Runs, box: Box) -> Runs:
-    """What of `runs` lies inside a box."""
+    """Clip runs to a box."""
     x0, y0, x1, y1 = box
     whose, row, left, right = runs
     left, right = np.maximum(left, x0), np.minimum(right, x1)
@@ -170,20 +191,26 @@ def _inside(runs: Runs, box: Box) -> Runs:
 
 
 def _lengths(runs: Runs, count: int) -> Ints:
-    """Pixels in each object's runs, int [count]."""
+    """Count the pixels in each object's runs; int [count]."""
     whose, _, left, right = runs
     return np.bincount(whose, right - left, count).astype(np.int64)
 
 
 def spans(polygons: Array, rows: int | None = None) -> Runs:
-    """Runs of pixel centres in convex polygons [K, M, 2], one for each polygon and row.
+    """Scan-convert convex polygons.
 
-    Those of no pixel are left out. rows: only rows from 0 up to this one.
+    Args:
+        polygons: float64 [K, M, 2] in pixels.
+        rows: Return only rows from 0 to below this number; by default all rows.
+
+    Returns:
+        Runs of pixels whose centres lie in a polygon, one per polygon and row, without empty runs.
+        Their owner is the polygon's index.
     """
     number, most = polygons.shape[:2]
-    # all first corners, all second ones and so on: NumPy is slow along short axes
+    # first corners of all polygons, then second corners: NumPy is slow along short axes
     x, y = polygons.transpose(2, 1, 0).reshape(2, -1)
-    # the first row whose centres a corner is not below
+    # first row whose centres are at or below the corner
     first = np.ceil(y - 0.5).astype(np.int64)
     if rows is not None:
         first = first.clip(0, rows)
@@ -191,7 +218,7 @@ def spans(polygons: Array, rows: int | None = None) -> Runs:
     top = by_corner.min(axis=0)
     height = by_corner.max(axis=0) - top
     start = height.cumsum() - height
-    # of a convex polygon one edge crosses a row on its way down the image, and one on its way up
+    # each row crosses one downward and one upward edge of a convex polygon
     climb = np.append(first[number:], first[:number]) - first
     edge = np.flatnonzero(climb)
     until, climb, whose = (edge + number) % len(first), climb[edge], edge % number
@@ -204,10 +231,10 @@ def spans(polygons: Array, rows: int | None = None) -> Runs:
     place = start[whose] + begin - top[whose] + rises * count
     before = length.cumsum() - length
     crossing = np.arange(int(length.sum()))
-    # whole numbers as floats, which lose nothing: NumPy is slow to turn them into each other
+    # integers as floats are exact, and NumPy converts slowly between the two
     step = (crossing - before.repeat(length)).astype(np.float64)
     columns = np.empty(2 * count)
-    # the first column whose centre a crossing is not right of
+    # first column whose centre is at or right of a crossing
     columns[(place - before).repeat(length) + crossing] = np.ceil(
         (at_begin - 0.5).repeat(length) + step * slope.repeat(length)
     )

@@ -1,4 +1,4 @@
-"""Text crops: which identifiers of an image can be read, and their pixels."""
+"""Text crops: pixels of the legible texts of an image."""
 
 from collections.abc import Iterator
 
@@ -16,16 +16,21 @@ from fastgen.scene import Decal
 _CROP_MARGIN_PX = 3
 _LEGIBLE_FRACTION = 0.85
 _LEGIBLE_LETTER = 0.5
-"""Of each letter's box, so that no crop reads what nobody can see."""
+"""Least visible share of each letter's box, so that every letter of a crop can be read."""
 
 _LETTER_POINTS = 7
-"""Along each side of a letter's box."""
+"""Sample points along each side of a letter's box."""
 
 
 def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDArray[np.uint8]]]:
-    """Each legible text of an image, and its pixels [h, w, 3] with a small margin, as a view.
+    """Yield the legible texts of an image.
 
-    min_text_px: least height of its capitals in the image, see config.LabelConfig.
+    Args:
+        sample: The labelled image.
+        min_text_px: Least height of capitals in pixels, see LabelConfig.
+
+    Yields:
+        The text's object and its pixels uint8 [h, w, 3] with a small margin, as a view.
     """
     width, height = sample.view.size
     for item in sample.objects:
@@ -44,8 +49,10 @@ def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDA
 
 
 def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
-    """Large enough along both of its sides, hardly occluded, by half at most in any letter, and not
-    cut by the border."""
+    """Test whether a text is large enough along both sides, inside the image, and hardly occluded.
+
+    At most half of each letter may be occluded.
+    """
     if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
         return False
     decal = decal_of(sample.scene, item.id)
@@ -59,7 +66,7 @@ def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
 
 
 def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
-    """The share seen of that letter of a text of which least is seen: locking bars hide an I."""
+    """Return the smallest visible share of any letter; a locking bar can hide an I."""
     font = glyph_tiles()[1][decal.font]
     lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical)
     middle = np.array(lettering.size_mm) / 2

@@ -1,4 +1,4 @@
-"""Boxes and labels drawn over images, for people."""
+"""Drawings of labels over images."""
 
 import colorsys
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from fastgen.sample import Sample
 Image = NDArray[np.uint8]
 
 _LINE_PX = 1000
-"""Side of an image for each pixel of a line's width."""
+"""Image side in pixels for each pixel of line width."""
 
 ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
 DAMAGE_GREYS = MappingProxyType({UNDAMAGED_CONTAINER: 200})
@@ -32,14 +32,16 @@ _STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader")
 
 
 def class_color(name: str) -> tuple[int, int, int]:
-    """An RGB colour that stays with a class name: markers' are pale, all others strong and far from
-    each other."""
+    """Return the RGB colour of a class.
+
+    Markers have pale colours. All other classes have strong colours that differ clearly.
+    """
     names, saturation = (_STRONG, 0.85) if name in _STRONG else (MARKER_CLASSES, 0.4)
     return _color(names.index(name), saturation, 1.0)
 
 
 def _color(number: int, saturation: float, brightness: float) -> tuple[int, int, int]:
-    """Hues of numbers in a row lie a golden ratio apart, which no run of numbers repeats."""
+    """Return a colour whose hue advances by the golden ratio per number, which never repeats."""
     hue = number * _GOLDEN % 1
     r, g, b = (round(255 * part) for part in colorsys.hsv_to_rgb(hue, saturation, brightness))
     return r, g, b
@@ -48,10 +50,15 @@ def _color(number: int, saturation: float, brightness: float) -> tuple[int, int,
 def draw_box(
     image: Image, box: tuple[float, float, float, float], class_name: str, caption: str = ""
 ) -> None:
-    """Draw box (x0, y0, x1, y1; x1 and y1 exclusive) in its class's colour into uint8 RGB, in
-    place, with a caption, by default the class's name.
+    """Draw a box in the colour of its class.
 
-    In large images lines and letters grow, so that they show when the whole is looked at.
+    Lines and letters are larger in large images, so that they are visible in the whole image.
+
+    Args:
+        image: uint8 RGB [H, W, 3], changed in place.
+        box: (x0, y0, x1, y1) in pixels; x1 and y1 are exclusive.
+        class_name: Class, which decides the colour.
+        caption: Text at the box; by default the class name.
     """
     x0, y0, x1, y1 = (round(v) for v in box)
     color = class_color(class_name)
@@ -60,7 +67,13 @@ def draw_box(
 
 
 def draw_outline(image: Image, points: NDArray[np.floating], class_name: str) -> None:
-    """As `draw_box`, of a closed polygon [N, 2] along the pixels' outer borders."""
+    """Draw a closed polygon in the colour of its class, with the class name.
+
+    Args:
+        image: uint8 RGB [H, W, 3], changed in place.
+        points: Polygon [N, 2] along the outer borders of pixels.
+        class_name: Class, which decides the colour.
+    """
     pixels = np.rint(np.minimum(points, np.array(image.shape[1::-1]) - 1)).astype(np.int32)
     color = class_color(class_name)
     cv2.polylines(image, [pixels], True, color, _line(image), cv2.LINE_AA)
@@ -69,12 +82,12 @@ def draw_outline(image: Image, points: NDArray[np.floating], class_name: str) ->
 
 
 def _line(image: Image) -> int:
-    """Width of lines in pixels."""
+    """Return the width of lines in pixels."""
     return max(round(max(image.shape[:2]) / _LINE_PX), 1)
 
 
 def _write(image: Image, left: int, bottom: int, text: str, color: tuple[int, int, int]) -> None:
-    """Write on a ground of `color`, above a row where there is room."""
+    """Write on a background of `color`, above a row if there is space, else below it."""
     line, font = _line(image), cv2.FONT_HERSHEY_SIMPLEX
     (width, height), base = cv2.getTextSize(text, font, 0.36 * line, line)
     top = bottom - height - base if bottom - height - base >= 0 else bottom
@@ -85,10 +98,15 @@ def _write(image: Image, left: int, bottom: int, text: str, color: tuple[int, in
 
 
 def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
-    """Labels [H, W] as colours, uint8 [H, W, 3], the same for a label in every image; those of a
-    few dozen numbers in a row can be told apart. 0 is black.
+    """Show a label image in colours.
 
-    greys: of labels that shall be grey, how bright; ID_GREYS or DAMAGE_GREYS.
+    Args:
+        labels: uint16 [H, W].
+        greys: Brightness of the labels to show in grey, such as ID_GREYS or DAMAGE_GREYS.
+
+    Returns:
+        uint8 [H, W, 3]. A label has the same colour in every image, and a few dozen consecutive
+        labels have distinguishable colours. 0 is black.
     """
     values, inverse = np.unique(labels, return_inverse=True)
     palette = np.array([_label_color(int(value), greys) for value in values], np.uint8)
@@ -96,7 +114,7 @@ def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
 
 
 def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
-    """Those of `_color`, at nine tones in turn."""
+    """Return a colour of `_color` in one of nine alternating tones."""
     if value == 0 or value in greys:
         return (greys.get(value, 0),) * 3
     saturation, brightness = (0.75, 0.45, 0.95)[value % 3], (1.0, 0.8, 0.6)[value // 3 % 3]
@@ -104,7 +122,7 @@ def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
 
 
 def overlay(sample: Sample, image: Image | None = None) -> Image:
-    """The sample's image, or `image`, with damage tinted and all visible objects boxed."""
+    """Return the sample's image, or `image`, with tinted damages and boxes of visible objects."""
     drawn = (sample.image if image is None else image).copy()
     damaged = sample.damage >= DAMAGE_VALUES.start
     if damaged.any():

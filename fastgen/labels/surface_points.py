@@ -1,7 +1,7 @@
-"""What single pixel centres see of facets, in the image and around it.
+"""Points of facets at pixel centres, in the image and around it.
 
-What is linear on a facet is linear in the image when divided by depth; Blinn 1992, "Hyperbolic
-Interpolation".
+Values that are linear on a facet are linear in the image after division by depth (Blinn 1992,
+"Hyperbolic Interpolation").
 """
 
 from dataclasses import dataclass, replace
@@ -14,18 +14,25 @@ from fastgen.labels.coverage import Projected, Runs, spans
 Array = NDArray[np.float64]
 
 _MOST_POINTS = 1_000_000
-"""Of things that cover more, what lies outside the image is looked at on a coarser grid."""
+"""Facets over a larger area are sampled on a coarser grid outside the image."""
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """What single pixel centres see. column, row: int [P]; within: bool [P], whether that is in the
-    image; depth_m: float64 [P]. Outside the image a point is the centre of `step` by `step` pixels,
-    of which (column, row) is the first.
+    """Points of facets at pixel centres.
 
-    facet: int [P], index into `plane`, float64 [F, 3, 4]: what each facet's rest position over
-    depth, in mm / m, and inverse depth are at its origin, and by how much they grow a pixel to the
-    right and down. away: float64 [2, P], right and down from that origin.
+    Attributes:
+        column: int [P], column of the pixel. Outside the image, a point is the centre of a square
+            of `step` by `step` pixels, and `column` and `row` are those of its upper left pixel.
+        row: int [P], row of the pixel.
+        within: bool [P], True in the image.
+        depth_m: float64 [P].
+        step: Side of the squares in pixels.
+        facet: int [P], index into `plane`.
+        plane: float64 [F, 3, 4], linear functions of the pixel: (rest position / depth in mm / m,
+            1 / depth) of each facet at its origin, and their change for one pixel to the right and
+            one pixel down.
+        away: float64 [2, P], pixels right of and below the facet's origin.
     """
 
     column: NDArray[np.int64]
@@ -38,7 +45,7 @@ class Points:
     away: Array
 
     def rest_mm(self, which: NDArray[np.int64]) -> Array:
-        """Rest positions [W, 3] of the points numbered `which` [W]."""
+        """Return the positions before damage [W, 3] of the points with indices `which` [W]."""
         plane = self.plane.take(self.facet.take(which), axis=0)
         right, down = self.away.take(which, axis=1)[..., None]
         over_depth = plane[:, 0] + right * plane[:, 1] + down * plane[:, 2]
@@ -46,8 +53,16 @@ class Points:
 
 
 def surface_points(seen: Projected, size: tuple[int, int]) -> list[Points]:
-    """Every pixel centre in every facet, also outside an image of `size`: there on a grid that is
-    coarser the larger the facets are together, as Points of its own."""
+    """Return the points at all pixel centres in facets, also outside the image.
+
+    Args:
+        seen: The facets in the image. They need Facets.rest_mm.
+        size: Width and height of the image.
+
+    Returns:
+        One Points, or two if the facets are large: the points in the image, and points outside it
+        on a grid that is coarser for larger facets.
+    """
     if not len(seen.pixels):
         return []
     polygons, area = seen.polygons, np.prod(np.ptp(seen.pixels, axis=0))
@@ -69,7 +84,7 @@ def surface_points(seen: Projected, size: tuple[int, int]) -> list[Points]:
 
 
 def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Points:
-    """The centres of squares of `step` pixels along `runs`, which count such squares."""
+    """Return the points at the centres of squares of `step` pixels; `runs` consist of squares."""
     polygon, row, left, right = runs
     length = right - left
     ends = length.cumsum()
@@ -92,12 +107,12 @@ def _points(seen: Projected, runs: Runs, step: int, size: tuple[int, int]) -> Po
 
 
 def _planes(seen: Projected, which: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Origins [F, 2] in pixels and planes [F, 3, 4], as of Points, of the facets `which` [F]."""
+    """Return origins [F, 2] in pixels and Points.plane [F, 3, 4] of the facets `which` [F]."""
     assert seen.facets.rest_mm is not None
     over_depth = np.column_stack([seen.facets.rest_mm, np.ones(len(seen.depth_m))])
     over_depth /= seen.depth_m[:, None]
     points = seen.facets.corners.take(which, axis=0)
-    # three corners fix a plane: of more, as clipping leaves, those of the largest triangle of a fan
+    # three corners define a plane: the largest triangle of a fan over all corners
     corners = seen.pixels.take(points, axis=0)
     sides = corners[:, 1:] - corners[:, :1]
     doubled = sides[:, :-1, 0] * sides[:, 1:, 1] - sides[:, :-1, 1] * sides[:, 1:, 0]

@@ -1,4 +1,4 @@
-"""A scene's materials, layers and damages as the values of the shader's uniform blocks."""
+"""Values of the shaders' uniform blocks: materials, layers and damages of a scene."""
 
 from collections.abc import Iterable, Mapping
 from functools import cached_property
@@ -21,15 +21,15 @@ from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.object_ids import mask_values
 
 _TILE_OF_SCALE = 4.0
-"""A noise tile spans this many of its pattern's typical lengths."""
+"""Typical lengths of a noise pattern in one tile."""
 
 
 def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.ndarray]:
-    """(albedo and roughness, traits) of each material, float32 [M, 4] each.
+    """Return (albedo and roughness) and traits of each material, float32 [M, 4] each.
 
-    Traits: metallic, proneness to rust, share of the paint's layers. Albedo of hot-dip zinc:
-    the range for weathered galvanised steel lies about 0.35 to 0.5 (measured tables of building
-    materials); rubber and tar are near 0.03. Cables are steel under grease.
+    The traits are metallic, proneness to rust and share of the paint's layers. Weathered galvanised
+    steel has an albedo of about 0.35 to 0.5 (measured tables of building materials), rubber and tar
+    are near 0.03. Cables are greased steel.
     """
     paint = np.array(surface.paint.albedo)
     rough = surface.paint.roughness
@@ -97,7 +97,12 @@ class SceneMaterials:
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
-    """All members of SCENE_BLOCK for `scene`."""
+    """Return the members of SCENE_BLOCK.
+
+    Args:
+        scene: The scene.
+        background_size: Side of the background map in texels, 0 without one.
+    """
     surface = scene.surface
     base, trait = _materials(surface, scene.spreader)
     return {
@@ -127,7 +132,14 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
 def damage_values(
     scene: Scene, shown: tuple[Damage, ...], threshold_mm: float, inner_row: int
 ) -> Mapping[str, ArrayLike]:
-    """All members of DAMAGE_BLOCK for the damages of `scene` that are shown, at least one."""
+    """Return the members of DAMAGE_BLOCK.
+
+    Args:
+        scene: The scene.
+        shown: Those of its damages that are drawn, at least one.
+        threshold_mm: Displacement above which a surface counts as damaged.
+        inner_row: First row of the interior in the visibility buffer.
+    """
     valued = [
         (damage, value)
         for damage, value in zip(scene.damages, mask_values(scene.damages), strict=True)
@@ -156,7 +168,7 @@ def damage_values(
 
 
 def _squared_reach(damage: Damage) -> float:
-    """Of a ball that holds all pixels that it may change, in mm^2."""
+    """Return the squared radius in mm^2 of a ball around all pixels that a damage may change."""
     return float(np.square(np.array(reach_mm(damage)) + REACH_MARGIN_MM).sum())
 
 
