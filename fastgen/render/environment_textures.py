@@ -11,11 +11,13 @@ from fastgen.light.octahedral import BORDER
 from fastgen.light.sky_rays import SkyRays
 from fastgen.light.traced_light import DIRECTIONS
 from fastgen.render.gl import GLContext
+from fastgen.render.gl_enums import (
+    GL_RGB,
+    GL_RGB9_E5,
+    GL_TEXTURE_2D,
+    GL_UNSIGNED_INT_5_9_9_9_REV,
+)
 
-_TEXTURE_2D = 0x0DE1
-_RGB = 0x1907
-_RGB9_E5 = 0x8C3D
-_UNSIGNED_INT_5_9_9_9_REV = 0x8C3E
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 
@@ -65,13 +67,13 @@ def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
     moderngl does not know the pixel type, and the conversion from another type takes 60 ms.
     """
     size = texels.shape[0]
-    texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=_RGB9_E5)
+    texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=GL_RGB9_E5)
     texture.use()
     upload = gl.function(
         "glTexSubImage2D", None, _ENUM, _INT, *(_INT,) * 4, _ENUM, _ENUM, ctypes.c_void_p
     )
     address = np.ascontiguousarray(texels, np.uint32).ctypes.data
-    upload(_TEXTURE_2D, 0, 0, 0, size, size, _RGB, _UNSIGNED_INT_5_9_9_9_REV, address)
+    upload(GL_TEXTURE_2D, 0, 0, 0, size, size, GL_RGB, GL_UNSIGNED_INT_5_9_9_9_REV, address)
     return texture
 
 

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from fastgen.frame import Frame
 from fastgen.render.gl import GLContext
+from fastgen.render.gl_enums import GL_DEPTH_ATTACHMENT, GL_FRAMEBUFFER, GL_R32UI, GL_TEXTURE_2D
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.textures import FLOATS, NUMBERS, texture_clearing
 from fastgen.render.variant import listed_classes
 from fastgen.render.visibility_buffer import VisibilityBuffer
-
-_GL_R32UI = 0x8236
-_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D = 0x8D40, 0x8D00, 0x0DE1
 
 
 class ImageTargets:
@@ -65,7 +63,7 @@ class ImageTargets:
             return False
         # moderngl requires attachments of one size; the depth of holed scenes has more rows
         tested = self.samples.depth_buffer.glo
-        self._attach(_GL_FRAMEBUFFER, _GL_DEPTH_ATTACHMENT, _GL_TEXTURE_2D, tested, 0)
+        self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, tested, 0)
         return True
 
     def bind_images(self) -> None:
@@ -74,7 +72,7 @@ class ImageTargets:
         if self.radiance:
             color.bind_to_image(0, read=False, write=True)
         else:  # four bytes of display colour are stored as one number
-            color.bind_to_image(0, read=False, write=True, format=_GL_R32UI)
+            color.bind_to_image(0, read=False, write=True, format=GL_R32UI)
         labels.bind_to_image(1, read=False, write=True)
         depth.bind_to_image(2, read=False, write=True)
 

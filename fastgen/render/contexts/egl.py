@@ -2,7 +2,8 @@
 
 The calls are typed here and not taken from PyOpenGL, which supports one platform per process. Its
 EGL modules fail to import if PYOPENGL_PLATFORM is osmesa, and its OSMesa module fails to import
-otherwise, but contexts of both kinds may be open at once.
+otherwise, but contexts of both kinds may be open at once. Its OpenGL constants need libGL or
+libOpenGL at import time, which machines with EGL alone lack.
 """
 
 import ctypes
