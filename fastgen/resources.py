@@ -1,4 +1,4 @@
-"""Where the shaders and assets that ship with fastgen lie: in the wheel or in the source tree."""
+"""Paths of the bundled shaders and assets, in the wheel or in the source tree."""
 
 from functools import cache
 from importlib.util import find_spec
@@ -9,30 +9,35 @@ from fastgen.errors import AssetError
 
 @cache
 def _folder(name: str) -> Path:
-    # a wheel maps the top-level folder to the package fastgen.NAME; a checkout keeps it beside
+    # a wheel has the folder as package fastgen.NAME; a checkout has it beside the package
     spec = find_spec(f"fastgen.{name}")
     packaged = list(spec.submodule_search_locations or ()) if spec else []
     for folder in (*map(Path, packaged), Path(__file__).resolve().parent.parent / name):
         if folder.is_dir():
             return folder
-    raise AssetError(f"the folder {name} of fastgen is missing; install fastgen again")
+    raise AssetError(f"the folder {name} of fastgen is missing; reinstall fastgen")
 
 
 def _inside(folder: Path, parts: tuple[str, ...]) -> Path:
     path = folder.joinpath(*parts)
     if not path.exists():
-        raise AssetError(f"{path}: missing from this copy of fastgen; install it again")
+        raise AssetError(f"{path}: missing from this copy of fastgen; reinstall it")
     return path
 
 
 def asset_path(*parts: str) -> Path:
-    """Path of a bundled asset, for example `asset_path("hdri", "index.json")`.
+    """Return the path of a bundled asset, for example `asset_path("hdri", "index.json")`.
 
-    Raises AssetError where it does not exist.
+    Raises:
+        AssetError: if it does not exist.
     """
     return _inside(_folder("assets"), parts)
 
 
 def shader_path(*parts: str) -> Path:
-    """Path of a bundled shader file. Raises AssetError where it does not exist."""
+    """Return the path of a bundled shader file.
+
+    Raises:
+        AssetError: if it does not exist.
+    """
     return _inside(_folder("shaders"), parts)

@@ -1,9 +1,6 @@
-"""Sample: what one render gives to a writer or a loader, and the Objects that label it."""
+"""Sample: the result of one render, with the Objects that label it."""
 
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.frame import Frame
@@ -12,29 +9,37 @@ from fastgen.scene import Camera, Scene
 Box = tuple[int, int, int, int]
 """(x0, y0, x1, y1) in pixels, x1 and y1 exclusive."""
 
-
 Keypoint = tuple[float, float, int]
-"""x, y in pixels and COCO's flag: 0 outside the image (x = y = 0), 1 hidden, 2 visible."""
+"""x, y in pixels, and the flag of COCO: 0 outside the image (x = y = 0), 1 hidden, 2 visible."""
 
 
 @dataclass(frozen=True)
 class Object:
-    """One labelled thing in one image. Pixel coordinates as in camera.py.
+    """One labelled object in one image, in the pixel coordinates of camera/projection.py.
 
-    id: its value in the id target; of a damage, which that does not show, its value in the damage
-    target, which no other object has for its id. instance: 1, 2, ... within its class and scene.
-    bbox: tight box of its visible pixels, None where nothing is visible. amodal_bbox: exact bounds
-    of the whole thing beyond the near plane, neither occluded nor cut by the image border, in float
-    pixels; None where nothing of it is. area: visible pixels. visible_fraction: visible pixels over
-    those it would cover alone in an unbounded image, 0..1. truncated: some of it is seen and some
-    lies beyond the image. occluded: some of it is seen and something hides more of it than a pixel
-    or two of its edge. ignored: too little is seen to train on, see LabelConfig.
-    text: what it reads, '' for other things. polygon: projected outline, x0, y0, x1, y1, ... of the
-    whole thing; empty for the spreader, for damages and where part of it lies behind the camera.
-    quad: four corners of a decal in the order upper left, upper right, lower right, lower left as
-    it is read (of a marker left, top, right, bottom). reading: 'horizontal', or 'vertical' for
-    letters below one another; '' without text. keypoints: the container's casting corners, see
-    labels.CASTINGS.
+    Attributes:
+        id: Value in the id target. Damages are not in that target; their id is their value in the
+            damage target, which no other object has as its id.
+        class_name: Label class.
+        instance: Number within its class and scene: 1, 2, ...
+        bbox: Tight box of the visible pixels, None if nothing is visible.
+        amodal_bbox: Exact bounds of the whole object beyond the near plane, in pixels. They are not
+            reduced by occlusion or by the image border. None if the object is behind the near
+            plane.
+        area: Number of visible pixels.
+        visible_fraction: Visible pixels divided by those that the object would have in an unbounded
+            image without other objects, 0..1.
+        truncated: Whether the object is partly visible and partly outside the image.
+        occluded: Whether the object is partly visible and more of it is hidden than a pixel or two
+            along its edge.
+        ignored: Whether too little is visible for training, see LabelConfig.
+        text: Text of the object, '' for objects without text.
+        polygon: Projected outline x0, y0, x1, y1, ... of the whole object. Empty for the spreader,
+            for damages, and for objects that are partly behind the camera.
+        quad: Corners of a decal in reading order: upper left, upper right, lower right, lower left.
+            For a marker these are the left, top, right and bottom corner.
+        reading: 'horizontal', or 'vertical' if the letters are below one another; '' without text.
+        keypoints: Casting corners of the container in the order of labels.objects.CASTINGS.
     """
 
     id: int
@@ -56,21 +61,15 @@ class Object:
 
 @dataclass(frozen=True, eq=False)
 class Sample(Frame):
-    """A Frame with its labels, and the scene and camera it was made from.
-
-    normals: float32 [H, W, 3], unit normals in view space (x right, y down, z forward) to about a
-    hundredth, averaged like colours over the surfaces that a pixel sees, 0 where void; None unless
-    asked for.
-    """
+    """Frame with its labels, and the scene and camera that it shows."""
 
     scene: Scene
     camera: Camera
     view: View
     objects: list[Object]
-    normals: NDArray[np.float32] | None = None
 
     def __repr__(self) -> str:
-        """One line: a notebook shows what its last line gives, and arrays and scene fill pages."""
+        """Return one line, because notebooks print samples and arrays would fill pages."""
         width, height = self.view.size
         seen = sum(item.area > 0 for item in self.objects)
         return (

@@ -1,23 +1,23 @@
-"""sRGB's transfer function, IEC 61966-2-1, and its tables."""
+"""Transfer function of sRGB (IEC 61966-2-1), and its tables."""
 
 import numpy as np
 
 
 def linear(encoded: float) -> float:
-    """Linear light, 0..1, of an encoded value 0..1.
+    """Return the linear light 0..1 of an encoded value 0..1.
 
-    By Python's own power: NumPy's may differ in the last bit between processors, and scenes, which
-    are the same on every machine, hold what comes out.
+    Scenes contain the result and must be the same on every machine. Python's power function is, but
+    NumPy's may differ in the last bit between processors.
     """
     return encoded / 12.92 if encoded <= 0.04045 else float(((encoded + 0.055) / 1.055) ** 2.4)
 
 
 DECODED = np.array([linear(code / 255) for code in range(256)], np.float32)
-"""Linear light, float32 [256], of each 8-bit code."""
+"""Linear light of each 8-bit code, float32 [256]."""
 
 _STEPS = np.linspace(0, 1, 1 << 16)
 
 ENCODED = np.rint(
     255 * np.where(_STEPS <= 0.0031308, 12.92 * _STEPS, 1.055 * _STEPS ** (1 / 2.4) - 0.055)
 ).astype(np.uint8)
-"""8-bit codes, uint8 [65536], of linear light in steps of 1 / 65535."""
+"""8-bit codes of linear light in steps of 1 / 65535, uint8 [65536]."""

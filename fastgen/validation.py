@@ -132,7 +132,7 @@ class _Strict:
 
 
 def _refusing(kind: str, schema: "CoreSchema", **context: Any) -> "CoreSchema":
-    """Return a schema whose errors are of type `kind` and carry `context`, for `_in_words`."""
+    """Return a schema whose errors have type `kind` and the `context` for `_in_words`."""
     from pydantic_core import core_schema
 
     return core_schema.custom_error_schema(
@@ -213,8 +213,8 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
     """
     try:
         values = _over(base, data)
-    except RecursionError:
-        raise ConfigError(f"{path or cls.__name__}: a value contains itself") from None
+    except RecursionError:  # a value contains itself, so no field accepts it
+        values = data
     made: T = _validated(cls, values, path, strict=None)
     return made
 

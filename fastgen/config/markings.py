@@ -23,13 +23,13 @@ _Face = Annotated[str, OneOf(SHEET_FACES)]
 class MarkingsConfig:
     """Markers, identifiers, brands and stickers (SeaFront paper, 3.3.3, Algorithms A1 and A2).
 
-    A decal that finds no room is left out.
+    Decals without room are left out.
 
     Attributes:
         marker_faces: Faces with dangerous-goods markers.
         markers_per_face: Number of markers on each of these faces; all numbers are equally likely.
-            Fewer are placed if there is no room, which is frequent on doors, beside texts and
-            plates.
+            Fewer are placed if there is no room, as is frequent beside the texts and plates
+            of doors.
         marker_side_mm: Side of the square. IMDG Code 5.2.2.2.1.1 requires 250 mm on containers.
         marker_gap_mm: Gap between markers.
         marker_tilt_deg: Tilt of each marker.
