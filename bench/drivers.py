@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
+import imageio.v3 as iio
 import numpy as np
 import results  # noqa: F401 makes the fastgen of this checkout importable
 
@@ -53,13 +53,7 @@ def checked(one: Path, other: Path) -> list[dict[str, Any]]:
 def pairs(one: Path, other: Path, pattern: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield the images with the same name in both folders."""
     for path in sorted(one.glob(pattern)):
-        first, second = (
-            cv2.imread(str(folder / path.relative_to(one)), cv2.IMREAD_UNCHANGED)
-            for folder in (one, other)
-        )
-        assert first is not None
-        assert second is not None
-        yield first, second
+        yield iio.imread(path), iio.imread(other / path.relative_to(one))
 
 
 def boxes(folder: Path, task: str) -> dict[tuple[str, int, int], np.ndarray]:

@@ -13,8 +13,7 @@ from fastgen.cli.options import (
     render_settings,
 )
 from fastgen.errors import ConfigError
-from fastgen.export import export_glb
-from fastgen.files.images import jpeg, png, write
+from fastgen.files.images import PICTURE_TYPES, encode_picture, write
 from fastgen.generator import Generator, find_camera
 from fastgen.preview import PREVIEW_LAYERS, preview
 
@@ -83,18 +82,20 @@ def add_export(commands: Any) -> None:
 
 
 def _show(options: argparse.Namespace) -> int:
-    encode = {".png": png, ".jpg": jpeg, ".jpeg": jpeg}.get(options.file.suffix.lower())
-    if encode is None:
+    suffix = options.file.suffix.lower()
+    if suffix not in PICTURE_TYPES:
         raise ConfigError(f"{options.file}: give a file name that ends in .png or .jpg")
     with Generator.of(config_of(options), options.seed, render_settings(options)) as generator:
         picture = preview(generator, options.index, options.camera, options.layer, options.overlay)
-    write(options.file, encode(picture))
+    write(options.file, encode_picture(picture, suffix))
     return 0
 
 
 def _export(options: argparse.Namespace) -> int:
     if options.file.suffix.lower() != ".glb":
         raise ConfigError(f"{options.file}: give a file name that ends in .glb")
+    from fastgen.export import export_glb  # here because trimesh takes a second to import
+
     with Generator.of(config_of(options), options.seed, render_settings(options)) as generator:
         scene = generator.scene(options.index)
         cameras = None if options.camera is None else [find_camera(scene, options.camera)]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.errors import OutputError
+from fastgen.files.images import decode
 from fastgen.formats import Format
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
@@ -61,11 +62,7 @@ def contact_sheet(
 
 
 def _tile(out: Path, path: Path, formats: Sequence[Format]) -> NDArray[np.uint8]:
-    # cv2.imread ends the process if the path is not UTF-8
-    stored = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
-    if stored is None:
-        raise ValueError("not an image")
-    image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB)
+    image = decode(path.read_bytes())
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
     tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

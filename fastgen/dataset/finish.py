@@ -13,7 +13,7 @@ from fastgen.dataset.job import Job, manifest_path
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
-from fastgen.files.images import png
+from fastgen.files.images import encode_picture
 from fastgen.formats import Format, Record, formats_of
 from fastgen.sampling.scene import SPLITS
 
@@ -60,7 +60,8 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
                 for path, content in each.dataset_files(split, _records(job, storage, split)):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder) and images:
-            put(CONTACT_SHEET, [png(contact_sheet(storage.root, images, formats))])
+            sheet = contact_sheet(storage.root, images, formats)
+            put(CONTACT_SHEET, [encode_picture(sheet, ".png")])
     result = {
         **settings,
         **makers[0],

@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, SEGMENTATION_CLASSES
-from fastgen.files.images import png
+from fastgen.files.images import decode, png
 from fastgen.formats import (
     DatasetFiles,
     Files,
@@ -116,8 +115,12 @@ def _outline_faults(found: list[tuple[int, list[float]]]) -> Iterator[str]:
 def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str, Any]]) -> str:
     """Compare a mask file with annotations; '' if it has the same parts."""
     width, height = size
-    mask = cv2.imdecode(np.frombuffer(png_file, np.uint8), cv2.IMREAD_UNCHANGED)
-    if mask is None or mask.shape != (height, width) or mask.dtype != np.uint16:
+    try:
+        mask = decode(png_file)
+        complete = mask.shape == (height, width) and mask.dtype == np.uint16
+    except ValueError:
+        complete = False
+    if not complete:
         return f"not a complete 16-bit PNG of {width}x{height}"
     parts = [(1, mask > 0)] if mask.any() else []
     parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
