@@ -14,7 +14,8 @@ from fastgen.camera.weather import _streaks, add_fog, add_rain
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
-from fastgen.scene import Camera, Scene
+from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from tests.test_environment import write_exr
 from tests.tone_inverse import light_of
@@ -47,6 +48,50 @@ def test_extreme_light_is_tone_mapped_to_black_or_white():
     image = tone_map_and_encode(light)
     assert (image[0, :3] >= 254).all()
     assert (image[0, 3] == 0).all()
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced"])
+def test_the_renderer_and_numpy_tone_map_alike(quality):
+    """Images differ by less than half a code from the exact tone curve of the linear frame."""
+    with Generator(seed=11, size=SIZE, quality=quality) as generator:
+        prepared = PreparedScene(generator.scene(0))
+        camera = prepared.scene.camera("B")
+        with generator.gpu.drawing() as renderer:
+            shown = renderer.render(prepared, camera, SIZE)
+            linear = renderer.render(prepared, camera, SIZE, radiance=True)
+    for name in ("ids", "damage", "depth", "cover"):
+        np.testing.assert_array_equal(getattr(linear, name), getattr(shown, name))
+    assert linear.radiance.max() > 1
+    exact = [[tone(pixel) for pixel in row] for row in linear.radiance.tolist()]
+    # rounding to a code, and the shader's polynomial for the sRGB curve
+    np.testing.assert_allclose(shown.image, exact, atol=0.5 + 0.06)
+    apart = np.abs(tone_map_and_encode(linear.radiance).astype(int) - shown.image)
+    assert apart.max() <= 1
+    assert apart.mean() < 0.05
+
+
+def test_defocus_keeps_the_radiance_of_a_rendered_lamp(tmp_path):
+    """A blurred lamp is brighter if the HDRI has more radiance, although both clip to white."""
+    images = {}
+    for radiance in (2.0, 50.0):
+        sky = np.full((128, 256, 3), 0.02, np.float32)
+        sky[60:64, 60:64] = radiance  # in front of a camera that looks along +y
+        write_exr(tmp_path / f"{radiance:g}.exr", sky)
+    defocus = Sensor(defocus=Defocus(300, 1.4))
+    camera = Camera("T", (0, 9000, 1200), (0, 20000, 1200), 35.0, sensor=defocus, exposure_ev=0.0)
+    with Generator(seed=6, size=SIZE, hdri_dir=tmp_path) as generator:
+        for radiance in (2.0, 50.0):
+            environment = EnvironmentView(f"{radiance:g}", 0.0)
+            scene = replace(generator.scene(2), environment=environment)
+            # the same exposure for both
+            stops = np.log2(generator.exposure(scene, camera))
+            shot = replace(camera, exposure_ev=float(-stops))
+            images[radiance] = generator.render(scene=scene, camera=shot).image.astype(int)
+            sharp = generator.render(scene=scene, camera=replace(shot, sensor=None)).image
+            assert sharp.max() > 240
+    lit = images[2.0] > images[2.0].min() + 10
+    assert lit.any()
+    assert images[50.0][lit].mean() > images[2.0][lit].mean() + 20
 
 
 def test_vignetting_follows_the_fourth_power_of_a_cosine():
