@@ -6,9 +6,17 @@ import pytest
 from PIL import Image, ImageDraw, ImageFont
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.decals.artwork import ART_SIZE, art_images, brands, glyph_tiles, mip_levels, stickers
+from fastgen.decals.artwork import (
+    ART_SIZE,
+    art_images,
+    art_layers,
+    brands,
+    glyph_tiles,
+    mip_levels,
+    stickers,
+)
 from fastgen.render.gl import open_context
-from fastgen.render.textures import art_texture
+from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path
 
 RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125, 26)
@@ -34,14 +42,14 @@ FIELDS = {
 
 
 def test_all_markers_come_first_and_in_class_order():
-    images, layers = art_images()
+    images, layers = art_images(), art_layers()
     assert images.shape[1:] == (ART_SIZE, ART_SIZE, 4)
     assert [layers[name] for name in MARKER_CLASSES] == list(range(26))
 
 
 @pytest.mark.parametrize("name", MARKER_CLASSES)
 def test_a_marker_fills_the_diamond_exactly(name):
-    images, layers = art_images()
+    images, layers = art_images(), art_layers()
     alpha = images[layers[name], ..., 3] / 255
     at = (np.arange(ART_SIZE) + 0.5) / ART_SIZE - 0.5
     inside = 0.5 - np.abs(at)[None] - np.abs(at)[:, None]
@@ -52,7 +60,7 @@ def test_a_marker_fills_the_diamond_exactly(name):
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_fields_have_their_regulation_colours(name):
-    images, layers = art_images()
+    images, layers = art_images(), art_layers()
     image = images[layers[name]].astype(int)
     upper, lower = image[int(0.44 * 512), int(0.15 * 512)], image[int(0.56 * 512), int(0.14 * 512)]
     assert np.abs(upper[:3] - FIELDS[name][0]).max() <= 12
@@ -60,7 +68,7 @@ def test_fields_have_their_regulation_colours(name):
 
 
 def test_markers_are_visibly_different_at_48_px():
-    images, _ = art_images()
+    images = art_images()
     small = np.stack(
         [cv2.resize(i[..., :3], (48, 48), interpolation=cv2.INTER_AREA) for i in images[:26]]
     ).astype(float)
@@ -104,7 +112,7 @@ def test_every_font_ships_its_licence():
 
 
 def test_stickers_and_emblems_have_art():
-    _, layers = art_images()
+    layers = art_layers()
     assert all(name in layers for name in stickers())
     assert all(brand.emblem in layers for brand in brands())
 
@@ -149,8 +157,9 @@ def test_the_gpu_samples_the_computed_mip_levels():
         found[level] = textureLod(art, vec3(corner, 2.0), float(level));
     }
     """
+    levels = zip(*map(mip_levels, images), strict=True)
     with open_context() as gl:
-        art_texture(gl, images).use(0)
+        levelled_texture(gl, [images, *map(np.stack, levels)]).use(0)
         found = gl.ctx.buffer(reserve=4 * 16)
         found.bind_to_storage_buffer(0)
         gl.ctx.compute_shader(code).run(4)

@@ -1,5 +1,6 @@
 """Markers, stickers, emblems and glyphs as arrays, read from the packaged assets."""
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,8 +15,11 @@ from numpy.typing import NDArray
 
 from fastgen.classes import MARKER_CLASSES
 from fastgen.errors import AssetError
+from fastgen.files import disk_cache
 from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
+
+VERSION = 1  # raise when the stored arrays change
 
 ART_SIZE = 512
 """Width and height of an artwork image, texels."""
@@ -89,21 +93,53 @@ class Brand:
 
 
 @lru_cache(maxsize=1)
-def art_images() -> tuple[NDArray[np.uint8], Mapping[str, int]]:
+def art_layers() -> Mapping[str, int]:
+    """Return the layer of each artwork by name: markers in class order, then stickers, emblems."""
+    return MappingProxyType(
+        {name: i for i, name in enumerate((*MARKER_CLASSES, *sorted(_index())))}
+    )
+
+
+def art_images() -> NDArray[np.uint8]:
     """Return all artwork.
 
     Returns:
-        Images, uint8 [K, ART_SIZE, ART_SIZE, 4], sRGB with straight alpha, row 0 at the top; and
-        the layer of each name. Markers come first, in class order, then stickers and emblems.
+        uint8 [K, ART_SIZE, ART_SIZE, 4], sRGB with straight alpha, row 0 at the top, in the order
+        of `art_layers`.
 
     Raises:
         AssetError: A file is missing or broken.
     """
-    paths = {name: asset_path("markers", f"{name}.png") for name in MARKER_CLASSES}
-    paths |= {name: asset_path("stickers", f"{name}.png") for name in sorted(_index())}
-    images = np.stack([_image(path, 4, ART_SIZE) for path in paths.values()])
-    images = np.ascontiguousarray(images[..., [2, 1, 0, 3]])
-    return images, MappingProxyType({name: i for i, name in enumerate(paths)})
+    images = np.stack([_image(path, 4, ART_SIZE) for path in _art_paths()])
+    return np.ascontiguousarray(images[..., [2, 1, 0, 3]])
+
+
+def art_levels() -> list[NDArray[np.uint8]]:
+    """Return `art_images` and its mip levels, from the disk cache if possible.
+
+    Returns:
+        uint8 [K, N, N, 4] for N = ART_SIZE, ART_SIZE / 2, ... 1.
+
+    Raises:
+        AssetError: A file is missing or broken.
+    """
+    digest = hashlib.sha256()
+    for path in _art_paths():
+        digest.update(path.read_bytes() if path.exists() else b"")
+
+    def make() -> dict[str, NDArray[np.uint8]]:
+        images = art_images()
+        levels = zip(*map(mip_levels, images), strict=True)
+        return {f"level{i}": level for i, level in enumerate([images, *map(np.stack, levels)])}
+
+    return list(disk_cache.cached("art", VERSION, digest.hexdigest(), make).values())
+
+
+def _art_paths() -> list[Path]:
+    return [
+        asset_path("markers" if name in MARKER_CLASSES else "stickers", f"{name}.png")
+        for name in art_layers()
+    ]
 
 
 def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:

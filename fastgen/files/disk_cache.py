@@ -1,15 +1,21 @@
-"""Arrays kept on disk from one run to the next. Losing them costs time only."""
+"""Arrays on disk that several processes share. Losing them only costs time.
+
+An entry is one .npy file with a structured array of a single record, whose fields are the arrays.
+Processes map the file read-only, so they share its pages in memory.
+"""
 
 import contextlib
 import fcntl
 import hashlib
 import importlib.metadata
+import mmap
 import os
 import tempfile
 import time
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,17 +23,28 @@ from numpy.typing import NDArray
 
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
 
-T = TypeVar("T")
-
 LIMIT_BYTES = 4 << 30
-"""Of a folder; beyond it, what was not read for longest goes. About 240 lights."""
+"""Largest size of a folder, about 240 environments; the least recently read entries go first."""
+
+_LIBRARIES = (np.__version__, cv2.__version__, importlib.metadata.version("scipy"))
+"""Versions of the libraries that compute the arrays; their results differ between releases."""
+
+_CHECKSUM = "checksum"
+
+_HEX = 32 * "[0-9a-f]"
+_OLD_FORMAT = (f"*-{_HEX}.npz", f"{_HEX}-[0-9]*.npz")
+"""Globs of entries that fastgen 0.23 and earlier wrote."""
+
+Arrays = dict[str, NDArray[Any]]
 
 
 def default_folder() -> Path:
-    """$XDG_CACHE_HOME/fastgen or ~/.cache/fastgen; for a user without a home, one of the user's
-    own among temporary files."""
+    """Return $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen.
+
+    A user without a home directory gets a folder in the directory for temporary files.
+    """
     base = os.environ.get("XDG_CACHE_HOME", "")
-    # the XDG base directory specification asks to ignore relative paths
+    # the XDG base directory specification says to ignore relative paths
     if os.path.isabs(base):
         return Path(base) / "fastgen"
     try:
@@ -36,80 +53,97 @@ def default_folder() -> Path:
         return Path(tempfile.gettempdir()) / f"fastgen-{os.getuid()}"
 
 
-def read(entry: Path) -> dict[str, NDArray[np.generic]]:
-    """The arrays of an entry by name; none where it is absent or damaged."""
-    try:
-        with np.load(entry, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        with contextlib.suppress(OSError):  # few disks note when a file is read, and _trim asks
-            os.utime(entry)
-        return arrays
-    except Exception:  # an archive can be damaged in many ways
-        return {}
+def cached(
+    name: str,
+    version: int,
+    inputs: object,
+    make: Callable[[], Mapping[str, NDArray[Any]]],
+    folder: Path | None = None,
+) -> Arrays:
+    """Return the arrays of an entry, and make and store them if the entry is missing or damaged.
 
+    If several processes need a missing entry, one makes it and the others wait. Without a writable
+    folder, every process makes it.
 
-def write(entry: Path, arrays: Mapping[str, Any], compress: bool = False) -> None:
-    """Keep arrays by name as an entry, whole or not at all; none without a writable folder."""
-    with contextlib.suppress(OSError):
-        entry.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(entry, durable=False) as file:
-            (np.savez_compressed if compress else np.savez)(file, **arrays)
-        _trim(entry.parent)
+    Args:
+        name: Name of the producer, unique in the package.
+        version: Version of the producer; a new one makes all its entries again.
+        inputs: Everything else that the arrays depend on; its `repr` is part of the key.
+        make: Returns the arrays by name.
+        folder: Folder of the entries, by default `default_folder()`.
 
-
-def once(entry: Path, read: Callable[[], T | None], make: Callable[[], T]) -> T:
-    """What `read` finds of an entry; where that is None, what `make` makes of it and writes.
-
-    Of many workers that miss it one makes it, and the others then read it.
+    Returns:
+        Read-only arrays by name, mapped from the file where possible.
     """
-    found = read()
-    if found is None:
+    key = hashlib.sha256(f"{version} {_LIBRARIES} {inputs!r}".encode()).hexdigest()
+    entry = (folder or default_folder()) / f"{name}-{key[:32]}.npy"
+    arrays = read(entry)
+    if arrays is None:
         with _alone(entry):
-            found = read()
-            if found is None:
-                found = make()
-    return found
-
-
-def computed(
-    name: str, inputs: object, make: Callable[[], Mapping[str, NDArray[Any]]]
-) -> dict[str, NDArray[Any]]:
-    """What `make` gives, arrays by name, read-only; read where the same code gave it before.
-
-    inputs: all that it hangs on but for the package's own code, told apart by its repr.
-    """
-    key = hashlib.sha256(f"{_CODE} {inputs!r}".encode()).hexdigest()
-    entry = default_folder() / f"{name}-{key[:32]}.npz"
-
-    def made() -> dict[str, NDArray[Any]]:
-        arrays = dict(make())
-        write(entry, arrays)
-        return arrays
-
-    arrays = once(entry, lambda: read(entry) or None, made)
-    for array in arrays.values():  # callers keep and share them
+            arrays = read(entry)
+            if arrays is None:
+                made = dict(make())
+                write(entry, made)
+                arrays = read(entry) or made  # the mapped pages are shared, the made ones are not
+    for array in arrays.values():
         array.flags.writeable = False
     return arrays
 
 
-def _code_digest(folder: Path) -> str:
-    """Of the modules in a folder and below, and of the versions of what they compute with: a number
-    that somebody must raise would be forgotten. Scripts that draw assets compute nothing here."""
-    versions = np.__version__, cv2.__version__, importlib.metadata.version("scipy")
-    digest = hashlib.sha256(repr(versions).encode())
-    for module in sorted(folder.rglob("*.py")):
-        if module.relative_to(folder).parts[0] != "assets":
-            digest.update(module.read_bytes())
-    return digest.hexdigest()
+def read(entry: Path) -> Arrays | None:
+    """Return the arrays of an entry by name; None if it is missing or damaged."""
+    try:
+        record = _mapped(entry)
+        if record[_CHECKSUM][0] != _checksum(record):
+            return None
+        with contextlib.suppress(OSError):  # _trim needs the time, which few file systems record
+            os.utime(entry)
+        return {
+            name: record[name][0, ...] for name in record.dtype.names or () if name != _CHECKSUM
+        }
+    except Exception:  # a file can be damaged in many ways
+        return None
 
 
-_CODE = _code_digest(Path(__file__).parent)
-"""Read with the modules: files that change later are not the code that runs."""
+def write(entry: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Store arrays by name as an entry, whole or not at all; do nothing if it cannot be written."""
+    fields = [(name, array.dtype, array.shape) for name, array in arrays.items()]
+    record = np.zeros(1, np.dtype([(_CHECKSUM, np.uint32), *fields], align=True))
+    for name, array in arrays.items():
+        record[name][0] = array
+    record[_CHECKSUM] = _checksum(record)
+    with contextlib.suppress(OSError):
+        entry.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(entry, durable=False) as file:
+            np.save(file, record, allow_pickle=False)
+        _trim(entry.parent)
+
+
+def unload(array: NDArray[Any]) -> None:
+    """Take a mapped array's pages out of this process's memory; they are mapped again when read."""
+    base: object = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    if isinstance(base, mmap.mmap):
+        base.madvise(mmap.MADV_DONTNEED)
+
+
+def _mapped(entry: Path) -> NDArray[np.void]:
+    try:
+        return np.asarray(np.load(entry, mmap_mode="r", allow_pickle=False))
+    except OSError:  # some network file systems cannot map files
+        return np.asarray(np.load(entry, allow_pickle=False))
+
+
+def _checksum(record: NDArray[np.void]) -> int:
+    """Return the CRC-32 of the names, types and values of all fields after the checksum itself."""
+    described = zlib.crc32(repr(record.dtype.descr).encode())
+    return zlib.crc32(record.view(np.uint8)[np.dtype(np.uint32).itemsize :].data, described)
 
 
 @contextlib.contextmanager
 def _alone(entry: Path) -> Iterator[None]:
-    """While inside, no other worker is inside for the same entry. A process that ends lets go.
+    """Exclude other processes from the same entry. The lock of a process ends with the process.
 
     Where files cannot be locked, nobody waits.
     """
@@ -124,15 +158,20 @@ def _alone(entry: Path) -> Iterator[None]:
 
 
 def _trim(folder: Path) -> None:
-    """Remove entries, oldest first, until the rest is within LIMIT_BYTES, and what killed processes
-    left."""
+    """Remove the least recently read entries beyond LIMIT_BYTES, and files without a use.
+
+    These are entries in an old format, and partial files and locks of processes that were killed.
+    """
+    for pattern in _OLD_FORMAT:
+        for old in folder.glob(pattern):
+            old.unlink(missing_ok=True)
     yesterday = time.time() - 24 * 3600
     for pattern in (ASIDE_FILES, "*.lock"):
         for left in folder.glob(pattern):
             with contextlib.suppress(FileNotFoundError):
                 if left.stat().st_mtime < yesterday:
                     left.unlink()
-    found = [(entry, entry.stat()) for entry in folder.glob("*.npz")]
+    found = [(entry, entry.stat()) for entry in folder.glob("*.npy")]
     spare = sum(about.st_size for _, about in found) - LIMIT_BYTES
     for entry, about in sorted(found, key=lambda one: one[1].st_mtime):
         if spare <= 0:

@@ -34,6 +34,8 @@ from fastgen.geometry.unfold import assemble
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.validation import check_known
 
+VERSION = 1  # raise when the stored arrays change
+
 NOMINAL_PROFILES = WallProfiles()
 
 _EDGE_LIMITS_MM = (25.0, 2000.0)
@@ -64,6 +66,7 @@ def build_container(
         raise ConfigError(f"max_edge_mm: {max_edge_mm:g} is outside {low:g} to {high:g} mm")
     return stored(
         "container",
+        VERSION,
         (kind, profiles, max_edge_mm),
         lambda: _assembled(Layout(KINDS[kind], profiles, max_edge_mm)),
     )

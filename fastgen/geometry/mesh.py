@@ -18,6 +18,8 @@ from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
 from fastgen.scene.faces import FACES, SHEET_FACES
 
+VERSION = 1  # raise when the stored arrays change
+
 MATERIALS = (
     *("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside"),
     *("spreader", "cable"),
@@ -224,7 +226,7 @@ class Mesh:
 
             return {"hull": np.asarray(ConvexHull(self.points_mm).vertices, np.int64)}
 
-        return disk_cache.computed("hull", self.shape_digest, found)["hull"]
+        return disk_cache.cached("hull", VERSION, self.shape_digest, found)["hull"]
 
     @cached_property
     def shape_digest(self) -> str:

@@ -29,6 +29,8 @@ from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.limits import GAP_LIMITS_MM
 from fastgen.validation import check_known
 
+VERSION = 1  # raise when the stored arrays change
+
 CABLE_TIER = TIERS.index("cables")
 
 USUAL_GAP_MM = 15.0
@@ -72,7 +74,7 @@ def touching_spreader(kind: str, flippers_down: tuple[bool, bool], cut_mm: float
     """
     check_known("container kind", kind, KINDS)
     inputs = kind, flippers_down, cut_mm
-    return stored("spreader", inputs, lambda: _built(*inputs))
+    return stored("spreader", VERSION, inputs, lambda: _built(*inputs))
 
 
 def check_gap(gap_mm: float) -> None:

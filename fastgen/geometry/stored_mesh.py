@@ -1,4 +1,4 @@
-"""Meshes that are built once and then read from the disk cache."""
+"""Meshes as entries of the disk cache."""
 
 import json
 from collections.abc import Callable
@@ -12,9 +12,16 @@ from fastgen.geometry.mesh import Chart, Mesh, Zone
 _ARRAYS = ("positions_mm", "normals", "atlas_mm", "zone", "triangles")
 
 
-def stored(name: str, inputs: object, build: Callable[[], Mesh]) -> Mesh:
-    """What `build` gives for `inputs`, its arrays read-only; see disk_cache.computed."""
-    arrays = disk_cache.computed(name, inputs, lambda: _packed(build()))
+def stored(name: str, version: int, inputs: object, build: Callable[[], Mesh]) -> Mesh:
+    """Return a mesh with read-only arrays from the disk cache, and build it if it is not there.
+
+    Args:
+        name: Name of the producer.
+        version: Version of the producer.
+        inputs: Everything else that the mesh depends on.
+        build: Returns the mesh.
+    """
+    arrays = disk_cache.cached(name, version, inputs, lambda: _packed(build()))
     about = json.loads(arrays["about"].tobytes())
     return Mesh(
         **{key: arrays[key] for key in _ARRAYS},

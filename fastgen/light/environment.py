@@ -5,7 +5,6 @@ Rec. 709 primaries. The yaw, in degrees, turns the environment about +z, counter
 above: radiance(direction) = map(Rz(-yaw) direction).
 """
 
-import contextlib
 import functools
 import hashlib
 from dataclasses import dataclass, fields
@@ -22,8 +21,7 @@ from fastgen.light.directional_lights import DirectionalLight, extract_lights
 from fastgen.light.hdri import HALF_MAX, load_radiance
 from fastgen.scene import REC_709
 
-PREFILTER_VERSION = 12
-"""Part of the cache key; increase it whenever the prefiltered arrays change."""
+VERSION = 1  # raise when the stored arrays change
 
 ROUGHNESS_LEVELS = (0.05, 0.1, 0.18, 0.28, 0.4, 0.55, 0.75, 1.0)
 """Perceptual roughness of each layer of `EnvironmentLight.specular`; interpolate linearly."""
@@ -37,7 +35,6 @@ _LUMINANCE_FLOOR = 1e-6  # keeps one black texel from turning a log average to 0
 _DARKEST = 1e-5  # darker maps show the steps of half floats
 _BRIGHTEST = 1e4  # radiance up to six times the mean still fits half floats
 _SKY_CELLS = 42  # along a side of `Ambient.sky`; 5 degrees each
-_MAPS = ("specular", "irradiance", "background", "luminance", "lights")
 _LIGHTS_WIDTH = 2048  # a texel is a third of the diameter of the sun
 _MAX_WORK_WIDTH = 8192  # a background texel covers about two of its texels
 
@@ -144,7 +141,7 @@ def _light(
         specular=specular.astype(np.float32),
         irradiance=irradiance.astype(np.float32),
         background=background,
-        luminance=luminance,
+        luminance=np.array(luminance),  # a view would keep the whole mapped entry
         mean_luminance=float(weight @ luminance.sum(axis=1, dtype=np.float64)),
         lights=lights,
         sky=_sky_cells(specular[0].astype(np.float32)),
@@ -178,69 +175,47 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
             key = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise AssetError(f"{path}: cannot read this HDRI: {error.strerror}") from None
-    folder = Path(cache_dir) if cache_dir is not None else disk_cache.default_folder()
-    entry = folder / f"{key[:32]}-{PREFILTER_VERSION}.npz"
-
-    def make() -> EnvironmentLight:
-        made = prefilter_environment(path.stem, load_radiance(path))
-        _write_cache(made, entry)
-        _remove_earlier(entry)
-        return made
-
-    cached = disk_cache.once(entry, lambda: _read_cache(path.stem, entry), make)
-    if cached.mean_luminance > _BRIGHTEST:
+    folder = None if cache_dir is None else Path(cache_dir)
+    light = _unpacked(
+        path.stem,
+        disk_cache.cached(
+            "environment",
+            VERSION,
+            key,
+            lambda: _packed(prefilter_environment(path.stem, load_radiance(path))),
+            folder,
+        ),
+    )
+    if light.mean_luminance > _BRIGHTEST:
         raise AssetError(
-            f"{path}: is too bright, with a mean luminance of {cached.mean_luminance:.2g}; scale "
+            f"{path}: is too bright, with a mean luminance of {light.mean_luminance:.2g}; scale "
             f"it to {_BRIGHTEST:g} or less"
         )
-    if cached.mean_luminance < _DARKEST:
+    if light.mean_luminance < _DARKEST:
         raise AssetError(
-            f"{path}: is dark, with a mean luminance of {cached.mean_luminance:.2g}; an HDRI must "
+            f"{path}: is dark, with a mean luminance of {light.mean_luminance:.2g}; an HDRI must "
             f"have {_DARKEST:g} or more to be exposed"
         )
-    return cached
+    return light
 
 
-def _read_cache(name: str, entry: Path) -> EnvironmentLight | None:
-    stored = disk_cache.read(entry)
-    try:
-        specular, irradiance, background, luminance, lights = (stored[field] for field in _MAPS)
-    except KeyError:
-        return None
-    if specular.shape != (len(ROUGHNESS_LEVELS), SPECULAR_SIZE, SPECULAR_SIZE, 3):
-        return None
-    return _light(
-        name,
-        specular.astype(np.float16),
-        irradiance.astype(np.float16),
-        background.astype(np.uint32),
-        luminance.astype(np.float32),
-        _unpacked_lights(lights.astype(np.float64)),
-    )
+def _packed(light: EnvironmentLight) -> disk_cache.Arrays:
+    return {
+        "specular": light.specular.astype(np.float16),
+        "irradiance": light.irradiance.astype(np.float16),
+        "background": light.background,
+        "luminance": light.luminance,
+        "lights": np.array([[*each.direction, *each.light, each.radius] for each in light.lights]),
+    }
 
 
-def _unpacked_lights(stored: NDArray[np.float64]) -> tuple[DirectionalLight, ...]:
-    rows = stored.reshape(-1, 7).tolist()
-    return tuple(
+def _unpacked(name: str, arrays: disk_cache.Arrays) -> EnvironmentLight:
+    rows = arrays["lights"].reshape(-1, 7).tolist()
+    lights = tuple(
         DirectionalLight((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows
     )
-
-
-def _write_cache(light: EnvironmentLight, entry: Path) -> None:
-    specular, irradiance = light.specular.astype(np.float16), light.irradiance.astype(np.float16)
-    lights = np.array([[*each.direction, *each.light, each.radius] for each in light.lights])
-    maps = (specular, irradiance, light.background, light.luminance, lights)
-    disk_cache.write(entry, dict(zip(_MAPS, maps, strict=True)))
-
-
-def _remove_earlier(entry: Path) -> None:
-    """Remove entries of the same HDRI with an earlier version; each takes 17 MB."""
-    key = entry.stem.rpartition("-")[0]
-    for other in entry.parent.glob(f"{key}-*.npz"):
-        version = other.stem.rpartition("-")[2]
-        if version.isdecimal() and int(version) < PREFILTER_VERSION:
-            with contextlib.suppress(OSError):
-                other.unlink()
+    maps = (arrays[field] for field in ("specular", "irradiance", "background", "luminance"))
+    return _light(name, *maps, lights)
 
 
 def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
@@ -270,7 +245,7 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
     """Return irradiance / pi, float32 [K, 3], by world normals [K, 3], without `env.lights`.
 
-    The numpy twin of diffuse_radiance() in shaders/ibl.glsl.
+    The numpy twin of diffuse_radiance() in shaders/environment_light.glsl.
     """
     return octahedral.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 

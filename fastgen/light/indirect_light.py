@@ -7,7 +7,8 @@ Progressive Radiosity).
 """
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.solids import Body
+
+VERSION = 1  # raise when the stored arrays change
 
 _CELL_MM = 500.0
 """Approximate width of the container's emitting cells. The visibility of the sky on the roof below
@@ -49,31 +52,48 @@ Array = NDArray[np.floating]
 Numbers = NDArray[np.integer]
 
 
+@dataclass(frozen=True, eq=False)
 class Links:
     """Sparse matrix of form factors between receivers and emitters.
 
-    Args:
-        receiver: int [K], receiver of each ray.
-        emitter: int [K], emitter that each ray hits. Pairs may occur several times.
-        weight: [K], share of the ray in the cosine-weighted hemisphere of its receiver.
+    Attributes:
+        receiver: int [R], receivers with any emitter.
+        start: int [R], first entry of each receiver in `emitter` and `weight`.
+        emitter: int [K], emitter of each form factor.
+        weight: float32 [K], the form factors.
     """
 
-    def __init__(self, receiver: Numbers, emitter: Numbers, weight: Array) -> None:
+    receiver: NDArray[np.intp]
+    start: NDArray[np.intp]
+    emitter: NDArray[np.intp]
+    weight: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, receiver: Numbers, emitter: Numbers, weight: Array) -> Self:
+        """Sum the rays between each receiver and each emitter.
+
+        Args:
+            receiver: int [K], receiver of each ray.
+            emitter: int [K], emitter that each ray hits. Pairs may occur several times.
+            weight: [K], share of the ray in the cosine-weighted hemisphere of its receiver.
+        """
         order = np.lexsort((emitter, receiver))
         receiver, emitter, weight = receiver[order], emitter[order], weight[order]
         new = np.diff(receiver, prepend=-1) != 0
         apart = np.flatnonzero(new | (np.diff(emitter, prepend=-1) != 0))
-        self._emitter = emitter[apart].astype(np.intp)
-        self._weight = np.add.reduceat(weight, apart).astype(np.float32)
-        self._rows = receiver[new]
-        self._starts = np.flatnonzero(new[apart])
+        return cls(
+            receiver[new].astype(np.intp),
+            np.flatnonzero(new[apart]),
+            emitter[apart].astype(np.intp),
+            np.add.reduceat(weight, apart).astype(np.float32),
+        )
 
     def gathered(self, given: NDArray[np.float32], count: int) -> NDArray[np.float32]:
         """Return irradiance / pi [M, count] of receivers from the radiance [M, E] of emitters."""
         found = np.zeros((len(given), count), np.float32)
         for received, emitted in zip(found, given, strict=True):
-            received[self._rows] = np.add.reduceat(
-                self._weight * np.take(emitted, self._emitter), self._starts
+            received[self.receiver] = np.add.reduceat(
+                self.weight * np.take(emitted, self.emitter), self.start
             )
         return found
 
@@ -137,11 +157,31 @@ def form_factors(
     digest = hashlib.sha256(spreader.shape_digest.encode())
     for array in (body.positions_mm, body.triangles, box, points, np.packbits(hidden)):
         digest.update(np.ascontiguousarray(array).tobytes())
-    found = disk_cache.computed(
+    arrays = disk_cache.cached(
         "form-factors",
+        VERSION,
         digest.hexdigest(),
-        lambda: _found(spreader, body, box, points, toward, hidden),
+        lambda: _packed(_computed(spreader, body, box, points, toward, hidden)),
     )
+    own, below = (
+        Links(**{field.name: arrays[f"{kind}_{field.name}"] for field in fields(Links)})
+        for kind in ("own", "below")
+    )
+    return FormFactors(own, below, arrays["known"])
+
+
+def _packed(factors: FormFactors) -> disk_cache.Arrays:
+    arrays: dict[str, NDArray[Any]] = {"known": factors.known}
+    for kind in ("own", "below"):
+        links = getattr(factors, kind)
+        arrays |= {f"{kind}_{name}": array for name, array in vars(links).items()}
+    return arrays
+
+
+def _computed(
+    spreader: Mesh, body: Body, box: Array, points: Array, toward: Array, hidden: NDArray[np.bool_]
+) -> FormFactors:
+    found = _found(spreader, body, box, points, toward, hidden)
     cosine = np.maximum(spreader.normals @ toward.T, 0)
     share = cosine / cosine.sum(axis=1, keepdims=True)
     is_known = ~hidden
@@ -150,7 +190,7 @@ def form_factors(
     known = np.maximum((share * is_known).sum(axis=1), _LEAST_KNOWN).astype(np.float32)
     share /= known[:, None]
     own, below = (
-        Links(receiver, emitter, share[receiver, ray])
+        Links.of(receiver, emitter, share[receiver, ray])
         for receiver, ray, emitter in (found["own"], found["below"])
     )
     return FormFactors(own, below, known)

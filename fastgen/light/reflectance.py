@@ -1,4 +1,4 @@
-"""Fresnel reflectance and GGX specular albedo; the numpy twin of shaders/reflector.glsl."""
+"""Fresnel reflectance and GGX specular albedo; the numpy twin of shaders/brdf.glsl."""
 
 import functools
 
@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
+
+VERSION = 1  # raise when the stored arrays change
 
 DIELECTRIC_INDEX = 1.5
 """Refractive index of non-metals, typical of paints and plastics."""
@@ -45,7 +47,8 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
         float32 [size, size, 2], read-only. Row r is at roughness (r + 0.5) / size, column c at n.v
         (c + 0.5) / size. These are texel centres for OpenGL's linear sampling with clamping.
     """
-    return disk_cache.computed("dfg", size, lambda: {"table": _integrated(size)})["table"]
+    found = disk_cache.cached("dfg", VERSION, size, lambda: {"table": _integrated(size)})
+    return found["table"]
 
 
 def mean_specular_albedo(f0: float, roughness: float) -> float:

@@ -6,7 +6,7 @@ mean direction of the visible sky, and the size of the visible part. shaders/sha
 
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,7 @@ _WORD = np.uint64(32)  # bits
 _BLOCK = 2048  # vertices at a time; they fit the cache of a core
 
 Array = NDArray[np.float64]
+Index = NDArray[np.unsignedinteger[Any]]
 Directions = NDArray[np.bool_]
 """Visibility of each of sky_directions() from each of V points: bool [V, DIRECTIONS]."""
 
@@ -131,41 +132,63 @@ class Sky:
     yaw_deg: float
 
 
+@dataclass(frozen=True, eq=False)
 class SkyVisibility:
     """Sky visibility of the V vertices of a mesh.
 
     Light is computed once for each of K kinds of vertices with equal arguments; a container has
     about 0.6 V kinds.
 
-    Args:
-        normals: unit vectors [V, 3], with few distinct values.
-        visible_bits: uint8 [V, DIRECTIONS / 8], visible directions as packed by np.packbits.
-        cone: uint8 [V, 3], see encoded_cones.
+    Attributes:
+        kind: unsigned [V], kind of each vertex.
+        rows: uint8 [K, VERTEX_BYTES], vertex bytes of each kind without the light.
+        normals: float32 [N, 3], distinct unit normals.
+        normal: unsigned [K], index of each kind in `normals`.
+        cones: uint8 [C, 3], distinct cones, see encoded_cones.
+        cone: unsigned [K], index of each kind in `cones`.
     """
 
-    def __init__(
-        self,
+    kind: Index
+    rows: NDArray[np.uint8]
+    normals: NDArray[np.float32]
+    normal: Index
+    cones: NDArray[np.uint8]
+    cone: Index
+
+    @classmethod
+    def of(
+        cls,
         normals: NDArray[np.float32],
         visible_bits: NDArray[np.uint8],
         cone: NDArray[np.uint8],
-    ) -> None:
-        first, number = distinct_rows(normals)
-        self._normals = normals[first]
+    ) -> Self:
+        """Return the sky visibility of vertices.
+
+        Args:
+            normals: unit vectors [V, 3], with few distinct values.
+            visible_bits: uint8 [V, DIRECTIONS / 8], visible directions as packed by np.packbits.
+            cone: uint8 [V, 3], see encoded_cones.
+        """
+        first_normal, number = distinct_rows(normals)
         rows = np.full((len(cone), VERTEX_BYTES), 255, np.uint8)
         rows[:, :3], rows[:, 8:] = cone, visible_bits
         a, _, b, c, d = rows.view(np.uint32).T.astype(np.uint64)
         identity = [a << _WORD | b, c << _WORD | d, number.astype(np.uint64)]
         first, kind = distinct_rows(np.stack(identity, axis=1))
-        self._kind, self._number = _narrow(kind), _narrow(number[first])
-        self._rows = rows[first]
-        """Vertex bytes of each kind, without the light."""
-        packed, which = np.unique(self._rows.view(np.uint32)[:, 0], return_inverse=True)
-        self._cones, self._which = packed.view(np.uint8).reshape(-1, 4)[:, :3], _narrow(which)
+        packed, which = np.unique(rows[first].view(np.uint32)[:, 0], return_inverse=True)
+        return cls(
+            kind=_narrow(kind),
+            rows=rows[first],
+            normals=normals[first_normal],
+            normal=_narrow(number[first]),
+            cones=packed.view(np.uint8).reshape(-1, 4)[:, :3],
+            cone=_narrow(which),
+        )
 
     @property
     def visible(self) -> Directions:
         """Visibility of each direction from each vertex, bool [V, DIRECTIONS]."""
-        return np.unpackbits(self._rows[self._kind, 8:], axis=1).astype(bool)
+        return np.unpackbits(self.rows[self.kind, 8:], axis=1).astype(bool)
 
     def irradiance(self, sky: Sky) -> NDArray[np.float32]:
         """Return irradiance / pi [V, 3] from the visible sky, without directional lights."""
@@ -195,8 +218,8 @@ class SkyVisibility:
             uint8 [V, VERTEX_BYTES].
         """
         if light is None:
-            return self._read(np.take(self._steps(sky, self._irradiance(sky)), self._kind))
-        return self._read(self._steps(sky, light, self._kind))
+            return self._read(np.take(self._steps(sky, self._irradiance(sky)), self.kind))
+        return self._read(self._steps(sky, light, self.kind))
 
     def lit(self, sky: Sky) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.float32]]:
         """Return vertex bytes, irradiance with and irradiance without directional lights.
@@ -204,16 +227,16 @@ class SkyVisibility:
         This costs less than the three methods.
         """
         light = self._irradiance(sky)
-        values = self._read(np.take(self._steps(sky, light), self._kind))
+        values = self._read(np.take(self._steps(sky, light), self.kind))
         return values, self._each(light + self._directional_irradiance(sky)), self._each(light)
 
     def _each(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return values of kinds [K, 3] for each vertex [V, 3], channel by channel in memory."""
-        return np.take(light.T, self._kind, axis=1).T
+        return np.take(light.T, self.kind, axis=1).T
 
     def _bits(self, number: int) -> NDArray[np.uint8]:
         """Return the visibility bits [K] of the eight directions from 8 `number` on."""
-        return self._rows[:, 8 + number]
+        return self.rows[:, 8 + number]
 
     def _irradiance(self, sky: Sky) -> NDArray[np.float32]:
         """Return `irradiance` of each kind, [K, 3].
@@ -222,34 +245,34 @@ class SkyVisibility:
         the sums over all 256 subsets of eight directions for each normal. A byte of visibility bits
         is the index.
         """
-        cosine = np.maximum(self._normals @ sky_directions().T.astype(np.float32), 0)
+        cosine = np.maximum(self.normals @ sky_directions().T.astype(np.float32), 0)
         weight = cosine[:, None] * _radiance(sky).T
         weight *= _WHOLE / weight.sum(axis=2, keepdims=True)
         # three channels in one integer, which makes the additions three times as fast
         red, green, blue = np.rint(weight).astype(np.uint64).transpose(1, 0, 2)
         together = (blue << _FIELD_BITS | green) << _FIELD_BITS | red
         sums = _sums_of_eight(together.reshape(len(together), -1, 8).transpose(1, 0, 2))
-        total = np.zeros(len(self._number), np.uint64)
-        row = 256 * self._number.astype(np.intp)
+        total = np.zeros(len(self.normal), np.uint64)
+        row = 256 * self.normal.astype(np.intp)
         for number, table in enumerate(sums.reshape(len(sums), -1)):
             total += np.take(table, row + self._bits(number))
-        step = self._whole(sky, _directions(open_sky(self._normals)[:, :3])) / _WHOLE
+        step = self._whole(sky, _directions(open_sky(self.normals)[:, :3])) / _WHOLE
         found = np.empty((3, len(total)), np.float32)
         for channel in range(3):
             share = (total & (2 * _WHOLE - 1)).astype(np.float32)
             total >>= _FIELD_BITS
-            np.multiply(share, np.take(step[:, channel], self._number), out=found[channel])
+            np.multiply(share, np.take(step[:, channel], self.normal), out=found[channel])
         return found.T
 
     def _directional_irradiance(self, sky: Sky) -> NDArray[np.float32]:
         """Return `directional_irradiance` of each kind, [K, 3]."""
-        found = np.zeros((3, len(self._number)), np.float32)
+        found = np.zeros((3, len(self.normal)), np.float32)
         for each in sky.light.lights:
             toward = to_map_frame(each.direction, -sky.yaw_deg)
             nearest = np.argsort(-sky_directions() @ toward)[:_AROUND_LIGHT]
             count = sum(self._bits(k >> 3) >> (7 - (k & 7)) & 1 for k in nearest.tolist())
-            cosine = np.maximum(self._normals @ toward.astype(np.float32), 0)
-            share = np.take(cosine, self._number) * (count / np.float32(_AROUND_LIGHT))
+            cosine = np.maximum(self.normals @ toward.astype(np.float32), 0)
+            share = np.take(cosine, self.normal) * (count / np.float32(_AROUND_LIGHT))
             for channel, light in zip(found, each.light, strict=True):
                 channel += share * np.float32(light)
         return found.T
@@ -264,7 +287,7 @@ class SkyVisibility:
             light: irradiance / pi [N, 3] of vertices or kinds.
             kind: kind of each row of `light`.
         """
-        step, which = LIGHT_STEPS / self._whole(sky, _directions(self._cones)), self._which[kind]
+        step, which = LIGHT_STEPS / self._whole(sky, _directions(self.cones)), self.cone[kind]
         steps = [light[:, c] * np.take(step[:, c], which) for c in range(3)]
         brightest = np.maximum(np.maximum.reduce(steps), 255) / 255
         times = np.minimum(np.ceil(LIGHT_TIMES * (brightest - 1)), 255)
@@ -278,7 +301,7 @@ class SkyVisibility:
 
     def _read(self, steps: NDArray[np.uint32]) -> NDArray[np.uint8]:
         """Return the vertex bytes with light from `_steps` [V]."""
-        found = np.take(self._rows, self._kind, axis=0)
+        found = np.take(self.rows, self.kind, axis=0)
         found.view(np.uint32)[:, 1] = steps
         return found
 
@@ -293,7 +316,7 @@ def _radiance(sky: Sky) -> NDArray[np.float32]:
     return np.maximum(sky_radiance(sky.light, sky_directions(), sky.yaw_deg), _DARK)
 
 
-def _narrow(index: NDArray[np.intp]) -> NDArray[np.unsignedinteger[Any]]:
+def _narrow(index: NDArray[np.intp]) -> Index:
     """Return indices [V] in the smallest integer type that fits."""
     return index.ravel().astype(np.min_scalar_type(int(index.max(initial=0))))
 

@@ -5,6 +5,7 @@ import ctypes
 import moderngl
 import numpy as np
 
+from fastgen.files import disk_cache
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.hdri import HALF_MAX
 from fastgen.light.octahedral import BORDER
@@ -17,6 +18,7 @@ from fastgen.render.gl_enums import (
     GL_TEXTURE_2D,
     GL_UNSIGNED_INT_5_9_9_9_REV,
 )
+from fastgen.render.recent_cache import Kept
 
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
@@ -31,14 +33,14 @@ class GpuLight:
 
     Attributes:
         ambient: light without the large maps.
-        background_size: texels along a side of the background map.
+        background: uint32 [B, B], texels of the background map, see BackgroundTextures.
         sky_rays: importance samples, None unless `traced`.
     """
 
     def __init__(self, gl: GLContext, light: EnvironmentLight, traced: bool = False) -> None:
         ctx = gl.ctx
         self.ambient = Ambient.of(light)
-        self.background_size = light.background.shape[0]
+        self.background = light.background
         self.sky_rays: SkyRays | None = None
         if traced:
             inner = slice(BORDER, -BORDER)
@@ -50,31 +52,71 @@ class GpuLight:
         )
         size = light.irradiance.shape[0]
         self.irradiance = ctx.texture((size, size), 4, _half(light.irradiance), dtype="f2")
-        self.background = _packed_texture(gl, light.background)
-        for texture in (self.specular, self.irradiance, self.background):
+        for texture in (self.specular, self.irradiance):
             texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
             texture.repeat_x = texture.repeat_y = False
+        disk_cache.unload(light.background)
 
     def release(self) -> None:
         """Free all GL objects."""
-        for texture in (self.specular, self.irradiance, self.background):
+        for texture in (self.specular, self.irradiance):
             texture.release()
 
 
-def _packed_texture(gl: GLContext, texels: np.ndarray) -> moderngl.Texture:
-    """Return a texture of RGB9_E5 texels, uint32 [N, N].
+class BackgroundTextures:
+    """Background maps on the GPU. Owned by the renderer, which releases them.
 
-    moderngl does not know the pixel type, and the conversion from another type takes 60 ms.
+    A software renderer has one texture per size and fills it again when the environment changes,
+    which takes a few milliseconds: its textures take private memory of each process, while
+    processes share the mapped texels.
     """
-    size = texels.shape[0]
-    texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=GL_RGB9_E5)
-    texture.use()
-    upload = gl.function(
-        "glTexSubImage2D", None, _ENUM, _INT, *(_INT,) * 4, _ENUM, _ENUM, ctypes.c_void_p
-    )
-    address = np.ascontiguousarray(texels, np.uint32).ctypes.data
-    upload(GL_TEXTURE_2D, 0, 0, 0, size, size, GL_RGB, GL_UNSIGNED_INT_5_9_9_9_REV, address)
-    return texture
+
+    def __init__(self, gl: GLContext) -> None:
+        self._gl = gl
+        self._textures: Kept[_BackgroundTexture] = Kept(24)
+
+    def get(self, light: GpuLight) -> moderngl.Texture:
+        """Return the background map of an environment; valid until the next call."""
+        size = len(light.background)
+        key = size if self._gl.software else light
+        kept = self._textures.get(key, lambda: _BackgroundTexture(self._gl, size))
+        kept.show(light.background)
+        return kept.texture
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        self._textures.release()
+
+
+class _BackgroundTexture:
+    """Texture of RGB9_E5 texels [size, size]."""
+
+    def __init__(self, gl: GLContext, size: int) -> None:
+        self._gl = gl
+        self._shown: np.ndarray | None = None
+        self.texture = gl.ctx.texture((size, size), 3, dtype="f2", internal_format=GL_RGB9_E5)
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.texture.repeat_x = self.texture.repeat_y = False
+
+    def show(self, texels: np.ndarray) -> None:
+        """Fill the texture with texels, uint32 [size, size].
+
+        moderngl does not know the pixel type, and the conversion from another type takes 60 ms.
+        """
+        if texels is self._shown:
+            return
+        self.texture.use()
+        upload = self._gl.function(
+            "glTexSubImage2D", None, _ENUM, _INT, *(_INT,) * 4, _ENUM, _ENUM, ctypes.c_void_p
+        )
+        address = np.ascontiguousarray(texels, np.uint32).ctypes.data
+        size = self.texture.size
+        upload(GL_TEXTURE_2D, 0, 0, 0, *size, GL_RGB, GL_UNSIGNED_INT_5_9_9_9_REV, address)
+        disk_cache.unload(texels)
+        self._shown = texels
+
+    def release(self) -> None:
+        self.texture.release()
 
 
 def _half(radiance: np.ndarray) -> bytes:

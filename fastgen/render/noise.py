@@ -9,7 +9,7 @@ thresholds by the same amount, so that near and far views show the same share of
 shimmers. Olano and Baker 2010, LEAN mapping, have this idea: variance that filtering removes
 returns as softness. It is exact for a normal field: if its mean over a footprint is m and its
 deviation within the footprint is s, the share Phi((m - t) / s) of the footprint exceeds t. Channels
-that the shader reads as the sum of two lookups (shaders/layers.glsl) are no longer uniform.
+that the shader reads as the sum of two lookups (shaders/noise.glsl) are no longer uniform.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastgen.camera.projection import View, view_of
-from fastgen.decals.artwork import art_images, glyph_coverage, glyph_tiles
+from fastgen.decals.artwork import art_layers, art_levels, glyph_coverage, glyph_tiles
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import corners_mm, seen_damages, variant
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -26,7 +26,7 @@ from fastgen.light.reflectance import dfg_table
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.depth_map import occluder_program
 from fastgen.render.draw_inputs import DrawInputs, Regions
-from fastgen.render.environment_textures import GpuLight
+from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
@@ -45,7 +45,7 @@ from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes, ray_bodies
 from fastgen.render.surface_values import SceneMaterials, cable_values, damage_values, scene_values
-from fastgen.render.textures import art_texture, mipmapped_array, noise_texture
+from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
@@ -94,6 +94,7 @@ class Renderer:
         self._bodies: Recent[RayBodies] = Recent(2)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights: Kept[GpuLight] = Kept(24)
+        self._backgrounds = BackgroundTextures(gl)
         self._scenes: Kept[SceneResources] = Kept(2)
         self._occluder = occluder_program(self.ctx)
         self.shadow_map = ShadowMap(self.ctx, self._occluder, quality.shadow_detail)
@@ -103,7 +104,7 @@ class Renderer:
         }
         for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
             self._blocks[block.name].bind_to_uniform_block(block.binding)
-        art, self._art_layers = art_images()
+        self._art_layers = art_layers()
         tiles, self._fonts = glyph_tiles()
         table = dfg_table()
         dfg = self.ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
@@ -111,7 +112,7 @@ class Renderer:
         glyphs = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
         self._tables: _Textures = {
             "noise_tiles": noise_texture(gl),
-            "art": art_texture(gl, art),
+            "art": levelled_texture(gl, art_levels()),
             "glyph_tiles": mipmapped_array(self.ctx, glyphs),
             "dfg_table": dfg,
         }
@@ -182,7 +183,7 @@ class Renderer:
         container, spreader, lit = self._shapes.of(
             prepared, resources.materials, lens, light.ambient
         )
-        self._set(SCENE_BLOCK, scene_values(scene, light.background_size))
+        self._set(SCENE_BLOCK, scene_values(scene, len(light.background)))
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
             self._set(DAMAGE_BLOCK, damage_values(scene, damages, threshold_mm, row))
@@ -208,7 +209,7 @@ class Renderer:
                 **self._material_textures(resources, container, spreader),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
-                "environment_map": light.background,
+                "environment_map": self._backgrounds.get(light),
             },
         )
 
@@ -324,6 +325,7 @@ class Renderer:
         """Free every GL object of this renderer."""
         owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
         owners += [
+            self._backgrounds,
             self.shadow_map,
             self._geometry,
             self._programs,

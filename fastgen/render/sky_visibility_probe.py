@@ -83,10 +83,10 @@ class LitMesh:
     """A mesh and the light at its vertices.
 
     Attributes:
-        mesh: the mesh.
+        mesh: The mesh.
         values: uint8 [V, VERTEX_BYTES], see SkyVisibility.vertex_bytes.
-        irradiance: irradiance / pi [V, 3], including directional lights.
-        without_lights: irradiance / pi [V, 3], without directional lights.
+        irradiance: Irradiance / pi [V, 3], including directional lights.
+        without_lights: Irradiance / pi [V, 3], without directional lights.
     """
 
     mesh: Mesh
@@ -119,9 +119,9 @@ class SkyVisibilityProbe:
         """Return a container in the light of the sky.
 
         Args:
-            container: the mesh.
-            spreader: spreader above the container, or None.
-            sky: the environment.
+            container: The mesh.
+            spreader: Spreader above the container, or None.
+            sky: The environment.
 
         Returns:
             The lit mesh. A second call with the same arguments returns the same object.
@@ -136,12 +136,12 @@ class SkyVisibilityProbe:
         """Return a spreader above a container in the light of the sky and indirect light.
 
         Args:
-            spreader: the mesh.
-            outline: the same surface with few triangles.
-            held: mesh of the container as an occluder of the sky.
-            below: the container in its light.
-            sky: the environment.
-            paints: reflectance of all materials.
+            spreader: The mesh.
+            outline: The same surface with few triangles.
+            held: Mesh of the container as an occluder of the sky.
+            below: The container in its light.
+            sky: The environment.
+            paints: Reflectance of all materials.
 
         Returns:
             The lit mesh. A second call with the same arguments returns the same object.

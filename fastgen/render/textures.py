@@ -1,38 +1,47 @@
 """Textures of a GL context made from arrays."""
 
 import ctypes
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 
 import moderngl
 import numpy as np
 
-from fastgen.decals.artwork import mip_levels
 from fastgen.render.gl import GLContext
+from fastgen.render.gl_enums import (
+    GL_DEPTH_COMPONENT,
+    GL_FLOAT,
+    GL_RED,
+    GL_RED_INTEGER,
+    GL_RGBA,
+    GL_RGBA8,
+    GL_TEXTURE_2D_ARRAY,
+    GL_UNSIGNED_BYTE,
+    GL_UNSIGNED_INT,
+)
 from fastgen.render.noise import noise_tiles
 
-_TEXTURE_2D_ARRAY, _RGBA, _RGBA8, _UNSIGNED_BYTE = 0x8C1A, 0x1908, 0x8058, 0x1401
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
 
-def art_texture(gl: GLContext, images: np.ndarray) -> moderngl.TextureArray:
-    """Artwork uint8 [K, N, N, 4] as a mip-mapped texture array, clamped at the borders. The driver
-    would average sRGB as if it were light, so the levels are `mip_levels`'s."""
-    levels = zip(*map(mip_levels, images), strict=True)
-    return _clamped(_levelled(gl, [images, *map(np.stack, levels)]))
+def levelled_texture(gl: GLContext, levels: Sequence[np.ndarray]) -> moderngl.TextureArray:
+    """Return a texture array with given mip levels, clamped at the borders.
 
-
-def _levelled(gl: GLContext, levels: Iterable[np.ndarray]) -> moderngl.TextureArray:
-    """A texture array of `levels` uint8 [K, N, N, 4], each half as wide as the one before."""
-    first, *others = map(np.ascontiguousarray, levels)
-    count, side = first.shape[:2]
-    texture = gl.ctx.texture_array((side, side, count), 4, first.tobytes(), alignment=1)
+    Args:
+        gl: Current context.
+        levels: uint8 [K, N, N, 4], each half as wide as the one before.
+    """
+    count, side = levels[0].shape[:2]
+    texture = gl.ctx.texture_array((1, 1, 1), 4)
     texture.use()
-    define = gl.function("glTexImage3D", None, _ENUM, *(_INT,) * 6, _ENUM, _ENUM, ctypes.c_void_p)
-    for level, texels in enumerate(others, start=1):
+    # allocates all levels once; drivers copy a texture that grows level by level
+    allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
+    allocate(GL_TEXTURE_2D_ARRAY, len(levels), GL_RGBA8, side, side, count)
+    fill = gl.function("glTexSubImage3D", None, _ENUM, *(_INT,) * 7, _ENUM, _ENUM, ctypes.c_void_p)
+    for level, texels in enumerate(map(np.ascontiguousarray, levels)):
         size = (texels.shape[2], texels.shape[1], count)
         address = texels.ctypes.data
-        define(_TEXTURE_2D_ARRAY, level, _RGBA8, *size, 0, _RGBA, _UNSIGNED_BYTE, address)
-    return texture
+        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, GL_RGBA, GL_UNSIGNED_BYTE, address)
+    return _clamped(texture)
 
 
 def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
@@ -60,9 +69,10 @@ def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:
     return texture
 
 
-NUMBERS, FLOATS, DEPTHS = (0x8D94, 0x1405), (0x1903, 0x1406), (0x1902, 0x1406)
-"""How a texel's value is told: GL_RED_INTEGER of GL_UNSIGNED_INT, and of GL_FLOAT GL_RED and
-GL_DEPTH_COMPONENT."""
+NUMBERS = GL_RED_INTEGER, GL_UNSIGNED_INT
+FLOATS = GL_RED, GL_FLOAT
+DEPTHS = GL_DEPTH_COMPONENT, GL_FLOAT
+"""Pixel format and type of the value that fills a texture."""
 
 
 def texture_clearing(
@@ -94,8 +104,11 @@ def _clamped(texture: moderngl.TextureArray) -> moderngl.TextureArray:
 
 
 def noise_texture(gl: GLContext) -> moderngl.TextureArray:
-    """The noise tiles, repeating. A driver may round up at every level of a chain of its own, which
-    adds up to three steps of 255."""
-    texture = _levelled(gl, noise_tiles().levels)
+    """Return the noise tiles as a repeating texture array.
+
+    A driver may round up at each mip level that it computes, which adds up to three steps of 255.
+    """
+    texture = levelled_texture(gl, noise_tiles().levels)
     texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = True
     return texture

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.decals.artwork import art_images, glyph_tiles
+from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Container, Damage, Decal, Scene
 from fastgen.scene.container_kinds import mm_away
@@ -103,7 +103,7 @@ def _check_decal(decal: Decal, path: str) -> None:
             if char != " ":
                 check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
     if decal.kind in _ART_KINDS and decal.art != "stripes":
-        check_known(f"{path}.art", decal.art, art_images()[1])
+        check_known(f"{path}.art", decal.art, art_layers())
     if decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
         width, height = decal.size_mm
         raise ConfigError(
