@@ -27,7 +27,7 @@ def displayed(radiance: Array, exposure: float) -> Array:
 def neutral_tone(color: Array) -> Array:
     """Apply the Khronos PBR Neutral tone curve to linear colours [..., 3].
 
-    Twin of shaders/tone.glsl.
+    Twin of shaders/tone_curve.glsl.
     """
     start, desaturation = 0.8 - 0.04, 0.15
     low = color.min(axis=-1, keepdims=True)

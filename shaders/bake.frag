@@ -3,22 +3,22 @@
 // roughness and metallic.
 #version 430 core
 #include "variant.constants"
-#include "octahedral.glsl"
-#include "tone.glsl"
-#include "reflector.glsl"
-#include "layers.glsl"
+#include "surface_id.glsl"
+#include "tone_curve.glsl"
+#include "brdf.glsl"
+#include "noise.glsl"
 #include "ageing.glsl"
 #include "dirt.glsl"
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
-#include "wet.glsl"
+#include "wetness.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "zone.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
-#include "damage.glsl"
+#include "damage_law.glsl"
 
 in vec3 rest_mm;
 #endif

@@ -1,6 +1,6 @@
 // Compute stage that sorts every pixel that sees more than sky into the list of its pixel class.
 // Reads the visibility buffer, decal cells and damages. Writes the lists, and label and depth of each
-// pixel whose centre sees a surface. shade_listed.comp overwrites labels near decals and damages.
+// pixel whose centre sees a surface. shade.comp overwrites labels near decals and damages.
 // The lists replace branches: Mesa's CPU driver llvmpipe executes both sides of every branch.
 #version 430 core
 #include "coarse.constants"
@@ -11,15 +11,15 @@
 #include "zones.constants"
 #include "view.block"
 #include "damage.block"
-#include "octahedral.glsl"
+#include "surface_id.glsl"
 #include "decals_near.glsl"
-#include "samples.glsl"
-#include "keys_around.glsl"
+#include "sample_lattice.glsl"
+#include "visibility_buffer.glsl"
 #include "pixel_list.glsl"
-#include "images.glsl"
+#include "output_images.glsl"
 #if DAMAGED
-#include "damage.glsl"
-#include "rest.glsl"
+#include "damage_law.glsl"
+#include "rest_position.glsl"
 #endif
 #if WITH_CABLES
 #include "lens.glsl"
@@ -30,8 +30,6 @@
 layout(local_size_x = LIST_GROUP) in;
 
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
-uniform sampler2D atlas_positions;
-uniform sampler2D surface_depths;
 
 #if DAMAGED
 // 2 near a hole, 1 near another damage, else 0.

@@ -4,13 +4,13 @@
 #version 430 core
 #include "variant.constants"
 #if HOLED
-#include "octahedral.glsl"
-#include "damage.glsl"
+#include "surface_id.glsl"
+#include "damage_law.glsl"
 #include "zone.glsl"
 #endif
 
 in vec2 atlas_mm;
-in vec4 openness;
+in vec4 sky_visibility;
 in vec4 sky_light;
 flat in uint surface_id;
 
@@ -45,7 +45,7 @@ void main() {
     // gl_FragCoord.w is 1 / clip w, and clip w is the depth along the optical axis. Unlike the depth
     // buffer it is not quantized.
     out_depth = 1.0 / gl_FragCoord.w;
-    out_sky_visibility = pack_bytes(openness);
+    out_sky_visibility = pack_bytes(sky_visibility);
     out_sky_light = pack_bytes(sky_light);
 #if DAMAGED
     out_rest_x = rest_mm.x;

@@ -8,9 +8,10 @@
 #include "variant.constants"
 #include "view.block"
 #include "octahedral.glsl"
+#include "surface_id.glsl"
 #include "lens.glsl"
 #if DAMAGED
-#include "damage.glsl"
+#include "damage_law.glsl"
 #endif
 
 layout(location = 0) in vec3 in_position_mm;
@@ -22,7 +23,7 @@ layout(location = 6) in vec4 in_sky_light;
 layout(location = 7) in uvec3 in_visible_directions;   // One bit per direction of sky_visibility.py.
 
 out vec2 atlas_mm;
-out vec4 openness;   // Cone; share of open sky about the mirror direction.
+out vec4 sky_visibility;   // Cone; share of open sky about the mirror direction.
 out vec4 sky_light;
 flat out uint surface_id;
 #if DAMAGED
@@ -58,7 +59,7 @@ void main() {
     rest_mm = in_position_mm;
     position_mm = deformed(in_position_mm);
 #endif
-    openness = vec4(in_sky_cone, mirror_visibility(position_mm * MM, in_normal));
+    sky_visibility = vec4(in_sky_cone, mirror_visibility(position_mm * MM, in_normal));
     gl_Position = bent(world_to_clip * vec4(position_mm * MM, 1.0));
 #if HOLED
     // Viewport 1 holds the inner view, which holes reveal. It is mirrored: that swaps front and back

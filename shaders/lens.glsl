@@ -1,7 +1,8 @@
+// Twin of fastgen/camera/lens.py.
 // vec4 bent(vec4 clip): clip position after the lens distortion.
 // vec2 undistorted(vec2 pixel): undistorted position of a pixel of the image; the inverse of bent().
 // Brown-Conrady and fisheye (Kannala-Brandt) models with OpenCV's coefficients. Far outside the image
-// the radial polynomial continues as a straight line; see lens.py.
+// the radial polynomial continues as a straight line.
 
 #include "view.block"
 

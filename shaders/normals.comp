@@ -5,13 +5,13 @@
 #include "samples.constants"
 #include "variant.constants"
 #include "damage.block"
-#include "octahedral.glsl"
-#include "samples.glsl"
-#include "keys_around.glsl"
+#include "surface_id.glsl"
+#include "sample_lattice.glsl"
+#include "visibility_buffer.glsl"
 #include "zone.glsl"
 #if WITH_DAMAGE
-#include "damage.glsl"
-#include "rest.glsl"
+#include "damage_law.glsl"
+#include "rest_position.glsl"
 #endif
 
 layout(local_size_x = LIST_GROUP) in;   // Pixels of one row.

@@ -1,6 +1,6 @@
 // Rust rust_at(...): shares of a footprint that are rust or stained by it.
 // vec3 stained(vec3 albedo, float share): albedo of paint with `share` under a thin stain of rust.
-// The constants are in rust.py, which also computes mean albedos.
+// Constants: fastgen/render/rust.py, which also computes the mean albedo under rust.
 
 #include "rust.constants"
 #include "scene.block"

@@ -17,41 +17,36 @@
 #include "view.block"
 #include "damage.block"
 
-#include "octahedral.glsl"
-#include "samples.glsl"
-#include "keys_around.glsl"
+#include "surface_id.glsl"
+#include "sample_lattice.glsl"
+#include "visibility_buffer.glsl"
 #include "lens.glsl"
 #include "view_ray.glsl"
-#include "tone.glsl"
-#include "reflector.glsl"
-#include "ibl.glsl"
+#include "tone_curve.glsl"
+#include "brdf.glsl"
+#include "environment_light.glsl"
 #if LIGHTS
-#include "sun.glsl"
+#include "directional_light.glsl"
 #endif
-#include "layers.glsl"
+#include "noise.glsl"
 #include "ageing.glsl"
 #include "dirt.glsl"
 #include "rust.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
-#include "wet.glsl"
+#include "wetness.glsl"
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "zone.glsl"
 #include "material.glsl"
 #if TRACED
-#include "traced.glsl"
+#include "traced_light.glsl"
 #endif
 #if WITH_DAMAGE
-#include "damage.glsl"
-#include "inside.glsl"
-#include "rest.glsl"
+#include "damage_law.glsl"
+#include "interior.glsl"
+#include "rest_position.glsl"
 #endif
-
-uniform sampler2D atlas_positions;
-uniform sampler2D surface_depths;
-uniform usampler2D sky_visibility_cones;   // Four bytes per texel.
-uniform usampler2D light_points;
 
 struct Shaded {
     vec3 color;   // Exposed radiance; in a single-layer image the value to show.
@@ -96,7 +91,7 @@ SkyVisibility sky_visibility_at(ivec2 sample_at, uint zone) {
     vec4 stored = coarse_mean_bytes(sky_visibility_cones, sample_at);
     vec3 cone = stored.xyz * (255.0 / 127.0) - 128.0 / 127.0;
     float size = length(cone);
-    vec4 encoded = coarse_mean_bytes(light_points, sample_at);
+    vec4 encoded = coarse_mean_bytes(sky_visibility_light, sample_at);
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float bounces = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float rim = clamp(2.0 - 2.0 * size, 0.0, 1.0);

@@ -9,7 +9,7 @@ from fastgen.render.variant import ShaderVariant
 
 NEEDS = [f"{name}.constants" for name in CONSTANTS] + [f"{name}.block" for name in BLOCKS]
 HEAD = "#version 430 core\n" + "".join(
-    f'#include "{name}"\n' for name in (*NEEDS, "octahedral.glsl")
+    f'#include "{name}"\n' for name in (*NEEDS, "surface_id.glsl")
 )
 
 

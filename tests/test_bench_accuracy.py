@@ -126,7 +126,7 @@ def test_the_front_is_exactly_the_points_that_no_other_dominates():
 
 
 def test_every_shader_text_that_an_ablation_replaces_exists():
-    shaders = ("bent_sky.frag", "shade_listed.comp")
+    shaders = ("background_by_ray.frag", "shade.comp")
     text = "".join(
         programs.expand(
             shader_path(name).read_text(encoding="utf-8"), 3, pixel_class=pixel_class, suns=1

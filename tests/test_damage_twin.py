@@ -58,7 +58,7 @@ def asked(gl, scene, body, points):
     values = damage_values(scene, scene.damages, THRESHOLD_MM, 0)
     kept = blocks(gl, **values)
     rows = np.column_stack([points, np.zeros(len(points))])
-    out = run(gl, f'#include "damage.glsl"\n{body}', rows, damage="holed")
+    out = run(gl, f'#include "damage_law.glsl"\n{body}', rows, damage="holed")
     del kept
     by_origin = {d.origin_mm: d for d in scene.damages}
     ordered = [by_origin[tuple(row[:3])] for row in values["damage_origin"]]

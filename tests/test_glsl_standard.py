@@ -81,15 +81,15 @@ def test_shading_is_standard_glsl(programs, quality):
 
 
 def add_all(programs, variant):
-    programs.add(("sky.comp",), variant)
-    programs.add(("sky.vert", "sky.frag"), variant)
-    programs.add(("fullscreen.vert", "bent_sky.frag"), variant)
+    programs.add(("background.comp",), variant)
+    programs.add(("background.vert", "background.frag"), variant)
+    programs.add(("fullscreen.vert", "background_by_ray.frag"), variant)
     for damage, cables in itertools.product(DAMAGE_VARIANTS, (False, True)):
         programs.add(("classify.comp",), replace(variant, damage=damage, cables=cables))
     for name, lights in itertools.product(listed_classes(variant.samples_per_axis), LIGHTS):
         damage = "holed" if "damaged" in name or name == "holed" else "undamaged"
         shaded = replace(variant, pixel_class=name, damage=damage, lights=lights)
-        programs.add(("shade_listed.comp",), shaded)
+        programs.add(("shade.comp",), shaded)
 
 
 def test_all_other_shaders_are_standard_glsl(programs):
@@ -100,7 +100,7 @@ def test_all_other_shaders_are_standard_glsl(programs):
         )
         for samples in (1, 2, 3, 5):
             variant = replace(of_points, samples_per_axis=samples)
-            programs.add(("fullscreen.vert", "light_points.frag"), variant)
+            programs.add(("fullscreen.vert", "ray_points.frag"), variant)
             traits = {"undamaged": "mixed", "damaged": "mixed_damaged", "holed": "holed"}
             if samples > 1 or damage == "holed":
                 normals = replace(variant, pixel_class=traits[damage])
@@ -116,7 +116,7 @@ def test_a_shader_file_includes_the_constants_and_blocks_that_it_uses(path):
     # a macro without a definition counts as 0 in #if, so a missing include changes the image
     text = path.read_text()
     included = set(re.findall(r'#include "(\w+\.(?:constants|block))"', text))
-    used = set(re.findall(r"\b[A-Za-z_]\w*\b", re.sub(r"//.*", "", text)))
+    used = set(re.findall(r"\b[A-Za-z_]\w*\b", re.sub(r"//.*|#include.*", "", text)))
     everything = [ShaderVariant(samples_per_axis=n) for n in (1, 3)]
     for group, constants in CONSTANTS.items():
         names = {name.split("(")[0] for variant in everything for name in constants(variant)}

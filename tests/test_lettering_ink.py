@@ -16,7 +16,7 @@ MARGIN_MM = 60.0
 
 BODY = (
     "struct Material { vec3 albedo; };\n"
-    '#include "tone.glsl"\n#include "layers.glsl"\n'
+    '#include "tone_curve.glsl"\n#include "noise.glsl"\n'
     '#include "decal_cell.glsl"\n#include "decal.glsl"\n'
     "vec4 f(vec4 x) { return vec4(text_coverage(x.xy, vec4(%r, 0.0, %d.0, %r), x.z)); }"
 )

@@ -46,7 +46,7 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
     roughness, cosine = np.meshgrid(np.linspace(0.05, 1, 20), np.linspace(0.05, 1, 20))
     rows = np.stack([roughness, cosine, np.full_like(cosine, metallic), cosine], -1).reshape(-1, 4)
     body = (
-        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
         " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
@@ -62,7 +62,7 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
     rng = np.random.default_rng(0)
     rows = np.c_[rng.uniform(0.05, 1, (500, 2)), rng.uniform(0, 1, (500, 2))]
     body = (
-        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
         " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
@@ -85,7 +85,7 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
 
     def lit(rays):
         body = (
-            '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+            '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
             "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
             f" vec3 open = vec3(x.z); TracedLight rays = {rays};"
             " return vec4(lit(reflector(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
@@ -95,7 +95,7 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
         return run(gl, body, rows, white_light(gl))[:, :3]
 
     all_open = lit("TracedLight(vec3(1.0), vec3(0.0), vec3(1.0), vec3(0.0), 1.0)")
-    bright = lit("Traced(open, 1.0 - open, open, 1.0 - open, 1.0)")
+    bright = lit("TracedLight(open, 1.0 - open, open, 1.0 - open, 1.0)")
     dark = lit("TracedLight(open, vec3(0.0), open, vec3(0.0), 1.0)")
     np.testing.assert_allclose(bright, all_open, rtol=1e-4)
     np.testing.assert_allclose(dark, rows[:, 2:3] * all_open, rtol=1e-3, atol=1e-4)
@@ -108,7 +108,7 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
     rng = np.random.default_rng(3)
     rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, paint, rim
     body = (
-        '#include "reflector.glsl"\n#include "ibl.glsl"\n'
+        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " float share = 1.0 - x.w * x.w;"
         " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
@@ -129,7 +129,7 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
 
 def test_fresnels_equations_equal_their_numpy_twin(gl):
     cosine = np.linspace(0, 1, 200)
-    body = '#include "reflector.glsl"\nvec4 f(vec4 x) { return vec4(fresnel_climb(x.x), 0, 0, 0); }'
+    body = '#include "brdf.glsl"\nvec4 f(vec4 x) { return vec4(fresnel_climb(x.x), 0, 0, 0); }'
     out = run(gl, body, np.repeat(cosine[:, None], 4, 1), white_light(gl))
     np.testing.assert_allclose(out[:, 0], fresnel_climb(cosine), atol=1e-5)
 
@@ -143,7 +143,7 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
     """
     slope, roughness, steps = np.deg2rad(slope_deg), 0.31, 120
     toward = np.tile([np.sin(slope), 0, np.cos(slope), 0], (4, 1))
-    kept = blocks(gl, yaw=(1, 0), sun_toward=toward, sun_light=np.ones((4, 4)))
+    kept = blocks(gl, yaw=(1, 0), light_direction=toward, light_irradiance=np.ones((4, 4)))
     theta, phi = np.meshgrid(
         (np.arange(steps) + 0.5) / steps * np.pi / 2, (np.arange(steps) + 0.5) / steps * np.pi
     )
@@ -151,7 +151,8 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
     ).reshape(-1, 3)
     body = (
-        '#include "reflector.glsl"\n#include "ibl.glsl"\n#include "sun.glsl"\n'
+        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
+        '#include "directional_light.glsl"\n'
         f"vec4 f(vec4 x) {{ Material black = Material(vec3(0.0), {roughness}, 0.0);"
         " return vec4(light_reflection(reflector(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
     )
@@ -199,7 +200,7 @@ def test_srgb_coding_is_iec_61966(gl):
     values = np.linspace(0, 1, 300)
     encoded = np.where(values <= 0.0031308, 12.92 * values, 1.055 * values ** (1 / 2.4) - 0.055)
     body = (
-        '#include "tone.glsl"\n'
+        '#include "tone_curve.glsl"\n'
         "vec4 f(vec4 x) { return vec4(srgb_encode(x.rrr).r, srgb_decode(x.ggg).r, 0, 0); }"
     )
     out = run(gl, body, np.stack([values, encoded, encoded, encoded], axis=1))
@@ -209,7 +210,7 @@ def test_srgb_coding_is_iec_61966(gl):
 
 def test_tone_curve_keeps_order_and_range(gl):
     greys = np.geomspace(1e-4, 1e5, 400)
-    body = '#include "tone.glsl"\nvec4 f(vec4 x) { return vec4(neutral_tone(x.rgb), 0); }'
+    body = '#include "tone_curve.glsl"\nvec4 f(vec4 x) { return vec4(neutral_tone(x.rgb), 0); }'
     out = run(gl, body, np.repeat(greys[:, None], 4, 1))[:, 0]
     assert (np.diff(out) >= -1e-6).all()
     assert out.min() >= 0
@@ -289,7 +290,7 @@ def noise_share(gl, layer, share, points, footprint, w=0.0, **scene):
     read = "read_without_period" if layer == 0 else "read_noise"
     kept = blocks(gl, noise_lost=noise_tiles().lost_deviation.reshape(-1, 4), **scene)
     body = (
-        '#include "layers.glsl"\n#include "scratches.glsl"\n'
+        '#include "noise.glsl"\n#include "scratches.glsl"\n'
         f"vec4 f(vec4 x) {{ NoiseSample n = {read}({layer}, x.xy, 1000.0, x.z);"
         f" return vec4({share}, 0.0, 0.0, 0.0); }}"
     )

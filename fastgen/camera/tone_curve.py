@@ -1,4 +1,4 @@
-"""Tone-mapping and sRGB encoding of linear light; the numpy twin of shaders/tone.glsl.
+"""Tone-mapping and sRGB encoding of linear light; the numpy twin of shaders/tone_curve.glsl.
 
 Tone curve: Khronos PBR Neutral (Khronos Group 2024, specification section 2). The shader gets its
 constants from here.

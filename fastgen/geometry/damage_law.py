@@ -1,9 +1,9 @@
 """Damages as displacement fields with a few parameters each; meshes keep their triangles.
 
 A damage moves a point p at rest (mm, container frame) by amount(p) along its `inward` direction.
-The shader evaluates the same fields (shaders/damage_law.glsl). This module is its plain equivalent for
-labels, tests and the exporter. Local coordinates of p are u along the damage, v across it and w
-inward, from its origin. Section 3.3.2 of the SeaFront paper describes the four kinds.
+shaders/damage_law.glsl is the GLSL twin. This module serves labels, tests and the exporter. Local
+coordinates of p are u along the damage, v across it and w inward, from its origin. Section 3.3.2 of
+the SeaFront paper describes the four kinds.
 """
 
 import numpy as np

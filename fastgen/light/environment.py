@@ -214,8 +214,9 @@ def _unpacked(name: str, arrays: disk_cache.Arrays) -> EnvironmentLight:
     lights = tuple(
         DirectionalLight((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows
     )
-    maps = (arrays[field] for field in ("specular", "irradiance", "background", "luminance"))
-    return _light(name, *maps, lights)
+    specular, irradiance = arrays["specular"], arrays["irradiance"]
+    background, luminance = arrays["background"], arrays["luminance"]
+    return _light(name, specular, irradiance, background, luminance, lights)
 
 
 def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:

@@ -33,9 +33,10 @@ def shader_text(name: str) -> str:
 def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     """Return the complete text of a shader.
 
-    `#include "NAME.glsl"` is replaced by that file. `#include "NAME.constants"` and
-    `#include "NAME.block"` say that a file needs a group of constants (constants.py) or a uniform
-    block (blocks.py); each is declared once, behind the #version line.
+    `#include "NAME.glsl"` is replaced by that file where it first occurs. `#include
+    "NAME.constants"` and `#include "NAME.block"` say that a file needs a group of constants
+    (constants.py) or a uniform block (blocks.py); each is declared behind the #version line.
+    Nothing is included twice.
 
     Args:
         text: Shader text with a #version line.
@@ -45,11 +46,13 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     needed: dict[str, None] = {}  # in order, each once
 
     def included(match: re.Match[str]) -> str:
-        kind = match[1].rpartition(".")[2]
-        if kind not in ("constants", "block"):
-            return _INCLUDE.sub(included, read(match[1]))
-        needed[match[1]] = None
-        return ""
+        name = match[1]
+        if name in needed:
+            return ""
+        needed[name] = None
+        if name.endswith((".constants", ".block")):
+            return ""
+        return _INCLUDE.sub(included, read(name))
 
     body = _INCLUDE.sub(included, text)
     version = _VERSION.search(body)

@@ -4,7 +4,7 @@ A sample is a texel of the render targets, which have S times the image's resolu
 axis. For S > 1 the image is drawn slanted: each row of pixels starts one texel further right than
 the row above. The S^2 samples of a pixel then have S^2 different horizontal positions instead of
 S. This antialiases nearly vertical edges best, and most edges of a container are nearly vertical.
-One sample lies exactly at each pixel's centre. shaders/samples.glsl is the GLSL twin.
+One sample lies exactly at each pixel's centre. shaders/sample_lattice.glsl is the GLSL twin.
 
 The slant adds one texel of width per image row. For a square image this is a third more texels
 with S = 3 and a fifth more with S = 5. The area beside the slanted image is cleared and never read.

@@ -1,7 +1,7 @@
 """Shadow map of a container and its spreader: one tile for each directional light.
 
 Dents are included, holes are not. Williams 1978, Casting Curved Shadows on Curved Surfaces.
-shaders/sun.glsl filters the map as Reeves et al. 1987 do.
+shaders/directional_light.glsl filters the map as Reeves et al. 1987 do.
 """
 
 from collections.abc import Sequence

@@ -8,13 +8,13 @@ import moderngl
 import numpy as np
 
 from fastgen.render.gl import GLContext
+from fastgen.render.gl_enums import GL_SCISSOR_TEST
 from fastgen.render.regions import Region
 from fastgen.render.sample_lattice import SampleLattice
 from fastgen.render.textures import DEPTHS, FLOATS, NUMBERS, texture_clearing
 
 T = TypeVar("T")
 
-_GL_SCISSOR_TEST = 0x0C11
 
 _OUT_OF_REACH_MM = 1e6
 """Rest position, along each axis, of samples that no damage touches."""
@@ -70,7 +70,7 @@ class VisibilityBuffer:
             "atlas_positions",
             "surface_depths",
             "sky_visibility_cones",
-            "light_points",
+            "sky_visibility_light",
         )
         usual = (self._keys, self._points, self._depths, self._visibility, self._light)
         rest = zip(("rest_x", "rest_y", "rest_z"), self._rest, strict=False)
@@ -148,11 +148,11 @@ class VisibilityBuffer:
         width, height = self._fine
         self._viewport(1, 0.0, self.inner_row, width, height)
         self._scissor(1, *self._texels_inside(region))
-        self._enable(_GL_SCISSOR_TEST, 1)
+        self._enable(GL_SCISSOR_TEST, 1)
 
     def end(self) -> None:
         """Lift the restriction of `limit_inside`."""
-        self._disable(_GL_SCISSOR_TEST, 1)
+        self._disable(GL_SCISSOR_TEST, 1)
 
     def _texels(self, region: Region | None) -> Region:
         """Return the texels that pixels of a region read."""

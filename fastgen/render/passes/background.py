@@ -45,7 +45,8 @@ class BackgroundPass:
     def _draw(self, inputs: DrawInputs) -> None:
         single_layer = inputs.variant.layer != "all"
         per_pixel = single_layer or inputs.view.distortion is not None
-        stages = ("fullscreen.vert", "bent_sky.frag") if per_pixel else ("sky.vert", "sky.frag")
+        by_ray = ("fullscreen.vert", "background_by_ray.frag")
+        stages = by_ray if per_pixel else ("background.vert", "background.frag")
         program = self._programs.get(stages, replace(inputs.variant, damage="undamaged", lights=0))
         self._ctx.scissor = None
         only_sky = inputs.targets.begin()
@@ -56,7 +57,7 @@ class BackgroundPass:
     def _store(self, inputs: DrawInputs) -> None:
         """Shade all pixels as sky, and store their labels and depth."""
         program = self._programs.get(
-            ("sky.comp",), replace(inputs.variant, damage="undamaged", lights=0)
+            ("background.comp",), replace(inputs.variant, damage="undamaged", lights=0)
         )
         program.bind(inputs.textures)
         width, height = inputs.targets.size

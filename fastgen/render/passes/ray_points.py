@@ -13,11 +13,11 @@ from fastgen.light.sky_rays import SkyRays
 from fastgen.light.traced_light import Points, traced_light
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.gl import GLContext
+from fastgen.render.gl_enums import GL_COLOR
 from fastgen.render.program import Programs
 from fastgen.render.regions import Region
 from fastgen.scene.limits import MM
 
-_GL_COLOR = 0x1800
 _NO_KEY = (ctypes.c_uint * 4)(0)
 
 _POINTS_PER_AXIS = 400
@@ -108,12 +108,12 @@ class RayPass:
             radiance=False,
             pixel_class="decal" if damage == "undamaged" else "damaged",
         )
-        program = self._programs.get(("fullscreen.vert", "light_points.frag"), variant)
+        program = self._programs.get(("fullscreen.vert", "ray_points.frag"), variant)
         program["point_rows"] = self._rows
         program["last_pixel"] = tuple(side - 1 for side in self._size)
         self._target.use()
         self._ctx.scissor = None
-        self._clear_uint(_GL_COLOR, 0, _NO_KEY)
+        self._clear_uint(GL_COLOR, 0, _NO_KEY)
         self._ctx.disable(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         program.bind(inputs.textures)
         for region in inputs.regions.drawn:

@@ -72,7 +72,7 @@ class ShadingPass:
                 # scenes with and without damage share the programs
                 damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "undamaged"
                 variant = replace(inputs.variant, pixel_class=name, damage=damage)
-                program = self._programs.get(("shade_listed.comp",), variant)
+                program = self._programs.get(("shade.comp",), variant)
                 program.bind(inputs.textures)
                 inputs.targets.lists.dispatch(name, program)
 

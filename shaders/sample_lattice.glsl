@@ -1,7 +1,7 @@
 // ivec2 center_texel(ivec2 pixel): texel of the sample at a pixel's centre, in the visibility buffer.
 // vec2 from_center(vec2 offset): offset in pixels of the sample `offset` texels from that sample.
 // vec2 sample_position(ivec2 sample_at): position of a sample in the image, in pixels.
-// Twin of sample_lattice.py, which explains the slanted lattice of samples.
+// Twin of fastgen/render/sample_lattice.py, which explains the slanted lattice of samples.
 
 #include "samples.constants"
 

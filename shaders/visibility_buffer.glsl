@@ -1,3 +1,4 @@
+// The visibility buffer, which geometry.frag writes: one texel per sample. The shading stages read it.
 // uint surface_id_at(ivec2 middle): surface id of one sample in the visibility buffer; 0 is sky.
 // uint[] near_surface_ids(ivec2 middle): ids of the first FILTER_NEAR samples of the pixel filter.
 // uint[] filter_surface_ids(ivec2 middle): ids of all its samples, in the order of FILTER_OFFSET.
@@ -5,7 +6,11 @@
 
 #include "samples.constants"
 
-uniform usampler2D surface_ids;
+uniform usampler2D surface_ids;            // 0 where no surface is seen.
+uniform sampler2D atlas_positions;         // In mm.
+uniform sampler2D surface_depths;          // In m.
+uniform usampler2D sky_visibility_cones;   // Four bytes per texel.
+uniform usampler2D sky_visibility_light;   // Four bytes per texel.
 
 uint surface_id_at(ivec2 middle) { return texelFetch(surface_ids, middle, 0).r; }
 

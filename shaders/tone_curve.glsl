@@ -1,9 +1,10 @@
+// Twin of fastgen/camera/tone_curve.py.
 // vec3 neutral_tone(vec3 c): exposed linear radiance to linear display colour.
 // vec3 srgb_encode(vec3 c), vec3 srgb_decode(vec3 c): sRGB transfer function and its inverse.
 
 #include "tone.constants"
 
-// Khronos PBR Neutral (Khronos Group 2024, specification section 2; constants in tone.py): subtracts
+// Khronos PBR Neutral (Khronos Group 2024, specification section 2; constants in the twin): subtracts
 // the Fresnel offset, then compresses highlights toward white.
 vec3 neutral_tone(vec3 c) {
     const float start = TONE_SHOULDER - TONE_FRESNEL;

@@ -5,7 +5,7 @@
 #include "pixel_list.constants"
 #include "variant.constants"
 #include "shade.glsl"
-#include "images.glsl"
+#include "output_images.glsl"
 
 layout(local_size_x = LIST_GROUP) in;   // Pixels of one row.
 

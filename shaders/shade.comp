@@ -11,7 +11,7 @@
 #include "scene.block"
 #include "view.block"
 #include "shade.glsl"
-#include "images.glsl"
+#include "output_images.glsl"
 #include "pixel_list.glsl"
 #if CABLE_CLASS
 #include "cables.glsl"

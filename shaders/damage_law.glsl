@@ -2,8 +2,8 @@
 // int hole_at(vec3 p): index of the perforation that removed p, -1 for none.
 // DamageSample damage_at(vec3 p): derivative of the deformation, wear of the steel and mask value at p.
 // vec3 deformed_normal(mat3 bend, vec3 n): normal n of the rest surface after the deformation.
-// Damage i displaces p along its inward axis. damage_law.py is the reference implementation in numpy;
-// section 3.3.2 of the SeaFront paper describes the four kinds.
+// Damage i displaces p along its inward axis. Twin of fastgen/geometry/damage_law.py; section 3.3.2 of
+// the SeaFront paper describes the four kinds.
 
 #include "damage.constants"
 #include "units.constants"
@@ -83,92 +83,99 @@ struct DamageField {
     // Gradient of `amount` in local coordinates. It is approximate along folds and hole outlines. It
     // leaves out the inward fade, which tilts neither the damaged sheet nor sheets perpendicular to it.
     vec3 slope;
-    float scar;     // Wear of the bent steel, 0..1: aged in a fold, rusty along a torn rim.
+    // Wear of the bent steel, 0..1: aged in a fold, rusty along a torn rim. Its weights are artistic
+    // choices.
+    float scar;
 };
-
-// Displacement field of damage i at p. Its kind follows from its index: perforations, dents, concave
-// damages, bent edges. The weights of `scar` are artistic choices.
-DamageField damage_field(int i, vec3 p) {
-    vec3 q = damage_local(i, p);
-    float half_length = damage_along[i].w;
-    float half_width = damage_across[i].w;
-    float depth = damage_inward[i].w;
-    vec4 shape = damage_shape[3 * i];
-    float hill = bump(q.x / half_length);
-    float hill_slope = bump_slope(q.x / half_length) / half_length;
-    float fade = 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(q.z));
-    if (i >= concave_end) {
-        float r = max(length(q.yz), 1e-3);
-        float reach = bump(r / half_width);
-        float reach_slope = bump_slope(r / half_width) / half_width;
-        vec3 slope = depth * vec3(hill_slope * reach, hill * reach_slope * q.yz / r);
-        return DamageField(depth * hill * reach, slope, 0.35 * hill * hill * reach * reach);
-    }
-    if (i >= dent_end) {
-        float across = bump(q.y / half_width);
-        float across_slope = bump_slope(q.y / half_width) / half_width;
-        vec3 slope = depth * fade * vec3(hill_slope * across, hill * across_slope, 0.0);
-        return DamageField(depth * hill * across * fade, slope, 0.0);
-    }
-    if (i >= hole_count) {
-        vec4 more = damage_shape[3 * i + 1];
-        float path = fold_path(shape, more, q.x);
-        float path_slope = (fold_path(shape, more, q.x + 2.0) - path) * 0.5;
-        float away = abs(q.y - path);
-        float side = q.y < path ? -1.0 : 1.0;
-        float taper = max(1.0 - q.x * q.x / (half_length * half_length), 0.0);
-        float taper_slope = taper > 0.0 ? -2.0 * q.x / (half_length * half_length) : 0.0;
-        float rest = max(1.0 - away / shape.x, 0.0);
-        float profile = mix(rest * sqrt(rest), bump(away / half_width), shape.y);
-        float profile_slope =
-            mix(-1.5 * sqrt(rest) / shape.x, bump_slope(away / half_width) / half_width, shape.y);
-        vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
-                          taper * profile_slope * side, 0.0);
-        return DamageField(depth * taper * fade * profile, depth * fade * slope,
-                     0.7 * fade * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
-    }
-    float r = max(length(q.xy), 1e-3);
-    float outside = r - hole_radius(i, atan(q.y, q.x));
-    float rim = clamp(1.0 - outside / shape.x, 0.0, 1.0);
-    float rim_slope = rim < 1.0 ? -2.0 * rim / shape.x : 0.0;
-    float scar = clamp(1.0 - outside / (0.7 * shape.x), 0.0, 1.0);
-    return DamageField(depth * rim * rim * fade, depth * fade * rim_slope * vec3(q.xy / r, 0.0),
-                 scar * scar * step(0.5, fade));
-}
 
 // Weight of a field at w mm behind its face: a damage must not move the opposite wall.
 float sheet_fade(float w) {
     return 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(w));
 }
 
-// Damages are sorted by kind, and each kind has its own loop. One loop with branches would cost
-// the work of four kinds per damage on llvmpipe, which executes both sides of every branch.
+// The functions below return the field of damage i of one kind. q: Local coordinates, see damage_local.
+
+DamageField perforation_field(int i, vec3 q) {
+    vec4 shape = damage_shape[3 * i];
+    float depth = damage_inward[i].w;
+    float fade = sheet_fade(q.z);
+    float r = max(length(q.xy), 1e-3);
+    float outside = r - hole_radius(i, atan(q.y, q.x));
+    float rim = clamp(1.0 - outside / shape.x, 0.0, 1.0);
+    float rim_slope = rim < 1.0 ? -2.0 * rim / shape.x : 0.0;
+    float scar = clamp(1.0 - outside / (0.7 * shape.x), 0.0, 1.0);
+    return DamageField(depth * rim * rim * fade, depth * fade * rim_slope * vec3(q.xy / r, 0.0),
+                       scar * scar * step(0.5, fade));
+}
+
+// taper: 1 - (u / half length)^2 at u along the fold, at least 0. The callers round it differently, so
+// each computes its own.
+DamageField dent_field(int i, vec3 q, float taper) {
+    vec4 shape = damage_shape[3 * i];
+    vec4 more = damage_shape[3 * i + 1];
+    float half_length = damage_along[i].w;
+    float half_width = damage_across[i].w;
+    float depth = damage_inward[i].w;
+    float fade = sheet_fade(q.z);
+    float path = fold_path(shape, more, q.x);
+    float path_slope = (fold_path(shape, more, q.x + 2.0) - path) * 0.5;
+    float away = abs(q.y - path);
+    float side = q.y < path ? -1.0 : 1.0;
+    float taper_slope = taper > 0.0 ? -2.0 * q.x / (half_length * half_length) : 0.0;
+    float rest = max(1.0 - away / shape.x, 0.0);
+    float profile = mix(rest * sqrt(rest), bump(away / half_width), shape.y);
+    float profile_slope =
+        mix(-1.5 * sqrt(rest) / shape.x, bump_slope(away / half_width) / half_width, shape.y);
+    vec3 slope = vec3(taper_slope * profile - taper * profile_slope * side * path_slope,
+                      taper * profile_slope * side, 0.0);
+    return DamageField(depth * taper * fade * profile, depth * fade * slope,
+                       0.7 * fade * taper * taper * max(1.0 - away / (0.8 * shape.x), 0.0));
+}
+
+// Concave damages, and bent edges: hills about the axis along the edge.
+DamageField hill_field(int i, vec3 q) {
+    bool edge = i >= concave_end;
+    float half_length = damage_along[i].w;
+    float half_width = damage_across[i].w;
+    float depth = damage_inward[i].w;
+    float fade = edge ? 1.0 : sheet_fade(q.z);
+    float hill = bump(q.x / half_length);
+    float hill_slope = bump_slope(q.x / half_length) / half_length;
+    float r = edge ? max(length(q.yz), 1e-3) : q.y;
+    float reach = bump(r / half_width);
+    float reach_slope = bump_slope(r / half_width) / half_width;
+    vec2 turned = edge ? hill * reach_slope * q.yz / r : vec2(hill * reach_slope, 0.0);
+    return DamageField(depth * hill * reach * fade, depth * fade * vec3(hill_slope * reach, turned),
+                       edge ? 0.35 * hill * hill * reach * reach : 0.0);
+}
+
+// Damages are sorted by kind: perforations, dents, concave damages, bent edges.
+DamageField damage_field(int i, vec3 p) {
+    vec3 q = damage_local(i, p);
+    if (i >= dent_end) return hill_field(i, q);
+    if (i >= hole_count) {
+        float half_length = damage_along[i].w;
+        return dent_field(i, q, max(1.0 - q.x * q.x / (half_length * half_length), 0.0));
+    }
+    return perforation_field(i, q);
+}
+
+// Each kind has its own loop. One loop with branches would cost the work of all kinds per damage on
+// llvmpipe, which executes both sides of every branch.
 vec3 deformed(vec3 p) {
     vec3 moved = p;
-    for (int i = next_damage_near(0, hole_count, p); i < hole_count; i = next_damage_near(i + 1, hole_count, p)) {
+    for (int i = next_damage_near(0, hole_count, p); i < hole_count;
+         i = next_damage_near(i + 1, hole_count, p))
+        moved += perforation_field(i, damage_local(i, p)).amount * damage_inward[i].xyz;
+    for (int i = next_damage_near(hole_count, dent_end, p); i < dent_end;
+         i = next_damage_near(i + 1, dent_end, p)) {
         vec3 q = damage_local(i, p);
-        float outside = length(q.xy) - hole_radius(i, atan(q.y, q.x));
-        float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
-        moved += damage_inward[i].w * rim * rim * sheet_fade(q.z) * damage_inward[i].xyz;
-    }
-    for (int i = next_damage_near(hole_count, dent_end, p); i < dent_end; i = next_damage_near(i + 1, dent_end, p)) {
-        vec3 q = damage_local(i, p);
-        vec4 shape = damage_shape[3 * i];
-        float away = abs(q.y - fold_path(shape, damage_shape[3 * i + 1], q.x));
         float along = q.x / damage_along[i].w;
-        float rest = max(1.0 - away / shape.x, 0.0);
-        float profile = mix(rest * sqrt(rest), bump(away / damage_across[i].w), shape.y);
-        float depth = damage_inward[i].w * max(1.0 - along * along, 0.0) * sheet_fade(q.z);
-        moved += depth * profile * damage_inward[i].xyz;
+        moved += dent_field(i, q, max(1.0 - along * along, 0.0)).amount * damage_inward[i].xyz;
     }
     for (int i = next_damage_near(dent_end, damage_count, p); i < damage_count;
-         i = next_damage_near(i + 1, damage_count, p)) {
-        vec3 q = damage_local(i, p);
-        bool axis = i >= concave_end;
-        float reach = (axis ? length(q.yz) : q.y) / damage_across[i].w;
-        float depth = damage_inward[i].w * bump(q.x / damage_along[i].w) * bump(reach);
-        moved += (axis ? depth : depth * sheet_fade(q.z)) * damage_inward[i].xyz;
-    }
+         i = next_damage_near(i + 1, damage_count, p))
+        moved += hill_field(i, damage_local(i, p)).amount * damage_inward[i].xyz;
     return moved;
 }
 

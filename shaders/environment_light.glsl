@@ -7,6 +7,7 @@
 #include "materials.constants"
 #include "scene.block"
 #include "view.block"
+#include "octahedral.glsl"
 
 uniform sampler2DArray specular_map;   // GGX-prefiltered radiance, one layer per roughness.
 uniform sampler2D irradiance_map;      // Irradiance / pi by surface normal.

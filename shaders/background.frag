@@ -3,9 +3,9 @@
 #version 430 core
 #include "variant.constants"
 #include "view.block"
-#include "tone.glsl"
+#include "tone_curve.glsl"
 
-uniform sampler2D environment_map;   // As in ibl.glsl.
+uniform sampler2D environment_map;   // As in environment_light.glsl.
 
 in vec2 map_uv;
 

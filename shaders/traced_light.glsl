@@ -1,5 +1,5 @@
 // TracedLight traced_light_at(vec2 place, uint key, vec3 from_eye, vec3 normal): light that rays found at
-// the points of light_points.frag near `place`, a position in the image in pixels.
+// the points of ray_points.frag near `place`, a position in the image in pixels.
 // key: Surface id. from_eye: Vector from the eye to the surface in m.
 
 #include "variant.constants"
