@@ -209,7 +209,8 @@ class Mesh:
         """Area of each zone [Z] on the sheets."""
         corners = self.atlas_mm[self.triangles].astype(float)
         area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
-        return np.bincount(self.zone[self.triangles[:, 0]], area, len(self.zones))
+        of_zone = np.bincount(self.zone[self.triangles[:, 0]], area, len(self.zones))
+        return of_zone.astype(np.float64, copy=False)
 
     @cached_property
     def points_mm(self) -> NDArray[np.float64]:
