@@ -5,7 +5,7 @@
 #include "view.block"
 #include "tone_curve.glsl"
 
-uniform sampler2D environment_map;   // As in environment_light.glsl.
+uniform sampler2D environment_map;   // As in environment_map.glsl.
 
 in vec2 map_uv;
 

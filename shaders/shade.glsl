@@ -24,9 +24,13 @@
 #include "view_ray.glsl"
 #include "tone_curve.glsl"
 #include "brdf.glsl"
+#include "sky_visibility.glsl"
+#include "environment_map.glsl"
 #include "environment_light.glsl"
 #if LIGHTS
 #include "directional_light.glsl"
+#include "light_visibility.glsl"
+#include "occluder_light.glsl"
 #endif
 #include "noise.glsl"
 #include "ageing.glsl"
@@ -112,8 +116,8 @@ vec3 displayed(vec3 color) {
 // light_seen: Unshadowed share of each directional light.
 vec3 layer_color(Material m, vec3 normal, vec3 view, SkyVisibility sky, vec4 light_seen) {
 #if LAYER == LAYER_ALL
-    BrdfTerms r = reflector(m, normal, view);
-    vec3 radiance = lit(r, sky);
+    BrdfTerms r = brdf_terms(m, normal, view);
+    vec3 radiance = environment_reflection(r, sky);
 #if LIGHTS
     for (int i = 0; i < LIGHTS; ++i)
         if (light_seen[i] > 0.0) radiance += light_seen[i] * light_reflection(r, i);
@@ -218,18 +222,9 @@ vec3 part_color(Part p, ivec2 sample_at, uint key, vec3 view) {
     sky.traced = traced_light_at(place, key, from_eye, normal);
 #endif
 #if LIGHTS && LAYER == LAYER_ALL
-    // The whole container blocks a light behind the panel, but it is too close to a groove for the
-    // shadow map to show that.
-    if (dot(p.surface.outward, light_direction[0].xyz) >= 0.0) {
-        light_seen[0] = filtered_light_visibility(from_eye, normal, depth * pixel_angle);
-        sky.occluder_light = sky.lacks_indirect * occluder_light(from_eye, normal, sky, 0);
-    }
-    for (int i = 1; i < LIGHTS; ++i) {
-        if (i < light_count && dot(p.surface.outward, light_direction[i].xyz) >= 0.0) {
-            light_seen[i] = light_visibility(from_eye, i);
-            sky.occluder_light += sky.lacks_indirect * occluder_light(from_eye, normal, sky, i);
-        }
-    }
+    vec3 outward = p.surface.outward;
+    light_seen = light_visibility(outward, from_eye, normal, depth * pixel_angle);
+    sky.occluder_light = occluder_light(outward, from_eye, normal, sky);
 #endif
     return layer_color(p.surface.material, normal, view, sky, light_seen);
 }

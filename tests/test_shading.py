@@ -46,9 +46,10 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
     roughness, cosine = np.meshgrid(np.linspace(0.05, 1, 20), np.linspace(0.05, 1, 20))
     rows = np.stack([roughness, cosine, np.full_like(cosine, metallic), cosine], -1).reshape(-1, 4)
     body = (
-        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
+        '#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
-        " return vec4(lit(reflector(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
+        " BrdfTerms r = brdf_terms(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view);"
+        " return vec4(environment_reflection(r,"
         " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
         " NO_TRACED_LIGHT)), 1.0); }"
     )
@@ -62,9 +63,10 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
     rng = np.random.default_rng(0)
     rows = np.c_[rng.uniform(0.05, 1, (500, 2)), rng.uniform(0, 1, (500, 2))]
     body = (
-        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
+        '#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
-        " return vec4(lit(reflector(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view),"
+        " BrdfTerms r = brdf_terms(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view);"
+        " return vec4(environment_reflection(r,"
         " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
         " NO_TRACED_LIGHT)), 1.0); }"
     )
@@ -85,10 +87,11 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
 
     def lit(rays):
         body = (
-            '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
+            '#include "environment_light.glsl"\n'
             "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
             f" vec3 open = vec3(x.z); TracedLight rays = {rays};"
-            " return vec4(lit(reflector(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
+            " BrdfTerms r = brdf_terms(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view);"
+            " return vec4(environment_reflection(r,"
             " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, 0.0, vec3(0.1),"
             " vec3(0.3), rays)), 1.0); }"
         )
@@ -108,10 +111,11 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
     rng = np.random.default_rng(3)
     rows = np.c_[rng.uniform(0.05, 1, 500), rng.uniform(0, 1, (500, 3))]  # rough, n.v, paint, rim
     body = (
-        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
+        '#include "environment_light.glsl"\n'
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " float share = 1.0 - x.w * x.w;"
-        " return vec4(lit(reflector(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view),"
+        " BrdfTerms r = brdf_terms(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view);"
+        " return vec4(environment_reflection(r,"
         " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, 0.0, vec3(0.0),"
         " vec3(0.0, 0.5, 1.0), NO_TRACED_LIGHT)), 1.0); }"
     )
@@ -129,7 +133,8 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
 
 def test_fresnels_equations_equal_their_numpy_twin(gl):
     cosine = np.linspace(0, 1, 200)
-    body = '#include "brdf.glsl"\nvec4 f(vec4 x) { return vec4(fresnel_climb(x.x), 0, 0, 0); }'
+    body = "vec4 f(vec4 x) { return vec4(fresnel_climb(x.x), 0, 0, 0); }"
+    body = f'#include "reflectance.glsl"\n{body}'
     out = run(gl, body, np.repeat(cosine[:, None], 4, 1), white_light(gl))
     np.testing.assert_allclose(out[:, 0], fresnel_climb(cosine), atol=1e-5)
 
@@ -151,10 +156,9 @@ def test_black_paint_reflects_a_sun_with_the_split_sum_albedo(gl, slope_deg):
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
     ).reshape(-1, 3)
     body = (
-        '#include "brdf.glsl"\n#include "environment_light.glsl"\n'
         '#include "directional_light.glsl"\n'
         f"vec4 f(vec4 x) {{ Material black = Material(vec3(0.0), {roughness}, 0.0);"
-        " return vec4(light_reflection(reflector(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
+        " return vec4(light_reflection(brdf_terms(black, vec3(0.0, 0.0, 1.0), x.xyz), 0), 1.0); }"
     )
     radiance = run(gl, body, np.c_[views, np.zeros(len(views))], white_light(gl))[:, 0]
     cell = np.sin(theta).ravel() * (np.pi / 2 / steps) * (2 * np.pi / steps)
