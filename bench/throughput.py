@@ -37,7 +37,9 @@ import fastgen
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.dataset.storage import Folder
-from fastgen.formats import SEAFRONT, Files, Item, assemble, formats_of
+from fastgen.formats.format import Files, assemble
+from fastgen.formats.item import Item
+from fastgen.formats.registry import SEAFRONT, formats_of
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot

@@ -21,7 +21,7 @@ import fastgen
 from fastgen.camera.projection import view_of
 from fastgen.errors import OutputError
 from fastgen.files.images import png, write
-from fastgen.formats import view_values
+from fastgen.formats.scene_file import view_values
 from fastgen.generator import Generator
 from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh

@@ -14,8 +14,10 @@ from pycocotools.cocoeval import COCOeval
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.cli.main import main
-from fastgen.formats import Item, assemble, formats_of
 from fastgen.formats.bop import OBJECT_IDS
+from fastgen.formats.format import assemble
+from fastgen.formats.item import Item
+from fastgen.formats.registry import formats_of
 from fastgen.generator import Generator
 from fastgen.labels.objects import CASTINGS
 from fastgen.scene import Scene

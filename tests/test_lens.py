@@ -13,7 +13,7 @@ from fastgen.camera.lens import Distortion
 from fastgen.camera.projection import View, view_of
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
-from fastgen.formats import view_values
+from fastgen.formats.scene_file import view_values
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container

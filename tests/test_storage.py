@@ -19,7 +19,7 @@ from fastgen.dataset.job import Job, Task
 from fastgen.dataset.storage import Folder, storage_of
 from fastgen.dataset.workers import run
 from fastgen.errors import OutputError
-from fastgen.formats import Same
+from fastgen.formats.format import Same
 from tests.crash_run import FAULTY_SCENE, QuickMaker, make
 from tests.folders import content
 

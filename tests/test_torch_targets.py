@@ -9,7 +9,9 @@ from fastgen import Config, Generator
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config.config import LabelConfig
 from fastgen.dataset.storage import Folder
-from fastgen.formats import SEAFRONT, Item, assemble, formats_of
+from fastgen.formats.format import assemble
+from fastgen.formats.item import Item
+from fastgen.formats.registry import SEAFRONT, formats_of
 from fastgen.torch import (
     ContainerDataset,
     ItemSettings,

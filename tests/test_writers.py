@@ -12,7 +12,10 @@ from pycocotools import mask as coco_mask
 from fastgen.classes import DETECTION_CLASSES
 from fastgen.config.config import LabelConfig
 from fastgen.files import images as encode
-from fastgen.formats import Item, assemble, coco, damage, known_formats, yolo
+from fastgen.formats import coco, damage, yolo
+from fastgen.formats.format import assemble
+from fastgen.formats.item import Item
+from fastgen.formats.registry import known_formats
 from fastgen.generator import Generator
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Object

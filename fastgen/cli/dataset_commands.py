@@ -22,7 +22,7 @@ from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
 from fastgen.dataset.verify import examine
-from fastgen.formats import SEAFRONT, known_formats
+from fastgen.formats.registry import SEAFRONT, known_formats
 
 _GENERATE = """\
 Generate a labelled dataset, or continue one that was stopped.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastgen.errors import OutputError
 from fastgen.files.images import decode
-from fastgen.formats import Format
+from fastgen.formats.format import Format
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 

@@ -14,7 +14,8 @@ from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
 from fastgen.files.images import encode_picture
-from fastgen.formats import Format, Record, formats_of
+from fastgen.formats.format import Format, Record
+from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
 
 CONTACT_SHEET = "contact_sheet.png"

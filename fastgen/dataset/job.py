@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from fastgen.config.config import Config
-from fastgen.formats import SEAFRONT
+from fastgen.formats.registry import SEAFRONT
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 

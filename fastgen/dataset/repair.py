@@ -11,7 +11,7 @@ from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
-from fastgen.formats import SEAFRONT
+from fastgen.formats.registry import SEAFRONT
 from fastgen.render.settings import RenderSettings
 
 

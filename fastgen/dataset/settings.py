@@ -9,7 +9,7 @@ from fastgen.dataset.dataset_json import unsealed
 from fastgen.dataset.job import LAYOUTS, Job
 from fastgen.dataset.seal import digest
 from fastgen.errors import ConfigError
-from fastgen.formats import formats_of
+from fastgen.formats.registry import formats_of
 from fastgen.light.environment import load_environment
 from fastgen.light.hdri import find_hdris
 from fastgen.sampling.scene import SPLITS

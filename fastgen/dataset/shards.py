@@ -24,7 +24,9 @@ from fastgen.dataset.job import Job, Task, manifest_path, stem_of
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
-from fastgen.formats import Files, Item, Record, Same, assemble, formats_of
+from fastgen.formats.format import Files, Record, Same, assemble
+from fastgen.formats.item import Item
+from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS, split_of
 
 _PRELOAD_IMAGES = 1000

@@ -15,7 +15,8 @@ from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
-from fastgen.formats import Format, Record, formats_of
+from fastgen.formats.format import Format, Record
+from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

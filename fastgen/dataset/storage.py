@@ -15,7 +15,7 @@ from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
-from fastgen.formats import Files, Same
+from fastgen.formats.format import Files, Same
 
 ASIDE = ".aside"
 """Prefix of temporary folders, where files wait until all files of their shard are on the disk."""

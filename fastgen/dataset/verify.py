@@ -15,7 +15,8 @@ from fastgen.dataset.job import manifest_path
 from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError
-from fastgen.formats import Format, Read, Record, formats_of
+from fastgen.formats.format import Format, Read, Record
+from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
 from fastgen.validation import from_plain

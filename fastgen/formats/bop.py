@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from fastgen.files.images import png
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same, view_values
 from fastgen.formats.depth import depth_mm
+from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
+from fastgen.formats.item import Item
+from fastgen.formats.scene_file import view_values
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene.container_kinds import KINDS

@@ -2,7 +2,10 @@
 
 from typing import Any
 
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, coco, view_values
+from fastgen.formats import coco
+from fastgen.formats.format import DatasetFiles, Files, Format, Records
+from fastgen.formats.item import Item
+from fastgen.formats.scene_file import view_values
 from fastgen.labels.objects import CASTINGS
 
 _EDGES = [[a + 1, b + 1] for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)]

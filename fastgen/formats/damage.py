@@ -8,18 +8,9 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, SEGMENTATION_CLASSES
 from fastgen.files.images import decode, png
-from fastgen.formats import (
-    DatasetFiles,
-    Files,
-    Format,
-    Item,
-    Label,
-    Read,
-    Record,
-    Records,
-    coco,
-    yolo,
-)
+from fastgen.formats import coco, yolo
+from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
+from fastgen.formats.item import Item
 from fastgen.labels.overlay import draw_outline
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Sample

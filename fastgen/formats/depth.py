@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.files.images import png
-from fastgen.formats import Files, Format, Item
+from fastgen.formats.format import Files, Format
+from fastgen.formats.item import Item
 
 
 def depth_mm(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from fastgen.config.cameras import CameraConfig
 from fastgen.errors import ConfigError
-from fastgen.formats import Files, Format, Item, Same
+from fastgen.formats.format import Files, Format, Same
+from fastgen.formats.item import Item
 from fastgen.scene import Camera
 
 DOOR_CLASSES = ("door", "no_door")

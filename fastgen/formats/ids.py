@@ -3,7 +3,8 @@
 from typing import Any
 
 from fastgen.files.images import png
-from fastgen.formats import Files, Format, Item
+from fastgen.formats.format import Files, Format
+from fastgen.formats.item import Item
 
 
 class _Ids(Format):

@@ -8,19 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
-from fastgen.formats import (
-    DatasetFiles,
-    Files,
-    Format,
-    Item,
-    Label,
-    Read,
-    Record,
-    Records,
-    Same,
-    coco,
-    yolo,
-)
+from fastgen.formats import coco, yolo
+from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records, Same
+from fastgen.formats.item import Item
 from fastgen.labels.overlay import draw_box
 from fastgen.labels.visibility import window
 from fastgen.sampling.scene import SPLITS

@@ -3,7 +3,8 @@ development kit says to; what is ignored is a DontCare region. Geiger et al. 201
 
 from typing import Any
 
-from fastgen.formats import Files, Format, Item, Same
+from fastgen.formats.format import Files, Format, Same
+from fastgen.formats.item import Item
 
 _UNKNOWN = "-1 -1 -1 -1000 -1000 -1000 -10"
 """Dimensions, location and rotation_y: their order is yaw only, which no tilted camera fits."""

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from fastgen.files.images import png
-from fastgen.formats import Files, Format, Item
+from fastgen.formats.format import Files, Format
+from fastgen.formats.item import Item
 
 
 class _Normals(Format):

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from fastgen.files.images import png
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records
+from fastgen.formats.format import DatasetFiles, Files, Format, Records
+from fastgen.formats.item import Item
 from fastgen.labels.crops import text_crops
 
 

@@ -4,7 +4,8 @@ development kit, section 7."""
 from typing import Any
 from xml.etree import ElementTree
 
-from fastgen.formats import DatasetFiles, Files, Format, Item, Records, Same
+from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
+from fastgen.formats.item import Item
 
 
 class _Voc(Format):

@@ -1,4 +1,8 @@
-"""YOLO text labels, normalised to the image and clipped to it: trainers refuse values beyond 1."""
+"""YOLO label files: boxes and outlines as shares of the image, from 0 to 1.
+
+A label is a line: the class index, then numbers. Values are clipped, because trainers refuse values
+above 1.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -7,55 +11,70 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen import formats
 from fastgen.classes import DETECTION_CLASSES
+from fastgen.formats import item
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Object
 
 
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
-    """Class, object and visible box of formats.detections, ignored ones left out: the format cannot
-    tell them from the rest."""
+    """Return class index, object and visible box of the objects that the marker task labels.
+
+    Ignored objects are left out, because YOLO files cannot mark them.
+    """
     return [
-        (DETECTION_CLASSES.index(item.class_name), item, box)
-        for item, box in formats.detections(objects)
-        if not item.ignored
+        (DETECTION_CLASSES.index(thing.class_name), thing, box)
+        for thing, box in item.detections(objects)
+        if not thing.ignored
     ]
 
 
 def normalised(box: Box, size: tuple[int, int]) -> tuple[float, float, float, float]:
-    """Centre x, y, width and height of a pixel box as shares of an image of (width, height)."""
+    """Return centre x, y, width and height of a pixel box as shares of the image.
+
+    Args:
+        box: (x0, y0, x1, y1) in pixels.
+        size: (width, height) of the image.
+    """
     (x0, y0, x1, y1), (width, height) = box, size
     return (x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height
 
 
 def pixel_box(values: Sequence[float], size: tuple[int, int]) -> tuple[float, float, float, float]:
-    """The pixel box (x0, y0, x1, y1) of what `normalised` gave: its inverse."""
+    """Return the pixel box (x0, y0, x1, y1) of a normalised box; the inverse of `normalised`."""
     (x, y, w, h), (width, height) = values, size
     return (x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width, (y + h / 2) * height
 
 
 def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:
-    """A line for each of `detections`: class, box centre x, y, width, height."""
+    """Return the label file of an image of this size, with a line for each of `detections`."""
     found = detections(objects)
     return "".join(line(index, normalised(box, size)) for index, _, box in found)
 
 
 def line(index: int, values: Iterable[float]) -> str:
-    """One label: class, then numbers clipped to 0..1."""
+    """Return one label: class index, then the values clipped to 0..1."""
     clipped = tuple([min(max(v, 0.0), 1.0) for v in values])
-    # outlines have hundreds: one format for all of them takes half the time of one each
+    # outlines have hundreds of values; one format string takes half the time of one per value
     return f"{index}{' %.6f' * len(clipped)}\n" % clipped
 
 
 def rows(text: str) -> list[tuple[int, list[float]]]:
-    """Class and numbers of each `line` of a file. Raises ValueError for text that is none."""
+    """Parse a label file into class index and values of each line.
+
+    Raises:
+        ValueError: The text is not a label file.
+    """
     lines = [each.split() for each in text.splitlines()]
     return [(int(index), [float(v) for v in values]) for index, *values in lines]
 
 
 def finite_rows(text: bytes) -> list[tuple[int, list[float]]]:
-    """Return `rows` of a file. Raises ValueError for negative classes and infinite numbers."""
+    """Parse a label file as `rows` does, and check that its values can be drawn.
+
+    Raises:
+        ValueError: The file is not a label file, or has negative classes or infinite values.
+    """
     found = rows(text.decode())
     if any(index < 0 or not all(map(math.isfinite, numbers)) for index, numbers in found):
         raise ValueError("not a YOLO label file")
@@ -63,15 +82,21 @@ def finite_rows(text: bytes) -> list[tuple[int, list[float]]]:
 
 
 def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """One closed polygon [N, 2] along the pixels' outer borders, around all parts of a mask.
+    """Return one closed polygon around all parts of a mask, along the outer edges of its pixels.
 
-    Parts are joined by a bridge between their nearest corners, there and back. Holes cannot be told
-    in a polygon and are filled.
+    Parts are joined by a bridge of zero width between their nearest corners. Holes are filled,
+    because one polygon cannot have holes.
+
+    Args:
+        mask: bool [H, W].
+
+    Returns:
+        Corners float64 [N, 2] as x, y in pixels; N is 0 for an empty mask.
     """
     box = mask_box(mask)
     if box is None:
         return np.zeros((0, 2))
-    # with pixels cut in four, contours run through quarters at the border, whose outer edge is it
+    # contours run through pixel centres; at twice the size they round to the pixels' outer edges
     seen = window(mask, box).view(np.uint8)
     quarters = cv2.resize(seen, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     found, _ = cv2.findContours(quarters, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)

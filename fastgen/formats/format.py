@@ -1,0 +1,130 @@
+"""The base class of label formats, the types it uses, and the assembly of one sample's files."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.formats.item import Item
+from fastgen.formats.scene_file import scene_file
+
+
+@dataclass(frozen=True)
+class Same:
+    """Content of a file that equals another file of the same sample.
+
+    Attributes:
+        path: The other file, relative to the dataset.
+    """
+
+    path: str
+
+
+Files = dict[str, bytes | Same]
+"""Content of files by path relative to the dataset, with forward slashes."""
+
+Record = dict[str, Any]
+"""One image as JSON values: stem, split, size [width, height], and facts by name of format."""
+
+Records = Callable[[], Iterable[Record]]
+"""Returns the records of one split in order; each call starts from the beginning."""
+
+Read = Callable[[str], bytes]
+"""Returns the content of a file of a dataset by its path relative to the dataset."""
+
+Label = tuple[str, Sequence[float]]
+"""Class name, and box as x, y, width and height in pixels."""
+
+DatasetFiles = Iterator[tuple[str, Iterable[str] | bytes]]
+"""Path and content of each file that covers a whole split; the content is bytes or text pieces."""
+
+
+class Format(ABC):
+    """One label format: the files of each sample, and what dataset code needs to know of them.
+
+    A subclass has one instance, which its module calls FORMAT.
+
+    Attributes:
+        name: Name on the command line and key of `Record["facts"]`.
+        classes: Class names of its labels in order; empty where labels have no classes.
+        needs_normals: `sample_files` reads `Sample.normals`, which cost another draw.
+        fits_archives: The webdataset layout can hold this format, because `sample_files` alone
+            gives everything a reader needs.
+    """
+
+    name: str
+    classes: tuple[str, ...] = ()
+    needs_normals: bool = False
+    fits_archives: bool = True
+
+    @abstractmethod
+    def sample_files(self, item: Item) -> tuple[Files, Any]:
+        """Return the files of one sample, and facts about it as JSON values.
+
+        The shard's manifest keeps the facts; the other methods work on them.
+        """
+
+    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+        """Yield the path and content of each file that covers a whole split."""
+        return iter(())
+
+    def folders(self, split: str) -> Sequence[str]:
+        """Return folders that readers expect even when they are empty."""
+        return ()
+
+    def labels(self, facts: Any) -> Iterable[Label]:
+        """Return the labels to train on in one image with these facts, ignored ones left out."""
+        return ()
+
+    def counts(self, facts: Iterable[Any]) -> dict[str, int]:
+        """Count labels over the images with these facts, under the names used in dataset.json.
+
+        Without images, return every name with 0.
+        """
+        return {}
+
+    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:  # noqa: B027
+        """Draw the labels of one image, as its label file has them, into `picture` in place.
+
+        Args:
+            picture: uint8 RGB [H, W, 3], the image at any scale.
+            read: Returns the content of a file of the dataset by its path.
+            name: SPLIT/STEM of the image.
+
+        Raises:
+            ValueError, IndexError: The label file cannot be read.
+        """
+
+    def check(self, record: Record, read: Read) -> Iterable[str]:
+        """Return a line "PATH: FAULT" for each label file of one image that contradicts others."""
+        return ()
+
+    def check_split(self, split: str, facts: list[Any], read: Read) -> Iterable[str]:
+        """Return a line "PATH: FAULT" for each file of a split that contradicts the facts.
+
+        Args:
+            split: train, val or test.
+            facts: Facts of the split's images in order.
+            read: Returns the content of a file of the dataset by its path.
+        """
+        return ()
+
+
+def assemble(item: Item, formats: Sequence[Format]) -> tuple[Files, Record]:
+    """Return the files of one sample, its image first and its scene file last, and its record."""
+    files: Files = {item.image_path: item.jpeg}
+    facts = {}
+    for each in formats:
+        more, facts[each.name] = each.sample_files(item)
+        files.update(more)
+    record = {
+        "stem": item.stem,
+        "split": item.split,
+        "size": list(item.sample.view.size),
+        "facts": facts,
+    }
+    files[f"scenes/{item.split}/{item.stem}.json"] = scene_file(item)
+    return files, record

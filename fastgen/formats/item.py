@@ -1,0 +1,73 @@
+"""One image with its labels, as formats get it."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
+from fastgen.config.config import LabelConfig
+from fastgen.files.images import jpeg
+from fastgen.formats import coco
+from fastgen.labels.visibility import window
+from fastgen.sample import Box, Object, Sample
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A sample and its place in a dataset.
+
+    Values that several formats need are computed on first use and kept.
+
+    Attributes:
+        sample: The image with its labels.
+        split: train, val or test.
+        stem: Name of its files without the suffix: scene and camera, as in 000017_A.
+        number: Position of the image in the whole dataset.
+        rules: Limits below which labels are ignored or left out.
+    """
+
+    sample: Sample
+    split: str
+    stem: str
+    number: int
+    rules: LabelConfig
+
+    @property
+    def image_path(self) -> str:
+        """Path of the image relative to the dataset."""
+        return f"images/{self.split}/{self.stem}.jpg"
+
+    @property
+    def container(self) -> Object:
+        """The container, visible or not."""
+        return next(thing for thing in self.sample.objects if thing.id == CONTAINER_ID)
+
+    @property
+    def detections(self) -> Iterator[tuple[Object, Box]]:
+        """The `detections` of the sample's objects."""
+        return detections(self.sample.objects)
+
+    @cached_property
+    def container_annotation(self) -> dict[str, Any] | None:
+        """COCO annotation of the container, category 1 of each task; None if it is not visible."""
+        thing, sample = self.container, self.sample
+        if thing.bbox is None:
+            return None
+        part = window(sample.damage, thing.bbox) > 0
+        return coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored)
+
+    @cached_property
+    def jpeg(self) -> bytes:
+        """The image as JPEG."""
+        return jpeg(self.sample.image)
+
+
+def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
+    """Yield the objects that the marker task labels, with their visible boxes.
+
+    Ignored objects are included; objects without visible pixels are not.
+    """
+    for thing in objects:
+        if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:
+            yield thing, thing.bbox
