@@ -204,7 +204,7 @@ def test_a_dataset_rendered_by_two_backends_is_reported(tmp_path, capfd):
     assert main([*command, "4", "--backend", "egl"]) == 0
     assert "was drawn by" not in capfd.readouterr().err
     assert main([*command, "8", "--backend", "osmesa"]) == 0
-    assert re.search(r"was drawn by egl \S.* and by osmesa \S.*: they", capfd.readouterr().err)
+    assert re.search(r"was rendered by egl \S.* and by osmesa \S.*, which", capfd.readouterr().err)
 
 
 def test_verify_passes_an_intact_dataset(dataset):

@@ -39,6 +39,9 @@ def generate(
 ) -> dict[str, Any]:
     """Make the dataset at `job.out`, or finish it.
 
+    Example:
+        generate(Job("boxes", images=1000, seed=7, render=RenderSettings(quality="draft")))
+
     Args:
         job: What to make.
         worker_count: Number of processes on this machine; by default one per core.
