@@ -107,3 +107,8 @@ def test_printed_limits_are_the_enforced_limits():
 def test_the_docs_page_shows_the_printed_config():
     page = Path("docs/configuration.md").read_text(encoding="utf-8")
     assert f"```yaml\n{as_yaml(Config.preset())}```\n" in page
+
+
+def test_lines_of_the_printed_config_have_at_most_100_characters():
+    for config in CONFIGS.values():
+        assert max(map(len, as_yaml(config).splitlines())) <= 100

@@ -106,7 +106,7 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
         ("damages", {"kind": "dent"}, r"damages\[0\].kind: 'dent' is unknown"),
         ("damages", {"shape": (1.0,)}, r"damages\[0\].shape: a concave has 0 numbers, not 1"),
         ("damages", {"size_mm": (9.0, -1.0)}, r"damages\[0\].size_mm\[1\]: -1.0 is out of range"),
-        ("damages", {"along": (0.0, 0.0, 0.0)}, r"damages\[0\].along, across, inward: these must be"),
+        ("damages", {"along": (0.0, 0.0, 0.0)}, r"damages\[0\].along, across, inward: these"),
         ("container", {"kind": "30"}, "container.kind: '30' is unknown"),
     ],
 )

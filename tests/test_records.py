@@ -1,5 +1,7 @@
 """Conversion between plain values and dataclasses, and its error messages."""
 
+import subprocess
+import sys
 import typing
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -188,3 +190,8 @@ def test_checking_an_instance_converts_nothing():
     ):
         with pytest.raises(ConfigError, match=f"^{message}"):
             check_fields(value, Outer, "it")
+
+
+def test_pydantic_is_imported_by_the_first_validation():
+    code = "import sys, fastgen.config.config; sys.exit('pydantic' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -86,7 +86,7 @@ def _indented(lines: Iterator[str]) -> Iterator[str]:
 
 
 def _comment(words: str) -> Iterator[str]:
-    return (f"# {line}" for line in textwrap.wrap(words, _WIDTH - 2))
+    return (f"# {line}" for line in textwrap.wrap(words, _WIDTH - 8))  # "# ", indentation
 
 
 def _plain(value: Any) -> str:
@@ -128,8 +128,8 @@ def _joined(*parts: str, by: str = ", ") -> str:
 def _explained(line: str, words: str, limits: str = "") -> Iterator[str]:
     """Yield a line with a comment of its meaning and limits; a long meaning goes above it."""
     comment = _joined(words.removesuffix("."), limits, by="; ")
-    if len(line) + len(limits) > _WIDTH - 10:
-        yield from _comment(f"{words} {limits[:1].upper()}{limits[1:]}.")
+    if limits and len(line) + len(limits) > _WIDTH - 4:
+        yield from _comment(f"{words} {limits[0].upper()}{limits[1:]}.".strip())
         comment = ""
     elif len(line) + len(comment) > _WIDTH - 10 and words:
         yield from _comment(words)
