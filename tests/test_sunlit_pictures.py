@@ -1,4 +1,4 @@
-"""Pictures under suns and lamps: places where their light must and must not fall."""
+"""Images under the sun and lamps: places where their light must and must not fall."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.test_environment import write_exr
 from tests.tone_inverse import light_of
 
 GREY = np.full((512, 1024, 3), 0.2, np.float32)
-"""An even sky to which suns are added."""
+"""A uniform sky to which suns are added."""
 
 
 @pytest.mark.parametrize(("camera", "x"), [("Cr", 0.75), ("Cl", -0.75)])

@@ -40,9 +40,9 @@ def points(normal, toward_eye=None, roughness=0.4, place=(0, 0, 0)):
     return Points(column, row, *rows, np.full(4, roughness, np.float32))
 
 
-def found(at, bodies, sky=EVEN, yaw_deg=0.0, suns=()):
+def found(at, bodies, sky=EVEN, yaw_deg=0.0, lights=()):
     """Return the traced light averaged over a tile, [4, 3]."""
-    return traced_light(at, RayBodies(bodies, suns), sky, yaw_deg).mean(axis=0)
+    return traced_light(at, RayBodies(bodies, lights), sky, yaw_deg).mean(axis=0)
 
 
 def square_factor(half_side, height):
@@ -60,27 +60,27 @@ FAR = plate((0, 0, -1e7), (1, 0, 0), (0, 1, 0))
 
 def test_an_open_place_sees_the_whole_sky():
     for normal in ((0, 0, 1), (1, 0, 0), (0.3, -0.8, 0.1)):
-        open_, thrown, mirrored, shown = found(points(normal), [FAR])
+        open_, indirect, mirrored, shown = found(points(normal), [FAR])
         assert (open_ == 1).all()
         assert (mirrored == 1).all()
-        assert (thrown == 0).all()
+        assert (indirect == 0).all()
         assert (shown == 0).all()
 
 
 @pytest.mark.parametrize("half_side", [300, 1000, 4000])
 def test_a_square_above_occludes_and_reflects_by_its_form_factor(half_side):
     above = plate((0, 0, 1000), (half_side, 0, 0), (0, half_side, 0), facing=-1)
-    open_, thrown, *_ = found(points((0, 0, 1)), [above])
+    open_, indirect, *_ = found(points((0, 0, 1)), [above])
     factor = square_factor(half_side, 999)
     np.testing.assert_allclose(open_, 1 - factor, atol=0.04)
-    np.testing.assert_allclose(thrown, factor * PAINT * LIGHT, atol=0.04 * PAINT.max())
+    np.testing.assert_allclose(indirect, factor * PAINT * LIGHT, atol=0.04 * PAINT.max())
 
 
 def test_the_back_of_a_surface_occludes_but_reflects_nothing():
     above = plate((0, 0, 1000), (1000, 0, 0), (0, 1000, 0))
-    open_, thrown, *_ = found(points((0, 0, 1)), [above])
+    open_, indirect, *_ = found(points((0, 0, 1)), [above])
     np.testing.assert_allclose(open_, 1 - square_factor(1000, 999), atol=0.04)
-    assert (thrown == 0).all()
+    assert (indirect == 0).all()
 
 
 def test_a_sunlit_wall_reflects_the_sun_and_a_shaded_one_does_not():
@@ -88,19 +88,19 @@ def test_a_sunlit_wall_reflects_the_sun_and_a_shaded_one_does_not():
     toward = np.array([0.6, 0.0, 0.8])
     sun = DistantLight(toward.astype(np.float32), np.full(3, 5, np.float32))
     dark = found(points((0, 0, 1)), [wall])[1]
-    lit = found(points((0, 0, 1)), [wall], suns=[sun])[1]
+    lit = found(points((0, 0, 1)), [wall], lights=[sun])[1]
     np.testing.assert_allclose(dark, 0.5 * PAINT * LIGHT, atol=0.01)  # half the hemisphere
     np.testing.assert_allclose(lit - dark, 0.5 * PAINT * 5 * 0.6, rtol=0.03)
     # far away, with its unlit back toward the wall
     roof = plate(toward * 3e5, np.cross(toward, (0, 1, 0)) * 1e6, (0, 1e6, 0), facing=-1)
-    shaded = found(points((0, 0, 1)), [wall, roof], suns=[sun])[1]
+    shaded = found(points((0, 0, 1)), [wall, roof], lights=[sun])[1]
     np.testing.assert_allclose(shaded, dark, atol=0.01)
 
 
 def test_a_sun_behind_a_wall_does_not_light_it():
     wall = plate((-1000, 0, 0), (0, 1e7, 0), (0, 0, 1e7))
     sun = DistantLight(np.array([-0.6, 0.0, 0.8], np.float32), np.full(3, 5, np.float32))
-    without, behind = (found(points((0, 0, 1)), [wall], suns=s)[1] for s in ((), [sun]))
+    without, behind = (found(points((0, 0, 1)), [wall], lights=s)[1] for s in ((), [sun]))
     np.testing.assert_array_equal(behind, without)
 
 
@@ -210,8 +210,8 @@ def test_occlusion_of_mirrored_skies_equals_a_sum_over_the_lobe(
     assert np.abs(expected - 0.5).max() < 0.47  # the screen hides a part
     np.testing.assert_allclose(traced[:, 2].mean(axis=0), expected, atol=0.03)
     even = ggx_share(np.ones_like(radiance), 0, normal, eye, roughness, hidden)
-    thrown = traced[:, 3].mean(axis=0)
-    np.testing.assert_allclose(thrown, (1 - even) * PAINT * LIGHT, rtol=0.05)
+    indirect = traced[:, 3].mean(axis=0)
+    np.testing.assert_allclose(indirect, (1 - even) * PAINT * LIGHT, rtol=0.05)
 
 
 @pytest.mark.parametrize("cosine", [0.3, 0.9])

@@ -30,9 +30,9 @@ def blur_radius_px(
     and 3).
 
     Args:
-        defocus: focus distance and f-number.
-        camera: focal length and sensor width.
-        width: image width in pixels.
+        defocus: Focus distance and f-number.
+        camera: Focal length and sensor width.
+        width: Image width in pixels.
         depth_m: float32 [H, W], metres along the optical axis; may be inf.
 
     Returns:
@@ -65,7 +65,7 @@ def motion_blurred(light: Light, motion_px: tuple[float, float]) -> Light:
 
     Args:
         light: float32 [H, W, 3].
-        motion_px: displacement of the image during the exposure, (right, down) in pixels. Each
+        motion_px: Displacement of the image during the exposure, (right, down) in pixels. Each
             pixel becomes the mean along this line, centred on the pixel.
     """
     if np.hypot(*motion_px) < _LEAST_PX:

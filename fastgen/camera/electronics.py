@@ -20,7 +20,7 @@ def vignette(size: tuple[int, int], corner_loss: float) -> Light:
 
     Args:
         size: (width, height) in pixels.
-        corner_loss: share of the light lost in the corners, 0 to less than 1.
+        corner_loss: Share of the light lost in the corners, 0 to less than 1.
 
     Returns:
         float32 [H, W, 1], 0..1.

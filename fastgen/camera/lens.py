@@ -56,11 +56,11 @@ class Distortion:
     """Distortion of one lens over one image.
 
     Args:
-        lens: model and coefficients.
+        lens: Model and coefficients.
         half_size: (width, height) from the centre of the image, in focal lengths.
 
     Raises:
-        ConfigError: the lens folds the image over, or its field of view is too wide to draw.
+        ConfigError: The lens folds the image over, or its field of view is too wide to draw.
     """
 
     def __init__(self, lens: Lens, half_size: tuple[float, float]) -> None:

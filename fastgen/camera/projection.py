@@ -26,9 +26,9 @@ class View:
     Attributes:
         rotation: float64 [3, 3], world to view.
         position_m: float64 [3], world metres.
-        focal_px: focal length in pixels, equal on both axes.
+        focal_px: Focal length in pixels, equal on both axes.
         size: (width, height) in pixels.
-        distortion: lens distortion, None for a pinhole.
+        distortion: Lens distortion, None for a pinhole.
     """
 
     rotation: NDArray[np.float64]
@@ -155,7 +155,7 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     The up direction of the image is world z, turned clockwise by the roll of the camera.
 
     Raises:
-        ConfigError: the lens cannot be drawn, see lens.Distortion.
+        ConfigError: The lens cannot be drawn, see lens.Distortion.
     """
     position = np.array(camera.position_mm, np.float64) * MM
     forward = np.array(camera.target_mm, np.float64) * MM - position

@@ -39,11 +39,11 @@ def apply_camera_model(
     """Return the image that a camera records of a rendered frame.
 
     Args:
-        frame: the ideal image. `frame.radiance` is required if `needs_radiance`.
-        view: projection of `camera` at the size of the frame.
-        camera: its `sensor` holds the parameters of the model.
-        weather: fog and rain between the camera and the scene.
-        airlight: mean linear light of the sky in the exposure of the frame: colour of fog and rain.
+        frame: The ideal image. `frame.radiance` is required if `needs_radiance`.
+        view: Projection of `camera` at the size of the frame.
+        camera: Its `sensor` holds the parameters of the model.
+        weather: Fog and rain between the camera and the scene.
+        airlight: Mean linear light of the sky in the exposure of the frame: colour of fog and rain.
 
     Returns:
         uint8 [H, W, 3], sRGB.

@@ -45,7 +45,7 @@ def add_fog(
         ray_m: float32 [H, W], distance along the ray of each pixel centre in metres, inf for the
             surroundings.
         cover: uint8 [H, W], see Frame.
-        visibility_mm: meteorological visibility V.
+        visibility_mm: Meteorological visibility V.
         airlight: float32 [3], A.
     """
     decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
@@ -77,7 +77,7 @@ def _behind(
     Args:
         light: float32 [H, W, 3].
         cover: uint8 [H, W].
-        mixed: rows and columns [N] of the partly covered pixels.
+        mixed: Rows and columns [N] of the partly covered pixels.
         share: float32 [N, 1], coverage of these pixels, 0..1.
     """
     step = np.arange(-_BESIDE, _BESIDE + 1)
@@ -119,8 +119,8 @@ def add_rain(
     Args:
         light: float32 [H, W, 3], linear.
         depth_m: float32 [H, W], metres along the optical axis.
-        view: projection of the camera.
-        rain: rate, shutter time, wind and random seed.
+        view: Projection of the camera.
+        rain: Rate, shutter time, wind and random seed.
         sky: float32 [3], mean ambient light.
     """
     rng = np.random.Generator(np.random.PCG64(rain.seed))
@@ -173,7 +173,7 @@ def _streaks(
         wide_px: [N], diameter in pixels.
         z: [N], depth in metres.
         depth_m: float32 [H, W], depth of the scene.
-        times: number of drops that each streak represents.
+        times: Number of drops that each streak represents.
     """
     height, width = depth_m.shape
     way = np.abs(way_px).max(axis=1)

@@ -34,9 +34,9 @@ class DirectionalLight:
     """Light from one direction, in the frame of the environment map.
 
     Attributes:
-        direction: unit vector toward the light.
-        light: linear RGB, irradiance / pi on a surface that faces the light.
-        radius: angular radius in radians of a uniform disc with the same spread.
+        direction: Unit vector toward the light.
+        light: Linear RGB, irradiance / pi on a surface that faces the light.
+        radius: Angular radius in radians of a uniform disc with the same spread.
     """
 
     direction: tuple[float, float, float]
@@ -92,9 +92,9 @@ class _Excess:
     """Radiance of a light above the surrounding sky.
 
     Attributes:
-        source: the light.
-        share: its share of the irradiance on a surface that faces it.
-        at: rows and columns [K] of its texels.
+        source: The light.
+        share: Its share of the irradiance on a surface that faces it.
+        at: Rows and columns [K] of its texels.
         radiance: [K, 3], excess in these texels.
     """
 

@@ -89,7 +89,7 @@ def prefilter_environment(name: str, radiance: NDArray[np.float32]) -> Environme
     of 1e6 keeps its energy wherever it is spread over more than a few texels.
 
     Args:
-        name: name of the environment.
+        name: Name of the environment.
         radiance: float32 [H, W, 3], equirectangular, finite and 0 or more, H close to W / 2.
     """
     width = radiance.shape[1]
@@ -164,10 +164,10 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
 
     Args:
         path: .hdr or .exr file.
-        cache_dir: by default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen.
+        cache_dir: By default $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen.
 
     Raises:
-        AssetError: the file cannot be used, see `load_radiance`, or is too dark or too bright.
+        AssetError: The file cannot be used, see `load_radiance`, or is too dark or too bright.
     """
     path = Path(path)
     try:
@@ -246,7 +246,7 @@ def _meter_cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def sky_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
     """Return irradiance / pi, float32 [K, 3], by world normals [K, 3], without `env.lights`.
 
-    The numpy twin of diffuse_radiance() in shaders/environment_light.glsl.
+    The numpy twin of diffuse_radiance() in shaders/environment_map.glsl.
     """
     return octahedral.sample_octahedral(env.irradiance, to_map_frame(normals, yaw_deg))
 
@@ -255,10 +255,10 @@ def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray
     """Return the mean radiance around each world direction, without `env.lights`.
 
     Args:
-        env: the light.
+        env: The light.
         directions: [K, 3], spread over the whole sphere. Each cell of `env.sky` counts for the
             nearest direction; each direction gets several cells.
-        yaw_deg: rotation of the environment.
+        yaw_deg: Rotation of the environment.
 
     Returns:
         float32 [K, 3].
@@ -293,10 +293,10 @@ def metered_luminance(
     cell. Luminance below 1e-6 counts as 1e-6.
 
     Args:
-        env: the light.
-        direction: axis of the cone in the world, [3].
-        half_angle_deg: half of its opening angle.
-        yaw_deg: rotation of the environment.
+        env: The light.
+        direction: Axis of the cone in the world, [3].
+        half_angle_deg: Half of its opening angle.
+        yaw_deg: Rotation of the environment.
     """
     cells, solid_angle = _meter_cells()
     cell = 2 * np.pi / _LUMINANCE_WIDTH

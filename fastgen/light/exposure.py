@@ -24,11 +24,11 @@ def metered_exposure(
     over other surfaces as well. The rest of the image is the background in view.
 
     Args:
-        light: light of the environment.
-        yaw_deg: rotation of the environment.
-        view: projection of the camera.
-        camera: its `exposure_ev` is added in stops.
-        paint: linear albedo of the container.
+        light: Light of the environment.
+        yaw_deg: Rotation of the environment.
+        view: Projection of the camera.
+        camera: Its `exposure_ev` is added in stops.
+        paint: Linear albedo of the container.
     """
     forward = view.rotation[2]
     level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])

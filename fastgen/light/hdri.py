@@ -34,7 +34,7 @@ def find_hdris(folder: str | Path) -> list[Path]:
     foreign disks.
 
     Raises:
-        AssetError: the folder does not exist or has no such file, or a name is not valid UTF-8.
+        AssetError: The folder does not exist or has no such file, or a name is not valid UTF-8.
     """
     if not str(folder):  # Path would use the current folder
         raise AssetError("'': is not a folder; give one that contains .hdr or .exr files")
@@ -57,7 +57,7 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
     """Return the HDRIs of a folder by name, see `find_hdris`.
 
     Raises:
-        AssetError: two file names differ only in their extension.
+        AssetError: Two file names differ only in their extension.
     """
     named: dict[str, Path] = {}
     for path in find_hdris(folder):
@@ -122,7 +122,7 @@ def load_radiance(path: str | Path) -> NDArray[np.float32]:
         float32 [H, W, 3], finite and 0 or more.
 
     Raises:
-        AssetError: the file is not such an image; the message names the file.
+        AssetError: The file is not such an image; the message names the file.
     """
     path = Path(path)
     kind = path.suffix.lower()

@@ -106,8 +106,8 @@ class FormFactors:
     intersects their face. The known part of the hemisphere is scaled up to the whole.
 
     Attributes:
-        own: form factors to other vertices of the spreader, relative to `known`.
-        below: form factors to the cells of the container, relative to `known`.
+        own: Form factors to other vertices of the spreader, relative to `known`.
+        below: Form factors to the cells of the container, relative to `known`.
         known: [V], share of the hemisphere that is sky or a known surface.
     """
 
@@ -119,10 +119,10 @@ class FormFactors:
         """Return irradiance / pi [V, 3] of the vertices from the sky and from other surfaces.
 
         Args:
-            sky: direct irradiance / pi from the sky, [V, 3].
-            sun: direct irradiance / pi from directional lights, [V, 3]. It is not in the result.
-            below: radiance of the cells of the container, [C, 3].
-            reflectance: diffuse reflectance of the vertices, [V, 3].
+            sky: Direct irradiance / pi from the sky, [V, 3].
+            sun: Direct irradiance / pi from directional lights, [V, 3]. It is not in the result.
+            below: Radiance of the cells of the container, [C, 3].
+            reflectance: Diffuse reflectance of the vertices, [V, 3].
         """
         count = len(sky)
         from_sky, from_sun, cells, paint = (
@@ -146,9 +146,9 @@ def form_factors(
     The container is represented by the bounding box of `held`.
 
     Args:
-        spreader: mesh whose vertices receive light.
-        body: the surface of the spreader with few triangles.
-        held: mesh of the container.
+        spreader: Mesh whose vertices receive light.
+        body: The surface of the spreader with few triangles.
+        held: Mesh of the container.
         points: [V, 3], origins of the rays in mm.
         toward: [D, 3], unit vectors spread evenly over the sphere.
         hidden: bool [V, D], whether a surface hides the sky in each direction.
@@ -231,10 +231,10 @@ def _representative(met: Array, normal: Array, near: Numbers, spreader: Mesh) ->
     """Return the vertex [K] that represents each hit.
 
     Args:
-        met: positions of the hits, [K, 3].
-        normal: normals of the hit surfaces, [K, 3].
-        near: candidate vertices, [K, N].
-        spreader: mesh of the vertices.
+        met: Positions of the hits, [K, 3].
+        normal: Normals of the hit surfaces, [K, 3].
+        near: Candidate vertices, [K, N].
+        spreader: Mesh of the vertices.
     """
     apart = _with_normals(met, normal)[:, None] - _with_normals(
         spreader.positions_mm[near], spreader.normals[near]
@@ -256,8 +256,8 @@ def _first_hits(start: Array, ray: Array, corners: Array) -> tuple[NDArray[np.in
     """Cast parallel rays at triangles that all face them.
 
     Args:
-        start: origins, [N, 3].
-        ray: direction, [3].
+        start: Origins, [N, 3].
+        ray: Direction, [3].
         corners: [T, 3, 3].
 
     Returns:
@@ -305,9 +305,9 @@ def _entered(start: Array, ray: Array, box: Array) -> tuple[NDArray[np.intp], Ar
     """Intersect parallel rays with a box.
 
     Args:
-        start: origins [N, 3], outside the box.
-        ray: direction, [3].
-        box: lowest and highest coordinates, [2, 3].
+        start: Origins [N, 3], outside the box.
+        ray: Direction, [3].
+        box: Lowest and highest coordinates, [2, 3].
 
     Returns:
         Side through which each ray enters, 2 k for the lower side of axis k and 2 k + 1 for the

@@ -70,10 +70,10 @@ def resample_octahedral(
 
     Args:
         radiance: float32 [H, 2H, 3], equirectangular as in prefilter.py.
-        size: texels along a side, even.
-        samples: each texel is the mean of samples x samples bilinear lookups. Choose it so that
+        size: Texels along a side, even.
+        samples: Each texel is the mean of samples x samples bilinear lookups. Choose it so that
             they are no further apart than a texel of the source.
-        level: turn the map so that the horizon runs along its rows and columns, with the axes y and
+        level: Turn the map so that the horizon runs along its rows and columns, with the axes y and
             z and x in the middle. An enlarged edge along a diagonal of the map looks jagged.
 
     Returns:

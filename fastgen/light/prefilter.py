@@ -120,7 +120,7 @@ def convolve(
 
     Args:
         radiance: float32 [H, 2H, C], equirectangular.
-        lobe: weight, 0 or more, of the cosine of the angle to the centre. It may cover the sphere.
+        lobe: Weight, 0 or more, of the cosine of the angle to the centre. It may cover the sphere.
 
     Returns:
         float32 [H, 2H, C].

@@ -44,8 +44,8 @@ class LitBody:
     Attributes:
         positions_mm: [V, 3].
         triangles: [T, 3], counter-clockwise from outside.
-        reflectance: diffuse, [V, 3], equal at the corners of a triangle.
-        irradiance: irradiance / pi [V, 3] without directional lights.
+        reflectance: Diffuse, [V, 3], equal at the corners of a triangle.
+        irradiance: Irradiance / pi [V, 3] without directional lights.
     """
 
     positions_mm: Floats
@@ -59,8 +59,8 @@ class DistantLight:
     """A directional light in world space.
 
     Attributes:
-        toward: unit vector [3] toward the light.
-        light: irradiance / pi [3] on a surface that faces the light.
+        toward: Unit vector [3] toward the light.
+        light: Irradiance / pi [3] on a surface that faces the light.
     """
 
     toward: Floats
@@ -84,14 +84,14 @@ class RayBodies:
         self._normals = normals / np.maximum(length, np.float32(1e-9))
         self._paint = np.concatenate([b.reflectance[b.triangles[:, 0]] for b in bodies])
         light = np.concatenate([b.irradiance[b.triangles].mean(axis=1) for b in bodies])
-        self._glow = self._paint * light
+        self._radiance = self._paint * light
 
     def hits(self, start_mm: Floats, toward: Floats) -> tuple[NDArray[np.intp], Floats]:
         """Cast rays and return the diffuse radiance of the surfaces that they hit.
 
         Args:
-            start_mm: origins, float32 [K, 3].
-            toward: unit directions, float32 [K, 3].
+            start_mm: Origins, float32 [K, 3].
+            toward: Unit directions, float32 [K, 3].
 
         Returns:
             Indices [H] of the rays with a hit, and the radiance [H, 3] reflected along each, 0 from
@@ -104,7 +104,7 @@ class RayBodies:
         triangle = found["primID"][which]
         normals, rays = self._normals[triangle], toward[which]
         front = np.einsum("hc,hc->h", normals, rays) < 0
-        radiance = self._glow[triangle]
+        radiance = self._radiance[triangle]
         if self._lights:
             place = start_mm[which] + found["tfar"][which, None] * rays + LIFT_MM * normals
         for each in self._lights:

@@ -1,4 +1,4 @@
-"""Fresnel reflectance and GGX specular albedo; the numpy twin of shaders/brdf.glsl."""
+"""Fresnel reflectance and GGX specular albedo; the numpy twin of shaders/reflectance.glsl."""
 
 import functools
 
@@ -26,7 +26,7 @@ def fresnel_climb(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
     approximation is 20 % too low. Metals use the same curve.
 
     Args:
-        cosine: cosine of the angle between light and normal, 0..1.
+        cosine: Cosine of the angle between light and normal, 0..1.
     """
     g = np.sqrt(cosine**2 + DIELECTRIC_INDEX**2 - 1)
     ratio = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)

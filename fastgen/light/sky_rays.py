@@ -22,10 +22,10 @@ class SkyRays:
 
     Args:
         radiance: [N, N, 3], octahedral map without a border and without directional lights.
-        count: number of directions, a power of two.
+        count: Number of directions, a power of two.
 
     Attributes:
-        directions: unit vectors [count, 3].
+        directions: Unit vectors [count, 3].
         density: [count], probability density per steradian at each direction.
         radiance: [count, 3], radiance from each direction.
     """
@@ -94,7 +94,7 @@ def _inverted(
     """Invert discrete cumulative distributions.
 
     Args:
-        share: probabilities of N bins, [K, N], or [1, N] for all rows.
+        share: Probabilities of N bins, [K, N], or [1, N] for all rows.
         at: [K], positions 0..1.
 
     Returns:

@@ -71,7 +71,7 @@ def lobe_masks(cells: int) -> NDArray[np.uint32]:
     """Return bit masks of directions for each cell of an octahedral map.
 
     Args:
-        cells: cells along a side of the map.
+        cells: Cells along a side of the map.
 
     Returns:
         uint32 [2 cells, cells, 4], with the bits in the order of the vertex bytes in three words.
@@ -96,7 +96,7 @@ def encoded_cones(normals: NDArray[np.floating], visible: Directions) -> NDArray
     of v is 1 - c / 2, which keeps v long enough for eight bits.
 
     Args:
-        normals: unit vectors [V, 3].
+        normals: Unit vectors [V, 3].
         visible: bool [V, DIRECTIONS].
 
     Returns:
@@ -165,7 +165,7 @@ class SkyVisibility:
         """Return the sky visibility of vertices.
 
         Args:
-            normals: unit vectors [V, 3], with few distinct values.
+            normals: Unit vectors [V, 3], with few distinct values.
             visible_bits: uint8 [V, DIRECTIONS / 8], visible directions as packed by np.packbits.
             cone: uint8 [V, 3], see encoded_cones.
         """
@@ -211,8 +211,8 @@ class SkyVisibility:
         three bytes have LIGHT_STEPS r / s, the fourth has LIGHT_TIMES (s - 1).
 
         Args:
-            sky: the environment.
-            light: irradiance / pi [V, 3], by default from the visible sky.
+            sky: The environment.
+            light: Irradiance / pi [V, 3], by default from the visible sky.
 
         Returns:
             uint8 [V, VERTEX_BYTES].
@@ -283,9 +283,9 @@ class SkyVisibility:
         """Return the four light bytes of `vertex_bytes` as integers [N].
 
         Args:
-            sky: the environment.
-            light: irradiance / pi [N, 3] of vertices or kinds.
-            kind: kind of each row of `light`.
+            sky: The environment.
+            light: Irradiance / pi [N, 3] of vertices or kinds.
+            kind: Kind of each row of `light`.
         """
         step, which = LIGHT_STEPS / self._whole(sky, _directions(self.cones)), self.cone[kind]
         steps = [light[:, c] * np.take(step[:, c], which) for c in range(3)]

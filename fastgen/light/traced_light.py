@@ -73,9 +73,9 @@ def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float
 
     Args:
         points: K points.
-        bodies: surfaces of the scene.
-        sky: samples of the environment, with DIRECTIONS directions.
-        yaw_deg: rotation of the environment.
+        bodies: Surfaces of the scene.
+        sky: Samples of the environment, with DIRECTIONS directions.
+        yaw_deg: Rotation of the environment.
 
     Returns:
         float32 [K, 4, 3]: share of the irradiance of an unoccluded sky; irradiance / pi of indirect
@@ -177,7 +177,7 @@ def _visible_normals(view: Floats, alpha: Floats, uv: Floats) -> Floats:
     """Sample visible microfacet normals [K, M, 3]; Dupuy and Benyoub 2023, listing 3.
 
     Args:
-        view: unit vectors [K, 1, 3] toward the eye, in the frame of the surface.
+        view: Unit vectors [K, 1, 3] toward the eye, in the frame of the surface.
         alpha: [K, 1], squared perceptual roughness.
         uv: [M, 2], points of the unit square.
     """

@@ -47,8 +47,8 @@ class CudaArray:
     stream has to wait for the default stream.
 
     Args:
-        pointer: device address.
-        shape: array shape, rows first, without padding.
+        pointer: Device address.
+        shape: Array shape, rows first, without padding.
         typestr: NumPy type string, such as '<f4'.
     """
 
@@ -86,9 +86,9 @@ class CudaFrame:
         image: uint8 [H, W, 4], sRGB and Frame.cover.
         labels: uint32 [H, W], id | damage << 16, see Frame.
         depth: float32 [H, W], metres along the optical axis, inf for the surroundings.
-        scene: the scene.
-        camera: the camera.
-        view: projection of the camera.
+        scene: The scene.
+        camera: The camera.
+        view: Projection of the camera.
     """
 
     image: CudaArray
@@ -114,7 +114,7 @@ class CudaFrames:
     """GPU memory for one frame, shared by OpenGL and CUDA.
 
     Args:
-        gl: current context; the caller owns it.
+        gl: Current context; the caller owns it.
         size: (width, height) in pixels.
 
     Raises:
@@ -156,7 +156,7 @@ class CudaFrames:
         them.
 
         Args:
-            targets: the rendered frame.
+            targets: The rendered frame.
         """
         self._unmap()
         targets.copy_to(*self._buffers)

@@ -47,10 +47,10 @@ class MapView:
     """Content of a tile of a map.
 
     Attributes:
-        bodies: occluders, of which the back faces are drawn.
-        to_map: projection of the tile, see occluders.map_matrix.
-        tile: rectangle in the map.
-        thick: occluders of which the front faces are drawn as well, moved into the body. Near the
+        bodies: Occluders, of which the back faces are drawn.
+        to_map: Projection of the tile, see occluders.map_matrix.
+        tile: Rectangle in the map.
+        thick: Occluders of which the front faces are drawn as well, moved into the body. Near the
             edge of a thick body a texel may have no back face that shades the surface beside it.
     """
 

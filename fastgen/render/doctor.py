@@ -20,9 +20,9 @@ class Finding:
     """Result for one backend or device.
 
     Attributes:
-        name: backend or device.
-        works: whether a context could be opened.
-        words: renderer string, or the reason of the failure.
+        name: Backend or device.
+        works: Whether a context could be opened.
+        words: Renderer string, or the reason of the failure.
     """
 
     name: str

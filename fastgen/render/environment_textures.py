@@ -27,14 +27,14 @@ class GpuLight:
     """Light of one environment on the GPU. Owned by the renderer, which releases it.
 
     Args:
-        gl: current context.
-        light: the environment.
-        traced: whether to prepare importance samples for ray casting.
+        gl: Current context.
+        light: The environment.
+        traced: Whether to prepare importance samples for ray casting.
 
     Attributes:
-        ambient: light without the large maps.
+        ambient: Light without the large maps.
         background: uint32 [B, B], texels of the background map, see BackgroundTextures.
-        sky_rays: importance samples, None unless `traced`.
+        sky_rays: Importance samples, None unless `traced`.
     """
 
     def __init__(self, gl: GLContext, light: EnvironmentLight, traced: bool = False) -> None:

@@ -31,12 +31,12 @@ class GLContext:
     before freeing objects made through `ctx`.
 
     Attributes:
-        ctx: moderngl.Context.
+        ctx: The moderngl.Context.
         backend: 'egl' or 'osmesa'.
         renderer: GL_RENDERER of the driver.
         vendor: GL_VENDOR of the driver.
         version: GL_VERSION of the driver.
-        software: whether it is one of Mesa's CPU rasterizers.
+        software: Whether it is one of Mesa's CPU rasterizers.
     """
 
     def __init__(self, native: NativeContext, backend: str) -> None:
@@ -61,12 +61,12 @@ class GLContext:
         The function acts on the context that is current when it is called.
 
         Args:
-            name: name of the function, such as 'glClearTexSubImage'.
-            result: ctypes type of the result, None for void.
-            *arguments: ctypes types of the arguments.
+            name: Name of the function, such as 'glClearTexSubImage'.
+            result: The ctypes type of the result, None for void.
+            *arguments: The ctypes types of the arguments.
 
         Raises:
-            ContextError: the driver does not have the function.
+            ContextError: The driver does not have the function.
         """
         address = self._native.load_opengl_function(name)
         if not address:
@@ -77,7 +77,7 @@ class GLContext:
         """Make this context current in the calling thread; costs nothing if it already is.
 
         Raises:
-            ContextError: the context was released.
+            ContextError: The context was released.
         """
         self._native.__enter__()
 
@@ -110,12 +110,12 @@ def open_context(backend: str = "auto", device_index: int | None = None) -> GLCo
 
     Args:
         backend: 'egl', 'osmesa', or 'auto' for the first that works in this order.
-        device_index: index of a device in the order of EGL; excludes OSMesa. None uses the first
+        device_index: Index of a device in the order of EGL; excludes OSMesa. None uses the first
             device that works, hardware before software.
 
     Raises:
-        ContextError: nothing works; the message names the packages to install.
-        ConfigError: unknown backend, or a device index for OSMesa.
+        ContextError: Nothing works; the message names the packages to install.
+        ConfigError: Unknown backend, or a device index for OSMesa.
     """
     check_known("backend", backend, BACKENDS)
     check_device(backend, device_index)
@@ -143,7 +143,7 @@ def egl_devices() -> list[EglDevice]:
     """Return the devices that EGL lists, in the order of `device_index`; [] if it cannot list them.
 
     Raises:
-        ContextError: libEGL is missing.
+        ContextError: The library libEGL is missing.
     """
     return Egl().devices()
 

@@ -1,7 +1,7 @@
 """Shadow map of a container and its spreader: one tile for each directional light.
 
 Dents are included, holes are not. Williams 1978, Casting Curved Shadows on Curved Surfaces.
-shaders/directional_light.glsl filters the map as Reeves et al. 1987 do.
+shaders/light_visibility.glsl filters the map as Reeves et al. 1987 do.
 """
 
 from collections.abc import Sequence
@@ -53,9 +53,9 @@ class EndTile:
     Attributes:
         to_tile: (scale u, scale v, offset u, offset v) from texture coordinates in the first tile
             to texture coordinates in this one.
-        inner: lowest (u, v) and highest (u, v) for lookups; the filter around them stays inside.
+        inner: Lowest (u, v) and highest (u, v) for lookups; the filter around them stays inside.
         side: 1 or -1, direction of the end along x.
-        from_mm: the tile is for points farther than this in that direction.
+        from_mm: The tile is for points farther than this in that direction.
     """
 
     to_tile: Array
@@ -106,14 +106,14 @@ class ShadowMap:
     per scene would fragment the memory of the process.
 
     Args:
-        ctx: current OpenGL context.
-        program: program of occluder.vert.
-        detail: share of the full number of texels along each axis; 0.5 has a quarter of all texels.
+        ctx: Current OpenGL context.
+        program: Program of occluder.vert.
+        detail: Share of the full number of texels along each axis; 0.5 has a quarter of all texels.
 
     Attributes:
-        toward: unit vectors [S, 3] toward the lights.
+        toward: Unit vectors [S, 3] toward the lights.
         tiles: [S, 4], tile of each light: (u, v) of the centres of its first and last texels.
-        end: finer tile of the first light.
+        end: Finer tile of the first light.
     """
 
     def __init__(
@@ -144,11 +144,11 @@ class ShadowMap:
         """Draw the map unless it already shows the same.
 
         Args:
-            container: undamaged mesh.
-            spreader: spreader without cables, or None.
-            toward: unit vectors [S, 3] toward the lights in world space, 1 to MAX_LIGHTS.
-            damages: damages of the container.
-            outline: the same container with fewer triangles, for charts that no damage touches.
+            container: Undamaged mesh.
+            spreader: Spreader without cables, or None.
+            toward: Unit vectors [S, 3] toward the lights in world space, 1 to MAX_LIGHTS.
+            damages: Damages of the container.
+            outline: The same container with fewer triangles, for charts that no damage touches.
         """
         shown = (container, outline, spreader, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
@@ -239,10 +239,10 @@ def _end_tile(
     Args:
         to_first: [4, 4], mm to clip space of the first tile.
         first_to_map: [4, 4], mm to clip space of the whole map through the first tile.
-        ends: triangles to draw, see _beyond.
+        ends: Triangles to draw, see _beyond.
         side: 1 or -1, direction of the end along x.
-        from_mm: the tile is for points farther than this in that direction.
-        layout: layout of the map.
+        from_mm: The tile is for points farther than this in that direction.
+        layout: Layout of the map.
     """
     lows, highs = zip(*(_extent(body.positions_mm, body.triangles) for body in ends), strict=True)
     low, high = np.min(lows, axis=0).astype(np.float64), np.max(highs, axis=0).astype(np.float64)
@@ -356,9 +356,9 @@ def light_values(
     """Return the members of VIEW_BLOCK that describe directional lights.
 
     Args:
-        lights: the lights of the environment.
-        shadow: shadow map of the lights, None without lights.
-        eye_m: position of the camera in world metres, [3].
+        lights: The lights of the environment.
+        shadow: Shadow map of the lights, None without lights.
+        eye_m: Position of the camera in world metres, [3].
     """
     lit = [] if shadow is None else [*zip(shadow.toward, lights, strict=True)]
     end = _NO_END if shadow is None else shadow.end

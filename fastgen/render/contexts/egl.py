@@ -98,7 +98,7 @@ class Egl:
         """Create an OpenGL 4.4 core context.
 
         Args:
-            device: device to draw on, or None for Mesa's surfaceless platform.
+            device: Device to draw on, or None for Mesa's surfaceless platform.
 
         Returns:
             Handles of the display and of the context.

@@ -12,8 +12,8 @@ class NativeContext(ABC):
     The context is current after construction.
 
     Args:
-        backend: name of the backend, for error messages.
-        handle: native context; this object owns it.
+        backend: Name of the backend, for error messages.
+        handle: Native context; this object owns it.
     """
 
     def __init__(self, backend: str, handle: int) -> None:

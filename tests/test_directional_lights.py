@@ -45,8 +45,8 @@ def test_an_even_sky_and_a_broad_lamp_have_no_sun():
     direction, _ = texel_grid(256)
     lamp = 50 * np.exp((direction @ TOWARD - 1)[..., None] / 0.02) * np.ones(3)
     for radiance in (np.ones_like(lamp), np.zeros_like(lamp), 0.1 + lamp):
-        suns, rest = extract_lights(radiance.astype(np.float32))
-        assert suns == ()
+        lights, rest = extract_lights(radiance.astype(np.float32))
+        assert lights == ()
         np.testing.assert_array_equal(rest, radiance.astype(np.float32))
 
 
@@ -55,11 +55,11 @@ LAMPS /= np.linalg.norm(LAMPS, axis=1, keepdims=True)
 
 
 def test_lamps_of_a_night_are_found_brightest_first():
-    lights = np.array([[0.2, 0.15, 0.1], [0.5, 0.5, 0.5], [0.1, 0.12, 0.2]])
-    suns, rest = extract_lights(lamps_at_night(LAMPS, lights))
-    for sun, k in zip(suns, (1, 0, 2), strict=True):
+    strength = np.array([[0.2, 0.15, 0.1], [0.5, 0.5, 0.5], [0.1, 0.12, 0.2]])
+    lights, rest = extract_lights(lamps_at_night(LAMPS, strength))
+    for sun, k in zip(lights, (1, 0, 2), strict=True):
         assert np.degrees(np.arccos(sun.direction @ LAMPS[k])) < 0.1
-        np.testing.assert_allclose(sun.light, lights[k], rtol=0.02)
+        np.testing.assert_allclose(sun.light, strength[k], rtol=0.02)
     np.testing.assert_allclose(rest, 0.02, rtol=1e-3)
 
 
@@ -95,8 +95,10 @@ def test_lamps_side_by_side_are_one_sun_and_a_broad_lamp_is_not_split():
     assert np.degrees(np.arccos(sun.direction @ LAMPS[0])) < 0.1
     np.testing.assert_allclose(sun.light, 2.0, rtol=0.02)
     for radius_deg in (2.8, 3.5, 4.5, 8.0):
-        suns, _ = extract_lights(lamps_at_night(LAMPS[:1], np.ones((1, 3)), radius_deg=radius_deg))
-        assert len(suns) <= 1
+        lights, _ = extract_lights(
+            lamps_at_night(LAMPS[:1], np.ones((1, 3)), radius_deg=radius_deg)
+        )
+        assert len(lights) <= 1
 
 
 @pytest.mark.parametrize("times", [0.7, 1.4])
@@ -112,9 +114,9 @@ def test_a_lamp_is_extracted_above_a_share_of_the_light_on_its_side(times):
     lamp = times * MIN_SHARE / (1 - times * MIN_SHARE) * irradiance * np.ones((1, 3))
     radiance = around + lamps_at_night(aside[None], lamp, radius_deg=2.5) - np.float32(0.02)
     assert radiance[direction @ aside > np.cos(np.deg2rad(2))].max() < around.max()
-    suns, _ = extract_lights(radiance)
-    assert len(suns) == (times > 1)
-    for sun in suns:
+    lights, _ = extract_lights(radiance)
+    assert len(lights) == (times > 1)
+    for sun in lights:
         assert sun.direction @ aside > np.cos(np.deg2rad(0.2))
 
 
