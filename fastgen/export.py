@@ -1,9 +1,11 @@
 """Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools.
 
-The file holds the damaged container, its inside if the damage tears holes, the spreader, their
-baked textures and the cameras. glTF has no place for the environment, the Scene, the exposure and
-the lens distortion, so they are stored as `extras`: the first two with the glTF scene, the others
-with each camera's node. Viewers show the cameras as pinholes.
+The file contains the damaged container, the spreader, their baked textures and the cameras. If the
+damage tears holes, it also contains the inside of the container.
+
+Data that glTF has no place for is stored as `extras`. The extras of the glTF scene are the
+environment and the Scene; those of a camera's node are its exposure and lens distortion. Viewers
+show each camera as a pinhole.
 """
 
 from collections.abc import Iterable

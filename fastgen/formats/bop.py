@@ -1,8 +1,10 @@
-"""BOP for the container's pose: millimetres, row-major matrices, pixel centres at whole numbers.
+"""BOP format for the pose of the container: bop_toolkit, docs/bop_datasets_format.md.
 
-Format: bop_toolkit, docs/bop_datasets_format.md. One BOP scene a split; image ids count the images
-of the whole dataset. Full silhouettes (`mask`) are not written, `scene_gt_info.json` has their
-boxes and pixel counts; `px_count_valid` is of the visible part alone.
+Lengths are in millimetres, matrices are row-major and pixel centres are at whole numbers. Each
+split is one BOP scene. Image ids count the images of the whole dataset.
+
+Masks of full silhouettes (`mask`) are not written; `scene_gt_info.json` has their boxes and pixel
+counts. `px_count_valid` counts pixels of the visible part only.
 """
 
 import json
@@ -21,7 +23,7 @@ from fastgen.sampling.scene import SPLITS
 from fastgen.scene.container_kinds import KINDS
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
-"""obj_id of each kind of container."""
+"""Object id by kind of container."""
 
 
 _LENS_KEYS = ("distortion_model", "distortion")
@@ -43,7 +45,7 @@ class _Bop(Format):
         intrinsics = sample.view.intrinsics.copy()
         intrinsics[:2, 2] -= 0.5
         camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}
-        if sample.view.distortion:  # beyond the format: its tools take images for undistorted
+        if sample.view.distortion:  # an addition of ours: BOP has no lens distortion
             camera |= {key: view_values(sample.view)[key] for key in _LENS_KEYS}
         if thing.bbox is None or thing.amodal_bbox is None:
             return files, {"id": item.number, "camera": camera, "gt": [], "info": []}
@@ -80,7 +82,7 @@ def _by_image(records: Records, key: str) -> Iterator[str]:
 
 
 def _models() -> Iterator[tuple[str, bytes]]:
-    """Each kind of container with nominal corrugation, in its own frame, in mm."""
+    """Yield a PLY model in mm of each kind of container, with nominal corrugation."""
     import trimesh
     from trimesh.exchange.ply import export_ply
 

@@ -1,4 +1,7 @@
-"""COCO masks and files. Format: cocodataset.org, 'Data format', and its mask API's notes."""
+"""COCO annotations, run-length masks and files, shared by the formats that write them.
+
+Sources: cocodataset.org, "Data format", and the notes of its mask API.
+"""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -20,18 +23,25 @@ _GROUP_SHIFTS = 5 * np.arange(12)
 
 
 def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int]) -> dict[str, Any]:
-    """Compressed run-length encoding of a mask: {'size': [H, W], 'counts': text}.
+    """Encode a mask as COCO's compressed run lengths, which go down the columns from zeros.
 
-    part: bool [h, w], what is not all zeros of the mask; corner: (x, y) of its first pixel in the
-    mask of `size` (width, height). Runs go down the columns and begin with zeros.
+    pycocotools gives the same bytes, but it encodes whole masks, which takes several times as long.
+
+    Args:
+        part: bool [h, w], a window of the mask that contains all its pixels.
+        corner: (x, y) of the window's first pixel.
+        size: (width, height) of the mask.
+
+    Returns:
+        {"size": [height, width], "counts": text}.
     """
     (x, y), (width, height) = corner, size
     padded = np.zeros((part.shape[0] + 2, part.shape[1]), bool)
     padded[1:-1] = part
-    # where columns begin and end to be set, in the order of the whole mask
+    # positions in the whole mask, column by column, where a run of ones starts or has ended
     row, column = np.divmod(np.flatnonzero(padded[1:] != padded[:-1]), part.shape[1])
     edges = np.sort((x + column) * height + y + row)
-    # a run that goes on in the next column ends and begins at one place
+    # a run that continues in the next column ends and starts at the same position
     again = edges[1:] == edges[:-1]
     once = np.ones(len(edges), bool)
     once[1:][again] = once[:-1][again] = False
@@ -43,15 +53,19 @@ def rle(part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int])
 
 
 def _packed(counts: NDArray[np.int64]) -> str:
-    """Run lengths as text: from the fourth on as differences to the one two before, then signed
-    groups of 5 bits, lowest first, 0x20 marking that more follow, offset by 48."""
+    """Return run lengths as COCO's text.
+
+    From the fourth on, a run length is stored as its difference to the one two places before. Each
+    number becomes groups of 5 bits, lowest first. Bit 0x20 says that more groups follow; the top
+    bit of the last group is the sign. A character is a group plus 48.
+    """
     rest = counts.astype(np.int64)
     rest[3:] -= counts[1:-2]
-    # what is left at each group, the number itself first; none is longer than the longest's
+    # column g: the number without its lowest g groups
     most = int(np.abs(rest).max()).bit_length() // 5 + 1
     left = rest[:, None] >> _GROUP_SHIFTS[: most + 1]
     group = left[:, :-1] & 0x1F
-    # the sign bit of a last group is that of all that is left
+    # a group is the last if the rest only repeats its sign bit
     more = left[:, 1:] != -(group >> 4)
     used = np.ones(group.shape, bool)
     np.logical_and.accumulate(more[:, :-1], axis=1, out=used[:, 1:])
@@ -65,10 +79,14 @@ def annotation(
     size: tuple[int, int],
     ignored: bool,
 ) -> dict[str, Any]:
-    """One instance: category, box (x, y, width, height), area and mask.
+    """Return the annotation of one instance without its ids.
 
-    part: bool [h, w], its pixels within the box. size: (width, height) of the image. An ignored one
-    is a crowd, which scorers neither ask for nor punish.
+    Args:
+        category_id: Category, from 1.
+        box: Visible box in pixels.
+        part: bool [h, w], the instance's pixels within the box.
+        size: (width, height) of the image.
+        ignored: Mark the instance as a crowd. Scorers neither expect nor punish its detection.
     """
     x0, y0, x1, y1 = box
     return {
@@ -81,7 +99,7 @@ def annotation(
 
 
 def trained_on(annotations: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Those that are not ignored."""
+    """Return the annotations that are not ignored."""
     return [item for item in annotations if not item["iscrowd"]]
 
 
@@ -108,9 +126,13 @@ def file_text(
     records: Callable[[], Iterable[dict[str, Any]]],
     facts: str,
 ) -> Iterator[str]:
-    """A COCO file piece by piece, so that its size does not matter.
+    """Yield a COCO file in pieces, so that memory does not depend on its size.
 
-    records: each call goes through the images' records again. facts: whose annotations.
+    Args:
+        description: Description of the dataset.
+        categories: The file's categories.
+        records: Returns the images' records; each call starts from the beginning.
+        facts: Name of the format whose facts are the annotations.
     """
     from fastgen import __version__
 

@@ -1,4 +1,4 @@
-"""The container's eight corner castings as COCO keypoints, and its pose."""
+"""COCO keypoints at the eight corner castings of the container, with its pose and the camera."""
 
 from typing import Any
 

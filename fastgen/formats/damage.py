@@ -1,4 +1,4 @@
-"""Damage detection and segmentation: 16-bit masks, COCO, and YOLO outlines."""
+"""Labels of the damage task: 16-bit masks, COCO files and YOLO outlines."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -19,12 +19,16 @@ CATEGORIES = [
     {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
     for i, name in enumerate(SEGMENTATION_CLASSES)
 ]
-"""The five categories of the task."""
+"""COCO categories of the task."""
 
 
 def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], bool]]:
-    """Category, tight box, mask [H, W] and whether it is ignored, of the container and each damage
-    that is seen. The container's mask spans its damages: they are part of it."""
+    """Yield the visible container and each visible damage.
+
+    Yields:
+        Category id, tight box, mask bool [H, W], and whether the instance is ignored. The mask of
+        the container includes its damages.
+    """
     own = [thing for thing in sample.objects if thing.class_name in SEGMENTATION_CLASSES]
     ignored = {thing.id: thing.ignored for thing in own}
     damaged = sample.damage.ravel()[np.flatnonzero(sample.damage >= DAMAGE_VALUES.start)]

@@ -1,4 +1,4 @@
-"""Depth along the optical axis as 16-bit PNG: millimetres, which reach 65 m, and 0 where void."""
+"""Depth along the optical axis in millimetres, as 16-bit PNG, up to 65.5 m; 0 is background."""
 
 from typing import Any
 
@@ -11,7 +11,11 @@ from fastgen.formats.item import Item
 
 
 def depth_mm(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Metres float32 [H, W] to whole millimetres; 0 where void, 65535 that far away and farther."""
+    """Return depth in whole millimetres, uint16 [H, W]: 0 for the background, at most 65535.
+
+    Args:
+        depth_m: float32 [H, W] in metres, not finite for the background.
+    """
     mm = np.where(np.isfinite(depth_m), depth_m * 1e3, 0.0)
     return np.asarray(np.rint(np.minimum(mm, 65535)), np.uint16)
 

@@ -1,4 +1,4 @@
-"""Door or no door: images of the two ends in folders named for their class, as an ImageFolder."""
+"""Door classification: images of the two ends in a folder per class, as ImageFolder reads them."""
 
 import math
 from collections.abc import Sequence
@@ -13,14 +13,14 @@ from fastgen.formats.item import Item
 from fastgen.scene import Camera
 
 DOOR_CLASSES = ("door", "no_door")
-"""Folders of the task, named as the faces that their cameras look at."""
+"""Classes and folders of the task, named like the faces that their cameras look at."""
 
 _LEAST_COSINE = 0.7
-"""Cosine to the container's length from which a camera counts as looking at an end."""
+"""A camera looks at an end if the cosine of its angle to the container's length is this or more."""
 
 
 def door_class(camera: Camera) -> str | None:
-    """Which end of the container a camera looks at, whatever its name; None for other views."""
+    """Return the end of the container at which a camera looks; None for other views."""
     toward = np.subtract(camera.target_mm, camera.position_mm)
     along = toward[0] / max(float(np.linalg.norm(toward)), 1e-9)
     if abs(along) < _LEAST_COSINE:
@@ -29,22 +29,25 @@ def door_class(camera: Camera) -> str | None:
 
 
 def door_number(camera: Camera) -> int:
-    """Position of `door_class` in DOOR_CLASSES. Raises ConfigError that names the camera where it
-    looks at no end."""
+    """Return the index of a camera's `door_class` in DOOR_CLASSES.
+
+    Raises:
+        ConfigError: The camera does not look at an end.
+    """
     found = door_class(camera)
     if found is None:
         raise ConfigError(
-            f"cameras.{camera.name}: looks at no end of the container, but along a side; keep "
-            "azimuth_deg and elevation_deg nearer to 0"
+            f"cameras.{camera.name}: does not look at an end of the container; keep "
+            "azimuth_deg and elevation_deg closer to 0"
         )
     return DOOR_CLASSES.index(found)
 
 
 def always_at_an_end(rig: CameraConfig) -> bool:
-    """Whether every camera that is drawn from `rig` has a `door_class`."""
+    """Return whether every camera sampled from `rig` has a `door_class`."""
     slant = [max(map(abs, angles)) for angles in (rig.azimuth_deg, rig.elevation_deg)]
     along = math.prod(math.cos(math.radians(angle)) for angle in slant)
-    return rig.face in DOOR_CLASSES and along > _LEAST_COSINE + 1e-3  # places are rounded
+    return rig.face in DOOR_CLASSES and along > _LEAST_COSINE + 1e-3  # positions are rounded
 
 
 class _Door(Format):

@@ -43,7 +43,7 @@ DatasetFiles = Iterator[tuple[str, Iterable[str] | bytes]]
 
 
 class Format(ABC):
-    """One label format: the files of each sample, and what dataset code needs to know of them.
+    """One label format: the files of each sample, and queries about them for dataset code.
 
     A subclass has one instance, which its module calls FORMAT.
 
@@ -76,7 +76,7 @@ class Format(ABC):
         return ()
 
     def labels(self, facts: Any) -> Iterable[Label]:
-        """Return the labels to train on in one image with these facts, ignored ones left out."""
+        """Return the labels in one image with these facts, except ignored ones."""
         return ()
 
     def counts(self, facts: Iterable[Any]) -> dict[str, int]:

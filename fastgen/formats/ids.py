@@ -1,4 +1,4 @@
-"""The id target as 16-bit PNG: 0 void, 1 container, else the id of an Object in the scene file."""
+"""Id map as 16-bit PNG: 0 background, 1 container, else the id of an Object in the scene file."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Marker detection: YOLO with its data.yaml, and COCO with what YOLO cannot say."""
+"""Labels of the marker task: YOLO with its data.yaml, and COCO with masks, texts and crowds."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,8 +26,8 @@ class _Imdg(Format):
         sample, split, stem = item.sample, item.split, item.stem
         labels = yolo.detection_lines(sample.objects, sample.view.size)
         files: Files = {
-            # trainers resolve this folder and look for labels where `images` reads `labels`: a link
-            # in place of the folder would lead them out of imdg
+            # Trainers replace `images` by `labels` in the resolved path of this folder. If the
+            # folder were a link, they would look outside of imdg.
             f"imdg/images/{split}/{stem}.jpg": Same(item.image_path),
             f"imdg/labels/{split}/{stem}.txt": labels.encode(),
         }
@@ -61,7 +61,7 @@ class _Imdg(Format):
         yield f"imdg/coco_{split}.json", coco.file_text(words, CATEGORIES, records, self.name)
         if split == SPLITS[0]:
             names = "".join(f"  {i}: {name}\n" for i, name in enumerate(DETECTION_CLASSES))
-            # no `path`: trainers take it relative to this file
+            # without the key `path`, trainers take folders relative to this file
             head = "".join(f"{each}: images/{each}\n" for each in SPLITS)
             yield "imdg/data.yaml", f"{head}nc: {len(DETECTION_CLASSES)}\nnames:\n{names}".encode()
 
@@ -75,7 +75,7 @@ class _Imdg(Format):
         path = f"imdg/labels/{name}.txt"
         scene = json.loads(read(f"scenes/{name}.json"))
         width, height = scene["size"]
-        listed = [  # the file has six digits: to 0.1 pixel
+        listed = [  # to 0.1 pixel, because the file has six digits
             (index, [round(v, 1) for v in yolo.pixel_box(values, (width, height))])
             for index, values in yolo.rows(read(path).decode())
         ]

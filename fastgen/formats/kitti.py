@@ -1,5 +1,8 @@
-"""KITTI's 2-D object labels: 15 columns an object, those of three dimensions left unknown as its
-development kit says to; what is ignored is a DontCare region. Geiger et al. 2012."""
+"""KITTI 2-D object labels, Geiger et al. 2012.
+
+Each object has 15 columns. The 3-D columns have the values for "unknown" of KITTI's development
+kit. Ignored objects are DontCare regions.
+"""
 
 from typing import Any
 
@@ -7,7 +10,7 @@ from fastgen.formats.format import Files, Format, Same
 from fastgen.formats.item import Item
 
 _UNKNOWN = "-1 -1 -1 -1000 -1000 -1000 -10"
-"""Dimensions, location and rotation_y: their order is yaw only, which no tilted camera fits."""
+"""Dimensions, location and rotation_y. KITTI has yaw only, which does not fit a tilted camera."""
 
 
 class _Kitti(Format):

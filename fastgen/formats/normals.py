@@ -1,5 +1,8 @@
-"""Surface normals as 8-bit PNG: x, y, z of view space (x right, y down, z forward) as red, green,
-blue, 0..255 for -1..1; 128 thrice where void."""
+"""Surface normals as 8-bit PNG.
+
+Red, green and blue are x, y and z in view space (x right, y down, z forward), 0..255 for -1..1.
+Pixels without a surface are (128, 128, 128).
+"""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Text recognition: crops of legible identifiers, and a line `file<TAB>text` for each."""
+"""Text recognition: image crops of legible texts, and a label file with lines `file<TAB>text`."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -1,5 +1,7 @@
-"""Pascal VOC: an XML file an image. Pixels count from 1 and boxes include their last one; VOC2012
-development kit, section 7."""
+"""Pascal VOC labels, one XML file per image; VOC2012 development kit, section 7.
+
+Pixels are numbered from 1, and boxes include their last pixel.
+"""
 
 from typing import Any
 from xml.etree import ElementTree

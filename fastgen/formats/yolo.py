@@ -20,7 +20,7 @@ from fastgen.sample import Box, Object
 def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
     """Return class index, object and visible box of the objects that the marker task labels.
 
-    Ignored objects are left out, because YOLO files cannot mark them.
+    Ignored objects are not included, because YOLO files cannot mark them.
     """
     return [
         (DETECTION_CLASSES.index(thing.class_name), thing, box)
