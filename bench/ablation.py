@@ -31,13 +31,12 @@ os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
-from ablation_elements import ELEMENTS, Absence, Element
+from ablation_elements import ELEMENTS, Element, gpu_session
 from image_error import displayed, flip
 from numpy.typing import NDArray
-from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
+from reference_set import FILTERS, SIZE, Case, Reference, load, traced
 from results import machine, origin, parse_size, save, write_section
 
-from fastgen import Config, Generator
 from fastgen.frame import Frame
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Scene
@@ -56,36 +55,37 @@ class Drawer:
     """Context manager that renders scenes without one element.
 
     Args:
-        absence: The element to remove.
-        whole: A Drawer with all elements. Its generator is shared if only the scene differs.
+        element: The element to remove.
+        whole: A Drawer with all elements. Its renderer is shared if only the scene differs.
     """
 
-    def __init__(self, absence: Absence, whole: "Drawer | None" = None) -> None:
-        self._absence = absence
+    def __init__(self, element: Element, whole: "Drawer | None" = None) -> None:
+        self._element = element
+        self._shapes = element.shapes()
         self._latest: PreparedScene | None = None
-        self._shared = whole is not None and absence.element.scene is not None
+        self._shared = whole is not None and element.scene is not None
         if whole is not None and self._shared:
-            self._generator = whole._generator
+            self._session = whole._session
         else:
-            self._generator = Generator(Config.preset(), SEED, SIZE, quality=QUALITY)
+            self._session = gpu_session([element], QUALITY)
 
     def __enter__(self) -> "Drawer":
         return self
 
     def __exit__(self, *_: object) -> None:
         if not self._shared:
-            self._generator.close()
+            self._session.close()
 
     def frame(self, case: Case, scene: Scene, size: tuple[int, int]) -> Frame:
         """Render the case's view of a scene."""
-        with self._absence.gone():
-            renderer = self._generator.gpu.renderer()
+        with self._element.light_removed():
+            renderer = self._session.renderer()
             return renderer.render(self._prepared(scene), scene.camera(case.camera), size)
 
     def seconds(self, case: Case, scene: Scene, size: tuple[int, int]) -> float:
         """Return the CPU time in seconds of one draw with warm caches."""
-        with self._absence.gone():
-            renderer = self._generator.gpu.renderer()
+        with self._element.light_removed():
+            renderer = self._session.renderer()
             prepared, camera = self._prepared(scene), scene.camera(case.camera)
             renderer.draw(prepared, camera, size)
             renderer.ctx.finish()
@@ -96,14 +96,14 @@ class Drawer:
 
     def _prepared(self, scene: Scene) -> PreparedScene:
         """Return the scene without the element."""
-        less = self._absence.scene(scene)
+        less = self._element.scene(scene) if self._element.scene else scene
         if self._latest is None or self._latest.scene != less:
-            self._latest = PreparedScene(less)
+            self._latest = PreparedScene(less, self._shapes)
         return self._latest
 
     def exposure(self, case: Case, scene: Scene) -> float:
         """Return the exposure of the case's camera."""
-        return self._generator.exposure(scene, scene.camera(case.camera))
+        return self._session.renderer().exposure(scene, scene.camera(case.camera), SIZE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +151,8 @@ def without(
     element: Element, wholes: list[Whole], full: Drawer, size: tuple[int, int], repeats: int
 ) -> dict[str, Any]:
     """Return the table row of an element, averaged over the cases."""
-    absence = Absence(element)
     changes, visible, farther, saved = [], [], [], []
-    with Drawer(absence, full) as less:
+    with Drawer(element, full) as less:
         for whole in wholes:
             case, scene = whole.case, whole.reference.scene
             part = less.frame(case, scene, size).image / 255.0
@@ -169,7 +168,6 @@ def without(
                 for drawer in (full, less) if turn % 2 else (less, full):
                     spent[drawer].append(drawer.seconds(case, scene, size))
             saved.append(1e3 * float(np.median(spent[full]) - np.median(spent[less])))
-    absence.check()
     return {
         "group": element.group,
         "flip": float(np.mean(changes)),
@@ -202,7 +200,7 @@ def main() -> None:
         "| --- | --- | --- | --- | --- |",
     ]
     rows: dict[str, Any] = {}
-    with Drawer(Absence(NOTHING)) as full:
+    with Drawer(NOTHING) as full:
         wholes = [Whole.of(case, full, size) for case in chosen]
         for element in (NOTHING, *ELEMENTS):
             if options.only not in f"{element.group} {element.name}":

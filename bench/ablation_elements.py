@@ -1,22 +1,35 @@
-"""Elements that can be removed from an image: by the scene, by shader text, or by mesh parts."""
+"""Elements that can be removed from an image: from its scene, shaders, meshes or light."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
+from fastgen.geometry.container import NOMINAL_PROFILES
 from fastgen.geometry.mesh import Mesh
-from fastgen.geometry.shape_library import ShapeLibrary, SpreaderShape
-from fastgen.light import sky_visibility
+from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
+from fastgen.geometry.spreader import USUAL_GAP_MM
+from fastgen.light.environment import EnvironmentLight, load_environment
+from fastgen.light.hdri import bundled_hdris
 from fastgen.light.indirect_light import FormFactors
-from fastgen.render import programs
+from fastgen.light.sky_visibility import open_sky
+from fastgen.render.gl import open_context
+from fastgen.render.program import shader_text
+from fastgen.render.renderer import Renderer
+from fastgen.render.session import GpuSession
+from fastgen.render.settings import QUALITY
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.scene import Scene, Spreader
+from fastgen.scene.container_kinds import WallProfiles
 from fastgen.scene.faces import FACE_AXES
+
+STUBS = Path(__file__).with_name("ablation_shaders")
+"""Shader files without an effect; each replaces the file of the same name in shaders/."""
 
 MeshEdit = Callable[[Mesh], Mesh]
 
@@ -25,88 +38,99 @@ MeshEdit = Callable[[Mesh], Mesh]
 class Element:
     """One modelled element, and how to remove it.
 
-    Sky visibility is still computed with the unedited meshes.
-
     Attributes:
         group: Group that --only of ablation.py can select.
         name: Name in the table.
         scene: Function that returns the scene without the element.
-        text: Pairs of old and new shader text. Every old text must occur in some shader.
+        files: Text of each shader file that replaces the one of the same name.
+        without: Material layers to leave out.
         container: Edit of the container's mesh.
         spreader: Edit of the spreader's mesh.
         open_sky: Remove the occlusion of the sky.
-        thrown: False to remove indirect light from surfaces on the spreader.
+        indirect: False to remove indirect light from surfaces on the spreader.
     """
 
     group: str
     name: str
     scene: Callable[[Scene], Scene] | None = None
-    text: tuple[tuple[str, str], ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
+    without: tuple[str, ...] = ()
     container: MeshEdit | None = None
     spreader: MeshEdit | None = None
     open_sky: bool = False
-    thrown: bool = True
+    indirect: bool = True
 
-
-class Absence:
-    """Removal of an element from all renders made while the context `gone` is active."""
-
-    def __init__(self, element: Element) -> None:
-        self.element = element
-        self._found: set[str] = set()
-
-    def scene(self, scene: Scene) -> Scene:
-        """Return the scene without the element."""
-        return self.element.scene(scene) if self.element.scene else scene
+    def shapes(self) -> ShapeLibrary:
+        """Return a library of the meshes without the element."""
+        if self.container is None and self.spreader is None:
+            return SHAPES
+        return _EditedShapes(self.container, self.spreader)
 
     @contextmanager
-    def gone(self) -> Iterator[None]:
-        """Make renderers that are created and used in this context omit the element."""
+    def light_removed(self) -> Iterator[None]:
+        """Make renderers used in this context compute the light without the element.
+
+        Sky visibility is that of the unedited meshes.
+        """
         with ExitStack() as stack:
-            for owner, name, value in self._replacements():
-                stack.enter_context(mock.patch.object(owner, name, value))
+            if self.container or self.spreader or self.open_sky:
+                for name in ("container_light", "spreader_light"):
+                    probe = _probe(getattr(SkyVisibilityProbe, name), self.open_sky)
+                    stack.enter_context(mock.patch.object(SkyVisibilityProbe, name, probe))
+            if not self.indirect:
+                stack.enter_context(mock.patch.object(FormFactors, "light", _sky_only))
             yield
 
-    def check(self) -> None:
-        """Check that all shader text to be replaced was found.
 
-        Raises:
-            SystemExit: Some text was not in any shader that was compiled.
-        """
-        for old, _ in self.element.text:
-            if old not in self._found:
-                raise SystemExit(
-                    f"{self.element.name}: no shader contains {old!r}; update ablation_elements.py"
-                )
+def gpu_session(elements: Sequence[Element], quality: str) -> GpuSession:
+    """Return a session whose renderer lacks the shader files and material layers of elements.
 
-    def _replacements(self) -> Iterator[tuple[Any, str, Any]]:
-        element = self.element
-        if element.text:
-            yield programs, "expand", self._edited(programs.expand)
-        if element.container:
-            for name in ("container", "container_outline"):  # as drawn, and for sun shadows
-                yield ShapeLibrary, name, _edited_container(name, element.container)
-        if element.spreader:
-            yield ShapeLibrary, "spreader", _edited_spreader(element.spreader)
-        for name in ("container_light", "spreader_light"):
-            yield (
-                SkyVisibilityProbe,
-                name,
-                _probe(getattr(SkyVisibilityProbe, name), element.open_sky),
-            )
-        if not element.thrown:
-            yield FormFactors, "light", lambda _, sky, *others: np.asarray(sky)
+    Args:
+        elements: The elements to remove.
+        quality: Quality preset.
+    """
+    files = {name: text for element in elements for name, text in element.files.items()}
+    make = partial(
+        Renderer,
+        light=_bundled_light,
+        quality=QUALITY[quality],
+        read=partial(_read, files),
+        without=tuple(layer for element in elements for layer in element.without),
+    )
+    return GpuSession(open_context, make)
 
-    def _edited(self, expand: Callable[..., str]) -> Callable[..., str]:
-        def edited(*args: Any, **kwargs: Any) -> str:
-            text = expand(*args, **kwargs)
-            for old, new in self.element.text:
-                if old in text:
-                    self._found.add(old)
-                    text = text.replace(old, new)
-            return text
 
-        return edited
+def _bundled_light(name: str) -> EnvironmentLight:
+    return load_environment(bundled_hdris()[name])
+
+
+def _read(files: Mapping[str, str], name: str) -> str:
+    return files[name] if name in files else shader_text(name)
+
+
+def _sky_only(_: FormFactors, sky: np.ndarray, *others: Any) -> np.ndarray:
+    """Replace FormFactors.light: no light comes from other surfaces."""
+    return np.asarray(sky)
+
+
+class _EditedShapes(ShapeLibrary):
+    """Shapes with edited meshes."""
+
+    def __init__(self, container: MeshEdit | None, spreader: MeshEdit | None) -> None:
+        super().__init__()
+        self._container_edit = container
+        self._spreader_edit = spreader
+
+    def container(self, kind: str, profiles: WallProfiles = NOMINAL_PROFILES) -> Mesh:
+        return _edited_mesh(SHAPES.container(kind, profiles), self._container_edit)
+
+    def container_outline(self, kind: str, profiles: WallProfiles = NOMINAL_PROFILES) -> Mesh:
+        return _edited_mesh(SHAPES.container_outline(kind, profiles), self._container_edit)
+
+    def spreader(
+        self, kind: str, flippers_down: tuple[bool, bool], gap_mm: float = USUAL_GAP_MM
+    ) -> SpreaderShape:
+        return _edited_shape(SHAPES.spreader(kind, flippers_down, gap_mm), self._spreader_edit)
 
 
 _SOURCES: dict[Mesh, Mesh] = {}
@@ -114,38 +138,32 @@ _SOURCES: dict[Mesh, Mesh] = {}
 
 
 @lru_cache(maxsize=512)
-def _edited_mesh(mesh: Mesh, edit: MeshEdit) -> Mesh:
+def _edited_mesh(mesh: Mesh, edit: MeshEdit | None) -> Mesh:
+    if edit is None:
+        return mesh
     edited = edit(mesh)
     _SOURCES[edited] = mesh
     return edited
 
 
-def _edited_container(name: str, edit: MeshEdit) -> Callable[..., Mesh]:
-    whole = getattr(ShapeLibrary, name)
-    return lambda *args, **named: _edited_mesh(whole(*args, **named), edit)
-
-
-def _edited_spreader(edit: MeshEdit) -> Callable[..., SpreaderShape]:
-    whole = ShapeLibrary.spreader
-    return lambda *args, **named: _edited_shape(whole(*args, **named), edit)
-
-
 @lru_cache(maxsize=64)
-def _edited_shape(shape: SpreaderShape, edit: MeshEdit) -> SpreaderShape:
+def _edited_shape(shape: SpreaderShape, edit: MeshEdit | None) -> SpreaderShape:
+    if edit is None:
+        return shape
     return SpreaderShape(_edited_mesh(shape.mesh, edit), _edited_mesh(shape.outline, edit))
 
 
 @lru_cache(maxsize=64)
 def _all_open(mesh: Mesh) -> LitMesh:
     dark = np.zeros(mesh.normals.shape, np.float32)
-    return LitMesh(mesh, sky_visibility.open_sky(mesh.normals), dark, dark)
+    return LitMesh(mesh, open_sky(mesh.normals), dark, dark)
 
 
-def _probe(measured: Callable[..., LitMesh], open_sky: bool) -> Callable[..., LitMesh]:
+def _probe(measured: Callable[..., LitMesh], whole_sky: bool) -> Callable[..., LitMesh]:
     """Wrap a SkyVisibilityProbe method to use the unedited meshes, or to return unoccluded sky."""
 
     def found(self: SkyVisibilityProbe, mesh: Mesh, *others: Any) -> LitMesh:
-        if open_sky:
+        if whole_sky:
             return _all_open(mesh)
         return measured(self, *(_unedited(item) for item in (mesh, *others)))
 
@@ -198,17 +216,17 @@ def _fresh_print(scene: Scene) -> Scene:
     return replace(scene, decals=tuple(replace(decal, wear=0.0) for decal in scene.decals))
 
 
-def _layer(name: str) -> tuple[tuple[str, str], ...]:
-    return ((f"#define SHOWN_{name} 1", f"#define SHOWN_{name} 0"),)
+def _stub(name: str) -> dict[str, str]:
+    return {name: (STUBS / name).read_text(encoding="utf-8")}
 
 
 ELEMENTS = (
-    Element("surface", "tone of the paint", text=_layer("TONE")),
-    Element("surface", "ageing toward corners", text=_layer("AGEING")),
-    Element("surface", "dirt along edges", text=_layer("DIRT")),
-    Element("surface", "rust", text=_layer("RUST")),
-    Element("surface", "scratches", text=_layer("SCRATCHES")),
-    Element("surface", "worn reflection", text=_layer("REFLECTION")),
+    Element("surface", "tone of the paint", without=("tone",)),
+    Element("surface", "ageing toward corners", without=("ageing",)),
+    Element("surface", "dirt along edges", without=("dirt",)),
+    Element("surface", "rust", without=("rust",)),
+    Element("surface", "scratches", without=("scratches",)),
+    Element("surface", "worn reflection", without=("reflection",)),
     Element("decals", "markers", _without_decals("marker")),
     Element("decals", "texts", _without_decals("text")),
     Element("decals", "stickers, emblems, stripes", _without_decals("sticker", "emblem")),
@@ -234,70 +252,22 @@ ELEMENTS = (
         "shape",
         "spreader: cables",
         spreader=without_charts("cables."),
-        text=(("return min(cover, 1.0);", "return 0.0;"),),
+        files=_stub("cables.glsl"),
     ),
     Element("shape", "spreader: headblock", spreader=without_charts("headblock.")),
     Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),
     Element("shape", "spreader: twist locks", spreader=without_charts(".locks.")),
     Element("light", "occlusion of the sky", open_sky=True),
-    Element(
-        "light",
-        "shadow of the sun",
-        text=(
-            (
-                "light_seen[0] = filtered_light_visibility(from_eye, normal, depth * pixel_angle);",
-                "light_seen[0] = 1.0;",
-            ),
-            ("light_seen[i] = light_visibility(from_eye, i);", "light_seen[i] = 1.0;"),
-        ),
-    ),
-    Element(
-        "light",
-        "bounces in occluded places",
-        text=(
-            (
-                "return min(fit * (0.75 + max(0.75 - 1.5 * sky.rim, 0.0)), 1.0 - share);",
-                "return vec3(0.0);",
-            ),
-        ),
-    ),
-    Element("light", "light from surfaces on the spreader", thrown=False),
-    Element(
-        "light",
-        "the sun's light from walls in recesses",
-        text=(
-            ("sky.occluder_light = sky.bounces * occluder_light(from_eye, normal, sky, 0);", ""),
-            ("sky.occluder_light += sky.bounces * occluder_light(from_eye, normal, sky, i);", ""),
-        ),
-    ),
+    Element("light", "shadow of the sun", files=_stub("light_visibility.glsl")),
+    Element("light", "bounces in occluded places", files=_stub("occluder_indirect.glsl")),
+    Element("light", "light from surfaces on the spreader", indirect=False),
+    Element("light", "the sun's light from walls in recesses", files=_stub("occluder_light.glsl")),
     Element(
         "light",
         "reflections lean away from what hides the sky",
-        text=(("fma(vec3(lean), aside, mirror), width", "mirror, width"),),
+        files=_stub("lobe_direction.glsl"),
     ),
-    Element(
-        "light",
-        "occlusion of reflections",
-        text=(
-            (
-                "float open = lobe_visibility(sky, mirror, m.roughness);",
-                "float open = 1.0;",
-            ),
-        ),
-    ),
-    Element(
-        "light",
-        "energy of multiple scattering",
-        text=(("float gain = 1.0 / (dfg.x + dfg.y) - 1.0;", "float gain = 0.0;"),),
-    ),
-    Element(
-        "light",
-        "reflections altogether",
-        text=(
-            (
-                "return r.diffuse * around + specular * mirrored;",
-                "return m.albedo * (1.0 - m.metallic) * around;",
-            ),
-        ),
-    ),
+    Element("light", "occlusion of reflections", files=_stub("lobe_visibility.glsl")),
+    Element("light", "energy of multiple scattering", files=_stub("multiple_scattering.glsl")),
+    Element("light", "reflections altogether", files=_stub("environment_light.glsl")),
 )

@@ -24,7 +24,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,7 +37,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import numpy as np
 import peers
 import trimesh
-from ablation_elements import ELEMENTS, Absence
+from ablation_elements import ELEMENTS, Element, gpu_session
 from cycles_figures import Figures
 from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
@@ -74,16 +74,24 @@ class Variant:
     absent: tuple[str, ...] = ()
     patches: Callable[[], Patches] = list
 
-    @contextmanager
-    def entered(self, absences: Sequence[Absence]) -> Iterator[None]:
-        """Make generators used in this context render this way.
+    @property
+    def elements(self) -> list[Element]:
+        """The elements to render without."""
+        return [element for element in ELEMENTS if element.name in self.absent]
 
-        Args:
-            absences: The Absence of each name in `absent`.
-        """
+    def generator(self) -> Generator:
+        """Return a generator of the benchmark's scenes that renders this way inside `entered`."""
+        made = Generator(Config.preset(), SEED, SIZE, quality=self.quality)
+        if self.absent:
+            made.gpu = gpu_session(self.elements, self.quality)
+        return made
+
+    @contextmanager
+    def entered(self) -> Iterator[None]:
+        """Make the generator render this way in this context."""
         with ExitStack() as stack:
-            for absence in absences:
-                stack.enter_context(absence.gone())
+            for element in self.elements:
+                stack.enter_context(element.light_removed())
             for owner, attribute, value in self.patches():
                 stack.enter_context(mock.patch.object(owner, attribute, value))
             yield
@@ -155,13 +163,11 @@ def spent(generator: Generator, scene: Scene, camera: Camera) -> float:
 def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats: int) -> Measured:
     """Measure a variant over all cases, alternating with a generator of the default settings."""
     errors, seconds = [], []
-    named = {element.name: element for element in ELEMENTS}
-    absences = [Absence(named[name]) for name in variant.absent]
-    with Generator(Config.preset(), SEED, SIZE, quality=variant.quality) as generator:
+    with variant.generator() as generator:
         for case in chosen:
             reference = load(case.number)
             scene, camera = reference.scene, reference.scene.camera(case.camera)
-            with variant.entered(absences):
+            with variant.entered():
                 image = generator.render(scene=scene, camera=camera).image / 255.0
                 exposure = generator.exposure(scene, camera)
             expected = displayed(reference.radiance[FILTERS[variant.quality]], exposure)
@@ -170,11 +176,9 @@ def measured(variant: Variant, balanced: Generator, chosen: list[Case], repeats:
             turns = []
             for _ in range(repeats):
                 beside = spent(balanced, scene, camera)
-                with variant.entered(absences):
+                with variant.entered():
                     turns.append((spent(generator, scene, camera), beside))
             seconds.append([statistics.median(each) for each in zip(*turns, strict=True)])
-    for absence in absences:
-        absence.check()
     means = [statistics.fmean(each) for each in zip(*seconds, strict=True)]
     return Measured(variant.name, statistics.fmean(errors), *means)
 

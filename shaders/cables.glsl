@@ -1,4 +1,4 @@
-// float cables_cover(vec2 pixel): share of a pixel that the hoisting cables cover, 0..1.
+// float cable_coverage(vec2 pixel): share of a pixel that the hoisting cables cover, 0..1.
 // pixel: Position of its centre. The share is computed analytically, because point samples would draw
 // a cable thinner than their spacing as dashes.
 
@@ -21,7 +21,7 @@ float filtered_below(float x) {
 float turned(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 
 // All cables are vertical.
-float cables_cover(vec2 pixel) {
+float cable_coverage(vec2 pixel) {
     vec3 ray = view_ray(pixel);
     // Half the width at which an axis-aligned square bar is seen. Like `aside`, it is multiplied by
     // the horizontal length of the ray.

@@ -66,7 +66,7 @@ bool sky_or_cable(uint key) { return key == 0u || float(id_zone(key)) == cable_z
 // Whether cables cover a part of the pixel, more than about a step of 255. bare: the pixel shows
 // nothing but sky and cables.
 bool covered_in_part(ivec2 pixel, bool bare) {
-    return bare && abs(cables_cover(vec2(pixel) + 0.5) - 0.5) <= 0.496;
+    return bare && abs(cable_coverage(vec2(pixel) + 0.5) - 0.5) <= 0.496;
 }
 
 // Whether a pixel of a single sample shows sky, or a cable surrounded by sky and cables. A cable in

@@ -43,7 +43,7 @@ Shaded cable(vec2 center) {
     }
     color /= max(abs(view.x) + abs(view.y), 1e-6);
     Shaded s = sky(ray);
-    s.cover = cables_cover(center);
+    s.cover = cable_coverage(center);
     s.color = mix(s.color, color, s.cover);
     return s;
 }

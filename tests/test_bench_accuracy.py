@@ -1,6 +1,7 @@
 """Reference images of the benchmarks, and the figures and charts computed from them."""
 
 import itertools
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -17,9 +18,10 @@ from reference_set import FILTERS
 
 from fastgen import Config, Generator
 from fastgen.geometry.container import build_container
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
-from fastgen.render import programs
-from fastgen.resources import shader_path
+from fastgen.render.program import shader_text
+from fastgen.render.variant import LAYERS
 from fastgen.scene.faces import FACE_AXES
 
 
@@ -125,24 +127,57 @@ def test_the_front_is_exactly_the_points_that_no_other_dominates():
     assert {p.setting for p in pareto_chart.front(points)} == unbeaten
 
 
-def test_every_shader_text_that_an_ablation_replaces_exists():
-    shaders = ("background_by_ray.frag", "shade.comp")
-    text = "".join(
-        programs.expand(
-            shader_path(name).read_text(encoding="utf-8"), 3, pixel_class=pixel_class, suns=1
-        )
-        for name in shaders
-        for pixel_class in ("plain", "mixed_decal")
+def functions(text):
+    """Return the return type, name and parameters of each function in GLSL text."""
+    return set(re.findall(r"^\w+ \w+\([^;{)]*\)(?= \{)", text, re.M))
+
+
+def test_every_shader_file_of_an_ablation_replaces_functions_of_a_shader():
+    replaced = [file for element in ablation_elements.ELEMENTS for file in element.files.items()]
+    assert sorted(name for name, _ in replaced) == sorted(
+        path.name for path in ablation_elements.STUBS.iterdir()
     )
-    for element in ablation_elements.ELEMENTS:
-        for old, _ in element.text:
-            assert old in text, element.name
+    for name, text in replaced:
+        declared = functions(text)
+        assert declared, name
+        assert declared <= functions(shader_text(name)), name
+        assert text != shader_text(name)
 
 
-def test_every_python_name_that_an_ablation_replaces_exists():
+def test_every_layer_that_an_ablation_leaves_out_exists():
     for element in ablation_elements.ELEMENTS:
-        for owner, name, _ in ablation_elements.Absence(element)._replacements():
-            assert hasattr(owner, name), (element.name, name)
+        assert set(element.without) <= set(LAYERS) - {"all", "normals"}, element.name
+
+
+@pytest.fixture(scope="module")
+def rusty_case():
+    """Scene, camera name and frame of a case with rust, sun, spreader and cables."""
+    case = reference_set.cases()[5]
+    scene = case.drawn()
+    return scene, case.camera, drawn([], scene, case.camera)
+
+
+def drawn(elements, scene, camera):
+    """Return the frame of a scene without elements of shaders."""
+    session = ablation_elements.gpu_session(elements, "draft")
+    with session.drawing() as renderer:
+        frame = renderer.render(PreparedScene(scene), scene.camera(camera), reference_set.SIZE)
+    session.close()
+    return frame
+
+
+@pytest.mark.parametrize(
+    "element",
+    [e for e in ablation_elements.ELEMENTS if e.files or e.without],
+    ids=lambda element: element.name,
+)
+def test_an_image_without_an_element_of_the_shaders_differs_but_its_labels_do_not(
+    element, rusty_case
+):
+    scene, camera, whole = rusty_case
+    frame = drawn([element], scene, camera)
+    assert (frame.image != whole.image).any()
+    assert np.array_equal(frame.ids, whole.ids)
 
 
 def test_removing_charts_removes_only_their_triangles_and_keeps_the_groups():

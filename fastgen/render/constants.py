@@ -92,7 +92,10 @@ class _Array(NamedTuple):
 
 
 def _variant(v: ShaderVariant) -> Defines:
-    shown = {name: int(v.layer in ("all", "normals", "reflection", name)) for name in LAYERS}
+    shown = {
+        name: int(v.layer in ("all", "normals", "reflection", name) and name not in v.without)
+        for name in LAYERS
+    }
     return {
         **{f"LAYER_{name.upper()}": i for i, name in enumerate(LAYERS)},
         **{f"SHOWN_{name.upper()}": value for name, value in shown.items()},

@@ -36,7 +36,7 @@ from fastgen.render.passes.geometry import GeometryPass
 from fastgen.render.passes.normals import NormalsPass
 from fastgen.render.passes.ray_points import RayPass, point_step
 from fastgen.render.passes.shading import ShadingPass
-from fastgen.render.program import Programs
+from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.recent_cache import Kept, Recent
 from fastgen.render.regions import bands, box_corners, merged, region_of
 from fastgen.render.sample_lattice import fitting
@@ -69,6 +69,8 @@ class Renderer:
         light: Callable[[str], EnvironmentLight],
         quality: Quality,
         mask_threshold_mm: float = 5.0,
+        read: Read = shader_text,
+        without: tuple[str, ...] = (),
     ) -> None:
         """Prepare a renderer.
 
@@ -78,13 +80,16 @@ class Renderer:
             quality: Samples, lookups and light. Images whose samples do not fit the driver's
                 textures get fewer samples. A traced quality needs `ray_bodies.check_rays`.
             mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
+            read: Returns the text of a shader file by its name.
+            without: Material layers of LAYERS to leave out of images.
         """
         self._gl = gl
         self.ctx = gl.ctx
         self._light_of = light
         self._quality = quality
         self._mask_threshold_mm = mask_threshold_mm
-        self._programs = programs = Programs(self.ctx)
+        self._without = without
+        self._programs = programs = Programs(self.ctx, read)
         self._geometry = GeometryPass(self.ctx, programs)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
         self._shading = ShadingPass(self.ctx, programs)
@@ -204,6 +209,7 @@ class Renderer:
                 traced=light.sky_rays is not None and layer == "all",
                 coarse=self._quality.coarse and per_axis == 1,
                 radiance=radiance,
+                without=self._without,
             ),
             textures={
                 **self._material_textures(resources, container, spreader),

@@ -44,6 +44,7 @@ class ShaderVariant:
         coarse: Classify pixels for 2x2 coarse shading.
         cables: Classify pixels that thin cables may cover in part.
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
+        without: Material layers of LAYERS to leave out.
     """
 
     samples_per_axis: int = 1
@@ -56,6 +57,7 @@ class ShaderVariant:
     coarse: bool = False
     cables: bool = False
     radiance: bool = False
+    without: tuple[str, ...] = ()
 
     @property
     def traits(self) -> tuple[str, ...]:
