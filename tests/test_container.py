@@ -8,6 +8,7 @@ from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.mesh import GROUP_SLACK_MM
 from fastgen.scene.container_kinds import KINDS, WallProfiles, Wave
 from fastgen.scene.faces import FACES
+from fastgen.validation import check_fields
 from tests.mesh_probe import (
     ISO_668,
     OUT,
@@ -260,9 +261,9 @@ def test_meshes_are_read_only():
         (lambda: build_container("41"), "41"),
         (lambda: build_container("20", max_edge_mm=0.0), "max_edge_mm"),
         (lambda: Wave(278, 36, 72, 68, 71), "pitch_mm"),
-        (lambda: Wave(278, 500, 72, 68, 70), "depth_mm"),
-        (lambda: Wave(278, 36, 142, 68, 0), "inner_mm"),
-        (lambda: Wave(20, 5, 5, 5, 5), "pitch_mm"),
+        (lambda: check_fields(Wave(278, 500, 72, 68, 70), Wave, "wave"), "depth_mm"),
+        (lambda: check_fields(Wave(278, 36, 142, 68, 0), Wave, "wave"), "inner_mm"),
+        (lambda: check_fields(Wave(20, 5, 5, 5, 5), Wave, "wave"), "pitch_mm"),
         (lambda: build_container("20").sheet_to_surface("lid", [[0, 0]]), "lid"),
     ],
 )

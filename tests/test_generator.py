@@ -202,8 +202,8 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
 
         for made in ("shapes.GpuMesh", "shapes.zone_table", "renderer.GpuLight"):
             monkeypatch.setattr(f"fastgen.render.{made}", never)
-        monkeypatch.setattr("fastgen.light.sky_visibility.encoded", never)
-        monkeypatch.setattr("fastgen.geometry.chart_sheet._Locator.of", never)
+        monkeypatch.setattr("fastgen.render.sky_visibility_probe.encoded_cones", never)
+        monkeypatch.setattr("fastgen.files.disk_cache.cached", never)
         for index in range(30):
             sample = generator.render(index)
             container = sample.scene.container
