@@ -92,7 +92,7 @@ def test_a_new_volume_with_lost_and_found_counts_as_empty(tmp_path):
 
 def test_running_out_of_memory_is_reported_with_advice():
     assert in_words(MemoryError(), "scene 3") == (
-        "scene 3: out of memory; give fewer workers or a smaller size"
+        "scene 3: out of memory; use fewer workers or a smaller size"
     )
 
 
