@@ -380,7 +380,10 @@ def test_water_darkens_porous_surfaces():
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"sensor": {"stamp": {"corners": ["top middle"]}}}, r"sensor.stamp.corners\[0\]: 'top middle'"),
+        (
+            {"sensor": {"stamp": {"corners": ["top middle"]}}},
+            r"sensor.stamp.corners\[0\]: 'top middle'",
+        ),
         ({"sensor": {"jpeg_quality": [90, 40]}}, "sensor.jpeg_quality: the lowest value 90"),
         ({"sensor": {"vignetting": 1.0}}, "sensor.vignetting: 1.0 is out of range"),
         ({"weather": {"fog_probability": 2}}, "weather.fog_probability: 2 is out of range"),

@@ -11,8 +11,8 @@ from fastgen.geometry.container import build_container, container_outline
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.solids import without_cables
 from fastgen.geometry.spreader import CABLE_TIER, build_spreader, tier_of_vertices
+from fastgen.render.depth_map import occluder_program
 from fastgen.render.gl import open_context
-from fastgen.render.program import link
 from fastgen.render.shadow_map import ShadowMap
 from fastgen.render.sky_visibility_probe import probe_points
 from fastgen.scene import Damage
@@ -28,7 +28,7 @@ def gl():
 
 @contextmanager
 def shadow_map(gl, detail):
-    made = ShadowMap(gl.ctx, link(gl.ctx, "occluder.vert", "occluder.frag", {}), detail)
+    made = ShadowMap(gl.ctx, occluder_program(gl.ctx), detail)
     yield made
     made.release()
 
