@@ -167,7 +167,7 @@ def test_tasks_are_done_once_each_by_any_number_of_workers():
         def hear(_, value, seen=seen):
             seen.append(value)
 
-        run(_setup, (), range(7), count, hear, None)
+        run(_setup, range(7), count, hear, None)
         assert sorted(seen) == list(range(7))
 
 
@@ -177,7 +177,7 @@ def _setup(report):
 
 def test_a_workers_error_reaches_the_caller_in_its_own_words():
     with pytest.raises(OutputError, match=r"scene 3: .*no such luck"):
-        run(_broken, (), [3], 1, lambda *_: None, None)
+        run(_broken, [3], 1, lambda *_: None, None)
 
 
 def _broken(report):
