@@ -345,7 +345,7 @@ def test_show_takes_the_first_camera_of_a_rig(tmp_path):
         ("a: \0", "special characters are not allowed at position 3"),
         ("surface: {rust_coverage: '1e-2'}", "write 0.01"),
         ("day: 2026-99-99", "not a YAML file"),
-        ("a: &a [*a]", "a value contains itself"),
+        ("a: &a [*a]", "a: unknown key"),
     ],
 )
 def test_malformed_config_files_are_named(tmp_path, capsys, text, words):
