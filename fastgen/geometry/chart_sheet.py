@@ -1,83 +1,55 @@
 """The triangles of one chart on its unfolded sheet, and point location among them."""
 
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import reduce
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+VERSION = 1  # raise when the stored arrays change
+
 _CELL_MM = 120.0
 
 
+@dataclass(frozen=True, eq=False)
 class ChartSheet:
-    """The triangles of one chart in sheet coordinates.
-
-    `bounds_mm` and the search grid of `find` are computed on first use and kept.
+    """The triangles of one chart in sheet coordinates, with a grid to locate points among them.
 
     Attributes:
         triangles: int [T], indices of the chart's triangles in the mesh.
         corners_mm: float64 [T, 3, 2], their corners in sheet coordinates.
+        lowest_mm: float64 [2, T], lowest sheet coordinates of each triangle.
+        highest_mm: float64 [2, T], highest sheet coordinates of each triangle.
+        to_weights: float64 [T, 2, 3], matrices from (x, y, 1) to the barycentric weights of a
+            triangle's second and third corner.
+        candidates: int32 [cells, M], triangles that touch each cell of the grid, padded with -1.
+        shape: int [2], columns and rows of the grid.
     """
 
-    def __init__(
-        self,
+    triangles: NDArray[np.int64]
+    corners_mm: NDArray[np.float64]
+    lowest_mm: NDArray[np.float64]
+    highest_mm: NDArray[np.float64]
+    to_weights: NDArray[np.float64]
+    candidates: NDArray[np.int32]
+    shape: NDArray[np.int64]
+
+    @classmethod
+    def of(
+        cls,
         triangles: NDArray[np.int64],
         corners_mm: NDArray[np.float64],
         size_mm: tuple[float, float],
-    ) -> None:
-        self.triangles = triangles
-        self.corners_mm = corners_mm
-        self._size_mm = size_mm
-
-    @cached_property
-    def bounds_mm(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lowest and highest sheet coordinates [2, T] of each triangle."""
-        corners = self.corners_mm.transpose(2, 1, 0)
-        return corners.min(axis=1), corners.max(axis=1)
-
-    def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """Locate sheet points [K, 2] in mm.
-
-        Returns:
-            Indices [K] of triangles in the mesh, and barycentric weights [K, 3] of their corners.
-            A point outside all triangles gets the triangle that it is least far outside of.
-        """
-        triangle, weights = self._locator.find(points)
-        return self.triangles[triangle], weights
-
-    def prepare(self) -> None:
-        """Compute everything that is otherwise computed on first use."""
-        _ = self.bounds_mm, self._locator
-
-    @cached_property
-    def _locator(self) -> "_Locator":
-        return _Locator.of(self.corners_mm, self._size_mm)
-
-
-@dataclass(frozen=True, eq=False)
-class _Locator:
-    """Grid over a chart; each cell lists the triangles that touch it.
-
-    Attributes:
-        to_weights: float64 [T, 2, 3], matrices from (x, y, 1) to the barycentric weights of a
-            triangle's second and third corner.
-        candidates: int32 [cells, M], triangles that touch each cell, padded with -1.
-        shape: Columns and rows of the grid.
-    """
-
-    to_weights: NDArray[np.float64]
-    candidates: NDArray[np.int32]
-    shape: tuple[int, int]
-
-    @staticmethod
-    def of(corners: NDArray[np.float64], size_mm: tuple[float, float]) -> "_Locator":
-        a, b, c = corners.transpose(1, 0, 2)
+    ) -> Self:
+        """Return the sheet of a chart with (width, height) = size_mm."""
+        a, b, c = corners_mm.transpose(1, 0, 2)
         inverse = np.linalg.inv(np.stack([b - a, c - a], axis=2))
         to_weights = np.concatenate([inverse, -(inverse @ a[:, :, None])], axis=2)
         columns, rows = (max(int(np.ceil(side / _CELL_MM)), 1) for side in size_mm)
         limit = (columns - 1, rows - 1)
-        low = np.clip((corners.min(axis=1) - 1e-3) // _CELL_MM, 0, limit).astype(int)
-        high = np.clip((corners.max(axis=1) + 1e-3) // _CELL_MM, 0, limit).astype(int)
+        low = np.clip((corners_mm.min(axis=1) - 1e-3) // _CELL_MM, 0, limit).astype(int)
+        high = np.clip((corners_mm.max(axis=1) + 1e-3) // _CELL_MM, 0, limit).astype(int)
         wide, tall = (high - low + 1).T
         touched = wide * tall
         triangle = np.repeat(np.arange(len(low)), touched)
@@ -89,12 +61,25 @@ class _Locator:
         place = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
         candidates = np.full((columns * rows, count.max()), -1, np.int32)
         candidates[cell[order], place] = triangle[order]
-        return _Locator(to_weights, candidates, (columns, rows))
+        by_axis = corners_mm.transpose(2, 1, 0)
+        return cls(
+            triangles,
+            corners_mm,
+            by_axis.min(axis=1),
+            by_axis.max(axis=1),
+            to_weights,
+            candidates,
+            np.array([columns, rows]),
+        )
 
-    def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
-        """Return the triangle [K] of each point [K, 2] and the weights [K, 3] of its corners."""
-        limit = np.array(self.shape) - 1
-        cells = np.clip(points // _CELL_MM, 0, limit).astype(int)
+    def find(self, points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Locate sheet points [K, 2] in mm.
+
+        Returns:
+            Indices [K] of triangles in the mesh, and barycentric weights [K, 3] of their corners.
+            A point outside all triangles gets the triangle that it is least far outside of.
+        """
+        cells = np.clip(points // _CELL_MM, 0, self.shape - 1).astype(int)
         listed = self.candidates[cells[:, 1] * self.shape[0] + cells[:, 0]]
         best, inside = self._best(points, listed)
         lost = np.flatnonzero(inside < -1e-3)
@@ -102,7 +87,7 @@ class _Locator:
             count = len(self.to_weights)
             everything = np.broadcast_to(np.arange(count), (lost.size, count))
             best[lost], _ = self._best(points[lost], everything)
-        return best, np.stack(self._weights(points, best), axis=-1)
+        return self.triangles[best], np.stack(self._weights(points, best), axis=-1)
 
     def _best(
         self, points: NDArray[np.float64], listed: NDArray[np.integer]

@@ -139,8 +139,8 @@ def _near(
     Returns:
         Indices [P] of decals, indices [P] of triangles, and the triangles' sheet corners [P, 3, 2].
     """
-    chart = mesh.sheets[mesh.chart_index(face)]
-    low, high = chart.bounds_mm
+    chart = mesh.sheet(mesh.chart_index(face))
+    low, high = chart.lowest_mm, chart.highest_mm
     here = np.array([i for i, decal in enumerate(decals) if decal.face == face])
     center, reach = outlines.center_mm[here], outlines.reach_mm()[here]
     least, most = (center - reach).T[..., None], (center + reach).T[..., None]

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.errors import ConfigError
 from fastgen.files import disk_cache
+from fastgen.geometry.chart_sheet import VERSION as SHEET_VERSION
 from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
 from fastgen.scene.faces import FACES, SHEET_FACES
@@ -128,16 +129,32 @@ class Mesh:
         return np.array([zone.chart for zone in self.zones], np.uint16)[self.zone]
 
     @cached_property
-    def sheets(self) -> tuple[ChartSheet, ...]:
-        """The triangles of each chart on its sheet, in the order of charts."""
-        of_triangle = self.chart[self.triangles[:, 0]]
-        sheets = []
-        for number, chart in enumerate(self.charts):
-            index = np.flatnonzero(of_triangle == number)
-            corners = self.atlas_mm[self.triangles[index]].astype(np.float64)
-            left, bottom, width, height = chart.rect_mm
-            sheets.append(ChartSheet(index, corners - (left, bottom), (width, height)))
-        return tuple(sheets)
+    def panels(self) -> Mapping[str, ChartSheet]:
+        """Sheets of those SHEET_FACES that the mesh has, by face."""
+        numbers = [i for i, chart in enumerate(self.charts) if chart.name in SHEET_FACES]
+        return {self.charts[number].name: self._stored_sheet(number) for number in numbers}
+
+    def sheet(self, number: int) -> ChartSheet:
+        """Return the triangles of a chart on its sheet.
+
+        Args:
+            number: Index into charts.
+        """
+        name = self.charts[number].name
+        return self.panels[name] if name in SHEET_FACES else self._sheet(number)
+
+    def _sheet(self, number: int) -> ChartSheet:
+        index = np.flatnonzero(self.chart[self.triangles[:, 0]] == number)
+        corners = self.atlas_mm[self.triangles[index]].astype(np.float64)
+        left, bottom, width, height = self.charts[number].rect_mm
+        return ChartSheet.of(index, corners - (left, bottom), (width, height))
+
+    def _stored_sheet(self, number: int) -> ChartSheet:
+        def make() -> disk_cache.Arrays:
+            return vars(self._sheet(number))
+
+        inputs = self._atlas_digest, number
+        return ChartSheet(**disk_cache.cached("sheet", SHEET_VERSION, inputs, make))
 
     def chart_index(self, name: str) -> int:
         """Return the index of a chart.
@@ -176,7 +193,7 @@ class Mesh:
         """
         number = self.chart_index(chart_name)
         points = np.asarray(sheet_mm, np.float64).reshape(-1, 2)
-        triangle, weights = self.sheets[number].find(points)
+        triangle, weights = self.sheet(number).find(points)
         corners = self.triangles[triangle]
         positions = np.einsum("kc,kcd->kd", weights, self.positions_mm[corners].astype(np.float64))
         normals = self.normals[corners[:, 0]].astype(np.float64)
@@ -188,8 +205,7 @@ class Mesh:
         Args:
             damages: Prepare for damaged scenes too.
         """
-        for face in SHEET_FACES:
-            self.sheets[self.chart_index(face)].prepare()
+        _ = self.panels, self.hull, self.zone_areas_mm2
         if damages:
             _ = self.triangle_bounds_mm
 
@@ -201,8 +217,14 @@ class Mesh:
     @cached_property
     def triangle_bounds_mm(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Lowest and highest coordinates [T, 3] of each triangle."""
-        a, b, c = self.positions_mm[self.triangles].transpose(1, 0, 2)
-        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+        def found() -> disk_cache.Arrays:
+            a, b, c = self.positions_mm[self.triangles].transpose(1, 0, 2)
+            low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+            return {"low": low, "high": high}
+
+        bounds = disk_cache.cached("triangle-bounds", VERSION, self.shape_digest, found)
+        return bounds["low"], bounds["high"]
 
     @cached_property
     def zone_areas_mm2(self) -> NDArray[np.float64]:
@@ -234,6 +256,14 @@ class Mesh:
         """SHA-256 of positions, normals and triangles in hexadecimal digits."""
         arrays = (self.positions_mm, self.normals, self.triangles)
         return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+
+    @cached_property
+    def _atlas_digest(self) -> str:
+        """SHA-256 of everything that places the triangles on the sheets."""
+        digest = hashlib.sha256(repr((self.charts, self.zones)).encode())
+        for array in (self.atlas_mm, self.zone, self.triangles):
+            digest.update(array.data)
+        return digest.hexdigest()
 
     @cached_property
     def _chart_numbers(self) -> dict[str, int]:
