@@ -73,17 +73,18 @@ class PreparedScene:
             return None
         return self._shapes.spreader(self.scene.container.kind, held.flippers_down)
 
-    def prepare_shapes(self, damages: bool) -> None:
-        """Load the meshes, so that later scenes with these shapes take no longer than others.
+    def prepare_shapes(self, lens: bool, damages: bool) -> None:
+        """Load the meshes and derive their geometry, so that later scenes find them ready.
 
         Args:
+            lens: Prepare for images with lens distortion.
             damages: Prepare for damaged scenes too.
         """
         self.container.prepare(damages)
         _ = self.container_outline, self.nominal_outline
-        for shape in (self.spreader, self.usual_spreader):
-            if shape is not None:
-                _ = shape.solid
+        if self.spreader is not None:
+            _ = self.usual_spreader, self.spreader.facets(lens)
+            _ = self.spreader.solid, self.spreader.ray_triangles, self.spreader.tier_bounds_mm
 
     @cached_property
     def decals(self) -> DecalSurface:
