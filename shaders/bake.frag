@@ -3,19 +3,7 @@
 // roughness and metallic.
 #version 430 core
 #include "variant.constants"
-#include "surface_id.glsl"
 #include "tone_curve.glsl"
-#include "brdf.glsl"
-#include "noise.glsl"
-#include "ageing.glsl"
-#include "dirt.glsl"
-#include "rust.glsl"
-#include "scratches.glsl"
-#include "wear.glsl"
-#include "wetness.glsl"
-#include "decal_cell.glsl"
-#include "decal.glsl"
-#include "zone.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
 #include "damage_law.glsl"

@@ -5,6 +5,7 @@
 #include "cables.constants"
 #include "samples.constants"
 #include "view.block"
+#include "view_ray.glsl"
 
 // Integral of the pixel filter up to x pixels from its centre: a tent for 2 samples per axis, else
 // a box, as in SampleLattice.filter.

@@ -22,8 +22,6 @@
 #include "rest_position.glsl"
 #endif
 #if WITH_CABLES
-#include "lens.glsl"
-#include "view_ray.glsl"
 #include "cables.glsl"
 #endif
 

@@ -3,6 +3,7 @@
 // footprint_mm: width of the lookup on the surface.
 
 #include "decals.constants"
+#include "tone_curve.glsl"
 
 uniform sampler2D decal_table;      // One row per decal; see DecalTables in decal_tables.py.
 uniform sampler2D glyph_table;      // One texel per letter; see GlyphRun in glyph_runs.py.

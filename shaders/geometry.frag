@@ -38,7 +38,7 @@ void main() {
 #if HOLED
     // This program draws the inner view, which holes reveal, so it discards torn sheet. The outer view
     // keeps torn sheet to mark the hole.
-    if (hole_at(rest_mm) >= 0 && !before_sheet(id_zone(surface_id))) discard;
+    if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(surface_id))) discard;
 #endif
     out_surface_id = surface_id;
     out_atlas_mm = atlas_mm;

@@ -8,6 +8,17 @@
 #include "variant.constants"
 #include "zones.constants"
 #include "scene.block"
+#include "brdf.glsl"
+#include "noise.glsl"
+#include "ageing.glsl"
+#include "dirt.glsl"
+#include "rust.glsl"
+#include "scratches.glsl"
+#include "wear.glsl"
+#include "wetness.glsl"
+#include "decal_cell.glsl"
+#include "decal.glsl"
+#include "zone.glsl"
 
 struct SurfacePoint {
     Material material;
@@ -95,7 +106,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
 #endif
     s.printed = decal_alpha * (1.0 - rusty);
     float metallic = trait.x * (1.0 - rusty);
-    wet(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
+    apply_wetness(albedo, roughness, metallic, wetness * (0.6 + 0.4 * coarse.value.x));
     s.material = Material(clamp(albedo, 0.0, 0.95), max(roughness, MIN_ROUGHNESS), metallic);
     return s;
 }

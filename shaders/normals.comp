@@ -27,7 +27,7 @@ vec3 normal_of(ivec2 sample_at) {
 #if WITH_DAMAGE
     vec3 rest_mm = rest_at(sample_at);
 #if WITH_HOLES
-    if (hole_at(rest_mm) >= 0 && !before_sheet(id_zone(key))) {
+    if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(key))) {
         // The interior, seen from behind; the sky through another hole has no normal.
         ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
         key = surface_id_at(inner_at);

@@ -7,7 +7,11 @@
 #include "samples.constants"
 #include "variant.constants"
 #include "view.block"
-#include "shade.glsl"
+#include "sample_lattice.glsl"
+#include "surface_id.glsl"
+#include "view_ray.glsl"
+#include "visibility_buffer.glsl"
+#include "zone_sample.glsl"
 
 uniform int point_rows;     // Rows of cells over the image.
 uniform ivec2 last_pixel;   // Column and row of the image's last pixel.
@@ -44,13 +48,13 @@ void main() {
         }
     }
     vec3 ray = view_ray(sample_position(sample_at));
-    Part p = part_at(sample_at, key, -normalize(ray));
+    ZoneSample p = zone_sample(sample_at, key, -normalize(ray));
     vec3 normal = id_normal(key);
 #if WITH_DAMAGE
     normal = deformed_normal(p.bend, normal);
 #endif
 #if HOLED
-    if (hole_at(rest_at(sample_at)) >= 0 && !before_sheet(id_zone(key))) key = 0u;
+    if (hole_at(rest_at(sample_at)) >= 0 && !is_door_gear(id_zone(key))) key = 0u;
 #endif
     out_surface_id = key;
     out_position = vec4(p.depth * ray, p.surface.material.roughness);

@@ -4,6 +4,7 @@
 
 #include "variant.constants"
 #include "view.block"
+#include "sky_visibility.glsl"
 
 uniform usampler2D ray_point_ids;
 uniform sampler2D ray_point_positions;

@@ -2,6 +2,7 @@
 // Its length is 1 m of depth along the optical axis.
 
 #include "view.block"
+#include "lens.glsl"
 
 vec3 view_ray(vec2 pixel) {
     pixel = undistorted(pixel);

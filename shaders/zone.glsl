@@ -1,4 +1,4 @@
-// bool before_sheet(uint zone): whether a zone belongs to door gear, which is in front of the sheet.
+// bool is_door_gear(uint zone): whether a zone belongs to door gear, which is in front of the sheet.
 // vec2 upright(vec2 sheet_mm, int code): atlas position, turned so that +y is up in the world.
 // float to_upper_side(vec2 from_low, vec2 size, int code): distance in mm to a zone's upper side.
 // A zone is a part of the atlas that weathers on its own, such as one side of a beam.
@@ -10,7 +10,7 @@
 // turns clockwise from +y to up, and bits for door gear, small pieces and level zones.
 uniform sampler2D zone_table;
 
-bool before_sheet(uint zone) {
+bool is_door_gear(uint zone) {
     return (int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x) & ZONE_GEAR) != 0;
 }
 

@@ -1,7 +1,8 @@
 """Sky visibility of vertices, and the light that they receive from the visible sky.
 
 Each vertex has one bit for each of DIRECTIONS directions and a cone: the bent normal, which is the
-mean direction of the visible sky, and the size of the visible part. shaders/shade.glsl decodes it.
+mean direction of the visible sky, and the size of the visible part. shaders/sky_visibility_at.glsl
+decodes the cone.
 """
 
 from dataclasses import dataclass

@@ -36,7 +36,8 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     `#include "NAME.glsl"` is replaced by that file where it first occurs. `#include
     "NAME.constants"` and `#include "NAME.block"` say that a file needs a group of constants
     (constants.py) or a uniform block (blocks.py); each is declared behind the #version line.
-    Nothing is included twice.
+    Nothing is included twice, so an include inside an #if must not be the first of a file that code
+    outside needs too.
 
     Args:
         text: Shader text with a #version line.

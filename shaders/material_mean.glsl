@@ -1,0 +1,20 @@
+// SurfacePoint empty_material_sum(SurfacePoint first): start of a mean over several material lookups.
+// void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 sheet_mm, float count): adds the
+// material of `p` at another atlas position to `sum`, the mean of `count` lookups.
+
+#include "zone_sample.glsl"
+
+// Keeps the values of the first lookup that are the same for all.
+SurfacePoint empty_material_sum(SurfacePoint first) {
+    first.material = Material(vec3(0.0), 0.0, 0.0);
+    first.printed = 0.0;
+    return first;
+}
+
+void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 sheet_mm, float count) {
+    SurfacePoint s = surface_at(zone, sheet_mm, p.footprint_mm, p.scar);
+    sum.material.albedo += s.material.albedo / count;
+    sum.material.roughness += s.material.roughness / count;
+    sum.material.metallic += s.material.metallic / count;
+    sum.printed += s.printed / count;
+}

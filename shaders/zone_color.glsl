@@ -1,0 +1,51 @@
+// vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view): light of a sample toward the eye.
+// p: Material of its zone. key: Surface id of the sample. view: Unit, toward the eye.
+
+#include "materials.constants"
+#include "variant.constants"
+#include "scene.block"
+#include "view.block"
+#include "coarse_shading.glsl"
+#include "layer_color.glsl"
+#include "sample_lattice.glsl"
+#include "sky_visibility_at.glsl"
+#include "surface_id.glsl"
+#include "view_ray.glsl"
+#include "visibility_buffer.glsl"
+#include "zone_sample.glsl"
+#if LIGHTS
+#include "light_visibility.glsl"
+#include "occluder_light.glsl"
+#endif
+#if TRACED
+#include "traced_light.glsl"
+#endif
+
+vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
+    vec3 normal = id_normal(key);
+    SkyVisibility sky = sky_visibility_at(sample_at, id_zone(key));
+#if WITH_DAMAGE
+    normal = deformed_normal(p.bend, normal);
+    sky.bent_normal = deformed_normal(p.bend, sky.bent_normal);
+#endif
+    // Occluders are assumed to have the local albedo, because heavy rust is rarely isolated. A decal
+    // says nothing about them, so the sheet's paint replaces it.
+    vec3 paint = material_base[SHEET_MATERIAL].rgb;
+    sky.occluder_albedo = mix(p.surface.material.albedo, paint, p.surface.printed);
+    // Above a roof the occluder is the spreader.
+    sky.overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
+    sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, sky.overhead);
+    vec4 light_seen = vec4(0.0);
+    float depth = coarse_mean(surface_depths, sample_at).r;
+    vec2 position = sample_position(sample_at) + 0.5 * vec2(coarse_offset);
+    vec3 from_eye = depth * view_ray(position);
+#if TRACED
+    sky.traced = traced_light_at(position, key, from_eye, normal);
+#endif
+#if LIGHTS && LAYER == LAYER_ALL
+    vec3 outward = p.surface.outward;
+    light_seen = light_visibility(outward, from_eye, normal, depth * pixel_angle);
+    sky.occluder_light = occluder_light(outward, from_eye, normal, sky);
+#endif
+    return layer_color(p.surface.material, normal, view, sky, light_seen);
+}
