@@ -18,7 +18,8 @@ class GeometryPass:
     Spreader and undamaged parts of the container, parts that damages touch, and the interior that
     each hole reveals have a program of their own.
 
-    Reads: the lobe masks of sky_visibility.py, which it owns. Writes: the visibility buffer.
+    Reads: the lobe masks of sky_visibility.py, which it owns, and for holes the zone table. Writes:
+    the visibility buffer.
     """
 
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
@@ -47,9 +48,8 @@ class GeometryPass:
         samples.begin(damage, drawn, rest, regions.holes)
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
-        self._programs["undamaged"].bind(
-            {"lobe_masks": self._lobes}
-        )  # all three read it from unit 0
+        textures = {**inputs.textures, "lobe_masks": self._lobes}
+        self._programs["undamaged"].bind(textures)
         if inputs.spreader is not None:
             inputs.spreader.draw("undamaged", inputs.spreader.seen_from(inputs.eye_mm))
         # a dent may tilt a face into view that the rest mesh turns away
@@ -62,10 +62,12 @@ class GeometryPass:
             seen, touched = container.clusters.parted(seen, boxes, REACH_MARGIN_MM)
             container.draw("undamaged", seen)
             samples.begin_damaged()
+            self._programs["damaged"].bind(textures)
             container.draw("damaged", touched)
         else:
             container.draw("undamaged", seen)
         moved_mm = sum(abs(d.depth_mm) for d in damages)
+        self._programs["holed"].bind(textures)
         for region in regions.holes:
             samples.limit_inside(region)
             container.draw("holed", container.clusters.seen_in(inputs.view, region, moved_mm))
