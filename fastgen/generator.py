@@ -4,7 +4,6 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import chain, product
 from pathlib import Path
 from typing import Any, Self
 
@@ -12,29 +11,23 @@ from fastgen.camera.projection import view_of
 from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
 from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import ConfigError
-from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
 from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
+from fastgen.preload import preload
 from fastgen.render.cuda import CudaFrame, cuda_reason
 from fastgen.render.gl import open_context
 from fastgen.render.passes.bake import Atlas
 from fastgen.render.renderer import Renderer
 from fastgen.render.session import GpuSession
 from fastgen.render.settings import QUALITY, RenderSettings
-from fastgen.render.shadow_map import shader_lights
 from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
-from fastgen.sampling.coverage import (
-    damage_variant_configs,
-    extreme_lenses,
-    possible_shapes,
-    single_container_configs,
-)
+from fastgen.sampling.coverage import extreme_lenses
 from fastgen.sampling.scene import sample_scene
-from fastgen.scene import Camera, Color, EnvironmentView, Scene
+from fastgen.scene import Camera, Color, Scene
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
 
@@ -272,43 +265,7 @@ class Generator:
         Args:
             on_step: Called before each step; a step takes seconds the first time.
         """
-        scene = self.scene(0)
-        drawn = [name for name, weight in self._weights.items() if weight > 0]
-        names = self.config.environment.names or drawn
-        lit = (
-            PreparedScene(replace(scene, environment=EnvironmentView(name, 0.0))) for name in names
-        )
-        shaped = [
-            PreparedScene(replace(scene, container=container, spreader=spreader, damages=()))
-            for container, spreader in possible_shapes(self.config)
-        ]
-        for shape in shaped:  # what shadows and labels ask of meshes
-            on_step()
-            shape.prepare_shapes(damages=self.config.damage.probability > 0)
-        lens = any(camera.lens is not None for camera in scene.cameras)
-        with self.gpu.drawing() as renderer:
-            for each in chain(lit, shaped):
-                on_step()
-                renderer.preload(each, lens)
-            lights = {shader_lights(renderer.ambient(name).lights): name for name in names}
-        # programs and targets: every way to draw, every container
-        ways = list(product(damage_variant_configs(self.config), lights.values()))
-        boxes = list(single_container_configs(self.config.container))
-        for i in range(max(len(ways), len(boxes))):
-            (config, name), box = ways[i % len(ways)], boxes[i % len(boxes)]
-            shown = sample_scene(replace(config, container=box), self.seed, 0, self.environments)
-            shown = replace(shown, environment=EnvironmentView(name, 0.0))
-            # what a camera does not see of the damage makes no difference to how it draws
-            alike = {
-                (
-                    camera.lens is None,
-                    variant(seen_damages(shown.damages, camera.position_mm)),
-                ): camera
-                for camera in shown.cameras
-            }
-            on_step()
-            for camera in alike.values():
-                self.render(scene=shown, camera=camera)
+        preload(self, on_step)
 
     def close(self) -> None:
         """Free the renderer and its GL context. A later render opens them again."""

@@ -97,6 +97,27 @@ class GpuMesh:
         """Bounding boxes of triangle runs; only containers need them, for damages and holes."""
         return Clusters(self.mesh)
 
+    @cached_property
+    def zone_rows(self) -> NDArray[np.float32]:
+        """The mesh's columns [2, zones, 4] of the zone table."""
+        zones = self.mesh.zones
+        charts = [self.mesh.charts[zone.chart] for zone in zones]
+        rows = np.zeros((2, len(zones), 4), np.float32)
+        rows[0] = [zone.rect_mm for zone in zones]
+        rows[1, :, 0] = [
+            chart.material_index
+            + ZONE_TURN * zone.quarter_turns
+            + ZONE_GEAR * is_gear(chart)
+            + ZONE_SMALL * zone.small
+            + ZONE_LEVEL * zone.level
+            for chart, zone in zip(charts, zones, strict=True)
+        ]
+        rows[1, :, 1:] = [
+            FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
+            for chart in charts
+        ]
+        return rows
+
     def set_sky_visibility(self, values: NDArray[np.uint8]) -> None:
         """Set the sky visibility of the vertices; before, every vertex sees the whole sky.
 
@@ -145,7 +166,7 @@ class GpuMesh:
             item.release()
 
 
-def zone_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Texture:
+def zone_table(ctx: moderngl.Context, meshes: Mapping[int, GpuMesh]) -> moderngl.Texture:
     """Return the table of zones that shaders/zone.glsl reads.
 
     Args:
@@ -155,22 +176,8 @@ def zone_table(ctx: moderngl.Context, meshes: Mapping[int, Mesh]) -> moderngl.Te
     Returns:
         Texture with two rows, which the caller releases.
     """
-    count = max(first + len(mesh.zones) for first, mesh in meshes.items())
+    count = max(first + len(each.mesh.zones) for first, each in meshes.items())
     table = np.zeros((2, count, 4), np.float32)
-    for first, mesh in meshes.items():
-        charts = [mesh.charts[zone.chart] for zone in mesh.zones]
-        columns = slice(first, first + len(charts))
-        table[0, columns] = [zone.rect_mm for zone in mesh.zones]
-        table[1, columns, 0] = [
-            chart.material_index
-            + ZONE_TURN * zone.quarter_turns
-            + ZONE_GEAR * is_gear(chart)
-            + ZONE_SMALL * zone.small
-            + ZONE_LEVEL * zone.level
-            for chart, zone in zip(charts, mesh.zones, strict=True)
-        ]
-        table[1, columns, 1:] = [
-            FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
-            for chart in charts
-        ]
+    for first, each in meshes.items():
+        table[:, first : first + len(each.mesh.zones)] = each.zone_rows
     return data_texture(ctx, table)

@@ -6,7 +6,7 @@ that see surfaces into classes, and shade each class. Colour, ids, damage and de
 draw. Labels are taken at the pixel centre and never filtered: a sample lies exactly on each centre.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from typing import Any, Self
 
@@ -44,7 +44,7 @@ from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes, ray_bodies
-from fastgen.render.surface_values import SceneMaterials, cable_values, damage_values, scene_values
+from fastgen.render.surface_values import cable_values, damage_values, scene_values
 from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
@@ -254,16 +254,32 @@ class Renderer:
             (prepared, lens), lambda: ray_bodies(prepared, materials, lens, inputs.lit, ambient)
         )
 
-    def preload(self, prepared: PreparedScene, lens: bool) -> None:
-        """Prepare light and shapes of a scene, so that drawing it takes no more time or memory.
+    def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
+        """Prepare the shapes of a scene, so that drawing them takes no more time or memory.
 
         Args:
             prepared: The scene.
-            lens: Whether a lens distorts the images.
+            lens: Prepare for images with lens distortion.
+            damages: Prepare for damaged scenes too.
         """
-        light = self.ambient(prepared.scene.environment.name)
-        materials = SceneMaterials(prepared)
-        self._shapes.zone_table(*self._shapes.of(prepared, materials, lens, light)[:2])
+        prepared.prepare_shapes(lens, damages)
+        self._shapes.preload(prepared, lens, damages)
+
+    def preload_environment(self, name: str) -> None:
+        """Prepare the light and the background of an environment."""
+        self._backgrounds.get(self._light(name))
+
+    def programs_key(self, prepared: PreparedScene, camera: Camera) -> Hashable:
+        """Return a key that is equal for all draws at one image size that use the same programs.
+
+        Args:
+            prepared: The scene.
+            camera: The camera.
+        """
+        damages = seen_damages(prepared.scene.damages, camera.position_mm)
+        lights = shader_lights(self.ambient(prepared.scene.environment.name).lights)
+        spreader = prepared.scene.spreader.present
+        return variant(damages), lights, camera.lens is not None, spreader
 
     def _light(self, environment: str) -> GpuLight:
         return self._lights.get(

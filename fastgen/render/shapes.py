@@ -52,7 +52,7 @@ class Shapes:
         mesh, shape = self.container(prepared), prepared.spreader
         usual = prepared.usual_spreader
         sky = Sky(light, prepared.scene.environment.yaw_deg)
-        below = self._probe.container_light(mesh.mesh, usual and usual.mesh, sky)
+        below = self._probe.container_light(mesh.mesh, None if usual is None else usual.mesh, sky)
         mesh.set_sky_visibility(below.values)
         if shape is None or usual is None:
             return mesh, None, (below,)
@@ -64,6 +64,21 @@ class Shapes:
         )
         spreader.set_sky_visibility(lit.values)
         return mesh, spreader, (below, lit)
+
+    def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
+        """Load the meshes of a scene and all that their light needs; see Renderer.preload."""
+        container, shape = self.container(prepared), prepared.spreader
+        usual = prepared.usual_spreader
+        if damages:
+            _ = container.clusters
+        self._probe.container_visibility(container.mesh, None if usual is None else usual.mesh)
+        if shape is None or usual is None:
+            self.zone_table(container, None)
+            return
+        spreader = self._drawn_spreader(shape.drawn(lens))
+        self.zone_table(container, spreader)
+        probed, outline = (spreader.mesh, shape.outline) if lens else (usual.mesh, usual.outline)
+        self._probe.preload_spreader(probed, outline, prepared.nominal_outline, container.mesh)
 
     def container(self, prepared: PreparedScene) -> GpuMesh:
         """Return the container of a scene at rest."""
@@ -82,9 +97,9 @@ class Shapes:
 
     def zone_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
         """Return the zones of both as the material layers read them."""
-        meshes = {0: container.mesh}
+        meshes = {0: container}
         if spreader is not None:
-            meshes[SPREADER_ZONE] = spreader.mesh
+            meshes[SPREADER_ZONE] = spreader
         return self._zones.get(tuple(meshes.values()), lambda: zone_table(self._ctx, meshes))
 
     def release(self) -> None:

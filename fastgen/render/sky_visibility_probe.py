@@ -126,9 +126,13 @@ class SkyVisibilityProbe:
         Returns:
             The lit mesh. A second call with the same arguments returns the same object.
         """
-        key = (container, spreader)
-        visibility = self._visibility(key, lambda: self._of_container(container, spreader))
+        visibility = self.container_visibility(container, spreader)
         return self._lit.get((visibility, sky), lambda: _lit(container, visibility, sky))
+
+    def container_visibility(self, container: Mesh, spreader: Mesh | None) -> SkyVisibility:
+        """Return the sky visibility of a container below a spreader or an open sky."""
+        key = (container, spreader)
+        return self._visibility(key, lambda: self._of_container(container, spreader))
 
     def spreader_light(
         self, spreader: Mesh, outline: Mesh, held: Mesh, below: LitMesh, sky: Sky, paints: Paints
@@ -146,22 +150,11 @@ class SkyVisibilityProbe:
         Returns:
             The lit mesh. A second call with the same arguments returns the same object.
         """
-        key = (spreader, held)
-        visibility = self._visibility(key, lambda: self._of_spreader(spreader, held))
+        visibility = self._spreader_visibility(spreader, held)
 
         def lit() -> LitMesh:
-            factors = self._factors.get(
-                (visibility, outline),
-                lambda: form_factors(
-                    spreader,
-                    without_cables(outline),
-                    held,
-                    _spreader_points(spreader),
-                    sky_directions(),
-                    ~visibility.visible,
-                ),
-            )
-            cells = self._cells.get((below.mesh, held), lambda: Cells.of(below.mesh, held))
+            factors = self._form_factors(spreader, outline, held)
+            cells = self._cells_of(below.mesh, held)
             sheet = np.array(paints[MATERIALS.index("paint_sheet")])
             reflectance = np.array(paints)[[chart.material_index for chart in spreader.charts]]
             direct = visibility.directional_irradiance(sky)
@@ -175,6 +168,31 @@ class SkyVisibilityProbe:
             return LitMesh(spreader, values, light + direct, light)
 
         return self._lit.get((visibility, sky, below, paints), lit)
+
+    def preload_spreader(self, spreader: Mesh, outline: Mesh, held: Mesh, below: Mesh) -> None:
+        """Prepare `spreader_light` for these meshes; `below` is the mesh of the container."""
+        self._form_factors(spreader, outline, held)
+        self._cells_of(below, held)
+
+    def _spreader_visibility(self, spreader: Mesh, held: Mesh) -> SkyVisibility:
+        return self._visibility((spreader, held), lambda: self._of_spreader(spreader, held))
+
+    def _form_factors(self, spreader: Mesh, outline: Mesh, held: Mesh) -> FormFactors:
+        visibility = self._spreader_visibility(spreader, held)
+        return self._factors.get(
+            (visibility, outline),
+            lambda: form_factors(
+                spreader,
+                without_cables(outline),
+                held,
+                _spreader_points(spreader),
+                sky_directions(),
+                ~visibility.visible,
+            ),
+        )
+
+    def _cells_of(self, container: Mesh, held: Mesh) -> Cells:
+        return self._cells.get((container, held), lambda: Cells.of(container, held))
 
     def _visibility(
         self, key: tuple[Mesh, Mesh | None], measure: Callable[[], NDArray[np.uint8]]
