@@ -1,0 +1,96 @@
+"""Content of disk cache entries compared with a table, so that no change forgets its VERSION."""
+
+import numpy as np
+import pytest
+
+from fastgen.decals import artwork
+from fastgen.files import disk_cache
+from fastgen.geometry import chart_sheet, container, mesh, spreader
+from fastgen.light import environment, indirect_light, reflectance
+from fastgen.light.hdri import bundled_hdris
+from fastgen.light.sky_visibility import Sky
+from fastgen.render import noise, sky_visibility_probe
+from fastgen.render.gl import open_context
+
+TABLE = {
+    "art": (artwork, 1, 18.00077, 48.96338, 43.30455),
+    "container": (container, 1, 12.85765, 33.80773, 31.04243),
+    "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
+    "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
+    "form-factors": (indirect_light, 1, 11.7319, 48.20674, 44.833),
+    "hull": (mesh, 1, 2.07944, 8.78941, 8.45058),
+    "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
+    "sheet": (chart_sheet, 1, 12.77786, 221.25527, 198.56161),
+    "sky-directions": (sky_visibility_probe, 1, 13.62804, 19.76269, 17.02392),
+    "sky-visibility": (sky_visibility_probe, 1, 13.23187, 58.93386, 51.90917),
+    "spreader": (spreader, 1, 11.0786, 33.25144, 30.30849),
+    "triangle-bounds": (mesh, 1, 11.98215, 14.57226, 13.1778),
+}
+"""Producer: its module, its VERSION and the summary of its entries, see `summary`."""
+
+TOLERANCE = 1e-4
+GL_TOLERANCE = 0.02
+"""Depth maps, and form factors of what they hide, differ a little between OpenGL drivers."""
+
+
+def summary(entries):
+    """Return three numbers about entries, which do not depend on the rounding of a CPU.
+
+    They are the logarithm of the number of values, and the sums over all arrays of log(1 + m) for
+    m = mean |x|, and for m = mean |x| weighted by a ramp, which changes with the order of values.
+    """
+    arrays = [np.abs(array, dtype=np.float64).ravel() for each in entries for array in each]
+    arrays = [array for array in arrays if array.size]
+    ramps = [array * np.linspace(0, 1, array.size) for array in arrays]
+    return (
+        float(np.log(sum(array.size for array in arrays))),
+        float(sum(np.log1p(array.mean()) for array in arrays)),
+        float(sum(np.log1p(ramp.mean()) for ramp in ramps)),
+    )
+
+
+@pytest.fixture(scope="module")
+def summaries(tmp_path_factory):
+    """The summary of new entries of each producer."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(disk_cache, "default_folder", lambda: folder)
+        reflectance.dfg_table.__wrapped__()
+        noise.noise_tiles.__wrapped__()
+        artwork.art_levels()
+        ambient = environment.load_environment(bundled_hdris()["night_2"])
+        body = container.build_container("20")
+        body.prepare(damages=True)
+        _ = body.hull
+        held = spreader.build_spreader("20")
+        sky = Sky(ambient, 0.0)
+        with open_context() as gl:
+            probe = sky_visibility_probe.SkyVisibilityProbe(gl.ctx)
+            below = probe.container_light(body, held, sky)
+            paints = ((0.5, 0.5, 0.5),) * len(mesh.MATERIALS)
+            probe.spreader_light(held, held, body, below, sky, paints)
+            probe.release()
+    found = {}
+    for entry in sorted(folder.glob("*.npy")):
+        arrays = disk_cache.read(entry)
+        found.setdefault(entry.stem.rpartition("-")[0], []).append(list(arrays.values()))
+    return {name: summary(entries) for name, entries in found.items()}
+
+
+def test_every_producer_is_in_the_table(summaries):
+    assert sorted(summaries) == sorted(TABLE)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_changed_content_has_a_new_version(summaries, name):
+    module, version, *wanted = TABLE[name]
+    tolerance = GL_TOLERANCE if name.startswith(("sky", "form")) else TOLERANCE
+    same = summaries[name] == pytest.approx(wanted, abs=tolerance)
+    row = tuple(round(number, 5) for number in summaries[name])
+    raised = version != module.VERSION
+    assert same or raised, (
+        f"{module.__name__}: the stored arrays changed; raise its VERSION, and put {row} into TABLE"
+    )
+    assert not raised, (
+        f"{module.__name__}: VERSION is {module.VERSION}; put it and {row} into TABLE"
+    )
