@@ -188,7 +188,8 @@ void main() {
     ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
     bool decal = false;
     for (int i = 0; i < (SAMPLES_PER_AXIS > 1 ? 3 : 1); ++i)
-        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]), texelFetch(atlas_positions, part_at[i], 0).xy));
+        decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]),
+                                                       texelFetch(atlas_positions, part_at[i], 0).xy));
     if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
     uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
 #if SAMPLES_PER_AXIS > 1
@@ -206,8 +207,10 @@ void main() {
 #if WITH_CABLES
     // All samples of a pixel may miss a cable, or all may hit it; its exact coverage decides.
 #if SAMPLES_PER_AXIS == 1
-    bool bare = seen_bare(pixel, key, uvec4(surface_id_at(middle - ivec2(1, 0)), surface_id_at(middle + ivec2(1, 0)),
-                                            surface_id_at(middle - ivec2(0, 1)), surface_id_at(middle + ivec2(0, 1))));
+    const ivec2 right = ivec2(1, 0), under = ivec2(0, 1);
+    uvec4 sides = uvec4(surface_id_at(middle - right), surface_id_at(middle + right),
+                        surface_id_at(middle - under), surface_id_at(middle + under));
+    bool bare = seen_bare(pixel, key, sides);
 #else
     bool bare = true;
     for (int i = 0; i < FILTER_NEAR; ++i) bare = bare && sky_or_cable(keys[i]);

@@ -14,4 +14,6 @@ vec2 from_center(vec2 offset) {
     return vec2((offset.x - float(SAMPLE_SLANT) * down) / float(SAMPLES_PER_AXIS), down);
 }
 
-vec2 sample_position(ivec2 sample_at) { return 0.5 + from_center(vec2(sample_at - center_texel(ivec2(0)))); }
+vec2 sample_position(ivec2 sample_at) {
+    return 0.5 + from_center(vec2(sample_at - center_texel(ivec2(0))));
+}

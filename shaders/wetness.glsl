@@ -1,5 +1,5 @@
-// void apply_wetness(inout vec3 albedo, inout float roughness, float metallic, float wetness): effect of rain on
-// a surface. wetness: 0 for dry to 1 for soaked.
+// void apply_wetness(inout vec3 albedo, inout float roughness, float metallic, float wetness): changes a
+// surface by rain. wetness: 0 for dry to 1 for soaked.
 
 #include "scene.block"
 

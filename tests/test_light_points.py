@@ -9,7 +9,7 @@ import pytest
 import fastgen.render.renderer
 from fastgen import Config, Generator
 from fastgen.errors import ConfigError
-from fastgen.render import light_points
+from fastgen.render.passes import ray_points
 from tests.tone_inverse import light_of
 
 FISHEYE = {"cameras": {"A": {"focal_mm": 24, "lens": {"model": "fisheye", "k1": [-0.02, 0.0]}}}}
@@ -35,15 +35,15 @@ def coarse(monkeypatch):
     """Function that places the points `step` pixels apart, as in much larger images."""
 
     def apart(size, step):
-        monkeypatch.setattr(light_points, "_POINTS_PER_AXIS", (size[0] * size[1]) ** 0.5 / step)
-        assert light_points.point_step(size) == step
+        monkeypatch.setattr(ray_points, "_POINTS_PER_AXIS", (size[0] * size[1]) ** 0.5 / step)
+        assert ray_points.point_step(size) == step
 
     return apart
 
 
 def test_points_are_at_most_400_along_an_axis_and_no_sparser_than_needed():
     for side in (64, 320, 400, 401, 640, 800, 801, 1440, 4096):
-        step = light_points.point_step((side, side))
+        step = ray_points.point_step((side, side))
         assert side / step <= 400
         assert step == 1 or side / (step - 1) > 400
 
