@@ -52,17 +52,15 @@ def test_masks_and_depth_equal_rays_on_the_mesh_deformed_in_numpy(generator, ind
         assert (error_m <= allowed_m).mean() > 0.999
 
 
-def test_ids_on_a_bulge_are_right_from_behind_the_plane_of_its_sheet():
+def test_ids_on_a_bulge_are_right_from_behind_the_plane_of_its_sheet(generators):
     """A camera behind the plane of a sheet sees decals on a part that bulges outward."""
     bulging = {"probability": 1, "kinds": ["concave", "dented"], "count": [4, 4]}
-    with Generator(Config.from_values({"damage": bulging}), seed=0, size=(256, 192)) as generator:
-        for index, camera in ((1463, "Cr"), (1103, "Cr"), (373, "Cl")):
-            sample = generator.render(index=index, camera=camera)
-            mesh = build_container(sample.scene.container.kind, sample.scene.container.profiles)
-            ids = oracle.object_ids(
-                sample.scene, mesh, oracle.cast(mesh, sample.view, sample.scene)
-            )
-            assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
+    generator = generators(Config.from_values({"damage": bulging}), seed=0, size=(256, 192))
+    for index, camera in ((1463, "Cr"), (1103, "Cr"), (373, "Cl")):
+        sample = generator.render(index=index, camera=camera)
+        mesh = build_container(sample.scene.container.kind, sample.scene.container.profiles)
+        ids = oracle.object_ids(sample.scene, mesh, oracle.cast(mesh, sample.view, sample.scene))
+        assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
 
 
 def close_up(scene: Scene, kind: str) -> Scene:
@@ -106,18 +104,18 @@ def test_every_kind_matches_rays_from_close_by(generator, kind):
         ("dented", {"amplitude_mm": 200, "width_mm": 300, "sink_share": 0.9, "depth_mm": 90}),
     ],
 )
-def test_a_mask_covers_all_steel_that_its_damage_moves(kind, ranges):
+def test_a_mask_covers_all_steel_that_its_damage_moves(generators, kind, ranges):
     """A wide `axis` reaches beyond the fade of other kinds, a winding dent beyond its width."""
     values = {"probability": 1.0, "count": [1, 1], "kinds": [kind], kind: ranges}
-    with Generator(Config.from_values({"damage": values}), 5, SIZE) as generator:
-        for index in range(3):
-            scene = close_up(replace(generator.scene(index), spreader=Spreader()), kind)
-            sample = generator.render(scene=scene, camera="close")
-            mesh = build_container(scene.container.kind, scene.container.profiles)
-            hits = oracle.cast(mesh, sample.view, scene)
-            expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
-            wrong = sample.damage != expected
-            assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
+    generator = generators(Config.from_values({"damage": values}), 5, SIZE)
+    for index in range(3):
+        scene = close_up(replace(generator.scene(index), spreader=Spreader()), kind)
+        sample = generator.render(scene=scene, camera="close")
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        hits = oracle.cast(mesh, sample.view, scene)
+        expected = oracle.damage_values(scene, hits, THRESHOLD_MM)
+        wrong = sample.damage != expected
+        assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
 
 
 def test_a_hole_shows_the_inside_and_never_the_sky(generator):
@@ -189,10 +187,10 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
     np.testing.assert_allclose(short.depth, usual.depth, rtol=4e-6)
 
 
-def test_a_hole_behind_rods_and_handles_shows_no_sky():
+def test_a_hole_behind_rods_and_handles_shows_no_sky(generators):
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
-    with Generator(Config.from_values({"damage": values}), 77, (256, 256)) as generator:
-        samples = [generator.render(index, "Cr") for index in range(12)]
+    generator = generators(Config.from_values({"damage": values}), 77, (256, 256))
+    samples = [generator.render(index, "Cr") for index in range(12)]
     holes = [sample.damage == 501 for sample in samples]
     assert sum(int(hole.sum()) for hole in holes) > 1000
     for sample, hole in zip(samples, holes, strict=True):
@@ -249,27 +247,27 @@ def test_deformed_steel_is_dulled_and_rusts(generator):
     assert (np.subtract(*blue) < -5).all()
 
 
-def test_a_dented_leaf_stays_behind_its_locking_gear():
+def test_a_dented_leaf_stays_behind_its_locking_gear(generators):
     """Rays that hit a bar or handle first on the undamaged door also do so on the damaged one."""
     doors = {"damage": {"probability": 1.0, "faces": ["door"], "kinds": ["dented"]}}
     across, up = np.meshgrid(np.arange(-870.0, 870.0, 8.0), np.arange(900.0, 1200.0, 8.0))
     eyes = np.column_stack([np.full(across.size, 9000.0), across.ravel(), up.ravel()])
     rays = np.tile([-1.0, 0.0, 0.0], (len(eyes), 1))
     gear = 0
-    with Generator(Config.from_values(doors), seed=3, size=(64, 64)) as generator:
-        for scene in map(generator.scene, range(40)):
-            mesh = build_container(scene.container.kind, scene.container.profiles)
-            names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
-            is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
-            met = []
-            for positions in (
-                mesh.positions_mm,
-                damage_law.deform(scene.damages, mesh.positions_mm),
-            ):
-                body = trimesh.Trimesh(positions, mesh.triangles.astype(np.int64), process=False)
-                met.append(is_gear[RayMeshIntersector(body).intersects_first(eyes, rays)])
-            gear += met[0].sum()
-            assert (met[0] & ~met[1]).sum() <= 10  # rays 8 mm apart, where a leaf folds sharply
+    generator = generators(Config.from_values(doors), seed=3, size=(64, 64))
+    for scene in map(generator.scene, range(40)):
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
+        is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
+        met = []
+        for positions in (
+            mesh.positions_mm,
+            damage_law.deform(scene.damages, mesh.positions_mm),
+        ):
+            body = trimesh.Trimesh(positions, mesh.triangles.astype(np.int64), process=False)
+            met.append(is_gear[RayMeshIntersector(body).intersects_first(eyes, rays)])
+        gear += met[0].sum()
+        assert (met[0] & ~met[1]).sum() <= 10  # rays 8 mm apart, where a leaf folds sharply
     assert gear > 40 * 200
 
 

@@ -18,7 +18,6 @@ from fastgen.formats.bop import OBJECT_IDS
 from fastgen.formats.format import assemble
 from fastgen.formats.item import Item
 from fastgen.formats.registry import formats_of
-from fastgen.generator import Generator
 from fastgen.labels.objects import CASTINGS
 from fastgen.scene import Scene
 from fastgen.validation import from_plain
@@ -243,12 +242,12 @@ def test_the_view_in_a_scene_file_projects_the_castings_to_their_keypoints(out):
                 np.testing.assert_allclose(pixel[:2] / pixel[2], (x, y), atol=0.01)
 
 
-def test_ignored_objects_are_marked_if_a_format_can_and_omitted_otherwise():
-    with Generator(seed=5, size=SIZE) as generator:
-        generator.config = type(generator.config).from_values(
-            {"labels": {"min_visible_px": 150, "min_visible_fraction": 0.5}}
-        )
-        sample = generator.render(index=1, camera="B")
+def test_ignored_objects_are_marked_if_a_format_can_and_omitted_otherwise(generators):
+    generator = generators(seed=5, size=SIZE)
+    generator.config = type(generator.config).from_values(
+        {"labels": {"min_visible_px": 150, "min_visible_fraction": 0.5}}
+    )
+    sample = generator.render(index=1, camera="B")
     small = [t for t in sample.objects if t.bbox and t.ignored]
     assert small
     assert all(t.area < 150 or t.visible_fraction < 0.5 for t in small)

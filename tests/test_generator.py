@@ -110,15 +110,15 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
         ("container", {"kind": "30"}, "container.kind: '30' is unknown"),
     ],
 )
-def test_errors_in_scenes_changed_by_hand_name_the_invalid_part(part, changes, words):
+def test_errors_in_scenes_changed_by_hand_name_the_invalid_part(generators, part, changes, words):
     values = {"damage": {"probability": 1, "kinds": ["concave"]}}
-    with Generator(Config.from_values(values), size=SIZE) as generator:
-        scene = generator.scene(0)
-        held = getattr(scene, part)
-        one = replace(held[0] if isinstance(held, tuple) else held, **changes)
-        bad = replace(scene, **{part: (one,) if isinstance(held, tuple) else one})
-        with pytest.raises(ConfigError, match=f"scene.{words}"):
-            generator.render(scene=bad)
+    generator = generators(Config.from_values(values), size=SIZE)
+    scene = generator.scene(0)
+    held = getattr(scene, part)
+    one = replace(held[0] if isinstance(held, tuple) else held, **changes)
+    bad = replace(scene, **{part: (one,) if isinstance(held, tuple) else one})
+    with pytest.raises(ConfigError, match=f"scene.{words}"):
+        generator.render(scene=bad)
 
 
 def test_a_hundred_damages_of_one_kind_are_refused():
@@ -135,10 +135,10 @@ def test_scene_files_with_nan_are_refused(generator):
         Scene.from_json(text)
 
 
-def test_the_first_camera_of_a_rig_is_the_default(generator):
+def test_the_first_camera_of_a_rig_is_the_default(generators, generator):
     assert generator.render(index=1).camera.name == "A"
-    with Generator(Config.from_values({"cameras": RIG}), size=SIZE) as gate:
-        assert gate.render(index=1).camera.name == "gate"
+    gate = generators(Config.from_values({"cameras": RIG}), size=SIZE)
+    assert gate.render(index=1).camera.name == "gate"
 
 
 def test_label_rules_may_be_given_for_one_image(generator):
@@ -220,16 +220,16 @@ def test_a_sample_prints_in_one_line(generator):
     assert len(words) < 120
 
 
-def test_closing_one_generator_does_not_affect_another():
-    with Generator(seed=2, size=SIZE) as kept:
-        before = kept.render(index=0)
-        with Generator(seed=1, size=SIZE) as other:
-            other.render(index=0)
-            kept.render(index=0)  # so that `other` is not current when it is closed
-        after = kept.render(index=0)
-        np.testing.assert_array_equal(after.image, before.image)
-        np.testing.assert_array_equal(after.ids, before.ids)
-        assert after.objects == before.objects
+def test_closing_one_generator_does_not_affect_another(generators):
+    kept = generators(seed=2, size=SIZE)
+    before = kept.render(index=0)
+    with Generator(seed=1, size=SIZE) as other:
+        other.render(index=0)
+        kept.render(index=0)  # so that `other` is not current when it is closed
+    after = kept.render(index=0)
+    np.testing.assert_array_equal(after.image, before.image)
+    np.testing.assert_array_equal(after.ids, before.ids)
+    assert after.objects == before.objects
 
 
 def test_a_generator_can_be_used_by_one_thread_after_another():
@@ -244,13 +244,13 @@ def test_a_generator_can_be_used_by_one_thread_after_another():
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_threads_that_share_a_generator_render_in_turn(backend):
-    with Generator(size=SIZE, backend=backend, quality="draft") as shared:
-        expected = [shared.render(index=index).image for index in range(4)]
-        with ThreadPoolExecutor(3) as pool:
-            found = pool.map(lambda k: shared.render(index=k % 4).image, range(24))
-        for k, image in enumerate(found):
-            np.testing.assert_array_equal(image, expected[k % 4])
+def test_threads_that_share_a_generator_render_in_turn(generators, backend):
+    shared = generators(size=SIZE, backend=backend, quality="draft")
+    expected = [shared.render(index=index).image for index in range(4)]
+    with ThreadPoolExecutor(3) as pool:
+        found = pool.map(lambda k: shared.render(index=k % 4).image, range(24))
+    for k, image in enumerate(found):
+        np.testing.assert_array_equal(image, expected[k % 4])
 
 
 def drawn_in_a_thread():
@@ -287,7 +287,7 @@ def test_the_memory_of_generators_is_freed(use, count):
     np.testing.assert_array_equal(after, before)
 
 
-def test_cameras_above_and_below_show_the_length_across_the_image_well_exposed():
+def test_cameras_above_and_below_show_the_length_across_the_image_well_exposed(generators):
     rig = {"focal_mm": 20, "distance_mm": 9000, "roll_deg": 0}
     plumb = {"azimuth_deg": 0, "elevation_deg": 0, "target_shift_mm": 0}
     cameras = {
@@ -295,19 +295,19 @@ def test_cameras_above_and_below_show_the_length_across_the_image_well_exposed()
         "plumb": {"face": "roof", **rig, **plumb},
         "pit": {"face": "underside", **rig},
     }
-    with Generator(Config.from_values({"cameras": cameras}), seed=1, size=SIZE) as generator:
-        for index in range(3):
-            scene = generator.scene(index)
-            for camera in scene.cameras:
-                across, down, _ = view_of(camera, SIZE).rotation @ [1.0, 0.0, 0.0]
-                assert across > 0.9
-                assert abs(down) < 0.01
-            plumb = scene.camera("plumb")
-            x, y, z = plumb.position_mm
-            beside = replace(plumb, position_mm=(x + 30, y - 20, z))
-            exposures = [generator.exposure(scene, camera) for camera in (plumb, beside)]
-            assert exposures[0] == pytest.approx(exposures[1], rel=0.02)
-            assert generator.render(scene=scene, camera="plumb").image.mean() > 25
+    generator = generators(Config.from_values({"cameras": cameras}), seed=1, size=SIZE)
+    for index in range(3):
+        scene = generator.scene(index)
+        for camera in scene.cameras:
+            across, down, _ = view_of(camera, SIZE).rotation @ [1.0, 0.0, 0.0]
+            assert across > 0.9
+            assert abs(down) < 0.01
+        plumb = scene.camera("plumb")
+        x, y, z = plumb.position_mm
+        beside = replace(plumb, position_mm=(x + 30, y - 20, z))
+        exposures = [generator.exposure(scene, camera) for camera in (plumb, beside)]
+        assert exposures[0] == pytest.approx(exposures[1], rel=0.02)
+        assert generator.render(scene=scene, camera="plumb").image.mean() > 25
 
 
 def test_an_interrupted_render_does_not_affect_later_ones(monkeypatch):

@@ -197,12 +197,12 @@ def test_visible_fractions_equal_ray_casts_over_a_larger_image(seen):
     assert compared > 2
 
 
-def test_casting_keypoints_equal_opencv_projections_of_the_corners():
+def test_casting_keypoints_equal_opencv_projections_of_the_corners(generators):
     (sample, _), *_ = samples(*LENSES["wide fisheye"])
     scene = dataclasses.replace(sample.scene, damages=())
     kind = KINDS[scene.container.kind]
-    with Generator(seed=5, size=SIZE) as generator:
-        thing = generator.render(scene=scene, camera=sample.camera).objects[0]
+    generator = generators(seed=5, size=SIZE)
+    thing = generator.render(scene=scene, camera=sample.camera).objects[0]
     ends = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
     corners = ends * (kind.length_mm / 2, kind.width_mm / 2, kind.height_mm)
     found = np.array(thing.keypoints)

@@ -237,17 +237,17 @@ def test_turning_stickers_off_changes_no_other_draw():
         assert classes[0] == classes[1]
 
 
-def test_wear_removes_print_in_proportion():
+def test_wear_removes_print_in_proportion(generators):
     """Half the wear removes half as much from the same spots; full wear leaves some print."""
     config = Config.from_values({"damage": {"probability": 0}, "spreader": {"probability": 0}})
     images = []
-    with Generator(config, seed=4, size=(256, 256), quality="draft") as generator:
-        scene = generator.scene(0)
-        for wear in (0.0, 0.5, 1.0):
-            worn = tuple(replace(decal, wear=wear) for decal in scene.decals)
-            sample = generator.render(scene=replace(scene, decals=worn), layer="decals")
-            images.append(DECODED[sample.image])
-        bare = generator.render(scene=replace(scene, decals=()), layer="decals")
+    generator = generators(config, seed=4, size=(256, 256), quality="draft")
+    scene = generator.scene(0)
+    for wear in (0.0, 0.5, 1.0):
+        worn = tuple(replace(decal, wear=wear) for decal in scene.decals)
+        sample = generator.render(scene=replace(scene, decals=worn), layer="decals")
+        images.append(DECODED[sample.image])
+    bare = generator.render(scene=replace(scene, decals=()), layer="decals")
     fresh, half, all_worn = (image - DECODED[bare.image] for image in images)
     printed = np.abs(fresh).max(axis=2) > 0.2
     share = 1 - all_worn[printed] / np.where(np.abs(fresh[printed]) > 0.1, fresh[printed], np.nan)

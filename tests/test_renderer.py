@@ -72,11 +72,11 @@ def test_ids_do_not_depend_on_antialiasing():
         assert difference.mean() < 6
 
 
-def test_antialiasing_approaches_a_fine_render_averaged_down():
+def test_antialiasing_approaches_a_fine_render_averaged_down(generators):
     """The reference has 4x4 as many pixels, averaged as linear light before the tone curve."""
     fine = (4 * SIZE[0], 4 * SIZE[1])
-    with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
-        light = light_of(generator.render(index=1, camera="Cl").image)
+    generator = generators(SOUND, seed=5, size=fine, quality="draft")
+    light = light_of(generator.render(index=1, camera="Cl").image)
     gathered = light.reshape(SIZE[1], 4, SIZE[0], 4, 3).mean(axis=(1, 3))
     reference = tone_map_and_encode(gathered).astype(float)
     errors = []
@@ -88,13 +88,13 @@ def test_antialiasing_approaches_a_fine_render_averaged_down():
     assert errors[2] < 0.8 * errors[1]
 
 
-def test_the_layers_of_high_approach_a_fine_render_averaged_down():
+def test_the_layers_of_high_approach_a_fine_render_averaged_down(generators):
     """Away from edges, `high` looks up the layers several times per pixel and `draft` once."""
     rusty = Config.from_values({"surface": {"rust_coverage": 0.2}, "damage": {"probability": 0}})
     fine = (5 * SIZE[0], 5 * SIZE[1])
-    with Generator(rusty, seed=5, size=fine, quality="draft") as generator:
-        scene = replace(generator.scene(1), spreader=Spreader())
-        albedo = light_of(generator.render(scene=scene, camera="A", layer="rust").image)
+    generator = generators(rusty, seed=5, size=fine, quality="draft")
+    scene = replace(generator.scene(1), spreader=Spreader())
+    albedo = light_of(generator.render(scene=scene, camera="A", layer="rust").image)
     reference = albedo.reshape(SIZE[1], 5, SIZE[0], 5, 3).mean(axis=(1, 3))
     errors = []
     for quality in ("draft", "high"):
@@ -196,18 +196,18 @@ def test_culled_faces_are_never_visible(generator, camera):
 
 
 @pytest.mark.parametrize("size", [(64, 64), (100, 37 + 64), (1333, 800), (4096, 64)])
-def test_every_size_is_drawn_completely(size):
-    with Generator(SOUND, seed=5, size=size) as generator:
-        sample = generator.render(index=0, camera="Cr")
+def test_every_size_is_drawn_completely(generators, size):
+    generator = generators(SOUND, seed=5, size=size)
+    sample = generator.render(index=0, camera="Cr")
     assert sample.image.shape == (size[1], size[0], 3)
     assert sample.ids.shape == sample.depth.shape == sample.damage.shape == size[::-1]
     assert (sample.ids > 0).any()
 
 
-def test_the_largest_holed_image_fits_the_driver():
+def test_the_largest_holed_image_fits_the_driver(generators):
     config = Config.from_values({"damage": {"probability": 1, "kinds": ["perforation"]}})
-    with Generator(config, seed=5, size=(128, 4096)) as generator:
-        sample = generator.render(index=0, camera="Cr")
+    generator = generators(config, seed=5, size=(128, 4096))
+    sample = generator.render(index=0, camera="Cr")
     assert sample.ids.shape == (4096, 128)
 
 
@@ -233,29 +233,29 @@ def test_removing_markers_changes_no_other_ids(generator):
     np.testing.assert_array_equal(same_text, (without.ids > 1) & ~covered)
 
 
-def test_normals_equal_those_of_the_visible_triangles():
-    with Generator(SOUND, seed=5, size=SIZE, quality="draft") as generator:
-        for camera in ("A", "Cl"):
-            scene = replace(generator.scene(1), spreader=Spreader())
-            sample = generator.render(scene=scene, camera=camera, normals=True)
-            mesh = build_container(scene.container.kind, scene.container.profiles)
-            hits = oracle.cast(mesh, sample.view, scene)
-            world = mesh.normals[mesh.triangles[hits.triangle, 0]]
-            truth = world @ sample.view.rotation.T
-            both = hits.hit & (sample.ids > 0)
-            error = np.linalg.norm(sample.normals - truth, axis=-1)[both]
-            assert np.quantile(error, 0.99) < 0.03
-            assert not sample.normals[sample.ids == 0].any()
+def test_normals_equal_those_of_the_visible_triangles(generators):
+    generator = generators(SOUND, seed=5, size=SIZE, quality="draft")
+    for camera in ("A", "Cl"):
+        scene = replace(generator.scene(1), spreader=Spreader())
+        sample = generator.render(scene=scene, camera=camera, normals=True)
+        mesh = build_container(scene.container.kind, scene.container.profiles)
+        hits = oracle.cast(mesh, sample.view, scene)
+        world = mesh.normals[mesh.triangles[hits.triangle, 0]]
+        truth = world @ sample.view.rotation.T
+        both = hits.hit & (sample.ids > 0)
+        error = np.linalg.norm(sample.normals - truth, axis=-1)[both]
+        assert np.quantile(error, 0.99) < 0.03
+        assert not sample.normals[sample.ids == 0].any()
 
 
 @pytest.mark.parametrize("quality", ["balanced", "high"])
-def test_normals_at_edges_face_the_camera(quality):
+def test_normals_at_edges_face_the_camera(generators, quality):
     """Sky samples of a pixel must not contribute to its mean normal."""
-    with Generator(SOUND, seed=5, size=SIZE, quality=quality) as generator:
-        for camera in CAMERAS:
-            sample = generator.render(index=1, camera=camera, normals=True)
-            edges = (sample.ids > 0) & (sample.cover < 255)
-            _, rays = sample.view.rays()
-            toward = np.einsum("hwc,hwc->hw", sample.normals, rays @ sample.view.rotation.T)
-            assert edges.sum() > 100
-            assert (toward[edges] > 0.1).mean() < 0.01
+    generator = generators(SOUND, seed=5, size=SIZE, quality=quality)
+    for camera in CAMERAS:
+        sample = generator.render(index=1, camera=camera, normals=True)
+        edges = (sample.ids > 0) & (sample.cover < 255)
+        _, rays = sample.view.rays()
+        toward = np.einsum("hwc,hwc->hw", sample.normals, rays @ sample.view.rotation.T)
+        assert edges.sum() > 100
+        assert (toward[edges] > 0.1).mean() < 0.01

@@ -70,13 +70,13 @@ def test_most_streaks_start_at_the_top_of_a_wall(wall):
     assert top < bottom - 0.02
 
 
-def test_old_rust_is_darker_and_lies_inside_younger_rust():
+def test_old_rust_is_darker_and_lies_inside_younger_rust(generators):
     values = {"surface": {"colors": {"white": "#ffffff"}, **EVEN_PAINT, "rust_coverage": 0.2}}
     config = Config.from_values({"damage": {"probability": 0}, **values})
-    with Generator(config, 3, (64, 64)) as generator:
-        scene = replace(generator.scene(0), decals=())
-        mesh = PreparedScene(scene).container
-        colors = DECODED[generator.bake(scene, 5.0).base_color[::-1]]
+    generator = generators(config, 3, (64, 64))
+    scene = replace(generator.scene(0), decals=())
+    mesh = PreparedScene(scene).container
+    colors = DECODED[generator.bake(scene, 5.0).base_color[::-1]]
     roof = next(c for c in mesh.charts if (c.face, c.material) == ("roof", "paint_sheet"))
     x, y, width, height = (np.array(roof.rect_mm) / 5.0).astype(int)
     blue, red = colors[y + 60 : y + height - 60, x + 60 : x + width - 60, [2, 0]].transpose(2, 0, 1)

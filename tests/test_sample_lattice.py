@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from fastgen.config.config import Config
-from fastgen.generator import Generator
 from fastgen.render.sample_lattice import SampleLattice, fitting
 
 
@@ -98,7 +97,7 @@ def test_the_sample_count_is_the_largest_that_fits_two_views(limit):
 
 
 @pytest.mark.parametrize(("quality", "most"), [("balanced", 0.09), ("high", 0.06)])
-def test_upright_edges_have_many_levels_of_coverage(quality, most):
+def test_upright_edges_have_many_levels_of_coverage(generators, quality, most):
     """Coverage at nearly upright edges is compared with 12x12 ids per pixel.
 
     Samples stacked in columns would be off by 1/6 (balanced) and 1/10 (high). The reference
@@ -107,13 +106,13 @@ def test_upright_edges_have_many_levels_of_coverage(quality, most):
     size, times = (160, 120), 12
     upright = {"roll_deg": 1.0, "elevation_deg": 0.0, "azimuth_deg": 0.0, "distance_mm": 9000}
     config = Config.from_values({"damage": {"probability": 0}, "cameras": {"Cl": upright}})
-    with Generator(config, 5, (size[0] * times, size[1] * times), quality="draft") as generator:
-        scene = generator.scene(2)
-        seen = (generator.render(scene=scene, camera="Cl").ids > 0).astype(np.float32)
+    generator = generators(config, 5, (size[0] * times, size[1] * times), quality="draft")
+    scene = generator.scene(2)
+    seen = (generator.render(scene=scene, camera="Cl").ids > 0).astype(np.float32)
     half = times // 2
     share = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
-    with Generator(config, 5, size, quality=quality) as generator:
-        cover = generator.render(scene=scene, camera="Cl").cover / 255
+    generator = generators(config, 5, size, quality=quality)
+    cover = generator.render(scene=scene, camera="Cl").cover / 255
     # rows in which all edges are nearly upright
     rows = slice(60, 90)
     edge = (share[rows] > 0.02) & (share[rows] < 0.98)

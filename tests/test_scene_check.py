@@ -194,13 +194,13 @@ def test_a_text_with_too_many_letters_is_named(full):
         check_scene(spoilt(full, path, ("A " * 2000, "B" * 2096)))
 
 
-def test_a_decal_off_its_sheet_is_named():
-    with Generator(seed=2, size=SIZE) as generator:
-        scene = generator.scene(3)
-        beside = replace(scene.decals[0], center_mm=(90000.0, 300.0))
-        scene = replace(scene, decals=(beside,))
-        with pytest.raises(SceneError, match=r"decals\[0\].* lies off its sheet"):
-            generator.render(scene=scene, camera="A")
+def test_a_decal_off_its_sheet_is_named(generators):
+    generator = generators(seed=2, size=SIZE)
+    scene = generator.scene(3)
+    beside = replace(scene.decals[0], center_mm=(90000.0, 300.0))
+    scene = replace(scene, decals=(beside,))
+    with pytest.raises(SceneError, match=r"decals\[0\].* lies off its sheet"):
+        generator.render(scene=scene, camera="A")
 
 
 def test_a_marker_that_is_not_square_is_refused(full):

@@ -51,14 +51,14 @@ def test_extreme_light_is_tone_mapped_to_black_or_white():
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced"])
-def test_the_renderer_and_numpy_tone_map_alike(quality):
+def test_the_renderer_and_numpy_tone_map_alike(generators, quality):
     """Images differ by less than half a code from the exact tone curve of the linear frame."""
-    with Generator(seed=11, size=SIZE, quality=quality) as generator:
-        prepared = PreparedScene(generator.scene(0))
-        camera = prepared.scene.camera("B")
-        with generator.gpu.drawing() as renderer:
-            shown = renderer.render(prepared, camera, SIZE)
-            linear = renderer.render(prepared, camera, SIZE, radiance=True)
+    generator = generators(seed=11, size=SIZE, quality=quality)
+    prepared = PreparedScene(generator.scene(0))
+    camera = prepared.scene.camera("B")
+    with generator.gpu.drawing() as renderer:
+        shown = renderer.render(prepared, camera, SIZE)
+        linear = renderer.render(prepared, camera, SIZE, radiance=True)
     for name in ("ids", "damage", "depth", "cover"):
         np.testing.assert_array_equal(getattr(linear, name), getattr(shown, name))
     assert linear.radiance.max() > 1
@@ -323,15 +323,15 @@ def test_the_crane_preset_changes_only_cameras_and_weather_and_survives_json():
     assert kinds == {"noise", "stamp", "defocus"}
 
 
-def test_the_shortest_allowed_shutter_is_sampled_and_rendered():
+def test_the_shortest_allowed_shutter_is_sampled_and_rendered(generators):
     weather = {"rain_probability": 1.0, "shutter_s": [1e-5, 1.2e-5]}
-    with Generator(Config.from_values({"weather": weather}), size=SIZE) as generator:
-        drawn = {generator.scene(index).weather.rain.shutter_s for index in range(5)}
-        assert len(drawn) == 5
-        assert min(drawn) >= 1e-5
-        assert max(drawn) <= 1.2e-5
-        # a drop that hardly moves has a streak of almost no length, which must not be divided by
-        assert np.ptp(generator.render(index=0).image) > 0
+    generator = generators(Config.from_values({"weather": weather}), size=SIZE)
+    drawn = {generator.scene(index).weather.rain.shutter_s for index in range(5)}
+    assert len(drawn) == 5
+    assert min(drawn) >= 1e-5
+    assert max(drawn) <= 1.2e-5
+    # a drop that hardly moves has a streak of almost no length, which must not be divided by
+    assert np.ptp(generator.render(index=0).image) > 0
 
 
 def test_the_sensor_changes_no_label_and_its_images_repeat():
@@ -360,15 +360,15 @@ def test_the_sensor_changes_no_label_and_its_images_repeat():
     np.testing.assert_array_equal(real.image, repeated.image)
 
 
-def test_water_darkens_porous_surfaces():
+def test_water_darkens_porous_surfaces(generators):
     config = Config.from_values({"surface": {"rust_coverage": 0.4}})
-    with Generator(config, seed=6, size=SIZE) as generator:
-        scene = generator.scene(1)
-        images = [
-            generator.render(scene=replace(scene, weather=Weather(wetness=wetness)), layer=layer)
-            for layer in ("rust", "reflection")
-            for wetness in (0.0, 1.0)
-        ]
+    generator = generators(config, seed=6, size=SIZE)
+    scene = generator.scene(1)
+    images = [
+        generator.render(scene=replace(scene, weather=Weather(wetness=wetness)), layer=layer)
+        for layer in ("rust", "reflection")
+        for wetness in (0.0, 1.0)
+    ]
     (dry, wet), (rough, smooth) = (
         [sample.image[sample.ids > 0].astype(int) for sample in images[i : i + 2]] for i in (0, 2)
     )
@@ -396,14 +396,14 @@ def test_bad_values_are_named(values, words):
 
 
 @pytest.mark.parametrize("lens", [None, Lens("fisheye", (-0.02, 0.0, 0.0, 0.0))])
-def test_fog_depends_on_the_distance_along_each_ray(lens):
+def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     camera = Camera("T", (0, -6000, 1200), (0, 0, 1200), 24.0, lens=lens)
-    with Generator(seed=6, size=SIZE) as generator:
-        scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
-        sample = generator.render(scene=scene, camera=camera)
-        clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
-        with generator.gpu.drawing() as renderer:
-            air = np.array(generator._airlight(renderer, scene, camera))
+    generator = generators(seed=6, size=SIZE)
+    scene = replace(generator.scene(2), weather=Weather(visibility_mm=40e3))
+    sample = generator.render(scene=scene, camera=camera)
+    clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
+    with generator.gpu.drawing() as renderer:
+        air = np.array(generator._airlight(renderer, scene, camera))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
     away = np.minimum(sample.depth / (rays @ forward), 300)

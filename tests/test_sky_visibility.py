@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen import Config, Generator
+from fastgen import Config
 from fastgen.classes import SPREADER_ID
 from fastgen.geometry.container import build_container
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -327,19 +327,19 @@ def test_backends_compute_the_same_sky_visibility(even_sky):
 
 
 @pytest.mark.parametrize(("camera", "index"), [("A", 2), ("Cl", 5), ("Cr", 3)])
-def test_sky_visibility_of_reflections_is_close_to_ray_casts(camera, index):
+def test_sky_visibility_of_reflections_is_close_to_ray_casts(generators, camera, index):
     """Rays from visible points are spread by about 17 degrees around the mirror direction."""
     size = (120, 90)
     undamaged = Config.from_values({"damage": {"probability": 0.0}})
-    with Generator(undamaged, 8, size, quality="draft") as g:
-        scene = g.scene(index)
-        sample = g.render(scene=scene, camera=camera, normals=True)
-        targets = g.gpu.renderer().draw(PreparedScene(scene), scene.camera(camera), size)
-        stored = np.frombuffer(
-            targets.samples.textures["sky_visibility_cones"].read(), np.uint8
-        ).reshape(*size[::-1], 4)
-        found = stored[..., 3] / 255
-        mesh = PreparedScene(scene).container
+    g = generators(undamaged, 8, size, quality="draft")
+    scene = g.scene(index)
+    sample = g.render(scene=scene, camera=camera, normals=True)
+    targets = g.gpu.renderer().draw(PreparedScene(scene), scene.camera(camera), size)
+    stored = np.frombuffer(
+        targets.samples.textures["sky_visibility_cones"].read(), np.uint8
+    ).reshape(*size[::-1], 4)
+    found = stored[..., 3] / 255
+    mesh = PreparedScene(scene).container
     start, rays = sample.view.rays()
     seen = (sample.ids > 0) & (sample.ids < SPREADER_ID)
     rays = rays[seen] / np.linalg.norm(rays[seen], axis=1, keepdims=True)

@@ -140,14 +140,14 @@ def test_ids_and_depth_equal_ray_casts_through_pixel_centres(generator, camera, 
 @pytest.mark.parametrize(
     ("quality", "camera"), [("draft", "B"), ("balanced", "A"), ("balanced", "B"), ("high", "A")]
 )
-def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(quality, camera):
+def test_thin_cables_cover_as_much_of_each_pixel_as_rays_hit(generators, quality, camera):
     """A cable a third of a pixel wide shows neither dashes nor steps."""
     size, steps = (240, 240), 12
-    with Generator(seed=6, size=size, quality=quality) as generator:
-        scene = generator.scene(0)
-        held = replace(scene.spreader, present=True)
-        scene = replace(scene, spreader=held)
-        sample = generator.render(scene=scene, camera=camera, layer="base")
+    generator = generators(seed=6, size=size, quality=quality)
+    scene = generator.scene(0)
+    held = replace(scene.spreader, present=True)
+    scene = replace(scene, spreader=held)
+    sample = generator.render(scene=scene, camera=camera, layer="base")
     code = sample.image[8:32].mean(axis=2) / 255
     # a layer image has a white sky; all values here lie above the linear part of sRGB
     lit = 1 - ((np.maximum(code, 0.05) + 0.055) / 1.055) ** 2.4
@@ -239,22 +239,22 @@ def test_a_marker_behind_a_lowered_flipper_is_hidden(generator):
     assert item.area == 0
 
 
-def test_damage_neither_moves_nor_marks_the_spreader():
+def test_damage_neither_moves_nor_marks_the_spreader(generators):
     config = Config.from_values({"spreader": {"probability": 1}, "damage": {"probability": 1}})
     inner = []
-    with Generator(config, seed=32, size=SIZE) as generator:
-        for index in range(6):
-            scene = generator.scene(index)
-            for camera in scene.cameras:
-                damaged = generator.render(scene=scene, camera=camera)
-                undamaged = generator.render(scene=replace(scene, damages=()), camera=camera)
-                spreader = damaged.ids == oracle.SPREADER
-                assert (damaged.damage[spreader] == 0).all()
-                both = spreader & (undamaged.ids == oracle.SPREADER)
-                assert both.sum() >= 0.99 * spreader.sum()
-                np.testing.assert_allclose(damaged.depth[both], undamaged.depth[both], rtol=1e-5)
-                same = (damaged.image == undamaged.image).all(axis=-1)
-                inner.append(same[both & ~oracle.near_edge(damaged.ids)])
+    generator = generators(config, seed=32, size=SIZE)
+    for index in range(6):
+        scene = generator.scene(index)
+        for camera in scene.cameras:
+            damaged = generator.render(scene=scene, camera=camera)
+            undamaged = generator.render(scene=replace(scene, damages=()), camera=camera)
+            spreader = damaged.ids == oracle.SPREADER
+            assert (damaged.damage[spreader] == 0).all()
+            both = spreader & (undamaged.ids == oracle.SPREADER)
+            assert both.sum() >= 0.99 * spreader.sum()
+            np.testing.assert_allclose(damaged.depth[both], undamaged.depth[both], rtol=1e-5)
+            same = (damaged.image == undamaged.image).all(axis=-1)
+            inner.append(same[both & ~oracle.near_edge(damaged.ids)])
     assert np.concatenate(inner).mean() > 0.99
 
 

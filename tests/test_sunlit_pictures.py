@@ -22,18 +22,18 @@ GREY = np.full((512, 1024, 3), 0.2, np.float32)
 
 
 @pytest.mark.parametrize(("camera", "x"), [("Cr", 0.75), ("Cl", -0.75)])
-def test_pictures_of_an_end_use_its_own_shadow_tile(tmp_path, camera, x):
+def test_pictures_of_an_end_use_its_own_shadow_tile(generators, tmp_path, camera, x):
     """Shadows of bars and ribs have finer edges in that tile, at the same places."""
     toward = np.array([x, -0.6, 0.2])
     write_exr(tmp_path / "low.exr", GREY + one_light(toward / np.linalg.norm(toward), 3e5, 512))
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
-    with Generator(config, 1, (480, 480), "auto", tmp_path) as generator:
-        scene = generator.scene(0)
-        scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
-        fine = generator.render(scene=scene, camera=camera)
-        shadow = generator.gpu.renderer().shadow_map
-        shadow.end = replace(shadow.end, inner=np.array([1.0, 1.0, 0.0, 0.0]))
-        coarse = generator.render(scene=scene, camera=camera)
+    generator = generators(config, 1, (480, 480), "auto", tmp_path)
+    scene = generator.scene(0)
+    scene = replace(scene, environment=EnvironmentView("low", 0.0), decals=())
+    fine = generator.render(scene=scene, camera=camera)
+    shadow = generator.gpu.renderer().shadow_map
+    shadow.end = replace(shadow.end, inner=np.array([1.0, 1.0, 0.0, 0.0]))
+    coarse = generator.render(scene=scene, camera=camera)
     apart = np.abs(fine.image.astype(int) - coarse.image).max(axis=2)[fine.ids > 0]
     assert 0.002 < (apart > 8).mean() < 0.1
 
@@ -64,7 +64,7 @@ def test_no_sunlight_leaks_through_a_wall(tmp_path):
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_no_sunlight_leaks_along_a_post(tmp_path, side):
+def test_no_sunlight_leaks_along_a_post(generators, tmp_path, side):
     """No part of an end that faces away from a low sun, almost along the axis, is sunlit.
 
     Flanks of its posts would be, without the thick parts behind them. Both sides have deep dents.
@@ -79,14 +79,14 @@ def test_no_sunlight_leaks_along_a_post(tmp_path, side):
     )  # fmt: skip
     camera = Camera("end", (length / 2 + 6000, 0, height / 2), (0, 0, height / 2), 50.0)
     config = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
-    with Generator(config, 1, (900, 900), "auto", tmp_path, "draft") as generator:
-        scene = generator.scene(0)
-        assert load_environment(tmp_path / "low.exr").lights
-        scene = replace(
-            scene, environment=EnvironmentView("low", 0.0), decals=(), damages=dents,
-            container=replace(scene.container, kind="20"), spreader=Spreader(),
-        )  # fmt: skip
-        sample = generator.render(scene=scene, camera=camera)
+    generator = generators(config, 1, (900, 900), "auto", tmp_path, "draft")
+    scene = generator.scene(0)
+    assert load_environment(tmp_path / "low.exr").lights
+    scene = replace(
+        scene, environment=EnvironmentView("low", 0.0), decals=(), damages=dents,
+        container=replace(scene.container, kind="20"), spreader=Spreader(),
+    )  # fmt: skip
+    sample = generator.render(scene=scene, camera=camera)
     end = cv2.erode((sample.ids == CONTAINER_ID).astype(np.uint8), np.ones((9, 9))) > 0
     shade = sample.image[end].astype(float).mean(axis=-1)
     assert end.sum() > 1e5
@@ -115,7 +115,7 @@ def test_antialiasing_does_not_move_shadows(quality):
 
 
 @pytest.mark.parametrize("others", [0, 1, 3])
-def test_shadow_edges_are_not_jagged(tmp_path, others):
+def test_shadow_edges_are_not_jagged(generators, tmp_path, others):
     """A flipper's straight edge casts a straight shadow on the end beam, at 2 mm per pixel.
 
     Fainter lamps behind the container do not change that.
@@ -130,15 +130,15 @@ def test_shadow_edges_are_not_jagged(tmp_path, others):
     target = (half_length - 12.0, -600.0, height + 15 + 260.0)
     place = (target[0] + 6000.0, *target[1:])
     camera = Camera("straight", place, target, 6000 / (2.0 * 400) * 36.0)
-    with Generator(config, 1, (400, 160), "auto", tmp_path) as generator:
-        scene = replace(
-            generator.scene(0),
-            environment=EnvironmentView("flat", 0.0),
-            decals=(),
-            container=replace(generator.scene(0).container, kind="20"),
-            spreader=Spreader(True, (0.5, 0.5, 0.5), (False, False), 15.0),
-        )
-        image = generator.render(scene=scene, camera=camera).image
+    generator = generators(config, 1, (400, 160), "auto", tmp_path)
+    scene = replace(
+        generator.scene(0),
+        environment=EnvironmentView("flat", 0.0),
+        decals=(),
+        container=replace(generator.scene(0).container, kind="20"),
+        spreader=Spreader(True, (0.5, 0.5, 0.5), (False, False), 15.0),
+    )
+    image = generator.render(scene=scene, camera=camera).image
     strip = image[60:155, 100:180].astype(float).sum(axis=2)
     shade, light = strip[:, :20].mean(axis=1), strip[:, -20:].mean(axis=1)
     assert (light > 1.3 * shade).all()

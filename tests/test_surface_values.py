@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen import Config, Generator
+from fastgen import Config
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.rust import rusted
@@ -15,7 +15,7 @@ from fastgen.srgb import DECODED
 
 
 @pytest.mark.parametrize("rust", [0.0, 0.12, 0.2])
-def test_mean_albedo_under_rust_equals_baked_textures(rust):
+def test_mean_albedo_under_rust_equals_baked_textures(generators, rust):
     """Checked on the roof, the frame, castings, the spreader and its cables."""
     config = Config.from_values(
         {
@@ -31,10 +31,10 @@ def test_mean_albedo_under_rust_equals_baked_textures(rust):
             "weather": {"wet_probability": 0.0},
         }
     )
-    with Generator(config, seed=3, size=(64, 64)) as generator:
-        scene = generator.scene(index=1)
-        meshes = PreparedScene(scene).container, PreparedScene(scene).spreader.mesh
-        atlases = generator.bake(scene, texel_mm=20.0), generator.bake_spreader(scene, 20.0)
+    generator = generators(config, seed=3, size=(64, 64))
+    scene = generator.scene(index=1)
+    meshes = PreparedScene(scene).container, PreparedScene(scene).spreader.mesh
+    atlases = generator.bake(scene, texel_mm=20.0), generator.bake_spreader(scene, 20.0)
     scene = replace(scene, decals=())
     base, trait = (np.asarray(scene_values(scene, 16)[f"material_{k}"]) for k in ("base", "trait"))
     coverage = rust * trait[:, 1:2]
@@ -57,9 +57,9 @@ def test_mean_albedo_under_rust_equals_baked_textures(rust):
         )
 
 
-def test_reflectance_is_albedo_plus_a_few_percent_specular():
-    with Generator(seed=3, size=(64, 64)) as generator:
-        scene = replace(generator.scene(index=1), spreader=Spreader(present=False))
+def test_reflectance_is_albedo_plus_a_few_percent_specular(generators):
+    generator = generators(seed=3, size=(64, 64))
+    scene = replace(generator.scene(index=1), spreader=Spreader(present=False))
     surface = scene.surface
     plain = replace(scene, surface=replace(surface, rust=replace(surface.rust, coverage=0.0)))
     paint = np.array(surface.paint.albedo)

@@ -153,10 +153,10 @@ def test_yolo_outlines_are_the_borders_of_their_masks(samples):
     assert seen
 
 
-def test_an_empty_image_has_files_but_no_annotations():
+def test_an_empty_image_has_files_but_no_annotations(generators):
     away = Camera("A", (0.0, -8000.0, 1000.0), (0.0, -20000.0, 1000.0), 14.5)
-    with Generator(seed=2, size=(64, 64)) as generator:
-        sample = generator.render(index=0, camera=away, normals=True)
+    generator = generators(seed=2, size=(64, 64))
+    sample = generator.render(index=0, camera=away, normals=True)
     assert not sample.damage.any()
     files, record = assemble(item_of(sample), list(known_formats().values()))
     assert files["imdg/labels/train/000000_A.txt"] == b""

@@ -228,19 +228,19 @@ def seen_straight(scene, target, right, out):
 
 
 @pytest.mark.parametrize("part", ["door header", "end beam", "telescopic beam"])
-def test_streaks_of_dirt_run_down(part):
+def test_streaks_of_dirt_run_down(generators, part):
     """Streaks change faster across than down, even on parts laid out lengthwise in the atlas."""
-    with Generator(DIRTY, 6, (320, 320), quality="draft") as generator:
-        scene = generator.scene(0)
-        length, _, height, _ = ISO_668[scene.container.kind]
-        base = height + scene.spreader.gap_mm
-        target, out, half = {
-            "door header": ((length / 2, 0.0, height - 70), (1, 0, 0), 28),
-            "end beam": ((length / 2, 0.0, base + 260), (1, 0, 0), 120),
-            "telescopic beam": ((length / 2 - 1600, -630.0, base + 325), (0, -1, 0), 110),
-        }[part]
-        scene = seen_straight(scene, target, np.cross((0, 0, 1), out), out)
-        image = generator.render(scene=scene, camera="straight", layer="dirt").image
+    generator = generators(DIRTY, 6, (320, 320), quality="draft")
+    scene = generator.scene(0)
+    length, _, height, _ = ISO_668[scene.container.kind]
+    base = height + scene.spreader.gap_mm
+    target, out, half = {
+        "door header": ((length / 2, 0.0, height - 70), (1, 0, 0), 28),
+        "end beam": ((length / 2, 0.0, base + 260), (1, 0, 0), 120),
+        "telescopic beam": ((length / 2 - 1600, -630.0, base + 325), (0, -1, 0), 110),
+    }[part]
+    scene = seen_straight(scene, target, np.cross((0, 0, 1), out), out)
+    image = generator.render(scene=scene, camera="straight", layer="dirt").image
     rows = round(half / 2)
     strip = image[160 - rows : 160 + rows, 60:260].astype(float).sum(axis=2)
     across = np.abs(np.diff(strip, axis=1)).mean()
@@ -250,30 +250,30 @@ def test_streaks_of_dirt_run_down(part):
     assert across > 1.3 * down
 
 
-def test_holes_do_not_cut_the_locking_bars():
+def test_holes_do_not_cut_the_locking_bars(generators):
     """The bar's depth equals ray casts on the undamaged door, within the bend of the torn rim."""
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
     bare = {"probability": 0}
     config = Config.from_values({"damage": values, "spreader": bare})
-    with Generator(config, 77, (320, 320)) as generator:
-        scene = generator.scene(3)
-        (hole,) = scene.damages
-        length = ISO_668[scene.container.kind][0]
-        hole = replace(
-            hole,
-            origin_mm=(length / 2 - 58.0, 275.0, 1500.0),
-            size_mm=(400.0, 400.0),
-            shape=(60.0, *[0.0] * 10),
-        )
-        camera = Camera("straight", (length / 2 + 3000, 275.0, 1500.0), hole.origin_mm, 60.0)
-        scene = replace(scene, damages=(hole,), cameras=(camera,), decals=())
-        sample = generator.render(scene=scene, camera="straight")
-        undamaged = replace(scene, damages=())
-        rusty, paint = (
-            generator.render(scene=one, camera="straight", layer="rust").image.astype(float)
-            for one in (scene, undamaged)
-        )
-        mesh = build_container(scene.container.kind, scene.container.profiles)
+    generator = generators(config, 77, (320, 320))
+    scene = generator.scene(3)
+    (hole,) = scene.damages
+    length = ISO_668[scene.container.kind][0]
+    hole = replace(
+        hole,
+        origin_mm=(length / 2 - 58.0, 275.0, 1500.0),
+        size_mm=(400.0, 400.0),
+        shape=(60.0, *[0.0] * 10),
+    )
+    camera = Camera("straight", (length / 2 + 3000, 275.0, 1500.0), hole.origin_mm, 60.0)
+    scene = replace(scene, damages=(hole,), cameras=(camera,), decals=())
+    sample = generator.render(scene=scene, camera="straight")
+    undamaged = replace(scene, damages=())
+    rusty, paint = (
+        generator.render(scene=one, camera="straight", layer="rust").image.astype(float)
+        for one in (scene, undamaged)
+    )
+    mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view)
     names = np.array([chart.name for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
     bar = (names == "door.bar.2")[hits.triangle] & hits.hit
@@ -290,25 +290,25 @@ def test_holes_do_not_cut_the_locking_bars():
     assert np.abs(rusty - paint)[torn & ~bar].mean() > 15
 
 
-def test_a_bar_is_seen_from_behind_through_holes_in_both_ends():
+def test_a_bar_is_seen_from_behind_through_holes_in_both_ends(generators):
     """The back of the bar is visible against the sky behind the hole in its leaf."""
     bare = {"damage": {"probability": 0}, "spreader": {"probability": 0}}
-    with Generator(Config.from_values(bare), 77, (320, 320)) as generator:
-        scene = generator.scene(3)
-        length = ISO_668[scene.container.kind][0]
-        near, far = (
-            Damage(
-                "perforation", face, (x, 275.0, 1500.0), (0.0, -sign, 0.0), (0.0, 0.0, 1.0),
-                (sign, 0.0, 0.0), (400.0, 400.0), 30.0, (60.0, *[0.0] * 10),
-            )
-            for face, x, sign in (
-                ("no_door", 40 - length / 2, 1.0), ("door", length / 2 - 58, -1.0)
-            )
-        )  # fmt: skip
-        eye = (-length / 2 - 1500, 275.0, 1500.0)
-        camera = Camera("straight", eye, far.origin_mm, 600.0)
-        scene = replace(scene, damages=(near, far), cameras=(camera,), decals=())
-        depth = generator.render(scene=scene, camera="straight").depth
+    generator = generators(Config.from_values(bare), 77, (320, 320))
+    scene = generator.scene(3)
+    length = ISO_668[scene.container.kind][0]
+    near, far = (
+        Damage(
+            "perforation", face, (x, 275.0, 1500.0), (0.0, -sign, 0.0), (0.0, 0.0, 1.0),
+            (sign, 0.0, 0.0), (400.0, 400.0), 30.0, (60.0, *[0.0] * 10),
+        )
+        for face, x, sign in (
+            ("no_door", 40 - length / 2, 1.0), ("door", length / 2 - 58, -1.0)
+        )
+    )  # fmt: skip
+    eye = (-length / 2 - 1500, 275.0, 1500.0)
+    camera = Camera("straight", eye, far.origin_mm, 600.0)
+    scene = replace(scene, damages=(near, far), cameras=(camera,), decals=())
+    depth = generator.render(scene=scene, camera="straight").depth
     row = depth[120, 100:220]
     bar = np.flatnonzero(np.isfinite(row))
     assert len(bar) > 5
