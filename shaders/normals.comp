@@ -20,26 +20,15 @@ layout(rgba32f, binding = 0) writeonly uniform image2D normal_image;
 
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
 
-vec3 normal_of(ivec2 sample_at) {
-    uint key = surface_id_at(sample_at);
-    if (key == 0u) return vec3(0.0);
-    vec3 normal = id_normal(key);
-#if WITH_DAMAGE
-    vec3 rest_mm = rest_at(sample_at);
 #if WITH_HOLES
-    if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(key))) {
-        // The interior, seen from behind; the sky through another hole has no normal.
-        ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
-        key = surface_id_at(inner_at);
-        if (key == 0u) return vec3(0.0);
-        normal = -id_normal(key);
-        rest_mm = rest_at(inner_at);
-    }
-#endif
-    normal = deformed_normal(damage_at(rest_mm).bend, normal);
-#endif
-    return normal;
+// The interior that a hole reveals, seen from behind; 0 where it reveals the sky through another hole.
+vec3 interior_normal(ivec2 sample_at) {
+    ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
+    uint key = surface_id_at(inner_at);
+    if (key == 0u) return vec3(0.0);
+    return deformed_normal(damage_at(rest_at(inner_at)).bend, -id_normal(key));
 }
+#endif
 
 void main() {
     ivec2 in_region = ivec2(gl_GlobalInvocationID.xy);
@@ -47,6 +36,28 @@ void main() {
     ivec2 pixel = region.xy + in_region;
     ivec2 middle = center_texel(pixel);
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < FILTER_SAMPLES; ++i) sum += FILTER_WEIGHT[i] * normal_of(middle + FILTER_OFFSET[i]);
+#if WITH_HOLES
+    // As in the image, all torn samples of a pixel show the interior behind the first one.
+    vec3 interior = vec3(0.0);
+    bool torn = false;
+#endif
+    for (int i = 0; i < FILTER_SAMPLES; ++i) {
+        ivec2 sample_at = middle + FILTER_OFFSET[i];
+        uint key = surface_id_at(sample_at);
+        if (key == 0u) continue;
+        vec3 normal = id_normal(key);
+#if WITH_DAMAGE
+        vec3 rest_mm = rest_at(sample_at);
+        normal = deformed_normal(damage_at(rest_mm).bend, normal);
+#endif
+#if WITH_HOLES
+        if (hole_at(rest_mm) >= 0 && !is_door_gear(id_zone(key))) {
+            if (!torn) interior = interior_normal(sample_at);
+            torn = true;
+            normal = interior;
+        }
+#endif
+        sum += FILTER_WEIGHT[i] * normal;
+    }
     imageStore(normal_image, pixel, vec4(sum, 0.0));
 }

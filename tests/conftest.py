@@ -24,13 +24,13 @@ def generators():
     """A function that lends a Generator; tests with equal arguments share one and leave it open."""
     kept = OrderedDict()
 
-    def lend(config=None, seed=0, size=(640, 640), **settings):
+    def lend(config=None, *arguments, **settings):
         plain = json.dumps((config or Config.preset()).to_plain())
-        key = (plain, seed, size, tuple(sorted(settings.items())))
+        key = (plain, arguments, tuple(sorted(settings.items())))
         if key not in kept:
             if len(kept) == OPEN_GENERATORS:
                 kept.popitem(last=False)[1].close()
-            kept[key] = Generator(config, seed, size, **settings)
+            kept[key] = Generator(config, *arguments, **settings)
         kept.move_to_end(key)
         return kept[key]
 

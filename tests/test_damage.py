@@ -18,6 +18,7 @@ from fastgen.geometry.container import build_container
 from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Scene, Spreader
+from fastgen.scene.object_ids import mask_values
 from tests import oracle
 
 SIZE = (256, 256)
@@ -87,7 +88,7 @@ def scene_with(generator, kind):
 def test_every_kind_matches_rays_from_close_by(generator, kind):
     scene = close_up(scene_with(generator, kind), kind)
     sample = generator.render(scene=scene, camera="close")
-    value = damage_law.mask_values(scene.damages)[0]
+    value = mask_values(scene.damages)[0]
     assert (sample.damage == value).sum() > 200
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view, scene)
@@ -232,7 +233,7 @@ def test_deformed_steel_is_dulled_and_rusts(generator):
     dented, whole = (
         generator.render(scene=one, camera="close", layer="rust") for one in (scene, undamaged)
     )
-    marked = dented.damage == damage_law.mask_values(scene.damages)[0]
+    marked = dented.damage == mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
     assert worked[0] / worked[2] > 1.3 * painted[0] / painted[2]
     # along the fold all paint changes, rusty or not
@@ -337,7 +338,7 @@ def test_scenes_with_damage_round_trip_through_json(many):
 
 
 def test_a_hundred_damages_of_one_kind_are_refused():
-    with pytest.raises(ConfigError, match=r"damage.count\[1\]: 100 is out of range; give 0 to 99"):
+    with pytest.raises(ConfigError, match=r"damage.count: 100 is out of range; give 0 to 99"):
         Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fastgen.render.renderer
 from fastgen import Config, Generator
 from fastgen.errors import ConfigError
 from fastgen.render.passes import ray_points
@@ -26,7 +25,7 @@ def traced_with(monkeypatch, light):
         asked.append(points)
         return light(points, *rest)
 
-    monkeypatch.setattr(fastgen.renderer, "traced_light", traced)
+    monkeypatch.setattr(ray_points, "traced_light", traced)
     return asked
 
 

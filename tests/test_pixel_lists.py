@@ -80,8 +80,8 @@ def test_a_frame_does_not_depend_on_earlier_frames(monkeypatch, quality):
     def spoil(targets, damage, *rest):
         targets._make_room(damage)
         origin = origins[len(spoilt) % len(origins)]
-        rest = [t for name, t in targets.textures.items() if name.startswith("rest_")]
-        for texture, value in zip(rest, origin, strict=False):
+        positions = [t for name, t in targets.textures.items() if name.startswith("rest_")]
+        for texture, value in zip(positions, origin, strict=False):
             texture.write(np.full(texture.size[::-1], value, np.float32).tobytes())
             spoilt.append(value)
         begin(targets, damage, *rest)
