@@ -34,10 +34,11 @@ class Object:
             along its edge.
         ignored: Whether too little is visible for training, see LabelConfig.
         text: Text of the object, '' for objects without text.
-        polygon: Projected outline x0, y0, x1, y1, ... of the whole object. Empty for the spreader,
-            for damages, and for objects that are partly behind the camera.
-        quad: Corners of a decal in reading order: upper left, upper right, lower right, lower left.
-            For a marker these are the left, top, right and bottom corner.
+        polygon: Points x0, y0, x1, y1, ... along the projected outline of the whole object. Empty
+            for the spreader, for damages, and for objects that are partly behind the camera.
+        quad: Four corners of a decal x0, y0, x1, y1, ..., clockwise from the text's upper left or
+            the marker's left corner. Empty for other objects, and for decals that are partly behind
+            the camera.
         reading: 'horizontal', or 'vertical' if the letters are below one another; '' without text.
         keypoints: Casting corners of the container in the order of labels.objects.CASTINGS.
     """

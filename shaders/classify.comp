@@ -97,8 +97,8 @@ void main() {
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_ids, 0));
     // The swizzle .wzxy reorders the texels of textureGather as in_group counts them.
     uvec4 key = textureGather(surface_ids, middle).wzxy;
-    vec4 sheet_x = textureGather(atlas_positions, middle, 0).wzxy;
-    vec4 sheet_y = textureGather(atlas_positions, middle, 1).wzxy;
+    vec4 atlas_x = textureGather(atlas_positions, middle, 0).wzxy;
+    vec4 atlas_y = textureGather(atlas_positions, middle, 1).wzxy;
     vec4 depth = textureGather(surface_depths, middle).wzxy;
 #if DAMAGED
     vec4 rest_mm[3] = vec4[3](textureGather(rest_x, middle).wzxy, textureGather(rest_y, middle).wzxy,
@@ -133,7 +133,7 @@ void main() {
         if (near == 1) damaged |= bit;
         if (near > 0) bit = 0u;
 #endif
-        if (near_decals(id_zone(key[i]), vec2(sheet_x[i], sheet_y[i]))) decals |= bit;
+        if (near_decals(id_zone(key[i]), vec2(atlas_x[i], atlas_y[i]))) decals |= bit;
         else plain |= bit;
     }
     list_each(LIST_DECAL, block, decals);
@@ -152,7 +152,7 @@ void main() {
         float most_mm = COARSE_STEP_PX * 1000.0 * pixel_angle * depth[i];
         uint group = 0u;
         for (int j = i; j < 4; ++j) {
-            float step_mm = max(abs(sheet_x[j] - sheet_x[i]), abs(sheet_y[j] - sheet_y[i]));
+            float step_mm = max(abs(atlas_x[j] - atlas_x[i]), abs(atlas_y[j] - atlas_y[i]));
             if (key[j] == key[i] && step_mm < most_mm) group |= 1u << j;
         }
         groups[i] = (plain & 1u << i) != 0u ? group & plain : 0u;

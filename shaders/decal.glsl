@@ -1,4 +1,4 @@
-// DecalHit decals_at(uint zone, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise):
+// DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample noise):
 // decals over the albedo `paint` at a point of the atlas: albedo, coverage and object id.
 // footprint_mm: width of the lookup on the surface.
 
@@ -67,10 +67,10 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
 }
 
 // Adds one decal on top of `hit`. worn: share of the ink lost by a decal of wear 1.
-void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm, float worn) {
+void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm, float worn) {
     vec4 place = decal_texel(decal, 1);
     vec4 turn = decal_texel(decal, 0);
-    vec2 d = sheet_mm - place.xy;
+    vec2 d = atlas_mm - place.xy;
     vec2 p = vec2(dot(turn.xy, d), dot(turn.zw, d));
     vec4 kind = decal_texel(decal, 3);
     float inside_mm = kind.x == DECAL_MARKER
@@ -100,14 +100,14 @@ void add_decal(inout DecalHit hit, uint decal, vec2 sheet_mm, float footprint_mm
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(uint zone, vec3 paint, vec2 sheet_mm, float footprint_mm, NoiseSample noise) {
+DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample noise) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
     float worn = covered(noise.value.w, 0.6, noise.lost.w, 0.15);
-    uvec4 cell = cell_at(zone, sheet_mm);
+    uvec4 cell = cell_at(zone, atlas_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;
     do {
-        if (decal != 0u) add_decal(hit, decal, sheet_mm, footprint_mm, worn);
+        if (decal != 0u) add_decal(hit, decal, atlas_mm, footprint_mm, worn);
         ++i;
         uint pair = cell[(i & 7) >> 1];
         decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;

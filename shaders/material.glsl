@@ -1,4 +1,4 @@
-// SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar): material of a
+// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar): material of a
 // point after all layers. footprint_mm: Width of the lookup on the surface. scar: Wear of the steel by
 // damage, 0..1. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
 // artistic choices.
@@ -27,7 +27,7 @@ struct SurfacePoint {
     float printed;   // Share of the footprint that shows a decal.
 };
 
-SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar) {
+SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar) {
     vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
     vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
     int code = int(part.x);
@@ -35,7 +35,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
     vec4 base = material_base[kind];   // Albedo, roughness.
     vec4 trait = material_trait[kind]; // Metallic, rust proneness, share of the paint layers, unused.
 
-    vec2 from_low = sheet_mm - rect.xy;
+    vec2 from_low = atlas_mm - rect.xy;
     vec2 to_border = min(from_low, rect.zw - from_low);
     float edge_mm = max(min(to_border.x, to_border.y), 0.0);
     float corner_mm = length(max(to_border, 0.0));
@@ -45,7 +45,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
         edge_mm = corner_mm = below_mm = SMALL_EDGE_MM;
         narrow_mm = SMALL_WIDE_MM;
     }
-    vec2 noise_mm = upright(sheet_mm, code) + noise_offset_mm;
+    vec2 noise_mm = upright(atlas_mm, code) + noise_offset_mm;
     NoiseSample coarse = read_without_period(0, noise_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
 
@@ -60,7 +60,7 @@ SurfacePoint surface_at(uint zone, vec2 sheet_mm, float footprint_mm, float scar
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
-    DecalHit decal = decals_at(zone, albedo, sheet_mm, footprint_mm, coarse);
+    DecalHit decal = decals_at(zone, albedo, atlas_mm, footprint_mm, coarse);
     s.decal_id = decal.id;
 #if SHOWN_DECALS
     albedo = decal.albedo;

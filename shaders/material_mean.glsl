@@ -1,5 +1,5 @@
 // SurfacePoint empty_material_sum(SurfacePoint first): start of a mean over several material lookups.
-// void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 sheet_mm, float count): adds the
+// void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 atlas_mm, float count): adds the
 // material of `p` at another atlas position to `sum`, the mean of `count` lookups.
 
 #include "zone_sample.glsl"
@@ -11,8 +11,8 @@ SurfacePoint empty_material_sum(SurfacePoint first) {
     return first;
 }
 
-void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 sheet_mm, float count) {
-    SurfacePoint s = surface_at(zone, sheet_mm, p.footprint_mm, p.scar);
+void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 atlas_mm, float count) {
+    SurfacePoint s = surface_at(zone, atlas_mm, p.footprint_mm, p.scar);
     sum.material.albedo += s.material.albedo / count;
     sum.material.roughness += s.material.roughness / count;
     sum.material.metallic += s.material.metallic / count;

@@ -1,4 +1,4 @@
-// NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm): filtered noise.
+// NoiseSample read_noise(int layer, vec2 noise_mm, float tile_mm, float footprint_mm): filtered noise.
 // NoiseSample read_without_period(...): the same, without visible repetition.
 // float covered(float value, float threshold, float lost, float softness): share of a footprint where
 // uniform noise exceeds a threshold, 0..1. normal_covered(...) does it for normally distributed noise.
@@ -18,9 +18,9 @@ struct NoiseSample {
 
 // tile_mm: Side of a noise tile on the surface. footprint_mm: Width of the lookup on the surface.
 // The mip level's texels are at most as wide as the footprint, because bilinear filtering widens them.
-NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
+NoiseSample read_noise(int layer, vec2 noise_mm, float tile_mm, float footprint_mm) {
     float lod = clamp(floor(log2(footprint_mm * NOISE_SIZE / tile_mm)), 0.0, NOISE_LEVELS - 1.0);
-    vec4 value = textureLod(noise_tiles, vec3(sheet_mm / tile_mm, layer), lod);
+    vec4 value = textureLod(noise_tiles, vec3(noise_mm / tile_mm, layer), lod);
     return NoiseSample(value, noise_lost[layer * int(NOISE_LEVELS) + int(lod)]);
 }
 
@@ -28,9 +28,9 @@ NoiseSample read_noise(int layer, vec2 sheet_mm, float tile_mm, float footprint_
 // repeats nowhere. The last channel, grain, has one lookup. The squares of the weights add up to 1,
 // which keeps mean and deviation, and the distribution of normal channels: Heitz and Neyret 2018,
 // High-Performance By-Example Noise using a Histogram-Preserving Blending Operator, section 3.
-NoiseSample read_without_period(int layer, vec2 sheet_mm, float tile_mm, float footprint_mm) {
-    NoiseSample a = read_noise(layer, sheet_mm, 0.7862 * tile_mm, footprint_mm);
-    NoiseSample b = read_noise(layer, vec2(-sheet_mm.x, sheet_mm.y), 1.2720 * tile_mm, footprint_mm);
+NoiseSample read_without_period(int layer, vec2 noise_mm, float tile_mm, float footprint_mm) {
+    NoiseSample a = read_noise(layer, noise_mm, 0.7862 * tile_mm, footprint_mm);
+    NoiseSample b = read_noise(layer, vec2(-noise_mm.x, noise_mm.y), 1.2720 * tile_mm, footprint_mm);
     a.value.xyz = clamp(0.5 + (a.value.xyz + b.value.xyz - 1.0) * 0.70710678, 0.0, 1.0);
     a.lost.xyz = sqrt(0.5 * (a.lost.xyz * a.lost.xyz + b.lost.xyz * b.lost.xyz));
     return a;

@@ -1,5 +1,5 @@
 // bool is_door_gear(uint zone): whether a zone belongs to door gear, which is in front of the sheet.
-// vec2 upright(vec2 sheet_mm, int code): atlas position, turned so that +y is up in the world.
+// vec2 upright(vec2 atlas_mm, int code): atlas position, turned so that +y is up in the world.
 // float to_upper_side(vec2 from_low, vec2 size, int code): distance in mm to a zone's upper side.
 // A zone is a part of the atlas that weathers on its own, such as one side of a beam.
 
@@ -16,9 +16,9 @@ bool is_door_gear(uint zone) {
 
 int quarter_turns(int code) { return code / ZONE_TURN & 3; }
 
-vec2 upright(vec2 sheet_mm, int code) {
+vec2 upright(vec2 atlas_mm, int code) {
     int turns = quarter_turns(code);
-    vec2 turned = (turns & 1) == 0 ? sheet_mm : vec2(-sheet_mm.y, sheet_mm.x);
+    vec2 turned = (turns & 1) == 0 ? atlas_mm : vec2(-atlas_mm.y, atlas_mm.x);
     return (turns & 2) == 0 ? turned : -turned;
 }
 

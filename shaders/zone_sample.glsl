@@ -1,5 +1,6 @@
-// ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view): the values that all samples of one zone
-// within a pixel share, taken at one sample. key: Surface id of the sample. view: Unit, toward the eye.
+// ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view): material, ids, damage and depth, which
+// are evaluated once per zone in a pixel, at one of its samples. key: Surface id of the sample. view:
+// Unit, toward the eye.
 
 #include "labels.constants"
 #include "lookups.constants"
@@ -17,18 +18,18 @@
 
 struct ZoneSample {
     SurfacePoint surface;
-    uint id;
-    uint damage;
-    float depth;
+    uint id;              // Value in the id image, not a surface id.
+    uint damage;          // Value in the damage mask.
+    float depth;          // In m along the optical axis.
     float footprint_mm;   // Width of a material lookup on the surface.
-    float scar;
+    float scar;           // See DamageSample; 0 without damage.
 #if WITH_DAMAGE
-    mat3 bend;
+    mat3 bend;            // See DamageSample.
 #endif
 };
 
 ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
-    vec2 sheet_mm = coarse_mean(atlas_positions, sample_at).xy;
+    vec2 atlas_mm = coarse_mean(atlas_positions, sample_at).xy;
     vec3 normal = id_normal(key);
     ZoneSample p;
     p.damage = UNDAMAGED_CONTAINER;
@@ -45,7 +46,7 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     // Geometric mean of the footprint's two axes on the surface.
     p.footprint_mm = sqrt(coarse_pixels) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
                      inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(id_zone(key), sheet_mm, p.footprint_mm, p.scar);
+    p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar);
     p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
     if (id_zone(key) >= SPREADER_ZONE) {
         p.id = SPREADER_ID;

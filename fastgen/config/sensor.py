@@ -73,9 +73,11 @@ class StampConfig:
 
     Attributes:
         probability: Probability that an image has a stamp.
-        years: First and last year of the date.
+        years: First and last year of the date, both included. The time of day suits the
+            environment's light.
         corners: Corners of the image; all are equally likely.
-        height: Height of the capitals as a share of the image height.
+        height: Height of the capitals as a share of the image height, at least 5 px. Text wider
+            than the image is scaled down to fit.
     """
 
     probability: Share = 0.0

@@ -45,7 +45,10 @@ class Item:
 
     @property
     def detections(self) -> Iterator[tuple[Object, Box]]:
-        """The `detections` of the sample's objects."""
+        """The container, texts and markers that have visible pixels.
+
+        Each comes with the box (x0, y0, x1, y1) of these pixels; x1 and y1 are exclusive.
+        """
         return detections(self.sample.objects)
 
     @cached_property
@@ -64,9 +67,10 @@ class Item:
 
 
 def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
-    """Yield the objects that the marker task labels, with their visible boxes.
+    """Yield the container, texts and markers that have visible pixels.
 
-    Ignored objects are included; objects without visible pixels are not.
+    Each comes with the box (x0, y0, x1, y1) of these pixels; x1 and y1 are exclusive. Ignored
+    objects are included.
     """
     for thing in objects:
         if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:

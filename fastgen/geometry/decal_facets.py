@@ -46,7 +46,8 @@ class _Pairs:
 class DecalSurface:
     """The labelled decals of a scene on the mesh of its container.
 
-    `facets` and `outlines_mm` are computed on first use and kept.
+    `facets` (polygons) and `outlines_mm` (float64 [N, points, 3]) are in mm in the container frame,
+    after damage. They are computed on first use and kept.
 
     Attributes:
         decals: The decals that have a class name, in scene order.

@@ -200,7 +200,9 @@ class Mesh:
         return positions, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
     def prepare(self, damages: bool) -> None:
-        """Compute what labels derive from a container's mesh, so that no later call takes longer.
+        """Compute the cached properties that labels and rust need.
+
+        The first image is then as fast as later ones.
 
         Args:
             damages: Prepare for damaged scenes too.

@@ -26,12 +26,12 @@ _SMALL_MM = 100.0
 everywhere, because rust reaches about 90 mm from edges."""
 
 _POINTS_A_MM = 20.0
-"""Grid cells per mm in which corners on the sheet count as one point."""
+"""Grid cells per mm in which corners in the atlas count as one point."""
 
 
 def zones_of(
     chart: int,
-    sheet_mm: Array,
+    atlas_mm: Array,
     heights_mm: Array,
     normals: Array,
     triangles: NDArray[np.int64],
@@ -41,7 +41,7 @@ def zones_of(
 
     Args:
         chart: Index of the chart.
-        sheet_mm: float64 [V, 2], atlas coordinates of the vertices.
+        atlas_mm: float64 [V, 2], atlas coordinates of the vertices.
         heights_mm: float64 [V], z of the vertices in the container frame.
         normals: float64 [V, 3].
         triangles: int [T, 3]. Triangles that share a vertex share a zone.
@@ -51,16 +51,16 @@ def zones_of(
     Returns:
         The zones, largest first, and the number [T] of each triangle's zone.
     """
-    piece = _connected(sheet_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
+    piece = _connected(atlas_mm, normals, triangles, _ANY_FOLD if panel else _CREASE)
     turns, level = (
-        found[piece] for found in _quarter_turns(sheet_mm[triangles], heights_mm[triangles], piece)
+        found[piece] for found in _quarter_turns(atlas_mm[triangles], heights_mm[triangles], piece)
     )
-    low, high = _bounds(sheet_mm[triangles], piece)
+    low, high = _bounds(atlas_mm[triangles], piece)
     small = ((high - low).min(axis=1) < _SMALL_MM)[piece]
     _, first, piece = np.unique(
         np.where(small, -1 - turns - 4 * level, piece), return_index=True, return_inverse=True
     )
-    low, high = _bounds(sheet_mm[triangles], piece)
+    low, high = _bounds(atlas_mm[triangles], piece)
     order = np.argsort(-(high - low).prod(axis=1), kind="stable")
     rank = np.argsort(order)
     found = [
@@ -84,7 +84,7 @@ def _quarter_turns(
     The mean over a piece makes a corrugated roof level: it falls as often as it rises.
 
     Args:
-        corners: Corners [T, 3, 2] of triangles on the sheet.
+        corners: Corners [T, 3, 2] of triangles in the atlas, in mm.
         heights: Heights [T, 3] of the corners.
         piece: Piece [T] of each triangle.
     """
@@ -103,17 +103,17 @@ def _quarter_turns(
 
 
 def _connected(
-    sheet_mm: Array, normals: Array, triangles: NDArray[np.int64], crease: float
+    atlas_mm: Array, normals: Array, triangles: NDArray[np.int64], crease: float
 ) -> NDArray[np.int64]:
     """Return the piece [T] of each triangle.
 
-    Triangles that share an edge on the sheet belong to one piece if the cosine of the angle between
+    Triangles that share an edge in the atlas belong to one piece if the cosine of the angle between
     their normals is greater than `crease`.
     """
     from scipy.sparse import coo_array  # takes 0.3 s, and finished meshes are kept on disk
     from scipy.sparse.csgraph import connected_components
 
-    places = np.rint(sheet_mm * _POINTS_A_MM).astype(np.int64)
+    places = np.rint(atlas_mm * _POINTS_A_MM).astype(np.int64)
     _, point = np.unique(places, axis=0, return_inverse=True)
     corners = point[triangles]
     ends = np.stack([corners, np.roll(corners, -1, axis=1)])
@@ -129,7 +129,7 @@ def _connected(
 
 
 def _bounds(corners: Array, piece: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return the lowest and highest sheet coordinates [P, 2] of pieces, from corners [T, 3, 2]."""
+    """Return the lowest and highest atlas coordinates [P, 2] of pieces, from corners [T, 3, 2]."""
     low = np.full((piece.max() + 1, 2), np.inf)
     high = -low
     np.minimum.at(low, piece, corners.min(axis=1))

@@ -16,16 +16,16 @@ _MIN_LUMINANCE = 1e-6
 def metered_exposure(
     light: Ambient, yaw_deg: float, view: View, camera: Camera, paint: Color
 ) -> float:
-    """Return the exposure: the factor on radiance that brings the metered mean to a mid-tone.
+    """Return the exposure: the factor on radiance that brings the metered mean to MIDDLE_GREY.
 
-    The centre of the image is assumed to be the container, under the light on the side that faces
-    the camera: a wall, or the roof or underside from more than 45 degrees above or below. Its
-    reflectance is the geometric mean of its paint and grey, because a metering pattern averages
-    over other surfaces as well. The rest of the image is the background in view.
+    The metered mean is geometric: 65 % the container, 35 % the background in view. The container
+    is taken as a plane that faces the camera squarely in azimuth: upright, or level if the camera
+    looks up or down by more than 45 degrees. Its reflectance is the geometric mean of its paint and
+    MIDDLE_GREY, because a metering pattern averages over other surfaces as well.
 
     Args:
         light: Light of the environment.
-        yaw_deg: Rotation of the environment.
+        yaw_deg: Counter-clockwise rotation of the environment about the vertical, seen from above.
         view: Projection of the camera.
         camera: Its `exposure_ev` is added in stops.
         paint: Linear albedo of the container.

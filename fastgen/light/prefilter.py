@@ -82,11 +82,12 @@ def ggx_lobe(roughness: float) -> Callable[[NDArray[np.float64]], NDArray[np.flo
 
     The function gives the weight of radiance at an angle t from the mirror direction, up to a
     constant factor. A surface of GGX microfacets reflects the integral of D G2 / (4 n.v) over
-    incoming directions, with alpha = roughness^2 (Walter et al. 2007, eq. 20). If v = n, the half
-    vector is at t/2, and G2 is the masking of the light alone,
-    G1(t) = 2 / (1 + sqrt(1 + alpha^2 tan^2 t)) (Heitz 2014, eq. 72 and 99). Substituting
-    cos^2(t/2) = (1 + cos t) / 2 gives D = 1 / ((1 - cos t) + alpha^2 (1 + cos t))^2. Karis 2013
-    uses cos t for G1, which is narrower.
+    incoming directions, with alpha = roughness^2 (Walter et al. 2007, eq. 20). The view v is along
+    the normal n, so the mirror direction is n and the half vector is at t/2. G2 is the masking of
+    the light alone, G1(t) = 2 / (1 + sqrt(1 + alpha^2 tan^2 t)) (Heitz 2014, eq. 72 and 99).
+    Without constant factors, D = 1 / ((1 - cos t) + alpha^2 (1 + cos t))^2, because
+    cos^2(t/2) = (1 + cos t) / 2. The weight is 0 from t = 90 degrees on. Karis 2013 uses cos t for
+    G1, which is narrower.
     """
     alpha_squared = roughness**4
 

@@ -139,7 +139,12 @@ class ShaderProgram:
         self.linked.run(across, down)
 
     def dispatch_indirect(self, buffer: moderngl.Buffer, offset: int) -> None:
-        """Run a compute shader on the work groups that a buffer names at a byte offset."""
+        """Run a compute shader with the three work-group counts in a buffer.
+
+        Args:
+            buffer: Holds the counts along x, y and z, three uint32.
+            offset: Position of the counts in the buffer, in bytes.
+        """
         assert isinstance(self.linked, moderngl.ComputeShader)
         self.linked.run_indirect(buffer, offset)
 

@@ -146,7 +146,15 @@ class Renderer:
         return replace(frame, normals=self._normals.run(inputs)) if normals else frame
 
     def draw(self, prepared: PreparedScene, camera: Camera, size: tuple[int, int]) -> ImageTargets:
-        """Draw a scene and leave the image on the GPU until the next draw."""
+        """Draw a scene and leave the image on the GPU until the next draw.
+
+        Sensor effects, fog and rain are not applied.
+
+        Args:
+            prepared: A scene that `check_scene` accepts.
+            camera: Any camera outside the container.
+            size: (width, height) in pixels.
+        """
         return self._draw(prepared, camera, size).targets
 
     def _draw(

@@ -111,9 +111,11 @@ class ShadowMap:
         detail: Share of the full number of texels along each axis; 0.5 has a quarter of all texels.
 
     Attributes:
-        toward: Unit vectors [S, 3] toward the lights.
-        tiles: [S, 4], tile of each light: (u, v) of the centres of its first and last texels.
-        end: Finer tile of the first light.
+        toward: Unit vectors [S, 3] in the world frame toward the S lights.
+        tiles: [S, 4], tile of each light: (u, v) of the centres of its first and last texels, in
+            texture coordinates (0..1) of the whole map.
+        end: The first light's finer tile for the container's end that it shines on; its bounds are
+            empty if there is none.
     """
 
     def __init__(
@@ -204,7 +206,10 @@ class ShadowMap:
     def from_ray(self, eye_m: Array) -> Array:
         """Return the matrices [S, 4, 4] to (u, v, depth) in the tile of each light.
 
-        They apply to the vector in metres from the eye, at eye_m [3], to a point.
+        Multiply them by (point - eye, 1), in world metres.
+
+        Args:
+            eye_m: The eye, [3] in world metres.
         """
         matrix = np.tile(np.eye(4), (len(self._to_map), 1, 1))
         matrix[:, :3, :3] = 500 * self._to_map[:, :3, :3]
