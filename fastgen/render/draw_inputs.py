@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import moderngl
+import numpy as np
 
 from fastgen.camera.projection import View
+from fastgen.geometry.damage_law import corners_mm
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
-from fastgen.render.regions import Region, bands
+from fastgen.render.regions import Region, bands, box_corners, merged, region_of
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.scene import Damage
@@ -35,6 +38,20 @@ class Regions:
     def drawn(self) -> list[Region | None]:
         """Disjoint rectangles that geometry may touch."""
         return bands([*self.surfaces, *self.near_damage])
+
+
+def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
+    """Return where in an image container, spreader, damages and cables may be seen."""
+    touched = [region_of(view, corners_mm(item)) for item in damages]
+    torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
+    boxes = [box_corners(prepared.container.bounds_mm, damages)]
+    cables = []
+    if prepared.spreader is not None:
+        frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
+        boxes = [np.concatenate([*boxes, frame]), *above]
+        cables = [region_of(view, above[-1])]
+    surfaces = bands([region_of(view, box) for box in boxes])
+    return Regions(surfaces, merged(touched), merged(torn), cables)
 
 
 @dataclass(frozen=True, eq=False)

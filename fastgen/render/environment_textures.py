@@ -18,7 +18,7 @@ from fastgen.render.gl_enums import (
     GL_TEXTURE_2D,
     GL_UNSIGNED_INT_5_9_9_9_REV,
 )
-from fastgen.render.recent_cache import Kept
+from fastgen.render.recent_cache import ReleasingCache
 
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
@@ -73,7 +73,7 @@ class BackgroundTextures:
 
     def __init__(self, gl: GLContext) -> None:
         self._gl = gl
-        self._textures: Kept[_BackgroundTexture] = Kept(24)
+        self._textures: ReleasingCache[_BackgroundTexture] = ReleasingCache(24)
 
     def get(self, light: GpuLight) -> moderngl.Texture:
         """Return the background map of an environment; valid until the next call."""

@@ -13,7 +13,7 @@ T = TypeVar("T")
 R = TypeVar("R", bound=_Releasable)
 
 
-class Recent(Generic[T]):
+class RecentCache(Generic[T]):
     """Cache that drops the least recently used value when it is full.
 
     Args:
@@ -42,7 +42,7 @@ class Recent(Generic[T]):
         """Handle a value that was dropped."""
 
 
-class Kept(Recent[R]):
+class ReleasingCache(RecentCache[R]):
     """Cache of GL objects that releases an object when it drops it."""
 
     def _dropped(self, value: R) -> None:

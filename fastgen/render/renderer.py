@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fastgen.camera.projection import View, view_of
 from fastgen.decals.artwork import art_layers, art_levels, glyph_coverage, glyph_tiles
 from fastgen.frame import Frame
-from fastgen.geometry.damage_law import corners_mm, seen_damages, variant
+from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight, to_map_frame
 from fastgen.light.exposure import metered_exposure
@@ -25,7 +25,7 @@ from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import dfg_table
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.depth_map import occluder_program
-from fastgen.render.draw_inputs import DrawInputs, Regions
+from fastgen.render.draw_inputs import DrawInputs, regions_of
 from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
@@ -34,11 +34,10 @@ from fastgen.render.passes.background import BackgroundPass
 from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
 from fastgen.render.passes.normals import NormalsPass
-from fastgen.render.passes.ray_points import RayPass, point_step
+from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
-from fastgen.render.recent_cache import Kept, Recent
-from fastgen.render.regions import bands, box_corners, merged, region_of
+from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sample_lattice import fitting
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
@@ -48,9 +47,9 @@ from fastgen.render.surface_values import cable_values, damage_values, scene_val
 from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
-from fastgen.render.visibility_buffer import VisibilityBuffer
+from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
-from fastgen.scene import Camera, Damage, Scene
+from fastgen.scene import Camera, Scene
 
 _Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 
@@ -94,13 +93,13 @@ class Renderer:
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
-        self._rays: Kept[RayPass] = Kept(2)
-        self._targets: Kept[ImageTargets] = Kept(2)
-        self._bodies: Recent[RayBodies] = Recent(2)
+        self._rays: ReleasingCache[RayPass] = ReleasingCache(2)
+        self._targets: ReleasingCache[ImageTargets] = ReleasingCache(2)
+        self._bodies: RecentCache[RayBodies] = RecentCache(2)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
-        self._lights: Kept[GpuLight] = Kept(24)
+        self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
         self._backgrounds = BackgroundTextures(gl)
-        self._scenes: Kept[SceneResources] = Kept(2)
+        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(2)
         self._occluder = occluder_program(self.ctx)
         self.shadow_map = ShadowMap(self.ctx, self._occluder, quality.shadow_detail)
         self._blocks = {
@@ -206,7 +205,7 @@ class Renderer:
             container=container,
             spreader=spreader,
             lit=lit,
-            regions=_regions(view, prepared, damages),
+            regions=regions_of(view, prepared, damages),
             targets=targets,
             variant=ShaderVariant(
                 samples_per_axis=per_axis,
@@ -248,7 +247,7 @@ class Renderer:
         materials = self._resources(prepared).materials
         exposure = self._exposure(scene, camera, view)
         values = {
-            **_view_values(scene, view, inputs.targets.samples, exposure),
+            **view_values(scene, view, inputs.targets.samples, exposure),
             **light_values(lights, shadow, view.position_m),
             **cable_values(prepared, materials, spreader.mesh if spreader else None, view),
         }
@@ -370,40 +369,3 @@ class Renderer:
 
     def __exit__(self, *_: object) -> None:
         self.release()
-
-
-def _regions(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
-    """Return where in an image container, spreader, damages and cables may be seen."""
-    touched = [region_of(view, corners_mm(item)) for item in damages]
-    torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
-    boxes = [box_corners(prepared.container.bounds_mm, damages)]
-    cables = []
-    if prepared.spreader is not None:
-        frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
-        boxes = [np.concatenate([*boxes, frame]), *above]
-        cables = [region_of(view, above[-1])]
-    surfaces = bands([region_of(view, box) for box in boxes])
-    return Regions(surfaces, merged(touched), merged(torn), cables)
-
-
-def _view_values(
-    scene: Scene, view: View, samples: VisibilityBuffer, exposure: float
-) -> dict[str, ArrayLike]:
-    """Return the members of VIEW_BLOCK about the camera."""
-    to_samples = np.eye(4)
-    to_samples[:2, :2] = samples.to_clip
-    right, down, forward = view.rotation
-    center_x, center_y = view.center_px
-    yaw = np.deg2rad(scene.environment.yaw_deg)
-    return {
-        "world_to_clip": to_samples @ view.clip_matrix(),
-        "ray_corner": forward - (center_x * right + center_y * down) / view.focal_px,
-        "eye_m": view.position_m,
-        "ray_right": right / view.focal_px,
-        "ray_down": down / view.focal_px,
-        "pixel_angle": 1 / view.focal_px,
-        "exposure": exposure,
-        "yaw": (np.cos(yaw), np.sin(yaw)),
-        "point_step": point_step(view.size),
-        **view.lens_values(samples.to_clip),
-    }

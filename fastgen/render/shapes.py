@@ -13,7 +13,7 @@ from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.sky_visibility import Sky
 from fastgen.render.gpu_mesh import GpuMesh, zone_table
-from fastgen.render.recent_cache import Kept
+from fastgen.render.recent_cache import ReleasingCache
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.zone_codes import SPREADER_ZONE
@@ -30,9 +30,9 @@ class Shapes:
     def __init__(self, ctx: moderngl.Context, programs: Mapping[str, moderngl.Program]) -> None:
         self._ctx = ctx
         self._programs = programs
-        self._containers: Kept[GpuMesh] = Kept(16)
-        self._spreaders: Kept[GpuMesh] = Kept(64)
-        self._zones: Kept[moderngl.Texture] = Kept(128)
+        self._containers: ReleasingCache[GpuMesh] = ReleasingCache(16)
+        self._spreaders: ReleasingCache[GpuMesh] = ReleasingCache(64)
+        self._zones: ReleasingCache[moderngl.Texture] = ReleasingCache(128)
         self._probe = SkyVisibilityProbe(ctx)
 
     def of(

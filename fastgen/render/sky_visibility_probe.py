@@ -28,7 +28,7 @@ from fastgen.light.sky_visibility import (
     sky_directions,
 )
 from fastgen.render.depth_map import DepthMap, DrawnBody, MapView, occluder_program
-from fastgen.render.recent_cache import Recent
+from fastgen.render.recent_cache import RecentCache
 
 VERSION = 1  # raise when the stored arrays change
 
@@ -110,10 +110,10 @@ class SkyVisibilityProbe:
         # depth maps, and so the results, depend on the driver
         self._driver = f"{ctx.info['GL_RENDERER']} {ctx.info['GL_VERSION']}"
         self._program = occluder_program(ctx)
-        self._found: Recent[SkyVisibility] = Recent(_CAPACITY)
-        self._factors: Recent[FormFactors] = Recent(_CAPACITY)
-        self._cells: Recent[Cells] = Recent(_CAPACITY)
-        self._lit: Recent[LitMesh] = Recent(_LIT_CAPACITY)
+        self._found: RecentCache[SkyVisibility] = RecentCache(_CAPACITY)
+        self._factors: RecentCache[FormFactors] = RecentCache(_CAPACITY)
+        self._cells: RecentCache[Cells] = RecentCache(_CAPACITY)
+        self._lit: RecentCache[LitMesh] = RecentCache(_LIT_CAPACITY)
 
     def container_light(self, container: Mesh, spreader: Mesh | None, sky: Sky) -> LitMesh:
         """Return a container in the light of the sky.

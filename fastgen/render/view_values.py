@@ -1,0 +1,32 @@
+"""Values of the view's uniform block that describe the camera."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastgen.camera.projection import View
+from fastgen.render.passes.ray_points import point_step
+from fastgen.render.visibility_buffer import VisibilityBuffer
+from fastgen.scene import Scene
+
+
+def view_values(
+    scene: Scene, view: View, samples: VisibilityBuffer, exposure: float
+) -> dict[str, ArrayLike]:
+    """Return the members of VIEW_BLOCK about the camera."""
+    to_samples = np.eye(4)
+    to_samples[:2, :2] = samples.to_clip
+    right, down, forward = view.rotation
+    center_x, center_y = view.center_px
+    yaw = np.deg2rad(scene.environment.yaw_deg)
+    return {
+        "world_to_clip": to_samples @ view.clip_matrix(),
+        "ray_corner": forward - (center_x * right + center_y * down) / view.focal_px,
+        "eye_m": view.position_m,
+        "ray_right": right / view.focal_px,
+        "ray_down": down / view.focal_px,
+        "pixel_angle": 1 / view.focal_px,
+        "exposure": exposure,
+        "yaw": (np.cos(yaw), np.sin(yaw)),
+        "point_step": point_step(view.size),
+        **view.lens_values(samples.to_clip),
+    }
