@@ -35,10 +35,11 @@ from ablation_elements import ELEMENTS, Element, gpu_session
 from image_error import displayed, flip
 from numpy.typing import NDArray
 from reference_set import FILTERS, SIZE, Case, Reference, load, traced
-from results import machine, origin, parse_size, save, write_section
+from reporting import machine, origin, parse_size, save, write_section
 
 from fastgen.frame import Frame
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.render.session import GpuSession
 from fastgen.scene import Scene
 
 NOTHING = Element("", "nothing")
@@ -64,6 +65,7 @@ class Drawer:
         self._shapes = element.shapes()
         self._latest: PreparedScene | None = None
         self._shared = whole is not None and element.scene is not None
+        self._session: GpuSession
         if whole is not None and self._shared:
             self._session = whole._session
         else:

@@ -36,7 +36,7 @@ from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
 from reference_set import DEPTH_STEP, FILTERS, SEED, SIZE, Case, Reference, cases, load, traced
-from results import ROOT, machine, origin, save, write_section
+from reporting import ROOT, machine, origin, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
@@ -201,8 +201,8 @@ def by_part(quality: str, listed: list[Result]) -> list[str]:
         "| too bright by, stops |"
     ]
     lines.append("| --- | --- | --- | --- | --- |")
-    for part, values in shares.items():
-        pixels, error, stops = np.array(values).T
+    for part, of_images in shares.items():
+        pixels, error, stops = np.array(of_images).T
         lines.append(
             f"| {part} | {pixels.sum() / totals[0]:.1%} | {error.sum() / totals[1]:.1%} | "
             f"{error.sum() / max(pixels.sum(), 1):.3f} | {np.nanmean(stops):+.2f} "
@@ -216,8 +216,8 @@ def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
 
     Covers the cases that have a Cycles series.
     """
-    columns = ("quality", "pixels", "FLIP", "CPU ms")
-    columns += ("Cycles with the same FLIP", "takes", "denoised Cycles", "takes")
+    columns = ["quality", "pixels", "FLIP", "CPU ms"]
+    columns += ["Cycles with the same FLIP", "takes", "denoised Cycles", "takes"]
     lines = ["| " + " | ".join(columns) + " |", "| --- |" + " --- |" * 7]
     for quality, listed in results.items():
         timed = [r for r in listed if r.case.number in figures.series]

@@ -4,6 +4,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from reference_set import FOLDER
@@ -38,7 +39,7 @@ class Figures:
     """
 
     floor: dict[int, dict[str, list[float]]]
-    series: dict[int, dict[str, dict[str, dict[str, object]]]]
+    series: dict[int, dict[str, dict[str, dict[str, Any]]]]
 
     @staticmethod
     def load(path: Path = FOLDER / "cycles.json") -> "Figures":

@@ -16,7 +16,7 @@ from typing import Any
 
 import imageio.v3 as iio
 import numpy as np
-import results  # noqa: F401 makes the fastgen of this checkout importable
+import reporting  # noqa: F401 makes the fastgen of this checkout importable
 
 from fastgen.dataset.verify import examine
 from fastgen.errors import FastgenError

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from results import ROOT, origin, parse_size, save, write_section
+from reporting import ROOT, origin, parse_size, save, write_section
 from throughput import whole_run
 
 import fastgen
@@ -168,7 +168,8 @@ def rate_together(options: argparse.Namespace, quality: str) -> float:
     starts, ends = zip(*(spans.get(timeout=LONGEST_S) for _ in started), strict=True)
     for process in started:
         process.join()
-    return len(started) * options.images / (max(ends) - min(starts))
+    rate: float = len(started) * options.images / (max(ends) - min(starts))
+    return rate
 
 
 def loader_rate(options: argparse.Namespace, quality: str) -> float:
@@ -196,7 +197,8 @@ def loader_rate(options: argparse.Namespace, quality: str) -> float:
         torch.cuda.synchronize()
         if came * 2 == length:
             began = time.perf_counter()
-    return length / 2 / (time.perf_counter() - began)
+    rate: float = length / 2 / (time.perf_counter() - began)
+    return rate
 
 
 def disk_rate(options: argparse.Namespace, quality: str) -> float:

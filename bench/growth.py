@@ -27,7 +27,7 @@ import cv2
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from results import RESULTS, ROOT, machine, origin, parse_size, save
+from reporting import RESULTS, ROOT, machine, origin, parse_size, save
 from throughput import fill_caches, generate_command, whole_run
 
 from fastgen import Config, Generator

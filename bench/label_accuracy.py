@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import cv2
 import matplotlib.pyplot as plt
 import numpy as np
-from results import ROOT, origin, save
+from reporting import ROOT, origin, save
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -150,13 +150,12 @@ def masks_one_by_one(
     generator: Generator, scene: Scene, camera: str
 ) -> list[list[tuple[int, ...]]]:
     """Render each marker alone as a binary mask, like the paper; return its components' boxes."""
-    found = []
+    found: list[list[tuple[int, ...]]] = []
     for decal in (d for d in scene.decals if d.kind == "marker"):
         alone = replace(scene, decals=(decal,))
         mask = (generator.render(scene=alone, camera=camera, layer="decals").ids >= 2).astype("u1")
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-        boxes = [(int(x), int(y), int(x + w), int(y + h)) for x, y, w, h, _ in stats[1:]]
-        found.append(boxes)
+        found.append([(int(x), int(y), int(x + w), int(y + h)) for x, y, w, h, _ in stats[1:]])
     return found
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import simplejpeg
 import torch
-from results import ROOT, machine, origin, parse_size, save, write_section
+from reporting import ROOT, machine, origin, parse_size, save, write_section
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 from transformers import ResNetConfig, ResNetForImageClassification
@@ -78,7 +78,7 @@ class ResNet(nn.Module):
     def __init__(self, width: float) -> None:
         super().__init__()
         sizes = [int(width * size) for size in (64, 128, 256, 512)]
-        config = ResNetConfig(
+        config = ResNetConfig(  # type: ignore[call-arg] # num_labels is not in its signature
             embedding_size=sizes[0],
             hidden_sizes=sizes,
             depths=[2, 2, 2, 2],
@@ -89,7 +89,8 @@ class ResNet(nn.Module):
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """Return logits [N, classes] of images [N, 3, H, W]."""
-        return self.net(pixel_values=images).logits
+        logits: torch.Tensor = self.net(pixel_values=images).logits
+        return logits
 
 
 NETS: dict[str, Callable[[], nn.Module]] = {

@@ -43,13 +43,14 @@ from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
 from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
-from results import ROOT, machine, origin, save, write_section
+from reporting import ROOT, machine, origin, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.export import export_glb
 from fastgen.geometry.shape_library import ShapeLibrary
 from fastgen.light import environment
+from fastgen.light.hdri import load_radiance
 from fastgen.scene import Camera, Scene
 
 PYRENDER_TEXEL_MM = 6.0
@@ -105,7 +106,7 @@ def _light_maps(scale: float) -> Callable[[], Patches]:
     """Scale the side of the prefiltered maps, and rebuild them instead of reading the cache."""
 
     def load_anew(path: Path) -> environment.EnvironmentLight:
-        return environment.prefilter_environment(path.stem, environment.load_radiance(path))
+        return environment.prefilter_environment(path.stem, load_radiance(path))
 
     def patches() -> Patches:
         sizes = [

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.ticker import FormatStrFormatter, NullLocator
 
 MARKS = {
@@ -90,7 +91,7 @@ def draw(points: Sequence[Point], caption: str, path: Path) -> None:
     plt.close(figure)
 
 
-def _note(axes: plt.Axes, point: Point, text: str, color: str) -> None:
+def _note(axes: Axes, point: Point, text: str, color: str) -> None:
     axes.annotate(
         text,
         (point.rate, point.error),
@@ -101,7 +102,7 @@ def _note(axes: plt.Axes, point: Point, text: str, color: str) -> None:
     )
 
 
-def _name_ours(points: Sequence[Point], axes: plt.Axes) -> None:
+def _name_ours(points: Sequence[Point], axes: Axes) -> None:
     """Draw numbered points on linear axes, with their settings listed below."""
     marker, color = MARKS["fastgen"]
     ranked = sorted(points, key=lambda p: p.error)

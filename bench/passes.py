@@ -25,7 +25,7 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
 import moderngl
-from results import parse_size
+from reporting import parse_size
 
 from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -71,7 +71,7 @@ class PassTimer:
         original = getattr(owner, method)
         self._kept.append((owner, method, original))
 
-        def timed(this: object, *args: Any, **named_args: Any) -> None:
+        def timed(this: Any, *args: Any, **named_args: Any) -> None:
             name = named(*args)
             if self.count_pixels:
                 query = self._ctx.query(samples=True)

@@ -30,7 +30,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 from peer_jobs import with_effort, write_jobs
-from results import ROOT, machine, origin, parse_size, save
+from reporting import ROOT, machine, origin, parse_size, save
 
 from fastgen import Config, Generator
 

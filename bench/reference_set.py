@@ -70,7 +70,7 @@ class Case:
 
 def cases() -> list[Case]:
     """Return all 32 cases, in the order in which they are traced."""
-    found = []
+    found: list[Case] = []
     for block in range(4):
         for i, light in enumerate(LIGHTS):
             state = _TIMES_TWO[i % 4] ^ block ^ (i // 4)
@@ -182,7 +182,7 @@ def load(number: int, folder: Path = FOLDER) -> Reference:
         depth_m, exposure = stored["depth_m"], float(stored["exposure"])
     file = OpenEXR.File(str(folder / f"{number:02d}.exr"), separate_channels=True)
     planes = {name: c.pixels.astype(np.float32) for name, c in file.channels().items()}
-    radiance = {
+    radiance: dict[str, Array] = {
         name: np.stack([planes[f"{name}.{c}"] for c in "RGB"], axis=-1) / exposure
         for name in sorted(set(FILTERS.values()))
     }

@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import matplotlib.pyplot as plt
 import numpy as np
-from results import ROOT, machine, origin, parse_size, save, write_section
+from reporting import ROOT, machine, origin, parse_size, save, write_section
 
 import fastgen
 from fastgen import Config, Generator

@@ -85,7 +85,8 @@ class Reader(Learner):
         mean, deviation = grey.mean((2, 3), keepdim=True), grey.std((2, 3), keepdim=True)
         columns = self.features((grey - mean) / (deviation + 1)).squeeze(2)
         surrounded = functional.relu(self.norm(self.context(columns))) + columns
-        return self.letters(surrounded).transpose(1, 2).log_softmax(-1)
+        shares: torch.Tensor = self.letters(surrounded).transpose(1, 2).log_softmax(-1)
+        return shares
 
     def loss(self, images: list[torch.Tensor], targets: list[str]) -> torch.Tensor:
         """Return the CTC loss of a batch of strips; spaces in the texts are ignored."""

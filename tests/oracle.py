@@ -126,7 +126,9 @@ def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarra
     return depth
 
 
-def _meet(corners: np.ndarray, start: np.ndarray, ray: np.ndarray):
+def _meet(
+    corners: np.ndarray, start: np.ndarray, ray: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return distance, weights of corners 1 and 2, and whether the front is hit, in float64."""
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(e1, e2)
@@ -141,7 +143,9 @@ def _meet(corners: np.ndarray, start: np.ndarray, ray: np.ndarray):
 
 def _between(corners: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     first = corners[:, 0]
-    return first + b[:, None] * (corners[:, 1] - first) + c[:, None] * (corners[:, 2] - first)
+    one, other = corners[:, 1] - first, corners[:, 2] - first
+    between: np.ndarray = first + b[:, None] * one + c[:, None] * other
+    return between
 
 
 def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
@@ -152,8 +156,10 @@ def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
     y = offset @ np.array([-np.sin(angle), np.cos(angle)])
     half_width, half_height = np.array(decal.size_mm) / 2
     if decal.kind == "marker":
-        return np.abs(x) / half_width + np.abs(y) / half_height <= 1
-    return (np.abs(x) <= half_width) & (np.abs(y) <= half_height)
+        within: np.ndarray = np.abs(x) / half_width + np.abs(y) / half_height <= 1
+    else:
+        within = (np.abs(x) <= half_width) & (np.abs(y) <= half_height)
+    return within
 
 
 def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
@@ -204,4 +210,5 @@ def near_edge(values: np.ndarray) -> np.ndarray:
     padded = np.pad(values, 1, mode="edge")
     height, width = values.shape
     around = [padded[y : y + height, x : x + width] for y in range(3) for x in range(3)]
-    return np.any([a != values for a in around], axis=0)
+    changes: np.ndarray = np.any([a != values for a in around], axis=0)
+    return changes

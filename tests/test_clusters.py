@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fastgen.camera.lens import Lens
 from fastgen.camera.projection import view_of
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.render.clusters import Clusters
+from fastgen.scene import Lens
 
 SIZE = (320, 240)
 REGIONS = [(150, 100, 20, 30), (0, 0, 40, 40), (300, 200, 20, 40), (10, 120, 300, 2)]

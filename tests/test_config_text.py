@@ -3,6 +3,7 @@
 import dataclasses
 import shutil
 import typing
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -82,7 +83,7 @@ def records(cls):
                 yield from records(part)
 
 
-@pytest.mark.parametrize("cls", sorted(set(records(Config)), key=lambda cls: cls.__name__))
+@pytest.mark.parametrize("cls", sorted(set(records(Config)), key=attrgetter("__name__")))
 def test_every_key_is_explained(cls):
     about, words = meanings(cls)
     hints = typing.get_type_hints(cls)

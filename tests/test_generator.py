@@ -34,8 +34,8 @@ def resident_mib():
     ("arguments", "words"),
     [
         ({"config": {}}, "config: dict is not a Config"),
-        ({"config": Config(labels=LabelConfig(min_visible_px=math.nan))}, "labels.min_visible_px"),
-        ({"config": Config(labels=None)}, "labels: expected a mapping"),
+        ({"config": Config(labels=LabelConfig(min_visible_px=math.nan))}, "labels.min_visible_px"),  # type: ignore[arg-type]
+        ({"config": Config(labels=None)}, "labels: expected a mapping"),  # type: ignore[arg-type]
         ({"seed": "x"}, "seed: 'x' is not a whole number of 0 or more"),
         ({"seed": True}, "seed: True is not"),
         ({"seed": 2**64}, "seed: 18446744073709551616 is not a whole number of 0 to"),
@@ -79,7 +79,7 @@ def generator():
         ),
         ({"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), 0)}, "camera.focal_mm: 0 is out"),
         (
-            {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), "x")},
+            {"index": 0, "camera": Camera("c", (0, 9, 0), (0, 0, 0), "x")},  # type: ignore[arg-type]
             "camera.focal_mm: expected a number, got 'x'",
         ),
         ({"scene": {}}, "scene: dict is not a Scene"),

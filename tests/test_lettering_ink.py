@@ -8,7 +8,7 @@ from fastgen.decals.artwork import glyph_coverage, glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.render.gl import open_context
 from fastgen.render.glyph_runs import glyph_run
-from tests.test_shading import blocks, run
+from tests.glsl import blocks, run
 
 CAP_MM = 100.0
 STEP_MM = 5.0

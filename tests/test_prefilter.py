@@ -167,7 +167,8 @@ def test_shrinking_keeps_light_per_solid_angle(shape):
 
     def total(image: np.ndarray) -> np.ndarray:
         edges = np.cos(np.linspace(0, np.pi, image.shape[0] + 1))
-        return (image.mean(1) * (edges[:-1] - edges[1:])[:, None]).sum(0) / 2
+        light: np.ndarray = (image.mean(1) * (edges[:-1] - edges[1:])[:, None]).sum(0) / 2
+        return light
 
     np.testing.assert_allclose(total(small), total(radiance), rtol=1e-4)
 

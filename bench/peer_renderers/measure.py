@@ -45,7 +45,8 @@ class Shot:
     @property
     def pose_y_up(self) -> np.ndarray:
         """The pose in the GLB's own frame."""
-        return Z_UP_TO_Y_UP @ self.pose
+        turned: np.ndarray = Z_UP_TO_Y_UP @ self.pose
+        return turned
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,8 @@ def nearest_id(pixels: np.ndarray, colors: dict[int, tuple[int, int, int]]) -> n
     keys = np.array([0, *colors])
     palette = np.array([(0, 0, 0), *colors.values()], np.int32)
     gaps = np.abs(pixels[:, :, None].astype(np.int32) - palette).sum(axis=-1)
-    return keys[gaps.argmin(axis=-1)]
+    ids: np.ndarray = keys[gaps.argmin(axis=-1)]
+    return ids
 
 
 def id_colors(ids: list[int]) -> dict[int, tuple[int, int, int]]:

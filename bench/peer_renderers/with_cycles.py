@@ -111,7 +111,8 @@ def draw(folder: Path) -> np.ndarray:
     width, height = image.size
     shape = (height, width, -1)
     bpy.data.images.remove(image)
-    return np.rint(pixels.reshape(shape)[::-1, :, :3] * 255).astype(np.uint8)
+    shown: np.ndarray = np.rint(pixels.reshape(shape)[::-1, :, :3] * 255).astype(np.uint8)
+    return shown
 
 
 def masks(shot: Shot, objects: dict[int, bpy.types.Object], folder: Path) -> np.ndarray:

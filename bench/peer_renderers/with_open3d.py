@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -16,7 +17,8 @@ def mesh_of(part: trimesh.Trimesh) -> o3d.geometry.TriangleMesh:
         o3d.utility.Vector3dVector(np.asarray(part.vertices)),
         o3d.utility.Vector3iVector(np.asarray(part.faces)),
     )
-    uv = np.asarray(part.visual.uv)[part.faces].reshape(-1, 2)
+    visual: Any = part.visual
+    uv = np.asarray(visual.uv)[part.faces].reshape(-1, 2)
     mesh.triangle_uvs = o3d.utility.Vector2dVector(uv * [1, -1] + [0, 1])
     mesh.compute_vertex_normals()
     return mesh
@@ -32,7 +34,8 @@ def fill(
     Returns:
         The names of both copies of each node, and the colour of each id.
     """
-    parts = trimesh.load(glb, process=False).geometry
+    loaded: Any = trimesh.load(glb, process=False)
+    parts = loaded.geometry
     colors = id_colors([object_id(name) for name in parts])
     names = []
     for name, part in parts.items():

@@ -3,6 +3,7 @@
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 os.environ["PYOPENGL_PLATFORM"] = "egl"
 
@@ -20,7 +21,8 @@ def load(glb: Path) -> tuple[pyrender.Scene, dict[pyrender.Node, int]]:
     """
     scene = pyrender.Scene(ambient_light=[0.5, 0.5, 0.5], bg_color=[0.5, 0.5, 0.5, 1.0])
     ids = {}
-    for name, part in trimesh.load(glb, process=False).geometry.items():
+    loaded: Any = trimesh.load(glb, process=False)
+    for name, part in loaded.geometry.items():
         ids[scene.add(pyrender.Mesh.from_trimesh(part, smooth=True), name=name)] = object_id(name)
     return scene, ids
 

@@ -5,6 +5,7 @@ The light keeps VTK's own rotation about the vertical; rotating it would not cha
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -30,7 +31,8 @@ def open_scene(
     painted = pv.Plotter(off_screen=True, window_size=job.size, lighting="none")
     painted.render_window.SetMultiSamples(0)  # blending two ids would give a third
     painted.background_color = "black"
-    parts = trimesh.load(scene.glb, process=False).geometry
+    loaded: Any = trimesh.load(scene.glb, process=False)
+    parts = loaded.geometry
     colors = id_colors([object_id(name) for name in parts])
     for name, part in parts.items():
         mesh = pv.wrap(trimesh.Trimesh(part.vertices, part.faces, process=False))

@@ -44,7 +44,8 @@ class _Residual(nn.Module):
         self.body = nn.Sequential(_conv(width, width), _conv(width, width))
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return x + self.body(x)
+        changed: torch.Tensor = x + self.body(x)
+        return changed
 
 
 class Detector(Learner):
@@ -103,7 +104,7 @@ class Detector(Learner):
         """
         maps = self(self._pixels(images))
         heat, box = maps[0], maps[1]
-        total = heat.new_zeros(())
+        total: torch.Tensor = heat.new_zeros(())
         count = max(sum(len(t["labels"]) for t in targets), 1)
         for number, target in enumerate(targets):
             boxes = target["boxes"].to(heat.device)

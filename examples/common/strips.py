@@ -123,7 +123,8 @@ def _grey(crop: torch.Tensor) -> Grey:
 
 
 def _upright(grey: Grey) -> bool:
-    return grey.shape[0] > _UPRIGHT * grey.shape[1]
+    upright: bool = grey.shape[0] > _UPRIGHT * grey.shape[1]
+    return upright
 
 
 def _parts(grey: Grey) -> list[Grey]:

@@ -69,7 +69,8 @@ def _packed(counts: NDArray[np.int64]) -> str:
     more = left[:, 1:] != -(group >> 4)
     used = np.ones(group.shape, bool)
     np.logical_and.accumulate(more[:, :-1], axis=1, out=used[:, 1:])
-    return (group + 0x20 * more + 48)[used].astype(np.uint8).tobytes().decode("ascii")
+    text: str = (group + 0x20 * more + 48)[used].astype(np.uint8).tobytes().decode("ascii")
+    return text
 
 
 def annotation(

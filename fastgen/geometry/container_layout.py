@@ -98,4 +98,5 @@ class Layout:
         long, wide, high = CASTING_MM
         x, y, z = np.moveaxis(np.abs(points_mm), -1, 0)
         near_corner = (x > half_length - long) & (y > half_width - wide)
-        return ~(near_corner & ((z < high) | (z > self.top - high)))
+        outside: NDArray[np.bool_] = ~(near_corner & ((z < high) | (z > self.top - high)))
+        return outside

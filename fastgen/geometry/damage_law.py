@@ -56,10 +56,13 @@ def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
         crease = np.maximum(1 - away / crease_mm, 0.0) ** 1.5
         sink = _bump(away / half_width)
         taper = np.maximum(1 - (u / half_length) ** 2, 0.0)
-        return damage.depth_mm * taper * fade * ((1 - sink_share) * crease + sink_share * sink)
+        profile = (1 - sink_share) * crease + sink_share * sink
+        amount: NDArray[np.float64] = damage.depth_mm * taper * fade * profile
+        return amount
     outside = np.hypot(u, v) - hole_radius_mm(damage, np.arctan2(v, u))
     rim_mm = damage.shape[0]
-    return damage.depth_mm * np.clip(1 - outside / rim_mm, 0.0, 1.0) ** 2 * fade
+    amount = damage.depth_mm * np.clip(1 - outside / rim_mm, 0.0, 1.0) ** 2 * fade
+    return amount
 
 
 def fold_path_mm(damage: Damage, u: Array) -> Array:
@@ -68,7 +71,8 @@ def fold_path_mm(damage: Damage, u: Array) -> Array:
     _, _, amplitude_mm, wavelength_mm, phase, stretch_mm = damage.shape[:6]
     # 0 on straight stretches, 1 on sinusoidal ones
     turn = _smoothstep(-0.25, 0.25, np.sin(np.pi * u / stretch_mm + phase))
-    return amplitude_mm * turn * np.sin(2 * np.pi * u / wavelength_mm)
+    path: Array = amplitude_mm * turn * np.sin(2 * np.pi * u / wavelength_mm)
+    return path
 
 
 def hole_radius_mm(damage: Damage, angle: Array) -> Array:
@@ -125,7 +129,8 @@ def corners_mm(damage: Damage) -> NDArray[np.float64]:
         low, high = -v, v + depth
     axes = np.array([damage.along, damage.across, damage.inward])
     inside = np.array([-u, -v, low]) + UNIT_CUBE * np.array([2 * u, 2 * v, high - low])
-    return np.array(damage.origin_mm) + inside @ axes
+    corners: NDArray[np.float64] = np.array(damage.origin_mm) + inside @ axes
+    return corners
 
 
 def variant(damages: tuple[Damage, ...]) -> str:
@@ -151,7 +156,8 @@ def may_be_seen(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = 
     # the inward axis is a coordinate axis for a sheet, and lies between two for an edge
     outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
     pushed_mm = sum(max(-other.depth_mm, 0.0) for other in beside)
-    return max(outward) > -SLACK_MM - pushed_mm
+    outside: bool = max(outward) > -SLACK_MM - pushed_mm
+    return outside
 
 
 def seen_damages(damages: tuple[Damage, ...], position_mm: Vec3) -> tuple[Damage, ...]:
@@ -170,4 +176,5 @@ def _bump(t: Array) -> Array:
 
 def _smoothstep(low: float, high: float, x: Array) -> Array:
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+    eased: Array = t * t * (3 - 2 * t)
+    return eased

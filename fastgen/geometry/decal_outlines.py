@@ -59,7 +59,8 @@ class Outlines:
     def reach_mm(self) -> Array:
         """Return the largest distances [N, 2] from the centres along the sheet's axes, in mm."""
         tips = np.abs(self.turn * self.half_mm[:, None])
-        return np.where(self.diamond[:, None], tips.max(axis=2), tips.sum(axis=2))
+        reach: Array = np.where(self.diamond[:, None], tips.max(axis=2), tips.sum(axis=2))
+        return reach
 
     def half_planes(self) -> tuple[Array, Array]:
         """Return the sides: normals n [N, 4, 2] in 1/mm and offsets c [N, 4].

@@ -166,7 +166,8 @@ def _cut(corners: Array, inside: Array) -> Array:
     slot = np.flatnonzero(valid)
     column = np.minimum(np.arange(max(int(used.max()), 3)), used[:, None] - 1)
     order = slot.take((used.cumsum() - used)[:, None] + column)
-    return slots.reshape(-1, channels).take(order, axis=0)
+    kept: Array = slots.reshape(-1, channels).take(order, axis=0)
+    return kept
 
 
 def lowest(values: NDArray[Number]) -> NDArray[Number]:

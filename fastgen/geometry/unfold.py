@@ -160,7 +160,8 @@ def sweep(
 def _crossed(vectors: Array, axis: Array) -> Array:
     """Return vectors [..., 3] cross one axis [3], in a fifth of the time of np.cross."""
     x, y, z = axis.tolist()
-    return vectors @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    crossed: Array = vectors @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return crossed
 
 
 def flat(points_mm: ArrayLike, triangles: ArrayLike, right: ArrayLike, up: ArrayLike) -> Patch:

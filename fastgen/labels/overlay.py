@@ -83,7 +83,8 @@ def draw_outline(image: Image, points: NDArray[np.floating], class_name: str) ->
 
 def _line(image: Image) -> int:
     """Return the width of lines in pixels."""
-    return max(round(max(image.shape[:2]) / _LINE_PX), 1)
+    width: int = max(round(max(image.shape[:2]) / _LINE_PX), 1)
+    return width
 
 
 def _write(image: Image, left: int, bottom: int, text: str, color: tuple[int, int, int]) -> None:

@@ -66,7 +66,8 @@ class Shot:
     @cached_property
     def spreader_shown(self) -> NDArray[np.bool_]:
         """Pixels [H, W] that show the spreader."""
-        return self.frame.ids == SPREADER_ID
+        shown: NDArray[np.bool_] = self.frame.ids == SPREADER_ID
+        return shown
 
     @cached_property
     def spreader_box(self) -> Box | None:

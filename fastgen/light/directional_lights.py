@@ -120,7 +120,8 @@ class _Places:
         def within(cosine: NDArray[np.float64]) -> NDArray[np.float64]:
             """Return 1 inside the cap, falling to 0 over one texel to lose no light in between."""
             angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-            return np.clip((cap + texel - angle) / texel, 0.0, 1.0)
+            share: NDArray[np.float64] = np.clip((cap + texel - angle) / texel, 0.0, 1.0)
+            return share
 
         solid_angle = np.pi * (cap * cap + cap * texel + texel * texel / 3)  # integral of `within`
         most = prefilter.convolve(coarse, within)[..., 0] * solid_angle
@@ -182,4 +183,6 @@ def _median(values: NDArray[np.floating], weights: NDArray[np.float64]) -> NDArr
     order = np.argsort(values, axis=0)
     below = np.cumsum(weights[order], axis=0)
     middle = (below < below[-1] / 2).sum(axis=0)
-    return np.take_along_axis(values, np.take_along_axis(order, middle[None], axis=0), axis=0)[0]
+    place = np.take_along_axis(order, middle[None], axis=0)
+    median: NDArray[np.floating] = np.take_along_axis(values, place, axis=0)[0]
+    return median

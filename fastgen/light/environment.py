@@ -223,7 +223,8 @@ def to_map_frame(direction: ArrayLike, yaw_deg: float) -> NDArray[np.float64]:
     """Return world directions [..., 3] in the frame of the environment map: Rz(-yaw) direction."""
     d = np.asarray(direction, np.float64)
     c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
-    return d @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
+    turned: NDArray[np.float64] = d @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]).T
+    return turned
 
 
 def irradiance_at(env: Ambient, normals: ArrayLike, yaw_deg: float = 0.0) -> NDArray[np.float32]:

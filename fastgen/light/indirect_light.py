@@ -241,7 +241,8 @@ def _representative(met: Array, normal: Array, near: Numbers, spreader: Mesh) ->
     )
     off = _OFF_PLANE * (apart[..., :3] * normal[:, None]).sum(axis=-1)
     best = ((apart**2).sum(axis=-1) + off**2).argmin(axis=1)
-    return near[np.arange(len(near)), best]
+    chosen: Numbers = near[np.arange(len(near)), best]
+    return chosen
 
 
 def _rows(receiver: Numbers, ray: int, emitter: Numbers) -> NDArray[np.int32]:
@@ -323,7 +324,8 @@ def _entered(start: Array, ray: Array, box: Array) -> tuple[NDArray[np.intp], Ar
 
 def _counts(box: Array) -> NDArray[np.intp]:
     """Return the number of cells along each axis, [3]."""
-    return np.ceil((box[1] - box[0]) / _CELL_MM).astype(np.intp)
+    counts: NDArray[np.intp] = np.ceil((box[1] - box[0]) / _CELL_MM).astype(np.intp)
+    return counts
 
 
 def _first_cells(box: Array) -> NDArray[np.intp]:
@@ -340,7 +342,10 @@ def cell_of(side: NDArray[np.intp], points: Array, box: Array) -> NDArray[np.int
     axis = side // 2
     one, other = np.where(axis == 0, 1, 0), np.where(axis == 2, 1, 2)
     row = np.arange(len(at))
-    return _first_cells(box)[side] + at[row, one] * counts[other] + at[row, other]
+    cells: NDArray[np.intp] = (
+        _first_cells(box)[side] + at[row, one] * counts[other] + at[row, other]
+    )
+    return cells
 
 
 @dataclass(frozen=True, eq=False)

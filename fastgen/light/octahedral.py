@@ -40,7 +40,8 @@ def octahedral_decode(uv: ArrayLike) -> NDArray[np.float64]:
     z = 1.0 - np.abs(f).sum(-1, keepdims=True)
     xy = f - np.where(f < 0, -1.0, 1.0) * np.maximum(-z, 0.0)
     n = np.concatenate([xy, z], axis=-1)
-    return n / np.linalg.norm(n, axis=-1, keepdims=True)
+    unit: NDArray[np.float64] = n / np.linalg.norm(n, axis=-1, keepdims=True)
+    return unit
 
 
 @cache

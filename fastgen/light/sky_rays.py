@@ -64,7 +64,8 @@ class SkyRays:
         uv = octahedral_encode(toward).T
         x, y = (np.minimum((c * side).astype(np.int32), side - 1) for c in uv)
         first = np.cumsum([0, *(sides * sides)[:-1]]).astype(np.int32)
-        return np.take(self._levels, first[level] + y * side + x, axis=0)
+        radiance: Floats = np.take(self._levels, first[level] + y * side + x, axis=0)
+        return radiance
 
 
 def spread_points(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -122,7 +122,8 @@ def _encoded_part(n: NDArray[np.float32], visible: Directions) -> Array:
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     mean = np.where(length > 1e-3, mean / np.maximum(length, 1e-3), n)
     rim = np.sqrt(np.clip(1 - share, 0, 1))
-    return np.rint(128 + 127 * (1 - rim / 2) * mean)
+    encoded: Array = np.rint(128 + 127 * (1 - rim / 2) * mean)
+    return encoded
 
 
 @dataclass(frozen=True)
@@ -325,7 +326,8 @@ def _narrow(index: NDArray[np.intp]) -> Index:
 def _directions(cone: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return the bent normals [K, 3] of encoded cones [K, 3]."""
     x, y, z = np.subtract(cone.T, 128, dtype=np.float32)
-    return (np.stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)).T
+    normals: NDArray[np.float32] = (np.stack([x, y, z]) / np.sqrt(x * x + y * y + z * z)).T
+    return normals
 
 
 def _sums_of_eight(weight: NDArray[np.uint64]) -> NDArray[np.uint64]:

@@ -140,7 +140,8 @@ def _grid(
     _check(decals, mesh, off, number[crowded])
     slots = np.zeros((size[1], size[0], CELL_SLOTS), np.uint32)
     slots.reshape(-1, CELL_SLOTS)[cell, slot] = number + 1
-    return slots[..., 0::2] | (slots[..., 1::2] << np.uint32(16))
+    pairs: NDArray[np.uint32] = slots[..., 0::2] | (slots[..., 1::2] << np.uint32(16))
+    return pairs
 
 
 def _check(

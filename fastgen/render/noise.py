@@ -68,7 +68,8 @@ def _uniform(values: NDArray[np.floating]) -> NDArray[np.float32]:
     low, high = values.min(), values.max()
     bins = ((values - low) * (_BINS / (high - low))).astype(np.int32)
     share = np.cumsum(np.bincount(bins.ravel(), minlength=_BINS + 1), dtype=np.float64)
-    return (share / values.size)[bins].astype(np.float32)
+    ranks: NDArray[np.float32] = (share / values.size)[bins].astype(np.float32)
+    return ranks
 
 
 def _looked_up_variance(channel: NDArray[np.floating]) -> float:
@@ -87,7 +88,9 @@ def _normal(ranks: NDArray[np.float32]) -> NDArray[np.float32]:
 
     deviations = np.clip(ndtri(ranks.astype(np.float64)), -NORMAL_REACH, NORMAL_REACH)
     deviations /= np.sqrt(_looked_up_variance(deviations))
-    return np.clip(0.5 + deviations / (2 * NORMAL_REACH), 0, 1).astype(np.float32)
+    values = np.clip(0.5 + deviations / (2 * NORMAL_REACH), 0, 1)
+    rounded: NDArray[np.float32] = values.astype(np.float32)
+    return rounded
 
 
 def _spectral(
@@ -140,7 +143,8 @@ def _scratches(rng: np.random.Generator) -> NDArray[np.float32]:
 def _halved(level: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the next mip level of [2, S, S, 4], the mean of 2x2 texels."""
     quads = level.reshape(2, level.shape[1] // 2, 2, level.shape[2] // 2, 2, 4)
-    return quads.mean(axis=(2, 4), dtype=np.float32)
+    mean: NDArray[np.float32] = quads.mean(axis=(2, 4), dtype=np.float32)
+    return mean
 
 
 @lru_cache(maxsize=1)

@@ -159,4 +159,5 @@ def box_corners(
     low, high = bounds_mm
     inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
     bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))
-    return low - bulge + UNIT_CUBE * (high - low + 2 * bulge)
+    corners: np.ndarray = low - bulge + UNIT_CUBE * (high - low + 2 * bulge)
+    return corners

@@ -132,7 +132,8 @@ class Egl:
     def _call(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         call = getattr(self._library, name)
         call.restype, call.argtypes = result, arguments
-        return call
+        function: Callable[..., Any] = call
+        return function
 
     def _extension(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         return ctypes.CFUNCTYPE(result, *arguments)(
