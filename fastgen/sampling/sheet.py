@@ -22,6 +22,11 @@ def tenth(value: float) -> float:
     return round(float(value), 1)
 
 
+def between(rng: np.random.Generator, values: Range) -> float:
+    """Draw a length from a range, in mm, rounded to 0.1 mm."""
+    return tenth(values.draw(rng))
+
+
 @dataclass
 class Sheet:
     """Sheet of one face while decals are placed on it.
