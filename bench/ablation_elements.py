@@ -256,7 +256,6 @@ ELEMENTS = (
     ),
     Element("shape", "spreader: headblock", spreader=without_charts("headblock.")),
     Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),
-    Element("shape", "spreader: twist locks", spreader=without_charts(".locks.")),
     Element("light", "occlusion of the sky", open_sky=True),
     Element("light", "shadow of the sun", files=_stub("light_visibility.glsl")),
     Element("light", "bounces in occluded places", files=_stub("occluder_indirect.glsl")),

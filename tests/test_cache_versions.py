@@ -17,13 +17,13 @@ TABLE = {
     "container": (container, 1, 12.85765, 33.80773, 31.04243),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
-    "form-factors": (indirect_light, 1, 11.7319, 48.20674, 44.833),
+    "form-factors": (indirect_light, 1, 11.68769, 47.98914, 44.6162),
     "hull": (mesh, 1, 2.07944, 8.78941, 8.45058),
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
     "sheet": (chart_sheet, 1, 12.77786, 221.25527, 198.56161),
-    "sky-directions": (sky_visibility_probe, 1, 13.62804, 19.76269, 17.02392),
-    "sky-visibility": (sky_visibility_probe, 1, 13.23187, 58.93386, 51.90917),
-    "spreader": (spreader, 1, 11.0786, 33.25144, 30.30849),
+    "sky-directions": (sky_visibility_probe, 1, 13.62247, 19.78437, 17.04365),
+    "sky-visibility": (sky_visibility_probe, 1, 13.22462, 58.75169, 51.73375),
+    "spreader": (spreader, 2, 11.03537, 33.16066, 30.22824),
     "triangle-bounds": (mesh, 1, 11.98215, 14.57226, 13.1778),
 }
 """Producer: its module, its VERSION and the summary of its entries, see `summary`."""

@@ -40,10 +40,6 @@ CUT_MM = 150.0
 """Spacing of cuts across members. Indirect light is interpolated between vertices, and members
 shade each other where they meet."""
 
-_TWISTLOCK_MM = (-45.0, 220.0)
-"""Heights of a twistlock's ends above the castings' upper plane. Its head is inside a casting,
-which is 70 mm deep there. Its stem ends inside its housing for every gap."""
-
 _PIVOT_MM = 200.0
 """Height of the flippers' pivot: raised flippers are lowered ones mirrored at this height."""
 
@@ -55,9 +51,6 @@ _CABLE_RADIUS_MM = 15.0
 
 CABLES = 8
 CABLE_CHART = "spreader.cables.falls"
-
-LOCKS_CHARTS = {end: f"spreader.frame.locks.{end}" for end in ("no_door", "door")}
-"""Charts of the twistlocks at each end, which stay in place when the rest is lifted."""
 
 CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
 """Width of a cable, whose four sides are parallel to x and y."""
@@ -109,7 +102,10 @@ def frame(hang: Hang) -> list[Sheet]:
 
 
 def ends(hang: Hang) -> list[Sheet]:
-    """Return telescopic beams, end beams across, and twistlocks in the castings."""
+    """Return telescopic beams, and end beams across with the housings of the twistlocks.
+
+    Twistlocks are not modelled: only their stems would show, in the gap above the castings.
+    """
     sheets = []
     half_length, half_width = hang.kind.length_mm / 2, hang.kind.width_mm / 2
     for name, end in (("no_door", -1.0), ("door", 1.0)):
@@ -120,14 +116,11 @@ def ends(hang: Hang) -> list[Sheet]:
         ]
         across = (20.0 - half_width, half_width - 20.0)
         beam = hang.block((end * (half_length - 260), end * (half_length - 12)), across, (70, 450))
-        housings, locks = [], []
+        housings = []
         for side in _SIGNS:
             x = end * (half_length - APERTURE_CENTER_MM[0])
             y = side * (half_width - APERTURE_CENTER_MM[1])
             housings.append(hang.block(_around(x, 106.0), _around(y, 95.0), (0.0, 300.0)))
-            stem = regular((x, y), 24.0, 8)
-            reach = [hang.kind.height_mm + z for z in _TWISTLOCK_MM]
-            locks.append(prism(stem, reach, 2, capped=(True, True)))
         # plates that carry the end beam's load into the telescopic beams
         gussets = [
             hang.block(
@@ -135,10 +128,8 @@ def ends(hang: Hang) -> list[Sheet]:
             )
             for y in (-_BEAM_Y_MM - 135, -_BEAM_Y_MM + 135, _BEAM_Y_MM - 135, _BEAM_Y_MM + 135)
         ]
-        sheets += [
-            _painted(f"spreader.frame.{name}", beside([beam, *beams, *housings, *gussets])),
-            Sheet(LOCKS_CHARTS[name], "roof", "cable", "frame", beside(locks)),
-        ]
+        parts = beside([beam, *beams, *housings, *gussets])
+        sheets.append(_painted(f"spreader.frame.{name}", parts))
     return sheets
 
 
