@@ -26,7 +26,6 @@ from fastgen.render.settings import QUALITY
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.scene import Scene, Spreader
 from fastgen.scene.container_kinds import WallProfiles
-from fastgen.scene.faces import FACE_AXES
 
 STUBS = Path(__file__).with_name("ablation_shaders")
 """Shader files without an effect; each replaces the file of the same name in shaders/."""
@@ -190,20 +189,13 @@ def without_charts(*words: str) -> MeshEdit:
     return edit
 
 
-def filled_pockets(mesh: Mesh) -> Mesh:
-    """Close the castings' apertures flush with their faces."""
-    positions = mesh.positions_mm.copy()
-    for number, chart in enumerate(mesh.charts):
-        if chart.name.endswith(".pocket"):
-            out = np.array(FACE_AXES[chart.face].out, np.float32)
-            mine = mesh.chart == number
-            depth = positions[mine] @ out
-            positions[mine] += (depth.max() - depth)[:, None] * out
+def filled_apertures(mesh: Mesh) -> Mesh:
+    """Give the castings' apertures the paint of the castings."""
     charts = tuple(
-        replace(chart, material="casting") if chart.name.endswith(".pocket") else chart
+        replace(chart, material="casting") if chart.name.endswith(".aperture") else chart
         for chart in mesh.charts
     )
-    return replace(mesh, positions_mm=positions, charts=charts)
+    return replace(mesh, charts=charts)
 
 
 def _without_decals(*kinds: str) -> Callable[[Scene], Scene]:
@@ -243,7 +235,7 @@ ELEMENTS = (
         ),
     ),
     Element("shape", "door gaskets", container=without_charts("door.gasket")),
-    Element("shape", "castings' apertures", container=filled_pockets),
+    Element("shape", "castings' apertures", container=filled_apertures),
     Element(
         "shape", "underside: members, fork pockets", container=without_charts("member.", "fork.")
     ),

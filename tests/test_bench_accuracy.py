@@ -22,7 +22,6 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.render.program import shader_text
 from fastgen.render.variant import LAYERS
-from fastgen.scene.faces import FACE_AXES
 
 
 @pytest.mark.parametrize("count", [8, 16, 24, 32])
@@ -190,25 +189,14 @@ def test_removing_charts_removes_only_their_triangles_and_keeps_the_groups():
         assert np.array_equal(less.triangles[less.groups[name]], triangles[kept])
 
 
-def test_filled_pockets_lie_in_the_plane_of_their_casting():
-    mesh = ablation_elements.filled_pockets(build_container("20"))
-    names = [chart.name for chart in mesh.charts]
-    for number, chart in enumerate(mesh.charts):
-        if chart.name.endswith(".pocket"):
-            out = np.array(FACE_AXES[chart.face].out)
-            plate = names.index(chart.name.removesuffix(".pocket"))
-            heights = [mesh.positions_mm[mesh.chart == n] @ out for n in (number, plate)]
-            assert np.allclose(heights[0], heights[1].max(), atol=1e-3)
-
-
 def test_mesh_edits_of_ablations_change_the_mesh():
     spreader, container = build_spreader("40HC"), build_container("20")
     for element in ablation_elements.ELEMENTS:
         for edit, mesh in ((element.spreader, spreader), (element.container, container)):
             if edit is not None:
                 edited = edit(mesh)
-                same = np.array_equal(edited.positions_mm, mesh.positions_mm)
-                assert len(edited.triangles) < len(mesh.triangles) or not same, element.name
+                fewer = len(edited.triangles) < len(mesh.triangles)
+                assert fewer or edited.charts != mesh.charts, element.name
 
 
 @pytest.mark.parametrize("name", ["accuracy", "pareto", "ablation"])

@@ -1,24 +1,21 @@
 """The eight corner fittings with their apertures, ISO 1161.
 
-An aperture is a recessed pocket with a twelve-point outline. At 10 m, a 45 mm lens and a 36 mm
-sensor of 640 pixels resolve 12.5 mm: a 63 mm opening covers 5 pixels and needs no rounder arc.
+An aperture is a dark polygon of twelve corners, flush with the face. At 10 m, a 45 mm lens and a
+36 mm sensor of 640 pixels resolve 12.5 mm: a 63 mm opening covers 5 pixels, which show neither a
+rounder arc nor the walls inside.
 """
 
 import numpy as np
 
 from fastgen.geometry.container_layout import CASTING_MM, Array, Layout
-from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon, sweep
+from fastgen.geometry.unfold import Patch, Sheet, beside, flat, polygon
 from fastgen.scene.faces import FACE_AXES, FACES
 
 APERTURE_CENTER_MM = (101.5, 89.0, 59.0)
 """Distance of the aperture centres from the end (x), the side (y) and the bottom or top (z)."""
 
-_APERTURES: dict[int, tuple[tuple[float, float], float]] = {
-    0: ((63.5, 51.0), 36.0),
-    1: ((79.0, 63.5), 50.0),
-    2: ((124.0, 63.5), 70.0),
-}
-"""((width, height) seen from outside, depth) by the axis of the face. Pockets do not overlap."""
+_APERTURES_MM = ((63.5, 51.0), (79.0, 63.5), (124.0, 63.5))
+"""Width and height seen from outside, by the axis of the face."""
 
 
 def castings(layout: Layout) -> list[Sheet]:
@@ -46,23 +43,13 @@ def _casting(name: str, faces: tuple[str, str, str], half: Array, signs: Array) 
         axes = FACE_AXES[face]
         center = holes_center.copy()
         center[axis] = corner[axis]
-        right, up, out = (np.array(v, np.float64) for v in (axes.right, axes.up, axes.out))
-        (width, height), depth = _APERTURES[axis]
-        outline = center + _stadium(width, height) @ np.array([right, up])
+        right, up = np.array(axes.right, np.float64), np.array(axes.up, np.float64)
+        outline = center + _stadium(*_APERTURES_MM[axis]) @ np.array([right, up])
         rectangle = _rectangle(corner, far, axis, corner[axis])
         front = _plate_with_hole(rectangle, outline, right, up)
-        closed = np.vstack([outline, outline[:1]])
-        walls = sweep(closed, (-depth, 0.0), out)
-        # the outline runs counter-clockwise, so swept outward its normals would face outward
-        walls = Patch(
-            walls.positions_mm,
-            -walls.normals,
-            walls.sheet_mm * (-1.0, 1.0),
-            walls.triangles[:, ::-1],
-        )
-        bottom = polygon(outline - depth * out, right, up)
+        aperture = polygon(outline, right, up)
         sheets.append(Sheet(f"{name}.{face}", face, "casting", face, front))
-        sheets.append(Sheet(f"{name}.{face}.pocket", face, "rubber", face, beside([walls, bottom])))
+        sheets.append(Sheet(f"{name}.{face}.aperture", face, "rubber", face, aperture))
         opposite = FACE_AXES[_opposite(face)]
         plain.append(polygon(_rectangle(corner, far, axis, far[axis]), opposite.right, opposite.up))
     sheets.append(Sheet(f"{name}.inner", faces[0], "casting", "frame", beside(plain)))
