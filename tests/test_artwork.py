@@ -1,5 +1,9 @@
 """Artwork: marker geometry and colours, and distance fields against a fresh rasterization."""
 
+import colorsys
+import json
+from collections import defaultdict
+
 import cv2
 import numpy as np
 import pytest
@@ -12,6 +16,7 @@ from fastgen.decals.artwork import (
     art_layers,
     brands,
     glyph_tiles,
+    marker_prints,
     mip_levels,
     stickers,
 )
@@ -19,38 +24,51 @@ from fastgen.render.gl import open_context
 from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path
 
-RED, GREEN, BLUE, ORANGE = (210, 32, 46), (0, 131, 63), (0, 87, 168), (240, 125, 26)
-YELLOW, WHITE, BLACK = (246, 201, 0), (255, 255, 255), (16, 16, 16)
+HUES = {"red": 357, "orange": 25, "yellow": 48, "green": 156, "blue": 221}
+"""Mean hue of each field colour in degrees; all inks of a colour lie within HUE_RANGE of it."""
+
+HUE_RANGE = 25
 
 FIELDS = {
     # class: colour at a blank spot of the upper half and of the lower half
-    "C1.1": (ORANGE, ORANGE),
-    "C2.1": (RED, RED),
-    "C2.3": (GREEN, GREEN),
-    "C2.5": (WHITE, WHITE),
-    "C3.2": (RED, RED),
-    "C4.2": (WHITE, RED),
-    "C4.3": (BLUE, BLUE),
-    "C5.1": (YELLOW, YELLOW),
-    "C5.2": (RED, YELLOW),
-    "C6.1": (WHITE, WHITE),
-    "C7.1": (WHITE, WHITE),
-    "C7.2": (YELLOW, WHITE),
-    "C7.4": (YELLOW, WHITE),
-    "C8.1": (WHITE, BLACK),
+    **dict.fromkeys(("C1.1", "C1.2", "C1.3", "C1.4"), ("orange", "orange")),
+    **dict.fromkeys(("C2.1", "C2.2", "C3.1", "C3.2"), ("red", "red")),
+    **dict.fromkeys(("C2.3", "C2.4"), ("green", "green")),
+    **dict.fromkeys(("C2.5", "C6.1", "C6.2", "C7.1", "C7.3", "C9.1"), ("white", "white")),
+    **dict.fromkeys(("C4.3", "C4.4"), ("blue", "blue")),
+    **dict.fromkeys(("C5.2", "C5.3"), ("red", "yellow")),
+    **dict.fromkeys(("C7.2", "C7.4"), ("yellow", "white")),
+    "C4.2": ("white", "red"),
+    "C5.1": ("yellow", "yellow"),
+    "C8.1": ("white", "black"),
 }
+"""Fields by class. C4.1 is left out: it has stripes."""
+
+WHITE_DIGITS = ("C2.2", "C2.4", "C3.2", "C4.4", "C8.1")
+
+IMAGES = art_images()
+
+PRINTS = [(name, art) for name, prints in marker_prints().items() for art in prints]
 
 
 def test_all_markers_come_first_and_in_class_order():
-    images, layers = art_images(), art_layers()
+    images, layers = IMAGES, art_layers()
     assert images.shape[1:] == (ART_SIZE, ART_SIZE, 4)
-    assert [layers[name] for name in MARKER_CLASSES] == list(range(26))
+    assert [layers[art] for _, art in PRINTS] == list(range(len(PRINTS)))
+    assert tuple(marker_prints()) == MARKER_CLASSES
 
 
-@pytest.mark.parametrize("name", MARKER_CLASSES)
-def test_a_marker_fills_the_diamond_exactly(name):
-    images, layers = art_images(), art_layers()
-    alpha = images[layers[name], ..., 3] / 255
+def test_every_class_has_several_prints_and_the_first_has_its_name():
+    for name, prints in marker_prints().items():
+        assert len(prints) >= 4
+        assert prints[0] == name
+        assert len(set(prints)) == len(prints)
+
+
+@pytest.mark.parametrize("art", [art for _, art in PRINTS])
+def test_a_marker_fills_the_diamond_exactly(art):
+    images, layers = IMAGES, art_layers()
+    alpha = images[layers[art], ..., 3] / 255
     at = (np.arange(ART_SIZE) + 0.5) / ART_SIZE - 0.5
     inside = 0.5 - np.abs(at)[None] - np.abs(at)[:, None]
     margin = 1.5 / ART_SIZE
@@ -58,27 +76,97 @@ def test_a_marker_fills_the_diamond_exactly(name):
     assert (alpha[inside < -margin] == 0).all()
 
 
-@pytest.mark.parametrize("name", FIELDS)
-def test_fields_have_their_regulation_colours(name):
-    images, layers = art_images(), art_layers()
-    image = images[layers[name]].astype(int)
-    upper, lower = image[int(0.44 * 512), int(0.15 * 512)], image[int(0.56 * 512), int(0.14 * 512)]
-    assert np.abs(upper[:3] - FIELDS[name][0]).max() <= 12
-    assert np.abs(lower[:3] - FIELDS[name][1]).max() <= 12
+@pytest.mark.parametrize(("name", "art"), PRINTS)
+def test_fields_have_their_regulation_colours(name, art):
+    if name == "C4.1":
+        return
+    image = IMAGES[art_layers()[art]].astype(int)
+    upper = image[int(0.42 * ART_SIZE), int(0.17 * ART_SIZE), :3]
+    lower = image[int(0.58 * ART_SIZE), int(0.17 * ART_SIZE), :3]
+    for spot, wanted in zip((upper, lower), FIELDS[name], strict=True):
+        chroma = spot.max() - spot.min()
+        if wanted == "white":
+            assert spot.min() > 215
+            assert chroma < 25
+        elif wanted == "black":
+            assert spot.max() < 40
+        else:
+            hue = 360 * colorsys.rgb_to_hsv(*(spot / 255))[0]
+            assert abs((hue - HUES[wanted] + 180) % 360 - 180) < HUE_RANGE
+            assert chroma > 60
 
 
-def test_markers_are_visibly_different_at_48_px():
-    images = art_images()
+def test_prints_are_visibly_different_at_48_px():
+    images = IMAGES
     small = np.stack(
-        [cv2.resize(i[..., :3], (48, 48), interpolation=cv2.INTER_AREA) for i in images[:26]]
+        [
+            cv2.resize(i[..., :3], (48, 48), interpolation=cv2.INTER_AREA)
+            for i in images[: len(PRINTS)]
+        ]
     ).astype(float)
-    for i in range(26):
-        for j in range(i):
-            most = np.abs(small[i] - small[j]).max(axis=-1)
-            # yellow II and yellow III differ only in one bar
-            pair = {MARKER_CLASSES[i], MARKER_CLASSES[j]}
-            least = 5 if pair == {"C7.2", "C7.4"} else 12
-            assert (most > 40).sum() >= least, pair
+    for i in range(len(PRINTS)):
+        most = np.abs(small[:i] - small[i]).max(axis=-1)
+        assert ((most > 40).sum(axis=(1, 2)) >= 8).all(), PRINTS[i]
+
+
+def digit_size_px(name, art, side_px):
+    """Return height and stroke width of the class digit on a marker that is `side_px` wide."""
+    image = IMAGES[art_layers()[art]].astype(int)
+    at = (np.arange(ART_SIZE) + 0.5) / ART_SIZE - 0.5
+    within = np.abs(at)[None] + at[:, None] < 0.5 - 0.09
+    within &= (np.abs(at) < 0.14)[None] & (at > 0.16)[:, None]
+    rgb = image[..., :3]
+    ink = (rgb.min(axis=-1) > 200) if name in WHITE_DIGITS else (rgb.max(axis=-1) < 70)
+    ink &= within
+    rows = np.flatnonzero(ink.any(axis=1))
+    # The digit is the lowest connected run of rows; letters and small print lie above it.
+    breaks = np.flatnonzero(np.diff(rows) > 1)
+    rows = rows[breaks[-1] + 1 :] if len(breaks) else rows
+    if name == "C9.1":  # The lowest run is the line below the digit.
+        rows = np.flatnonzero(ink.any(axis=1))
+        rows = rows[breaks[-2] + 1 : breaks[-1] + 1] if len(breaks) > 1 else rows[: breaks[-1] + 1]
+    inked = ink[rows].astype(np.uint8)
+    stroke = 2 * cv2.distanceTransform(np.pad(inked, 1), cv2.DIST_L2, 5).max()
+    return len(rows) * side_px / ART_SIZE, stroke * side_px / ART_SIZE
+
+
+@pytest.mark.parametrize("name", MARKER_CLASSES)
+def test_most_prints_have_a_digit_that_is_legible_on_a_marker_20_px_wide(name):
+    sizes = np.array([digit_size_px(name, art, 20) for art in marker_prints()[name]])
+    # Half a pixel of ink in a stroke, and five rows of half a pixel in a digit
+    legible = (sizes[:, 0] > 2.4) & (sizes[:, 1] > 0.5)
+    assert legible.sum() >= 3, sizes
+
+
+@pytest.mark.parametrize(("name", "art"), PRINTS)
+def test_the_digit_contrasts_with_its_field_at_20_px(name, art):
+    image = IMAGES[art_layers()[art]]
+    small = cv2.resize(image[..., :3], (20, 20), interpolation=cv2.INTER_AREA).astype(int)
+    corner = small[13:18, 8:12].mean(axis=-1)
+    assert np.ptp(corner) > 18
+
+
+def test_wordings_do_not_tell_the_class():
+    index = json.loads(asset_path("markers", "index.json").read_text(encoding="utf-8"))
+    classes = defaultdict(set)
+    for name, prints in marker_prints().items():
+        wordings = [index[art]["wording"] for art in prints]
+        assert len(set(wordings)) == len(wordings)
+        for wording in wordings:
+            classes[wording].add(name)
+    assert len(classes) >= 6
+    assert all(len(names) >= len(MARKER_CLASSES) / 2 for names in classes.values()), classes
+
+
+def test_prints_with_a_un_number_have_a_white_band_with_dark_digits():
+    index = json.loads(asset_path("markers", "index.json").read_text(encoding="utf-8"))
+    images, layers = IMAGES, art_layers()
+    numbered = [art for art, about in index.items() if about["wording"] == "un"]
+    for art in numbered:
+        band = images[layers[art], int(0.45 * ART_SIZE) : int(0.55 * ART_SIZE), ..., :3]
+        middle = band[:, int(0.22 * ART_SIZE) : int(0.78 * ART_SIZE)].astype(int)
+        assert (middle.min(axis=-1) > 200).mean() > 0.4
+        assert 0.08 < (middle.max(axis=-1) < 70).mean() < 0.5
 
 
 def test_distance_tiles_agree_with_the_font_drawn_at_another_size():

@@ -13,7 +13,7 @@ from fastgen.render import noise, sky_visibility_probe
 from fastgen.render.gl import open_context
 
 TABLE = {
-    "art": (artwork, 1, 18.00077, 48.96338, 43.30455),
+    "art": (artwork, 2, 17.97926, 43.96841, 38.61123),
     "container": (container, 2, 12.82068, 33.60903, 30.83656),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),

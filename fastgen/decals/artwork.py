@@ -19,9 +19,9 @@ from fastgen.files import disk_cache
 from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
 
-VERSION = 1  # raise when the stored arrays change
+VERSION = 2  # raise when the stored arrays change
 
-ART_SIZE = 512
+ART_SIZE = 256
 """Width and height of an artwork image, texels."""
 
 GLYPH_TILE_SIZE = 64
@@ -63,14 +63,42 @@ class Sticker:
     Attributes:
         name: Name of its artwork.
         size_mm: Width and height.
-        where: Faces that may carry it; empty for all faces.
+        where: Faces that may carry it.
         always: True if every container carries it on these faces.
+        weight: Relative frequency among the stickers that are drawn by number.
+        share: Probability that such a face carries it in addition to that number.
+        kinds: Container kinds that may carry it; empty for all.
+        place: Range of x, then of y, from left and bottom (0) to right and top (1).
+        ink: 'art' for the drawing's own colours, 'lettering' for the colour of the lettering, or
+            'overpaint' for a darker tone of the paint.
+        group: Name of a group, or ''. Of a group, a container carries only one sticker.
     """
 
     name: str
     size_mm: tuple[float, float]
     where: tuple[str, ...]
-    always: bool
+    always: bool = False
+    weight: float = 1.0
+    share: float = 0.0
+    kinds: tuple[str, ...] = ()
+    place: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    ink: str = "art"
+    group: str = ""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Mark of the IMDG Code with a label.
+
+    Attributes:
+        name: Name of its artwork and of its class.
+        size_mm: Smallest width and height.
+        where: Faces that carry it; empty for those with markers.
+    """
+
+    name: str
+    size_mm: tuple[float, float]
+    where: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -93,11 +121,25 @@ class Brand:
 
 
 @lru_cache(maxsize=1)
-def art_layers() -> Mapping[str, int]:
-    """Return the layer of each artwork by name: markers in class order, then stickers, emblems."""
+def marker_prints() -> Mapping[str, tuple[str, ...]]:
+    """Return the names of the printed variants of each marker class, in class order.
+
+    The first variant has the name of its class.
+    """
+    prints = _json("markers", "index.json")
     return MappingProxyType(
-        {name: i for i, name in enumerate((*MARKER_CLASSES, *sorted(_index())))}
+        {
+            name: tuple(art for art, about in prints.items() if about["class"] == name)
+            for name in MARKER_CLASSES
+        }
     )
+
+
+@lru_cache(maxsize=1)
+def art_layers() -> Mapping[str, int]:
+    """Return the layer of each artwork by name: markers in class order, then the others."""
+    markers = [art for prints in marker_prints().values() for art in prints]
+    return MappingProxyType({name: i for i, name in enumerate((*markers, *sorted(_index())))})
 
 
 def art_images() -> NDArray[np.uint8]:
@@ -136,8 +178,9 @@ def art_levels() -> list[NDArray[np.uint8]]:
 
 
 def _art_paths() -> list[Path]:
+    markers = {art for prints in marker_prints().values() for art in prints}
     return [
-        asset_path("markers" if name in MARKER_CLASSES else "stickers", f"{name}.png")
+        asset_path("markers" if name in markers else "stickers", f"{name}.png")
         for name in art_layers()
     ]
 
@@ -229,13 +272,17 @@ def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 @lru_cache(maxsize=1)
 def stickers() -> Mapping[str, Sticker]:
-    """Return all plates and stickers by name; markers and emblems are not included."""
+    """Return all plates and stickers by name; markers, marks and emblems are not included."""
     return MappingProxyType(
-        {
-            name: Sticker(name, tuple(s["size_mm"]), tuple(s["where"]), s["always"])
-            for name, s in _index().items()
-            if s["role"] == "sticker"
-        }
+        {name: Sticker(name, **values) for name, values in _with_role("sticker").items()}
+    )
+
+
+@lru_cache(maxsize=1)
+def marks() -> Mapping[str, Mark]:
+    """Return the marks of the IMDG Code by name."""
+    return MappingProxyType(
+        {name: Mark(name, **values) for name, values in _with_role("mark").items()}
     )
 
 
@@ -246,6 +293,19 @@ def brands() -> tuple[Brand, ...]:
         Brand(name, b["emblem"], tuple(b["owner_codes"]), b["wordmark"], tuple(b["main_texts"]))
         for name, b in _json("stickers", "brands.json").items()
     )
+
+
+def _with_role(role: str) -> dict[str, dict[str, Any]]:
+    """Return the entries of the index with a role, without it and with tuples for lists."""
+    return {
+        name: {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in entry.items()
+            if key != "role"
+        }
+        for name, entry in _index().items()
+        if entry["role"] == role
+    }
 
 
 @lru_cache(maxsize=1)

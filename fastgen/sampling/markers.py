@@ -6,6 +6,8 @@ import numpy as np
 
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config.markings import MarkingsConfig
+from fastgen.decals.artwork import marker_prints
+from fastgen.sampling.lettering_style import Streams
 from fastgen.sampling.sheet import Sheet, between, tenth
 from fastgen.scene import Decal, Vec2
 from fastgen.validation import Range
@@ -33,8 +35,18 @@ def rhombus_offsets(count: int, width_mm: float, height_mm: float) -> list[Vec2]
     ]
 
 
-def sample_markers(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> list[Decal]:
-    """Sample the markers of a face; drop markers until the pattern fits."""
+def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> list[Decal]:
+    """Sample the markers of a face; drop markers until the pattern fits.
+
+    Args:
+        config: Numbers, sizes and wear of markers.
+        sheet: Sheet of the face.
+        streams: Function from the name of a property to its independent random generator.
+
+    Returns:
+        Markers of the face, each with one of the prints of its class.
+    """
+    rng = streams(f"markers.{sheet.face}")
     low, high = config.markers_per_face
     count = int(rng.integers(low, high + 1))
     side = between(rng, config.marker_side_mm)
@@ -43,6 +55,8 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generato
     classes = rng.choice(MARKER_CLASSES, size=count)
     tilts = rng.uniform(*config.marker_tilt_deg, size=count)
     wears = rng.uniform(*config.marker_wear, size=count)
+    print_rng = streams(f"marker_prints.{sheet.face}")
+    prints = [str(print_rng.choice(marker_prints()[str(name)])) for name in classes]
     while count > 0:
         # A square turned by t extends side / 2 * (cos t + sin t) toward its neighbour.
         tilt = math.radians(float(np.abs(tilts).max()))
@@ -61,7 +75,7 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generato
                     center_mm=(tenth(x), tenth(y)),
                     size_mm=(diagonal, diagonal),
                     rotation_deg=round(float(tilts[i]), 2),
-                    art=str(classes[i]),
+                    art=prints[i],
                     wear=round(float(wears[i]), 3),
                 )
                 for i, (x, y) in enumerate(offsets + shift)

@@ -56,7 +56,7 @@ def sample_decals(
     drawn += sample_weights(config, kind, faces["door"], style, streams)
     markers: list[Decal] = []
     for face in config.marker_faces:
-        markers += sample_markers(config, faces[face], streams(f"markers.{face}"))
+        markers += sample_markers(config, faces[face], streams)
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
         drawn += _stickers(config, kind, sheet, streams(f"stickers.{sheet.face}"))
