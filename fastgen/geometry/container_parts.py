@@ -1,4 +1,4 @@
-"""Frame and base of a container: posts, rails, headers, sills, cross members, fork pockets."""
+"""Frame and base of a container: posts, rails, headers, sills, floor, fork pockets."""
 
 from collections.abc import Sequence
 
@@ -33,10 +33,8 @@ DOOR_HEADER_MM = DOOR_SILL_MM = 120.0
 DOOR_FACE_MM = 50.0
 """Inset d of the faces of the door header and sill; the locking bars pass in front of them."""
 
-_MEMBER_SPACING_MM = 300.0
-
-_FLOOR_CUT_MM, _MEMBER_CUT_MM = 280.0, 400.0
-"""Spacing of cuts across the floor and the members below it: a lens distorts corners only."""
+_FLOOR_CUT_MM, _FORK_CUT_MM = 280.0, 400.0
+"""Spacing of cuts across the floor and the fork pockets below it: a lens distorts corners only."""
 
 
 def frame(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
@@ -151,7 +149,7 @@ def _front_beams(layout: Layout, wall: Panel) -> list[Sheet]:
             (outer, FRONT_SILL_TOP_MM), (inner, FRONT_SILL_TOP_MM)]  # fmt: skip
     return [
         _beam("header.no_door", "no_door", header, stations),
-        _beam("sill.no_door", "no_door", sill, stations),
+        _beam("sill.no_door", "no_door", sill, _to_posts(stations, half_width - layout.post_mm)),
     ]
 
 
@@ -170,8 +168,14 @@ def _door_beams(layout: Layout) -> list[Sheet]:
             (inner, FLOOR_MM + OVERLAP_MM)]  # fmt: skip
     return [
         _beam("header.door", "door", header, stations),
-        _beam("sill.door", "door", sill, stations),
+        _beam("sill.door", "door", sill, _to_posts(stations, half_width - layout.door_post_mm[1])),
     ]
+
+
+def _to_posts(stations: Array, post: float) -> Array:
+    """Return a sill's stations with ends at the posts, to close the gaps above the castings."""
+    reach = post + OVERLAP_MM
+    return np.concatenate([[-reach], stations, [reach]]) if reach > stations[-1] else stations
 
 
 def _profile(section: list[tuple[float, float]]) -> Array:
@@ -190,7 +194,10 @@ def _fork_centers(layout: Layout) -> tuple[float, ...]:
 
 
 def base(layout: Layout) -> list[Sheet]:
-    """Return floor, cross members and fork pockets, as seen from below."""
+    """Return floor and fork pockets, as seen from below.
+
+    Cross members are not modelled: they are behind the rails for all cameras but those far below.
+    """
     half_length, half_width = layout.half
     reach_y = half_width - layout.side_inner_mm + OVERLAP_MM
     start = -half_length + layout.end_inner_mm
@@ -201,15 +208,9 @@ def base(layout: Layout) -> list[Sheet]:
         FACE_AXES["underside"].up,
     )
     sheets = [Sheet("underside", "underside", "underside", "underside", floor)]
-    rows = breaks(-reach_y, reach_y, _MEMBER_CUT_MM)
-    pockets = _fork_centers(layout)
-    bays = max(round((end - start) / _MEMBER_SPACING_MM), 2)
-    for i, x in enumerate(np.linspace(start, end, bays + 1)[1:-1]):
-        if all(abs(x - center) > FORK_WIDTH_MM / 2 + 60 for center in pockets):
-            patch = _member(float(x), rows)
-            sheets.append(Sheet(f"member.{i}", "underside", "underside", "underside", patch))
+    rows = breaks(-reach_y, reach_y, _FORK_CUT_MM)
     outer = half_width - layout.frame_recess_mm
-    for i, center in enumerate(pockets):
+    for i, center in enumerate(_fork_centers(layout)):
         sheets.append(
             Sheet(f"fork.{i}", "underside", "underside", "frame", _fork_lining(center, outer))
         )
@@ -225,13 +226,6 @@ def base(layout: Layout) -> list[Sheet]:
             )
         )
     return sheets
-
-
-def _member(x: float, rows: Array) -> Patch:
-    """Return a C channel across; its upper flange is inside the floor."""
-    top, flange, lip = FLOOR_MM + 2, x + 45.0, 18.0
-    section = [(x + 5, top), (x + 5, lip), (flange, lip), (flange, 12.5), (x, 12.5), (x, top)]
-    return sweep(_profile(section), rows, (0, 1, 0))
 
 
 def _fork_lining(center: float, outer: float) -> Patch:
