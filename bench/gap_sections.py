@@ -1,0 +1,310 @@
+"""Sections of the comparison with real pictures, each measured with one seed.
+
+A section trains on fresh renders, and then measures the same on held-out renders ("ours") and on
+real pictures ("theirs"). Real pictures are never trained on, and no setting here was chosen by
+them.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from crop_networks import Classifier, fit_classifier, fit_reader
+from crop_statistics import (
+    Array,
+    Interval,
+    auc_interval,
+    joint_scores,
+    single_aucs,
+    statistics_of,
+)
+from marker_search import overlap, search, true_scores
+from numpy.typing import NDArray
+from real_crops import DAMAGE_KINDS, LAYOUTS, RealCrops
+from rendered_crops import MARKER_PX, PANEL_PX, Crops, Pixels, Text, square_crop, training_crops
+from rendered_views import View, default_texts, default_views
+from text import edit_distance
+
+from fastgen.classes import MARKER_CLASSES
+
+
+class Share(NamedTuple):
+    """Number of right answers, and number of all."""
+
+    right: int
+    total: int
+
+
+class Count(NamedTuple):
+    """A number of things."""
+
+    value: float
+
+
+Measure = Share | Interval | Count
+Measures = dict[str, Measure]
+
+HELD_OUT, MINED = 1_000_000, 500_000
+"""First scene of the held-out renders, and of the images that background crops are mined from."""
+
+_BACKGROUND = len(MARKER_CLASSES)
+_RECALL = 0.9
+_HOLE = "perforation"
+_LONGEST = {"photographs": 640, "panels": PANEL_PX, "identifiers": 256}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Amount of rendering and training of one seed.
+
+    Attributes:
+        scenes: Training scenes.
+        held_out: Held-out scenes.
+        images: Whole images of the preset, for the search and for the statistics.
+        mined: Images that background crops are mined from.
+        marker_steps: Training steps of the marker classifier.
+        reader_steps: Training steps of the reader.
+        damage_steps: Training steps of the damage classifier.
+    """
+
+    scenes: int = 300
+    held_out: int = 50
+    images: int = 40
+    mined: int = 40
+    marker_steps: int = 700
+    reader_steps: int = 600
+    damage_steps: int = 400
+
+
+class Trial:
+    """Renders and trained networks of one seed, made when a section first needs them.
+
+    Args:
+        real: The real pictures.
+        seed: Seed of scenes, weights and order.
+        effort: Amount of rendering and training.
+        workers: Processes that render.
+        kinds: Crops to render: some of rendered_crops.KINDS.
+    """
+
+    def __init__(
+        self, real: RealCrops, seed: int, effort: Effort, workers: int, kinds: Sequence[str]
+    ) -> None:
+        self.real, self.seed, self.effort, self.workers = real, seed, effort, workers
+        self._kinds = kinds
+        self.confused: Counter[tuple[str, str]] = Counter()
+
+    @cached_property
+    def crops(self) -> Crops:
+        """Training crops."""
+        return training_crops(self.seed, range(self.effort.scenes), self._kinds, self.workers)
+
+    @cached_property
+    def held_out(self) -> Crops:
+        """Crops of other scenes of the same kind."""
+        scenes = range(HELD_OUT, HELD_OUT + self.effort.held_out)
+        return training_crops(self.seed, scenes, self._kinds, self.workers)
+
+    @cached_property
+    def texts(self) -> list[Text]:
+        """Held-out identifiers as the preset's own cameras see them."""
+        scenes = range(HELD_OUT, HELD_OUT + self.effort.held_out // 4)
+        return default_texts(self.seed, scenes, self.workers)
+
+    @cached_property
+    def views(self) -> list[View]:
+        """Held-out images of the preset."""
+        return default_views(
+            "seafront", self.seed, range(HELD_OUT, HELD_OUT + self.effort.images), self.workers
+        )
+
+    @cached_property
+    def marker_model(self) -> Classifier:
+        """Classifier of the markers and the background."""
+        crops = self.crops
+        classes = [MARKER_CLASSES.index(name) for _, name in crops.markers]
+        pixels = [crop for crop, _ in crops.markers] + crops.backgrounds
+        return fit_classifier(
+            np.stack(pixels),
+            np.array(classes + [_BACKGROUND] * len(crops.backgrounds)),
+            _BACKGROUND + 1,
+            self.effort.marker_steps,
+            self.seed,
+        )
+
+
+def markers(trial: Trial) -> Measures:
+    """Return top-1 accuracy of markers, on ours and theirs, and theirs by class."""
+    model, real = trial.marker_model, trial.real.placards
+    mine = trial.held_out.markers
+    found: Measures = {
+        "ours, held out": _top1(model, [c for c, _ in mine], [name for _, name in mine])[0]
+    }
+    pictures = [
+        cv2.resize(p.pixels, (MARKER_PX, MARKER_PX), interpolation=cv2.INTER_AREA) for p in real
+    ]
+    names = [p.class_name for p in real]
+    found["theirs"], guessed = _top1(model, np.array(pictures, np.uint8), names)
+    for name in sorted(set(names), key=MARKER_CLASSES.index):
+        reads = [guess for guess, truth in zip(guessed, names, strict=True) if truth == name]
+        found[f"theirs, {name}"] = Share(reads.count(name), len(reads))
+    trial.confused.update(
+        (truth, guess) for truth, guess in zip(names, guessed, strict=True) if truth != guess
+    )
+    return found
+
+
+def identifiers(trial: Trial) -> Measures:
+    """Return exact reads and character errors of a small reader, by layout."""
+    reader = fit_reader(trial.crops.texts, trial.effort.reader_steps, trial.seed)
+    ours = [(t.framed(), t.layout, t.code) for t in trial.held_out.texts]
+    theirs = [(r.pixels, r.layout, r.code) for r in trial.real.identifiers]
+    found: Measures = {}
+    for whose, texts in (("ours, held out", ours), ("theirs", theirs)):
+        read = reader.read([(pixels, layout) for pixels, layout, _ in texts])
+        for name in LAYOUTS:
+            pairs = [
+                (code, got)
+                for (_, layout, code), got in zip(texts, read, strict=True)
+                if layout == name
+            ]
+            if pairs:
+                exact = sum(code == got for code, got in pairs)
+                wrong = sum(edit_distance(got, code) for code, got in pairs)
+                found[f"{whose}, {name}, exact"] = Share(exact, len(pairs))
+                total = sum(len(code) for code, _ in pairs)
+                found[f"{whose}, {name}, character errors"] = Share(wrong, total)
+    return found
+
+
+def false_markers(trial: Trial) -> Measures:
+    """Return markers found in photographs without any, at a recall of 90 % on our own images."""
+    scenes = range(MINED, MINED + trial.effort.mined)
+    pixels: list[Pixels] = []
+    classes: list[int] = []
+    for view in default_views("seafront", trial.seed, scenes, trial.workers):
+        found = search(trial.marker_model, view.image)
+        near = overlap(found.boxes, view.seen).max(axis=1, initial=0.0)
+        for box in found.boxes[near < 0.2][:40]:
+            pixels.append(square_crop(view.image, box.tolist(), MARKER_PX))
+            classes.append(_BACKGROUND)
+    crops = trial.crops
+    pixels += [crop for crop, _ in crops.markers] + crops.backgrounds
+    classes += [MARKER_CLASSES.index(name) for _, name in crops.markers]
+    classes += [_BACKGROUND] * len(crops.backgrounds)
+    model = fit_classifier(
+        np.stack(pixels),
+        np.array(classes),
+        _BACKGROUND + 1,
+        trial.effort.marker_steps // 2,
+        trial.seed,
+        start=trial.marker_model,
+    )
+    ours = [(search(model, view.image), view) for view in trial.views]
+    scores = np.concatenate([true_scores(f, v.boxes, v.classes) for f, v in ours])
+    least = max(float(np.quantile(scores, 1 - _RECALL, method="lower")), 1e-6)
+    false = sum(
+        int((overlap(f.boxes, v.seen).max(axis=1, initial=0.0)[f.scores >= least] < 0.2).sum())
+        for f, v in ours
+    )
+    photos = [search(model, photo) for photo in trial.real.photos]
+    return {
+        "recall on ours": Share(int((scores >= least).sum()), len(scores)),
+        "score": Count(least),
+        "false per image of ours": Count(false / len(ours)),
+        "false per photograph": Count(
+            sum(int((f.scores >= least).sum()) for f in photos) / len(photos)
+        ),
+    }
+
+
+def damage(trial: Trial) -> Measures:
+    """Return the AUC of damaged against undamaged panels."""
+    panels = trial.crops.panels
+    pixels = np.stack([crop for crop, _ in panels])
+    classes = np.array([int(kind != "") for _, kind in panels])
+    model = fit_classifier(pixels, classes, 2, trial.effort.damage_steps, trial.seed)
+    mine = trial.held_out.panels
+    ours = model.shares(np.stack([crop for crop, _ in mine]))[:, 1]
+    kinds = np.array([kind for _, kind in mine])
+    whole = ours[kinds == ""]
+    found: Measures = {
+        "ours, held out, all": auc_interval(ours[kinds != ""], whole),
+        "ours, held out, hole": auc_interval(ours[kinds == _HOLE], whole),
+        "ours, held out, dent": auc_interval(ours[(kinds != "") & (kinds != _HOLE)], whole),
+    }
+    theirs = trial.real.panels
+    damaged, undamaged = (
+        model.shares(
+            np.array(
+                [cv2.resize(p, (PANEL_PX, PANEL_PX), interpolation=cv2.INTER_AREA) for p in each],
+                np.uint8,
+            )
+        )[:, 1]
+        for each in ([p.damaged for p in theirs], [p.undamaged for p in theirs])
+    )
+    found["theirs, all"] = auc_interval(damaged, undamaged)
+    for kind in sorted(DAMAGE_KINDS, reverse=True):
+        chosen = np.array([p.kind == kind for p in theirs])
+        if chosen.any():
+            found[f"theirs, {kind}"] = auc_interval(damaged[chosen], undamaged[chosen])
+    return found
+
+
+def image_statistics(trial: Trial) -> Measures:
+    """Return AUCs of telling our pictures from theirs, of all statistics together and of each."""
+    found: Measures = {}
+    for group, ours, theirs in _groups(trial):
+        if len(theirs) < 3 or len(ours) < 3:
+            continue
+        longest = _LONGEST[group.partition(",")[0]]
+        names = tuple(statistics_of(ours[0], longest))
+        mine, real = (
+            np.array([tuple(statistics_of(p, longest).values()) for p in pictures])
+            for pictures in (ours, theirs)
+        )
+        scores = joint_scores(mine, real, trial.seed)
+        found[f"{group}, all together"] = auc_interval(*scores, trial.seed)
+        for name, value in single_aucs(mine, real, names).items():
+            found[f"{group}, {name}"] = Count(value)
+    return found
+
+
+def _groups(trial: Trial) -> Iterator[tuple[str, list[Pixels], list[Pixels]]]:
+    """Yield the name of a group, our pictures and theirs."""
+    real = trial.real
+    if real.photos:
+        yield "photographs", [view.image for view in trial.views], list(real.photos)
+        scenes = range(HELD_OUT, HELD_OUT + trial.effort.images)
+        crane = default_views("crane", trial.seed, scenes, trial.workers)
+        yield "photographs, preset crane", [view.image for view in crane], list(real.photos)
+    if real.panels:
+        theirs = [p for pair in real.panels for p in (pair.damaged, pair.undamaged)]
+        yield "panels", [crop for crop, _ in trial.held_out.panels], theirs
+    if real.identifiers:
+        ours = [text.framed() for text in trial.texts]
+        yield "identifiers", ours, [r.pixels for r in real.identifiers]
+
+
+SECTIONS: Mapping[str, Callable[[Trial], Measures]] = {
+    "markers": markers,
+    "identifiers": identifiers,
+    "false": false_markers,
+    "damage": damage,
+    "statistics": image_statistics,
+}
+"""Sections that are measured with each seed, by their name on the command line."""
+
+
+def _top1(
+    model: Classifier, crops: Sequence[Pixels] | NDArray[np.uint8], names: Sequence[str]
+) -> tuple[Share, list[str]]:
+    """Return the share of right classes, the background left out, and the guesses."""
+    shares: Array = model.shares(np.asarray(crops))[:, :_BACKGROUND].astype(float)
+    guessed = [MARKER_CLASSES[k] for k in shares.argmax(axis=1)]
+    right = sum(a == b for a, b in zip(guessed, names, strict=True))
+    return Share(right, len(names)), guessed

@@ -1,0 +1,187 @@
+"""Labelled real pictures in a folder, for measuring only.
+
+Layout of the folder; every part may be missing:
+
+    placards.csv      file,class,kind            kind is exact or near; near rows are not scored
+    identifiers.csv   file,code,layout,view      layout is rows, block or column
+    damage.csv        pair,kind                  kind is dent or hole
+    damage/NN_pos.jpg, damage/NN_neg.jpg         a damaged and an undamaged panel of each pair
+    look/*.jpg                                   photographs without any marker
+
+`file` is relative to the folder. `class` is one of MARKER_CLASSES. `code` has four capital letters,
+six digits and the check digit. `view` starts with A for an end of the container, and with L or R
+for a long side. Pictures are JPEG or PNG. Further columns are ignored.
+
+A placard is cut out upright: the box of its diamond plus 10 %. An identifier is cut out as the box
+of its letters with a small margin. A panel is a square.
+"""
+
+import csv
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.classes import MARKER_CLASSES
+from fastgen.decals.iso6346 import check_digit
+from fastgen.errors import ConfigError
+from fastgen.validation import check_known
+
+LAYOUTS = ("rows", "block", "column")
+"""Layouts of an identifier: one line, several lines, letters below one another."""
+
+DAMAGE_KINDS = ("dent", "hole")
+
+Pixels = NDArray[np.uint8]
+"""RGB picture [H, W, 3]."""
+
+_CODE = re.compile("[A-Z]{4}[0-9]{7}")
+_PLACARD_KINDS = ("exact", "near")
+_PICTURES = (".jpg", ".jpeg", ".png")
+
+
+@dataclass(frozen=True, eq=False)
+class Placard:
+    """Picture of a marker, and its class."""
+
+    pixels: Pixels
+    class_name: str
+
+
+@dataclass(frozen=True, eq=False)
+class RealIdentifier:
+    """Picture of an identifier.
+
+    Attributes:
+        pixels: The picture.
+        code: Owner code, serial number and check digit, 11 characters.
+        layout: One of LAYOUTS.
+        on_end: True on an end of the container, False on a long side.
+    """
+
+    pixels: Pixels
+    code: str
+    layout: str
+    on_end: bool
+
+
+@dataclass(frozen=True, eq=False)
+class PanelPair:
+    """A damaged and an undamaged panel of one photograph; `kind` is one of DAMAGE_KINDS."""
+
+    damaged: Pixels
+    undamaged: Pixels
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class RealCrops:
+    """Everything that a folder holds. Parts that it does not have are empty."""
+
+    placards: tuple[Placard, ...]
+    identifiers: tuple[RealIdentifier, ...]
+    panels: tuple[PanelPair, ...]
+    photos: tuple[Pixels, ...]
+
+
+def load_real(folder: Path) -> RealCrops:
+    """Read a folder of real pictures.
+
+    Raises:
+        ConfigError: The folder is missing or has none of the parts, a picture is missing, or a row
+            has an invalid value. The message names the file and the row.
+    """
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: there is no such folder")
+    found = RealCrops(
+        tuple(_placards(folder)),
+        tuple(_identifiers(folder)),
+        tuple(_panels(folder)),
+        tuple(_photos(folder / "look")),
+    )
+    if not (found.placards or found.identifiers or found.panels or found.photos):
+        raise ConfigError(
+            f"{folder}: has no placards.csv, identifiers.csv, damage.csv or look/ with pictures; "
+            "see docs/benchmarks.md for the layout"
+        )
+    return found
+
+
+def read_picture(path: Path) -> Pixels:
+    """Return the RGB pixels [H, W, 3] of a picture.
+
+    Raises:
+        ConfigError: The file is missing or is not a picture.
+    """
+    if not path.is_file():
+        raise ConfigError(f"{path}: the picture is missing")
+    pixels = cv2.imdecode(np.frombuffer(path.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
+    if pixels is None:
+        raise ConfigError(f"{path}: is not a JPEG or PNG picture")
+    return np.ascontiguousarray(pixels[:, :, ::-1]).astype(np.uint8)
+
+
+def _placards(folder: Path) -> Iterator[Placard]:
+    for place, row in _rows(folder / "placards.csv", ("file", "class", "kind")):
+        check_known(f"{place}: kind", row["kind"], _PLACARD_KINDS)
+        if row["kind"] == "exact":
+            check_known(f"{place}: class", row["class"], MARKER_CLASSES)
+            yield Placard(_picture(folder, row["file"], place), row["class"])
+
+
+def _identifiers(folder: Path) -> Iterator[RealIdentifier]:
+    for place, row in _rows(folder / "identifiers.csv", ("file", "code", "layout", "view")):
+        code = row["code"]
+        if not _CODE.fullmatch(code):
+            raise ConfigError(
+                f"{place}: code: {code!r} is not four capital letters, six digits and a check digit"
+            )
+        if check_digit(code[:10]) != int(code[10]):
+            raise ConfigError(
+                f"{place}: code: the check digit of {code[:10]} is {check_digit(code[:10])}, not "
+                f"{code[10]}"
+            )
+        check_known(f"{place}: layout", row["layout"], LAYOUTS)
+        check_known(f"{place}: view, first letter", row["view"][:1], ("A", "L", "R"))
+        pixels = _picture(folder, row["file"], place)
+        yield RealIdentifier(pixels, code, row["layout"], row["view"].startswith("A"))
+
+
+def _panels(folder: Path) -> Iterator[PanelPair]:
+    for place, row in _rows(folder / "damage.csv", ("pair", "kind")):
+        check_known(f"{place}: kind", row["kind"], DAMAGE_KINDS)
+        damaged, undamaged = (
+            _picture(folder, f"damage/{row['pair']}_{end}.jpg", place) for end in ("pos", "neg")
+        )
+        yield PanelPair(damaged, undamaged, row["kind"])
+
+
+def _photos(folder: Path) -> Iterator[Pixels]:
+    for path in sorted(folder.glob("*")):
+        if path.suffix.lower() in _PICTURES:
+            yield read_picture(path)
+
+
+def _picture(folder: Path, name: str, place: str) -> Pixels:
+    try:
+        return read_picture(folder / name)
+    except ConfigError as error:
+        raise ConfigError(f"{place}: {error}") from None
+
+
+def _rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield 'FILE, row N' and the values of each row; nothing if there is no such file."""
+    if not path.exists():
+        return
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        table = csv.DictReader(file)
+        missing = [name for name in columns if name not in (table.fieldnames or ())]
+        if missing:
+            raise ConfigError(f"{path}: has no column {missing[0]!r}; it needs {','.join(columns)}")
+        for row in table:
+            values = {name: (row[name] or "").strip() for name in columns}
+            yield f"{path}, row {table.line_num}", values

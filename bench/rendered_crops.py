@@ -1,0 +1,392 @@
+"""Labelled crops from fresh renders: markers, identifiers, panels and backgrounds.
+
+A gate camera stands a few metres from the container. Cameras here are therefore aimed at single
+markers, identifiers and damages from there, in small images. One scene gives many crops, because
+its second and further views cost a fifth of the first.
+"""
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from multiprocessing import get_context
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import Config, Generator
+from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, MARKER_CLASSES
+from fastgen.config.cameras import direction_from, face_frame
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
+from fastgen.geometry.damage_law import deform
+from fastgen.geometry.shape_library import SHAPES
+from fastgen.labels.objects import decal_of
+from fastgen.sample import Object, Sample
+from fastgen.sampling.scene import stream
+from fastgen.scene import Camera, Decal, Scene
+
+Pixels = NDArray[np.uint8]
+"""RGB picture [H, W, 3]."""
+
+MARKER_PX, PANEL_PX = 48, 64
+"""Sides of the crops of markers and backgrounds, and of panels."""
+
+MARGIN = 0.1
+"""Total margin of a marker's crop, as a share of its box."""
+
+CODE_LENGTH = 11
+"""Characters of an identifier: owner code, serial number, check digit."""
+
+KINDS = ("markers", "texts", "panels")
+
+TRAINING = Config.from_values(
+    {
+        "markings": {"markers_per_face": [2, 10]},
+        "damage": {"probability": 0.8, "count": [2, 5]},
+        "sensor": {
+            "motion": {"probability": 0.2, "extent": [0.001, 0.006]},
+            "exposure_error_ev": [-0.7, 0.7],
+            "white_balance_ev": [-0.15, 0.15],
+            "noise": {"probability": 0.8},
+            "jpeg_quality": [50, 95],
+        },
+    }
+)
+"""More markers and damages than the preset, and the sensor effects of the preset `crane` that are
+not part of a scene's surroundings."""
+
+_FACES = ("front", "back", "door", "no_door")
+_VIEW_PX = 352
+_TEXT_MARGIN_CAPS = 0.7
+_SEEN = 0.9
+_LEAST_CAP_PX = 9.0
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """Crop of an identifier.
+
+    Attributes:
+        pixels: RGB picture [H, W, 3] with a margin around the letters.
+        code: Owner code, serial number and check digit.
+        layout: 'rows', 'block' or 'column'.
+        on_end: True on an end of the container, False on a long side.
+        letters_px: Centres of the letters of `code`, float64 [11, 2], x right and y down.
+        frame_px: Box of all letters x0, y0, x1, y1.
+        cap_px: Height of the capitals.
+    """
+
+    pixels: Pixels
+    code: str
+    layout: str
+    on_end: bool
+    letters_px: NDArray[np.float64]
+    frame_px: tuple[float, float, float, float]
+    cap_px: float
+
+    def framed(self) -> Pixels:
+        """Return the box of the letters with the margin of the real crops, a third of a capital."""
+        height, width = self.pixels.shape[:2]
+        x0, y0, x1, y1 = self.frame_px
+        rim = self.cap_px / 3
+        left, top = max(int(x0 - rim), 0), max(int(y0 - rim), 0)
+        return self.pixels[top : min(int(y1 + rim), height), left : min(int(x1 + rim), width)]
+
+
+@dataclass(eq=False)
+class Crops:
+    """Crops of many scenes.
+
+    Attributes:
+        markers: Crops [MARKER_PX, MARKER_PX, 3] and their classes.
+        backgrounds: Crops of the same size without a marker.
+        texts: Identifiers.
+        panels: Crops [PANEL_PX, PANEL_PX, 3], and the damage class or ''.
+    """
+
+    markers: list[tuple[Pixels, str]] = field(default_factory=list)
+    backgrounds: list[Pixels] = field(default_factory=list)
+    texts: list[Text] = field(default_factory=list)
+    panels: list[tuple[Pixels, str]] = field(default_factory=list)
+
+    def add(self, other: "Crops") -> None:
+        """Append the crops of another set."""
+        for name, mine in vars(self).items():
+            mine += getattr(other, name)
+
+
+def training_crops(
+    seed: int, scenes: range, wanted: Sequence[str], workers: int, config: Config = TRAINING
+) -> Crops:
+    """Render scenes and cut out crops.
+
+    Args:
+        seed: Seed of the scenes.
+        scenes: Indices of the scenes.
+        wanted: Some of KINDS; only views of these are rendered.
+        workers: Processes that render.
+        config: Distribution of the scenes.
+    """
+    share = partial(_crops_of, config, seed, tuple(wanted))
+    shares = [scenes[i :: 4 * workers] for i in range(4 * workers)]
+    shares = [each for each in shares if len(each)]
+    made = Crops()
+    for crops in in_processes(share, shares, workers):
+        made.add(crops)
+    return made
+
+
+def in_processes(task: Any, arguments: Sequence[Any], workers: int) -> Iterator[Any]:
+    """Yield the task's result for each argument, computed by `workers` processes in order."""
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # inherited: one thread per process
+    if workers == 1:
+        yield from map(task, arguments)
+        return
+    # a process with OpenGL or torch must not be forked
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(task, arguments)
+
+
+def _crops_of(config: Config, seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crops:
+    made = Crops()
+    with Generator(config, seed, (_VIEW_PX, _VIEW_PX)) as generator:
+        for index in scenes:
+            scene = generator.scene(index)
+            rng = stream(seed, index, "gap")
+            for kind in wanted:
+                for camera in _cameras(scene, kind, rng):
+                    sample = generator.render(scene=scene, camera=camera)
+                    if kind == "texts":
+                        made.texts += texts_of(sample)
+                    elif kind == "panels":
+                        made.panels += _panels_of(sample, rng)
+                    else:
+                        pairs = marker_objects(sample)
+                        made.markers += [
+                            (square_crop(sample.image, box, MARKER_PX), name) for name, box in pairs
+                        ]
+                        made.backgrounds += _backgrounds_of(sample, rng)
+    return made
+
+
+def _cameras(scene: Scene, kind: str, rng: np.random.Generator) -> Iterator[Camera]:
+    """Yield cameras that are aimed at the scene's markers, identifiers or damages."""
+    if kind == "panels":
+        for damage in scene.damages:
+            if damage.face in _FACES:
+                size = min(max(damage.size_mm), 1500.0) * float(rng.uniform(2.0, 3.5))
+                yield aimed(scene, damage.face, np.array(damage.origin_mm), size, rng)
+        return
+    for face in _FACES:
+        if kind == "texts":
+            for decal in scene.decals:
+                if decal.class_name == "text" and decal.face == face:
+                    size = max(decal.size_mm) * float(rng.uniform(1.15, 1.5))
+                    yield aimed(scene, face, place_mm(scene, decal), size, rng)
+            continue
+        markers = [d for d in scene.decals if d.kind == "marker" and d.face == face]
+        if markers:
+            decal = markers[int(rng.integers(len(markers)))]
+            size = float(np.exp(rng.uniform(np.log(900), np.log(3500))))
+            yield aimed(scene, face, place_mm(scene, decal), size, rng)
+
+
+def place_mm(scene: Scene, decal: Decal) -> NDArray[np.float64]:
+    """Return the position [3] of a decal's centre in the container frame."""
+    mesh = SHAPES.container(scene.container.kind, scene.container.profiles)
+    places, _ = mesh.sheet_to_surface(decal.face, decal.center_mm)
+    place: NDArray[np.float64] = places[0]
+    return place
+
+
+def aimed(
+    scene: Scene, face: str, target_mm: NDArray[Any], size_mm: float, rng: np.random.Generator
+) -> Camera:
+    """Return a camera a few metres away that sees `size_mm` of a face around a point.
+
+    Exposure and sensor effects are those of one of the scene's cameras.
+    """
+    frame = face_frame(face, scene.container.kind)
+    angles = float(rng.uniform(-35, 35)), float(rng.uniform(-15, 25))
+    distance = float(rng.uniform(1800, 6000))
+    position = target_mm + direction_from(frame, *angles) * distance
+    like = scene.cameras[int(rng.integers(len(scene.cameras)))]
+    return replace(
+        like,
+        position_mm=_point(position),
+        target_mm=_point(target_mm),
+        focal_mm=like.sensor_width_mm * distance / size_mm,
+        roll_deg=float(rng.uniform(-4, 4)),
+        lens=None,
+    )
+
+
+def zoomed(camera: Camera, target_mm: NDArray[Any], px_per_mm: float, width_px: int) -> Camera:
+    """Return a camera at the same place, turned to a point, with a given scale there."""
+    distance = float(np.linalg.norm(np.array(camera.position_mm) - target_mm))
+    focal = px_per_mm * distance * camera.sensor_width_mm / width_px
+    return replace(camera, target_mm=_point(target_mm), focal_mm=focal, lens=None)
+
+
+def marker_objects(sample: Sample) -> list[tuple[str, tuple[float, float, float, float]]]:
+    """Return class and box of each marker that is inside the image and hardly occluded."""
+    return [
+        (item.class_name, item.amodal_bbox)
+        for item in sample.objects
+        if item.class_name in MARKER_CLASSES
+        and not item.truncated
+        and item.visible_fraction >= _SEEN
+        and item.amodal_bbox is not None
+        and min(_sides(item.amodal_bbox)) >= MARKER_PX / 2
+    ]
+
+
+def square_crop(image: Pixels, box: Sequence[float], side: int, margin: float = MARGIN) -> Pixels:
+    """Return the square around a box with a margin, scaled to [side, side, 3]."""
+    x0, y0, x1, y1 = box
+    half = max(x1 - x0, y1 - y0) * (1 + margin) / 2
+    left, top = round((x0 + x1) / 2 - half), round((y0 + y1) / 2 - half)
+    size = max(round(2 * half), 1)
+    height, width = image.shape[:2]
+    pad = max(0, -left, -top, left + size - width, top + size - height)
+    if pad:
+        image = cv2.copyMakeBorder(image, pad, pad, pad, pad, cv2.BORDER_REPLICATE).astype(np.uint8)
+    cut = image[top + pad : top + pad + size, left + pad : left + pad + size]
+    way = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
+    return cv2.resize(cut, (side, side), interpolation=way).astype(np.uint8)
+
+
+def _backgrounds_of(sample: Sample, rng: np.random.Generator, count: int = 3) -> list[Pixels]:
+    """Return random squares that overlap no marker."""
+    height, width = sample.view.size[1], sample.view.size[0]
+    boxes = np.array(
+        [i.bbox for i in sample.objects if i.class_name in MARKER_CLASSES and i.bbox], float
+    ).reshape(-1, 4)
+    found = []
+    for _ in range(count):
+        side = float(np.exp(rng.uniform(np.log(24), np.log(160))))
+        x, y = rng.uniform(0, width - side), rng.uniform(0, height - side)
+        apart = (
+            (boxes[:, 0] >= x + side)
+            | (boxes[:, 2] <= x)
+            | (boxes[:, 1] >= y + side)
+            | (boxes[:, 3] <= y)
+        )
+        if apart.all():
+            box = (x, y, x + side, y + side)
+            found.append(square_crop(sample.image, box, MARKER_PX, margin=0.0))
+    return found
+
+
+def texts_of(sample: Sample) -> list[Text]:
+    """Return the identifiers of an image that are inside it and hardly occluded."""
+    found = []
+    for item in sample.objects:
+        if item.class_name != "text" or item.truncated or item.visible_fraction < _SEEN:
+            continue
+        decal = decal_of(sample.scene, item.id)
+        if item.quad and decal.cap_mm * _px_per_mm(item, decal) >= _LEAST_CAP_PX:
+            found.append(_text(sample, item, decal))
+    return found
+
+
+def _text(sample: Sample, item: Object, decal: Decal) -> Text:
+    first = _letters_px(sample, decal)[:CODE_LENGTH]
+    cap = decal.cap_mm * _px_per_mm(item, decal)
+    box = np.array(item.quad).reshape(4, 2)
+    low, high = box.min(axis=0), box.max(axis=0)
+    margin = _TEXT_MARGIN_CAPS * cap
+    width, height = sample.view.size
+    x0, y0 = np.maximum(np.floor(low - margin), 0).astype(int).tolist()
+    x1, y1 = np.minimum(np.ceil(high + margin), (width, height)).astype(int).tolist()
+    corner = np.array([x0, y0])
+    (left, top), (right, bottom) = (low - corner).tolist(), (high - corner).tolist()
+    return Text(
+        sample.image[y0:y1, x0:x1].copy(),
+        item.text.replace(" ", "")[:CODE_LENGTH],
+        _layout(first),
+        decal.face in ("door", "no_door"),
+        first - corner,
+        (left, top, right, bottom),
+        cap,
+    )
+
+
+def _letters_px(sample: Sample, decal: Decal) -> NDArray[np.float64]:
+    """Return the centres of a text's letters in reading order, float64 [N, 2] in pixels."""
+    font = glyph_tiles()[1][decal.font]
+    parts = getattr(decal, "parts", ())
+    arguments = (decal.lines, font, decal.cap_mm, decal.vertical)
+    lettering = layout(*arguments, parts) if parts else layout(*arguments)
+    middle = np.array(lettering.size_mm) / 2
+    centers = np.array(
+        [
+            ((g.x0 + g.x1) / 2, g.y0 + (TILE_BASELINE_CAPS + 0.5) * decal.cap_mm)
+            for g in lettering.glyphs
+            if g.char.isalnum()
+        ]
+    )
+    sheet = (centers - middle) @ decal.turn.T + np.array(decal.center_mm)
+    container = sample.scene.container
+    mesh = SHAPES.container(container.kind, container.profiles)
+    rest, _ = mesh.sheet_to_surface(decal.face, sheet)
+    return sample.view.project(deform(sample.scene.damages, rest))[0]
+
+
+def _px_per_mm(item: Object, decal: Decal) -> float:
+    """Return the smaller scale of a decal, along its lower or its left edge."""
+    upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)
+    across = np.linalg.norm(lower_right - lower_left) / decal.size_mm[0]
+    up = np.linalg.norm(upper_left - lower_left) / decal.size_mm[1]
+    return float(min(across, up))
+
+
+def _layout(letters_px: NDArray[np.float64]) -> str:
+    """Return the layout of a code from the centres of its letters."""
+    across, down = np.abs(letters_px[2] - letters_px[0])
+    if down > across:
+        return "column"
+    drop, advance = letters_px[-1, 1] - letters_px[0, 1], letters_px[2, 0] - letters_px[0, 0]
+    return "rows" if abs(drop) < abs(advance) * 0.8 else "block"
+
+
+def _panels_of(sample: Sample, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
+    """Return a square around each damage, and as large a square of undamaged container."""
+    damaged = np.isin(sample.damage, np.array(DAMAGE_VALUES))
+    height, width = damaged.shape
+    found = []
+    for item in sample.objects:
+        if item.class_name not in DAMAGE_CLASSES or item.bbox is None:
+            continue
+        if item.area < 60 or item.visible_fraction < 0.5:
+            continue
+        side = max(_sides(item.bbox)) * float(rng.uniform(1.2, 3.0))
+        side = min(max(side, 40.0), 0.9 * min(height, width))
+        middle = np.array([item.bbox[0] + item.bbox[2], item.bbox[1] + item.bbox[3]]) / 2
+        corner = middle - side / 2 + rng.uniform(-0.15, 0.15, 2) * side
+        found.append((_square(sample.image, corner, side), item.class_name))
+        for _ in range(12):
+            x, y = rng.uniform(0, (width - side, height - side))
+            area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
+            if (sample.ids[area] > 0).mean() > 0.8 and not damaged[area].any():
+                found.append((_square(sample.image, (x, y), side), ""))
+                break
+    return found
+
+
+def _square(image: Pixels, corner: Any, side: float) -> Pixels:
+    x, y = corner
+    return square_crop(image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
+
+
+def _sides(box: Sequence[float]) -> tuple[float, float]:
+    return box[2] - box[0], box[3] - box[1]
+
+
+def _point(values: NDArray[Any]) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
