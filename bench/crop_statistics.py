@@ -121,7 +121,7 @@ def single_aucs(ours: Array, theirs: Array, names: Sequence[str]) -> dict[str, f
         names: Names of the K statistics.
 
     Returns:
-        AUC of at least 0.5 by name; the direction is left out.
+        AUC by name, at least 0.5: an AUC below is replaced by 1 - AUC.
     """
     found = {name: auc(ours[:, k], theirs[:, k]) for k, name in enumerate(names)}
     found = {name: max(value, 1 - value) for name, value in found.items()}
@@ -131,7 +131,7 @@ def single_aucs(ours: Array, theirs: Array, names: Sequence[str]) -> dict[str, f
 def joint_scores(ours: Array, theirs: Array, seed: int = 0) -> tuple[Array, Array]:
     """Return out-of-fold scores of a logistic regression on all statistics.
 
-    Folds are stratified. Both groups weigh the same, whatever their sizes.
+    Folds are stratified. Both groups have the same total weight.
 
     Args:
         ours: Statistics [N, K] of our pictures.

@@ -303,7 +303,7 @@ SECTIONS: Mapping[str, Callable[[Trial], Measures]] = {
 def _top1(
     model: Classifier, crops: Sequence[Pixels] | NDArray[np.uint8], names: Sequence[str]
 ) -> tuple[Share, list[str]]:
-    """Return the share of right classes, the background left out, and the guesses."""
+    """Return the share of right classes and the guesses. A guess is never the background."""
     shares: Array = model.shares(np.asarray(crops))[:, :_BACKGROUND].astype(float)
     guessed = [MARKER_CLASSES[k] for k in shares.argmax(axis=1)]
     right = sum(a == b for a, b in zip(guessed, names, strict=True))

@@ -1,19 +1,7 @@
 """Labelled real pictures in a folder, for measuring only.
 
-Layout of the folder; every part may be missing:
-
-    placards.csv      file,class,kind            kind is exact or near; near rows are not scored
-    identifiers.csv   file,code,layout,view      layout is rows, block or column
-    damage.csv        pair,kind                  kind is dent or hole
-    damage/NN_pos.jpg, damage/NN_neg.jpg         a damaged and an undamaged panel of each pair
-    look/*.jpg                                   photographs without any marker
-
-`file` is relative to the folder. `class` is one of MARKER_CLASSES. `code` has four capital letters,
-six digits and the check digit. `view` starts with A for an end of the container, and with L or R
-for a long side. Pictures are JPEG or PNG. Further columns are ignored.
-
-A placard is cut out upright: the box of its diamond plus 10 %. An identifier is cut out as the box
-of its letters with a small margin. A panel is a square.
+docs/benchmarks.md describes the layout of the folder. Every part may be missing, and further
+columns of its tables are ignored.
 """
 
 import csv
@@ -174,7 +162,7 @@ def _picture(folder: Path, name: str, place: str) -> Pixels:
 
 
 def _rows(path: Path, columns: Sequence[str]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield 'FILE, row N' and the values of each row; nothing if there is no such file."""
+    """Yield 'FILE, row N' and the values of each row. A missing file has no rows."""
     if not path.exists():
         return
     with path.open(encoding="utf-8-sig", newline="") as file:

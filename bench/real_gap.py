@@ -3,15 +3,8 @@
     python bench/real_gap.py --install                   # once: rapidocr, for the section ocr
     python bench/real_gap.py REAL_DIR [--only markers,identifiers] [--seeds 3]
 
-REAL_DIR holds labelled real pictures. They are only measured, never trained on:
-
-    placards.csv      file,class,kind            kind is exact or near; near rows are not scored
-    identifiers.csv   file,code,layout,view      layout is rows, block or column
-    damage.csv        pair,kind                  kind is dent or hole
-    damage/NN_pos.jpg, damage/NN_neg.jpg         a damaged and an undamaged panel of each pair
-    look/*.jpg                                   photographs without any marker
-
-Each part may be missing; its section is then skipped. real_crops.py describes the columns.
+REAL_DIR holds labelled real pictures, in the layout of docs/benchmarks.md. They are only
+measured, never trained on. Each part may be missing; its section is then skipped.
 
 Sections:
 
@@ -60,7 +53,7 @@ _NEEDS = {
     "damage": ("panels",),
     "statistics": ("photos", "panels", "identifiers"),
 }
-"""Parts of RealCrops of which a section needs at least one."""
+"""Parts of RealCrops for each section. A section needs at least one of its parts."""
 
 _CROPS = {
     "markers": ("markers",),
@@ -149,7 +142,7 @@ def line(name: str, figure: dict[str, Any]) -> str:
 
 
 def show(section: str, figures: dict[str, dict[str, Any]]) -> None:
-    """Print the table of a section; of the statistics, only those that tell most."""
+    """Print the table of a section; of the statistics only the best cues."""
     print(f"\n{section}")
     if section != "statistics":
         print("\n".join(line(name, figure) for name, figure in figures.items()), flush=True)

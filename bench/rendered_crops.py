@@ -127,7 +127,7 @@ def training_crops(
     Args:
         seed: Seed of the scenes.
         scenes: Indices of the scenes.
-        wanted: Some of KINDS; only views of these are rendered.
+        wanted: Kinds of crops to render, from KINDS.
         workers: Processes that render.
         config: Distribution of the scenes.
     """

@@ -34,8 +34,8 @@ class View(NamedTuple):
     Attributes:
         image: RGB pixels [H, W, 3].
         boxes: Boxes of the markers that are inside the image and hardly occluded, [N, 4].
-        classes: Positions of these in MARKER_CLASSES, [N].
-        seen: Boxes of all markers of which a pixel is visible, [M, 4].
+        classes: Position in MARKER_CLASSES of each box's marker, [N].
+        seen: Boxes of all markers with a visible pixel, [M, 4].
     """
 
     image: Pixels

@@ -1,4 +1,4 @@
-"""Read the pictures of a folder with rapidocr: python with_rapidocr.py PICTURES OUT.json.
+"""Reader rapidocr on a folder of pictures: python with_rapidocr.py PICTURES OUT.json.
 
 Writes, for each PNG by name, its texts as [text, x0, y0, x1, y1] with the box in pixels.
 """
