@@ -1,9 +1,10 @@
-// DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample noise):
-// decals over the albedo `paint` at a point of the atlas: albedo, coverage and object id.
-// footprint_mm: width of the lookup on the surface.
+// DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
+// NoiseSample streaks): decals over the albedo `paint` at a point of the atlas: albedo, coverage and
+// object id. footprint_mm: width of the lookup on the surface.
 
 #include "decals.constants"
 #include "tone_curve.glsl"
+#include "worn_art.glsl"
 
 uniform sampler2D decal_table;      // One row per decal; see DecalTables in decal_tables.py.
 uniform sampler2D glyph_table;      // One texel per letter; see GlyphRun in glyph_runs.py.
@@ -66,8 +67,18 @@ float text_coverage(vec2 p, vec4 run, float footprint_mm) {
                glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
 }
 
-// Adds one decal on top of `hit`. worn: share of the ink lost by a decal of wear 1.
-void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm, float worn) {
+// Distance in mm to the ragged line along which corners were torn off, positive on the decal.
+// torn: Shares of the half width and half height that are missing at left, right, top and bottom.
+float inside_tear(vec2 p, vec2 half_size, vec4 torn, NoiseSample coarse) {
+    vec4 to_line = (1.0 - torn) * half_size.xxyy + vec4(p.x, -p.x, -p.y, p.y);
+    to_line = mix(vec4(1e6), to_line, greaterThan(torn, vec4(0.0)));
+    return min(min(to_line.x, to_line.y), min(to_line.z, to_line.w)) +
+           (coarse.value.w - 0.5) * 0.12 * half_size.x;
+}
+
+// Adds one decal on top of `hit`.
+void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
+               NoiseSample streaks) {
     vec4 place = decal_texel(decal, 1);
     vec4 turn = decal_texel(decal, 0);
     vec2 d = atlas_mm - place.xy;
@@ -91,23 +102,30 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
         // Half a level finer, because trilinear filtering widens the footprint by about as much.
         float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
         vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
-        albedo = kind.x == DECAL_EMBLEM ? ink.rgb : srgb_decode(texel.rgb);
         if (kind.x != DECAL_MARKER) alpha *= texel.a;
+        if (kind.x != DECAL_EMBLEM) {
+            float tear_mm = inside_tear(p, place.zw, decal_texel(decal, 4), coarse);
+            vec4 aged = worn_art(srgb_decode(texel.rgb), ink.rgb, ink.a, kind.w, coarse, streaks);
+            alpha *= aged.a * clamp(0.5 + tear_mm / footprint_mm, 0.0, 1.0);
+            albedo = aged.rgb;
+        }
     }
-    alpha *= 1.0 - ink.a * worn;
+    // Painted decals wear off in flakes.
+    if (kind.x != DECAL_MARKER && kind.x != DECAL_STICKER)
+        alpha *= 1.0 - ink.a * covered(coarse.value.w, 0.6, coarse.lost.w, 0.15);
     hit.albedo = mix(hit.albedo, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample noise) {
+DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
+                   NoiseSample streaks) {
     DecalHit hit = DecalHit(paint, 0.0, 0u);
-    float worn = covered(noise.value.w, 0.6, noise.lost.w, 0.15);
     uvec4 cell = cell_at(zone, atlas_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;
     do {
-        if (decal != 0u) add_decal(hit, decal, atlas_mm, footprint_mm, worn);
+        if (decal != 0u) add_decal(hit, decal, atlas_mm, footprint_mm, coarse, streaks);
         ++i;
         uint pair = cell[(i & 7) >> 1];
         decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;

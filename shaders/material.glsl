@@ -60,7 +60,7 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
-    DecalHit decal = decals_at(zone, albedo, atlas_mm, footprint_mm, coarse);
+    DecalHit decal = decals_at(zone, albedo, atlas_mm, footprint_mm, coarse, streaks);
     s.decal_id = decal.id;
 #if SHOWN_DECALS
     albedo = decal.albedo;

@@ -33,7 +33,9 @@ class MarkingsConfig:
         marker_side_mm: Side of the square. IMDG Code 5.2.2.2.1.1 requires 250 mm on containers.
         marker_gap_mm: Gap between markers.
         marker_tilt_deg: Tilt of each marker.
-        marker_wear: Fading and tearing of markers.
+        marker_wear: Scratches, dirt and peeled patches of markers.
+        marker_fade: Bleaching of markers.
+        marker_torn: Probability that a marker has lost a corner, or two.
         fonts: Names of the fonts to draw from; an empty list stands for all bundled fonts.
         cap_mm: Height of an identifier's capitals. ISO 6346 requires 100 mm. Vertical identifiers
             on an end have the lowest height.
@@ -48,7 +50,7 @@ class MarkingsConfig:
         brand_cap_mm: Height of a brand's capitals; it is less than half of this on the ends.
         stickers_per_face: Number of signs and stickers, in addition to the plates that every
             container has.
-        sticker_wear: Fading and tearing of stickers.
+        sticker_wear: Scratches, dirt and peeled patches of stickers.
         height_marks: Probability of striped height marks on a high cube.
     """
 
@@ -57,7 +59,9 @@ class MarkingsConfig:
     marker_side_mm: Annotated[Range, Bounds(40, 5000, "mm")] = Range(250, 300)
     marker_gap_mm: Annotated[Range, LENGTH] = Range(8, 40)
     marker_tilt_deg: Annotated[Range, Bounds(-45, 45, "degrees")] = Range(-2.5, 2.5)
-    marker_wear: Annotated[Range, UNIT] = Range(0.0, 0.35)
+    marker_wear: Annotated[Range, UNIT] = Range(0.0, 0.6)
+    marker_fade: Annotated[Range, UNIT] = Range(0.0, 0.5)
+    marker_torn: Share = 0.12
     fonts: tuple[str, ...] = ()
     cap_mm: Annotated[Range, Bounds(100, 2000, "mm")] = Range(100, 165)
     weights_cap_mm: Annotated[Range, Bounds(50, 1000, "mm")] = Range(50, 62)

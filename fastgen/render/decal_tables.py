@@ -51,9 +51,10 @@ class DecalTables:
             without decals has one row of zeros.
             0. Rotation: cos, sin, -sin, cos.
             1. Placement in the atlas: centre x, centre y, half width, half height, mm.
-            2. Albedo r, g, b; wear.
-            3. Kind, object id, art layer, 0.
-            4. Texts only: cap height in mm, first glyph, number of glyphs, parts per mm.
+            2. Albedo r, g, b, or the tint of markers and stickers; wear.
+            3. Kind, object id, art layer, fade.
+            4. Texts: cap height in mm, first glyph, number of glyphs, parts per mm. Others:
+               `Decal.torn`.
         glyphs: float32 [rows, GLYPH_COLUMNS, 4], the glyphs of all texts in order, see GlyphRun.
     """
 
@@ -93,8 +94,9 @@ def pack_decals(
     letters = 0
     for row, decal, object_id in zip(table, decals, object_ids(scene), strict=False):
         kind = decal.art if decal.art == "stripes" else decal.kind
-        row[2] = *decal.albedo, decal.wear
-        row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), 0
+        row[2] = *(decal.tint if kind in ("marker", "sticker") else decal.albedo), decal.wear
+        row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade
+        row[4] = decal.torn
         if decal.kind == "text":
             run = glyph_run(layout(decal.lines, fonts[decal.font], decal.cap_mm, decal.vertical))
             row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm

@@ -1,6 +1,7 @@
 """Sampling of dangerous-goods markers: the rhombus pattern of the SeaFront paper, section 3.3.3."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> li
     tilts = rng.uniform(*config.marker_tilt_deg, size=count)
     wears = rng.uniform(*config.marker_wear, size=count)
     print_rng = streams(f"marker_prints.{sheet.face}")
-    prints = [str(print_rng.choice(marker_prints()[str(name)])) for name in classes]
+    prints = [_print(config, str(name), print_rng) for name in classes]
     while count > 0:
         # A square turned by t extends side / 2 * (cos t + sin t) toward its neighbour.
         tilt = math.radians(float(np.abs(tilts).max()))
@@ -75,10 +76,31 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> li
                     center_mm=(tenth(x), tenth(y)),
                     size_mm=(diagonal, diagonal),
                     rotation_deg=round(float(tilts[i]), 2),
-                    art=prints[i],
                     wear=round(float(wears[i]), 3),
+                    **prints[i],
                 )
                 for i, (x, y) in enumerate(offsets + shift)
             ]
         count -= 1
     return []
+
+
+def _print(config: MarkingsConfig, class_name: str, rng: np.random.Generator) -> dict[str, Any]:
+    """Sample the appearance of one marker: artwork, tint, bleaching and torn corners."""
+    art = str(rng.choice(marker_prints()[class_name]))
+    tint = rng.uniform(0.86, 0.98) + rng.uniform(-0.02, 0.02, 3)
+    fade = rng.uniform(*config.marker_fade)
+    # The corner with the class digit is held by more paper and is torn less often.
+    corners = rng.permutation(4)[: 1 + int(rng.random() < 0.25)]
+    lost = rng.uniform(0.06, 0.3, 4) * (rng.random() < config.marker_torn)
+    kept_digit = rng.random() < 0.8
+    torn = [
+        round(float(lost[i]), 3) if i in corners and not (i == 3 and kept_digit) else 0.0
+        for i in range(4)
+    ]
+    return {
+        "art": art,
+        "tint": tuple(round(float(part), 3) for part in tint),
+        "fade": round(float(fade), 3),
+        "torn": tuple(torn),
+    }

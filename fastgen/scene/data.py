@@ -147,7 +147,12 @@ class Decal:
         vertical: Whether a text is vertical.
         cap_mm: Height of the capitals of a text.
         albedo: Linear color of texts, emblems and stripes.
-        wear: Share of the ink that has gone.
+        wear: Wear of the print. Texts, emblems and stripes lose this share of their ink in flakes.
+            Markers and stickers are scratched and dirty, and peel off in patches.
+        tint: Linear color that multiplies the artwork of markers and stickers.
+        fade: Bleaching of markers and stickers.
+        torn: Shares of the half width and half height that are torn off a marker or sticker at its
+            left, right, top and bottom. The label keeps the whole decal.
     """
 
     kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind != "stripes"))]
@@ -163,6 +168,9 @@ class Decal:
     cap_mm: Millimetres = 0.0
     albedo: Color = (0.8, 0.8, 0.8)
     wear: Share = 0.0
+    tint: Color = (1.0, 1.0, 1.0)
+    fade: Share = 0.0
+    torn: tuple[Share, Share, Share, Share] = (0.0, 0.0, 0.0, 0.0)
 
     @property
     def text(self) -> str:
