@@ -15,7 +15,14 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import distance_transform_edt
 
 from fastgen.decals.artwork import GLYPH_TILE_SIZE as TILE
-from fastgen.decals.lettering import TILE_BASELINE_CAPS, TILE_CAPS, TILE_RANGE_CAPS
+from fastgen.decals.lettering import (
+    BOX,
+    BOX_MARGIN_CAPS,
+    BOX_STROKE_CAPS,
+    TILE_BASELINE_CAPS,
+    TILE_CAPS,
+    TILE_RANGE_CAPS,
+)
 
 FOLDER = Path(__file__).parent / "fonts"
 CHARS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-./:,&'()+"
@@ -41,13 +48,34 @@ def bake(path: Path) -> dict[str, tuple[np.ndarray, float, float, float]]:
         ImageDraw.Draw(image).text(
             (pen, side - TILE_BASELINE_CAPS * cap_px), char, fill=255, font=font, anchor="ls"
         )
-        ink = np.asarray(image) > 127
-        distance = distance_transform_edt(ink) - distance_transform_edt(~ink)
-        value = 0.5 + distance / cap_px / TILE_RANGE_CAPS
-        tile = value.reshape(TILE, OVERSAMPLING, TILE, OVERSAMPLING).mean(axis=(1, 3))
-        pixels = np.rint(np.clip(tile, 0, 1) * 255).astype(np.uint8)
+        pixels = distances(np.asarray(image) > 127)
         baked[char] = (pixels, left / cap_px, right / cap_px, font.getlength(char) / cap_px)
+    baked[BOX] = box(max(right - left for _, left, right, _ in (baked[c] for c in "0123456789")))
     return baked
+
+
+def box(digit_caps: float) -> tuple[np.ndarray, float, float, float]:
+    """Return the frame around a digit of the given width, in the form of `bake`."""
+    across = np.abs((np.arange(TILE * OVERSAMPLING) + 0.5) / OVERSAMPLING / TILE - 0.5) * TILE_CAPS
+    up = (np.arange(TILE * OVERSAMPLING) + 0.5) / OVERSAMPLING / TILE * TILE_CAPS
+    half_width = digit_caps / 2 + BOX_MARGIN_CAPS
+    # row 0 of the tile is its top
+    half_up = np.abs(TILE_CAPS - up - TILE_BASELINE_CAPS - 0.5)
+    half_height = 0.5 + BOX_MARGIN_CAPS
+    outside = (across[None] > half_width) | (half_up[:, None] > half_height)
+    inner = (across[None] < half_width - BOX_STROKE_CAPS) & (
+        half_up[:, None] < half_height - BOX_STROKE_CAPS
+    )
+    return distances(~outside & ~inner), -half_width, half_width, 2 * half_width
+
+
+def distances(ink: np.ndarray) -> np.ndarray:
+    """Return the tile, uint8 [TILE, TILE], of ink bool [N, N]; 127.5 is on the outline."""
+    cap_px = TILE * OVERSAMPLING / TILE_CAPS
+    signed = distance_transform_edt(ink) - distance_transform_edt(~ink)
+    value = 0.5 + signed / cap_px / TILE_RANGE_CAPS
+    tile = value.reshape(TILE, OVERSAMPLING, TILE, OVERSAMPLING).mean(axis=(1, 3))
+    return np.rint(np.clip(tile, 0, 1) * 255).astype(np.uint8)
 
 
 def main() -> None:

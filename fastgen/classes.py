@@ -10,6 +10,19 @@ MARKER_CLASSES = (
 DETECTION_CLASSES = ("container", "text", *MARKER_CLASSES)
 """The 28 classes of the marker task, in the order of YOLO labels."""
 
+MARK_CLASSES = (
+    "limited_quantity",
+    "environmentally_hazardous",
+    "elevated_temperature",
+    "fumigation_warning",
+    "lithium_battery",
+)
+"""Marks of the IMDG Code that do not tell the class: 3.4.5, 5.2.1.6, 5.3.2.2, 5.5.2.3.2, 5.2.1.10.
+They are drawn and labelled only where a configuration has `markings.marks`."""
+
+ALL_DETECTION_CLASSES = (*DETECTION_CLASSES, *MARK_CLASSES)
+"""Classes of the marker task with the marks; the first 28 are DETECTION_CLASSES."""
+
 DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)

@@ -14,6 +14,22 @@ Keypoint = tuple[float, float, int]
 
 
 @dataclass(frozen=True)
+class LabelledPart:
+    """One part of an identifier in an image.
+
+    Attributes:
+        role: 'owner', 'serial', 'check' or 'type'.
+        text: Its letters.
+        quad: Four corners x0, y0, x1, y1, ... in pixels, clockwise from the upper left corner of
+            the letters. The frame around a check digit belongs to it.
+    """
+
+    role: str
+    text: str
+    quad: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Object:
     """One labelled object in one image, in the pixel coordinates of camera/projection.py.
 
@@ -40,6 +56,8 @@ class Object:
             the marker's left corner. Empty for other objects, and for decals that are partly behind
             the camera.
         reading: 'horizontal', or 'vertical' if the letters are below one another; '' without text.
+        parts: Parts of an identifier in reading order; empty for other objects, and for decals that
+            are partly behind the camera.
         keypoints: Casting corners of the container in the order of labels.objects.CASTINGS.
     """
 
@@ -57,6 +75,7 @@ class Object:
     polygon: tuple[float, ...] = ()
     quad: tuple[float, ...] = ()
     reading: str = ""
+    parts: tuple[LabelledPart, ...] = ()
     keypoints: tuple[Keypoint, ...] = ()
 
 

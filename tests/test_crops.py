@@ -7,13 +7,12 @@ import numpy as np
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.labels.crops import text_crops
-from fastgen.labels.objects import decal_of
 
 
 def letters_of(decal):
     """Yield decals of one letter each with the same ink as `decal`."""
     font = glyph_tiles()[1][decal.font]
-    whole = layout(decal.lines, font, decal.cap_mm, decal.vertical)
+    whole = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
     assert decal.rotation_deg == 0
     for glyph in whole.glyphs:
         alone = layout((glyph.char,), font, decal.cap_mm)
@@ -24,6 +23,7 @@ def letters_of(decal):
         yield replace(
             decal,
             lines=(glyph.char,),
+            parts=(),
             vertical=False,
             size_mm=alone.size_mm,
             center_mm=tuple((np.array(decal.center_mm) + center).tolist()),
@@ -31,27 +31,32 @@ def letters_of(decal):
 
 
 def test_no_letter_of_a_crop_is_mostly_hidden(generators):
+    """Identifiers that are moved along the door disappear in part behind locking bars."""
     kept = hidden = 0
-    generator = generators(seed=21, size=(640, 640), quality="draft")
-    for index in (2, 19, 24, 5):
-        sample = generator.render(index=index, camera="Cr")
-        crops = {item.id for item, _ in text_crops(sample, 10.0)}
-        texts = [t for t in sample.objects if t.text and t.visible_fraction > 0.85]
-        for item in (t for t in texts if not t.truncated):
-            decal = decal_of(sample.scene, item.id)
-            if item.id not in crops and decal.face != "door":
-                continue  # seen at a slant, too small
-            scene = replace(sample.scene, decals=tuple(letters_of(decal)))
-            letters = generator.render(scene=scene, camera="Cr").objects
-            least = min(letter.visible_fraction for letter in letters if letter.text)
-            if item.id in crops:
-                assert least > 0.4
+    generator = generators(seed=21, size=(1024, 1024), quality="draft")
+    for index in (2, 19):
+        scene = generator.scene(index)
+        (decal,) = (d for d in scene.decals if d.face == "door" and d.class_name == "text")
+        for shift_mm in (0.0, -60.0, -90.0, -130.0):
+            x, y = decal.center_mm
+            moved = replace(decal, center_mm=(x + shift_mm, y))
+            sample = generator.render(scene=replace(scene, decals=(moved,)), camera="Cr")
+            (item,) = (t for t in sample.objects if t.text)
+            if item.truncated or item.visible_fraction <= 0.85:
+                continue
+            letters = generator.render(
+                scene=replace(scene, decals=tuple(letters_of(moved))), camera="Cr"
+            )
+            least = min(t.visible_fraction for t in letters.objects if t.text)
+            if any(True for _ in text_crops(sample, 10.0)):
+                # a column of pixels is a fifth of a narrow letter
+                assert least > 0.3
                 kept += 1
             else:
-                assert least < 0.6
+                assert least < 0.7
                 hidden += 1
-    assert kept >= 1
-    assert hidden >= 3
+    assert kept >= 2
+    assert hidden >= 2
 
 
 def test_a_text_hidden_by_more_than_a_seventh_is_not_cropped(generators):

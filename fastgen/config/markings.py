@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from fastgen.classes import ALL_DETECTION_CLASSES, DETECTION_CLASSES, MARK_CLASSES
+from fastgen.config.identifiers import IdentifierConfig
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.validation import (
@@ -27,6 +29,7 @@ class MarkingsConfig:
 
     Attributes:
         marker_faces: Faces with dangerous-goods markers.
+        marked_containers: Share of the containers that carry markers. At a gate, most carry none.
         markers_per_face: Number of markers on each of these faces; all numbers are equally likely.
             Fewer are placed if there is no room, as is frequent beside the texts and plates
             of doors.
@@ -36,14 +39,16 @@ class MarkingsConfig:
         marker_wear: Scratches, dirt and peeled patches of markers.
         marker_fade: Bleaching of markers.
         marker_torn: Probability that a marker has lost a corner, or two.
+        marks: Probability of each mark of the IMDG Code on a container. A mark is on all
+            marker_faces, but the fumigation warning is on the door alone. Marks that are not named
+            are not drawn. If any is named, the marker task has all five as its classes 28 to 32.
         fonts: Names of the fonts to draw from; an empty list stands for all bundled fonts.
-        cap_mm: Height of an identifier's capitals. ISO 6346 requires 100 mm. Vertical identifiers
-            on an end have the lowest height.
+        cap_mm: Height of an identifier's capitals. ISO 6346 requires 100 mm. Identifiers on
+            the door have the lowest height.
         weights_cap_mm: Height of the capitals of the weights on the door. ISO 6346 requires 50 mm.
         text_wear: Wear of identifiers and weights.
         second_identifier: Probability of a second identifier on the same long side.
-        vertical: Probability that an identifier is vertical. On no_door, 0.6 of the others are
-            vertical as well; on the roof, none is.
+        identifiers: Layouts and codes of identifiers.
         colored_lettering: Probability of colored lettering; otherwise it is white or black.
         brand: Probability of a brand by face, th_alpha of Algorithm A1.
         main_text: Probability of another large text by face, th_beta of Algorithm A1.
@@ -55,6 +60,7 @@ class MarkingsConfig:
     """
 
     marker_faces: tuple[_Face, ...] = ("front", "back", "door", "no_door")
+    marked_containers: Share = 1.0
     markers_per_face: Annotated[tuple[int, int], Bounds(0, 300)] = (1, 6)
     marker_side_mm: Annotated[Range, Bounds(40, 5000, "mm")] = Range(250, 300)
     marker_gap_mm: Annotated[Range, LENGTH] = Range(8, 40)
@@ -62,12 +68,13 @@ class MarkingsConfig:
     marker_wear: Annotated[Range, UNIT] = Range(0.0, 0.6)
     marker_fade: Annotated[Range, UNIT] = Range(0.0, 0.5)
     marker_torn: Share = 0.12
+    marks: dict[Annotated[str, OneOf(MARK_CLASSES)], Share] = field(default_factory=dict)
     fonts: tuple[str, ...] = ()
     cap_mm: Annotated[Range, Bounds(100, 2000, "mm")] = Range(100, 165)
     weights_cap_mm: Annotated[Range, Bounds(50, 1000, "mm")] = Range(50, 62)
     text_wear: Annotated[Range, UNIT] = Range(0.0, 0.4)
     second_identifier: Share = 0.45
-    vertical: Share = 0.3
+    identifiers: IdentifierConfig = field(default_factory=IdentifierConfig)
     colored_lettering: Share = 0.12
     brand: dict[_Face, Share] = field(
         default_factory=lambda: {"front": 0.6, "back": 0.6, "door": 0.35, "no_door": 0.3}
@@ -79,6 +86,11 @@ class MarkingsConfig:
     stickers_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 4)
     sticker_wear: Annotated[Range, UNIT] = Range(0.0, 0.5)
     height_marks: Share = 0.85
+
+    @property
+    def detection_classes(self) -> tuple[str, ...]:
+        """Classes of the marker task, in the order of YOLO labels."""
+        return ALL_DETECTION_CLASSES if self.marks else DETECTION_CLASSES
 
     def __post_init__(self) -> None:
         """Refuse unknown fonts and repeated faces."""

@@ -12,6 +12,10 @@ _LETTER_VALUES = dict(
 )
 
 
+_CATEGORY_SHARES = (0.96, 0.02, 0.02)
+"""Frequency of the equipment categories U, J and Z in random owner codes."""
+
+
 @dataclass(frozen=True)
 class Identifier:
     """Identifier of one container.
@@ -60,13 +64,19 @@ def sample_identifier(
 
     Args:
         rng: Random generator.
-        owner_codes: Owner codes to choose from, all equally likely.
+        owner_codes: Owner codes to choose from, all equally likely. If there are none, the first
+            three letters are random, and the fourth is mostly U (freight containers), rarely J
+            (detachable equipment) or Z (trailers).
         size_type: Size-type code of the container.
 
     Returns:
         Identifier with a valid check digit.
     """
-    owner = str(rng.choice(owner_codes))
+    if owner_codes:
+        owner = str(rng.choice(owner_codes))
+    else:
+        owner = "".join(rng.choice(list(_LETTER_VALUES), size=3))
+        owner += str(rng.choice(list("UJZ"), p=_CATEGORY_SHARES))
     while True:
         serial = f"{int(rng.integers(1_000_000)):06d}"
         remainder = _remainder(owner + serial)

@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from fastgen.decals.artwork import Font
 from fastgen.errors import AssetError
+from fastgen.validation import Bounds, Flag, OneOf
+
+_WITHIN = Bounds(-1e5, 1e5, "mm")
 
 TILE_CAPS = 1.6
 """Side of the square that a glyph's tile covers, in cap heights; ink is centred horizontally."""
@@ -25,6 +28,63 @@ COLUMN_PITCH_CAPS = 1.6
 
 GLYPH_PITCH_CAPS = 1.35
 """Distance between the baselines of the glyphs of a column, in cap heights."""
+
+
+BOX = "\N{WHITE RECTANGLE}"
+"""Character of the frame around a check digit, in every font."""
+
+BOX_MARGIN_CAPS = 0.15
+"""Distance from a digit's capitals or widest ink to the outside of its frame, in cap heights."""
+
+BOX_STROKE_CAPS = 0.06
+"""Width of the frame's line, in cap heights."""
+
+PART_ROLES = ("owner", "serial", "check", "type")
+"""Parts of an identifier: owner code, serial number, check digit, size-type code."""
+
+
+@dataclass(frozen=True)
+class TextPart:
+    """One part of a text with its own place, for example the serial number of an identifier.
+
+    Attributes:
+        role: One of PART_ROLES, or '' for a part without a label.
+        text: The letters; spaces are gaps.
+        x_mm: Left end of the letters' ink, from the left end of the decal.
+        y_mm: Lowest baseline, from the lower end of the decal.
+        vertical: True if the letters are below one another, centred in their column.
+        pitch_mm: Distance between the centres of neighbouring letters, or between their baselines
+            in a vertical part; 0 for the font's own spacing.
+        boxed: True for a frame around the part, which must be a single character.
+    """
+
+    role: Annotated[str, OneOf(("", *PART_ROLES))]
+    text: str
+    x_mm: Annotated[float, _WITHIN]
+    y_mm: Annotated[float, _WITHIN]
+    vertical: Flag = False
+    pitch_mm: Annotated[float, Bounds(0.0, 1e5, "mm")] = 0.0
+    boxed: Flag = False
+
+
+class PartBox(NamedTuple):
+    """Tight box of a part with its frame, in mm from the lower left corner of the text.
+
+    Attributes:
+        role: Role of the part.
+        text: Its letters.
+        x0: Left end.
+        y0: Lower end.
+        x1: Right end.
+        y1: Upper end.
+    """
+
+    role: str
+    text: str
+    x0: float
+    y0: float
+    x1: float
+    y1: float
 
 
 class PlacedGlyph(NamedTuple):
@@ -52,16 +112,25 @@ class Lettering:
     """Layout of one text.
 
     Attributes:
-        size_mm: Width of the ink, and height from the lowest baseline to the capitals' tops.
-        glyphs: Glyphs of all characters except spaces.
+        size_mm: Width of the ink, and height from the lowest baseline to the capitals' tops,
+            frames included.
+        glyphs: Glyphs of all characters except spaces, and of frames.
+        parts: Boxes of the parts, empty for a text without parts.
     """
 
     size_mm: tuple[float, float]
     glyphs: tuple[PlacedGlyph, ...]
+    parts: tuple[PartBox, ...] = ()
 
 
 @lru_cache(maxsize=64)  # Sampling, renderer and labels lay out the same texts.
-def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = False) -> Lettering:
+def layout(
+    lines: tuple[str, ...],
+    font: Font,
+    cap_mm: float,
+    vertical: bool = False,
+    parts: tuple[TextPart, ...] = (),
+) -> Lettering:
     """Lay out a text.
 
     Args:
@@ -70,6 +139,8 @@ def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = F
         cap_mm: Height of the capitals.
         vertical: False for left-aligned lines, the first at the top. True for columns from left to
             right: upright glyphs one below the other, centred in their column.
+        parts: Places of the parts of the text. If given, they decide the layout, and `lines` and
+            `vertical` are not used.
 
     Returns:
         Size of the text and position of each glyph.
@@ -77,27 +148,83 @@ def layout(lines: tuple[str, ...], font: Font, cap_mm: float, vertical: bool = F
     Raises:
         AssetError: The font has no glyph for a character.
     """
-    for char in "".join(lines):
+    for char in "".join(part.text for part in parts) if parts else "".join(lines):
         if char not in font.glyphs and char != " ":
             raise AssetError(f"font {font.name}: no glyph for {char!r}; use other characters")
+    if parts:
+        return _laid_out(parts, font, cap_mm)
     place = _columns if vertical else _rows
     inks = place(lines, font)
-    right = max(x + width for _, x, _, width in inks)
-    left = min(x for _, x, _, _ in inks)
-    bottom = min(y for _, _, y, _ in inks)
-    top = max(y for _, _, y, _ in inks) + 1.0
-    glyphs = []
-    for char, x, y, width in inks:
-        x0 = (x - left + width / 2 - TILE_CAPS / 2) * cap_mm
-        y0 = (y - bottom - TILE_BASELINE_CAPS) * cap_mm
-        side = TILE_CAPS * cap_mm
-        glyphs.append(PlacedGlyph(char, font.glyphs[char].tile, x0, y0, x0 + side, y0 + side))
-    size = (round((right - left) * cap_mm, 1), round((top - bottom) * cap_mm, 1))
-    return Lettering(size, tuple(glyphs))
+    x0, y0, x1, y1 = _bounds(inks)
+    moved = [ink._replace(x=(ink.x - x0), y=(ink.y - y0)) for ink in inks]
+    size = (round((x1 - x0) * cap_mm, 1), round((y1 - y0) * cap_mm, 1))
+    return Lettering(size, tuple(_placed(ink, font, cap_mm) for ink in moved))
 
 
-_Ink = tuple[str, float, float, float]
-"""Character, left end of the ink, baseline and ink width, in cap heights."""
+class _Ink(NamedTuple):
+    """Ink of one glyph, in cap heights."""
+
+    char: str
+    x: float
+    """Left end."""
+    y: float
+    """Baseline."""
+    width: float
+
+
+def _laid_out(parts: Sequence[TextPart], font: Font, cap_mm: float) -> Lettering:
+    glyphs: list[PlacedGlyph] = []
+    boxes = []
+    for part in parts:
+        inks = _part_inks(part, font, cap_mm)
+        x0, y0, x1, y1 = (value * cap_mm for value in _bounds(inks))
+        if part.boxed:
+            frame = font.glyphs[BOX]
+            width = frame.ink_right - frame.ink_left
+            (letter,) = inks
+            # the frame comes first: the shader takes the first of two glyphs at one place
+            inks.insert(0, _Ink(BOX, letter.x + (letter.width - width) / 2, letter.y, width))
+            x0 = inks[0].x * cap_mm
+            x1 = x0 + width * cap_mm
+            y0, y1 = y0 - BOX_MARGIN_CAPS * cap_mm, y1 + BOX_MARGIN_CAPS * cap_mm
+        glyphs += [_placed(ink, font, cap_mm) for ink in inks]
+        boxes.append(PartBox(part.role, part.text, x0, y0, x1, y1))
+    size = (round(max(box.x1 for box in boxes), 1), round(max(box.y1 for box in boxes), 1))
+    return Lettering(size, tuple(glyphs), tuple(boxes))
+
+
+def _part_inks(part: TextPart, font: Font, cap_mm: float) -> list[_Ink]:
+    inks = (_columns if part.vertical else _rows)((part.text,), font)
+    if part.pitch_mm:
+        pitch = part.pitch_mm / cap_mm
+        places = [i for i, char in enumerate(part.text) if char != " "]
+        if part.vertical:
+            inks = [ink._replace(y=-i * pitch) for i, ink in zip(places, inks, strict=True)]
+        else:
+            inks = [
+                ink._replace(x=i * pitch - ink.width / 2)
+                for i, ink in zip(places, inks, strict=True)
+            ]
+    left, low, _, _ = _bounds(inks)
+    right, up = part.x_mm / cap_mm - left, part.y_mm / cap_mm - low
+    return [ink._replace(x=ink.x + right, y=ink.y + up) for ink in inks]
+
+
+def _bounds(inks: Sequence[_Ink]) -> tuple[float, float, float, float]:
+    """Return left, lowest baseline, right and capitals' top of inks, in cap heights."""
+    return (
+        min(ink.x for ink in inks),
+        min(ink.y for ink in inks),
+        max(ink.x + ink.width for ink in inks),
+        max(ink.y for ink in inks) + 1.0,
+    )
+
+
+def _placed(ink: _Ink, font: Font, cap_mm: float) -> PlacedGlyph:
+    x0 = (ink.x + ink.width / 2 - TILE_CAPS / 2) * cap_mm
+    y0 = (ink.y - TILE_BASELINE_CAPS) * cap_mm
+    side = TILE_CAPS * cap_mm
+    return PlacedGlyph(ink.char, font.glyphs[ink.char].tile, x0, y0, x0 + side, y0 + side)
 
 
 def _rows(lines: Sequence[str], font: Font) -> list[_Ink]:
@@ -110,7 +237,7 @@ def _rows(lines: Sequence[str], font: Font) -> list[_Ink]:
                 continue
             glyph = font.glyphs[char]
             width = glyph.ink_right - glyph.ink_left
-            inks.append((char, pen + glyph.ink_left, -row * LINE_PITCH_CAPS, width))
+            inks.append(_Ink(char, pen + glyph.ink_left, -row * LINE_PITCH_CAPS, width))
             pen += glyph.advance
     return inks
 
@@ -124,6 +251,6 @@ def _columns(lines: Sequence[str], font: Font) -> list[_Ink]:
                 y -= 0.6
                 continue
             width = font.glyphs[char].ink_right - font.glyphs[char].ink_left
-            inks.append((char, column * COLUMN_PITCH_CAPS - width / 2, y, width))
+            inks.append(_Ink(char, column * COLUMN_PITCH_CAPS - width / 2, y, width))
             y -= GLYPH_PITCH_CAPS
     return inks

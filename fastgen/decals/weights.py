@@ -30,17 +30,7 @@ def weight_lines(kind: str, rng: np.random.Generator) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def split_entry(line: str, count: int) -> tuple[str, ...]:
-    """Split one line of the weights panel into shorter lines.
-
-    Args:
-        line: A line from `weight_lines`.
-        count: 2 to put name and metric value before the imperial value, 3 for a line each.
-
-    Returns:
-        The shorter lines.
-    """
+def entries(line: str) -> tuple[str, str, str]:
+    """Return name, metric value and imperial value of a line from `weight_lines`."""
     words = line.split(" ")
-    name, metric, imperial = words[:-4], words[-4:-2], words[-2:]
-    rows = (name + metric, imperial) if count == 2 else (name, metric, imperial)
-    return tuple(" ".join(row) for row in rows)
+    return " ".join(words[:-4]), " ".join(words[-4:-2]), " ".join(words[-2:])

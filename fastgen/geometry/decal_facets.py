@@ -11,6 +11,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import PartBox, layout
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.decal_outlines import Outlines
 from fastgen.geometry.facets import Facets, clip, padded
@@ -109,6 +111,36 @@ class DecalSurface:
         for face in {self.decals[row].face for row in np.flatnonzero(lost.any(axis=1))}:
             off = lost & np.array([decal.face == face for decal in self.decals])[:, None]
             rest[off], _ = mesh.sheet_to_surface(face, edges[off])
+        return deform(self._damages, rest)
+
+    @cached_property
+    def parts(self) -> list[tuple[int, PartBox]]:
+        """Index into `decals` and box of each labelled part of a text, in scene order."""
+        fonts = glyph_tiles()[1]
+        found = []
+        for row, decal in enumerate(self.decals):
+            if decal.parts:
+                font, upright = fonts[decal.font], decal.vertical
+                text = layout(decal.lines, font, decal.cap_mm, upright, decal.parts)
+                found += [(row, box) for box in text.parts if box.role]
+        return found
+
+    @cached_property
+    def part_corners_mm(self) -> Array:
+        """Corners float64 [P, 4, 3] of `parts` after damage, clockwise from the upper left."""
+        rest = np.zeros((len(self.parts), 4, 3))
+        faces = np.array([self.decals[row].face for row, _ in self.parts])
+        sheet = np.zeros((len(self.parts), 4, 2))
+        for corners, (row, box) in zip(sheet, self.parts, strict=True):
+            decal = self.decals[row]
+            local = np.array(
+                [[box.x0, box.y1], [box.x1, box.y1], [box.x1, box.y0], [box.x0, box.y0]]
+            )
+            corners[:] = (local - np.array(decal.size_mm) / 2) @ decal.turn.T + decal.center_mm
+        for face in set(faces.tolist()):
+            here = faces == face
+            points, _ = self._mesh.sheet_to_surface(face, sheet[here].reshape(-1, 2))
+            rest[here] = points.reshape(-1, 4, 3)
         return deform(self._damages, rest)
 
     @cached_property

@@ -13,7 +13,9 @@ from fastgen.geometry.mesh import Chart
 from fastgen.geometry.unfold import Patch, Sheet, beside, box, breaks, prism, regular
 
 BAR_RADIUS_MM = 17.0
-BAR_Y_MM = (-825.0, -275.0, 275.0, 825.0)
+BAR_Y_MM = (-545.0, -130.0, 130.0, 545.0)
+"""Positions of the locking bars. Between the outer ones and the edges, a leaf has room for a serial
+number."""
 
 _BAR_INSET_MM = 31.0
 _BAR_END_MM = 50.0
@@ -49,7 +51,7 @@ def gear(layout: Layout) -> list[Sheet]:
     place = opening(layout)
     sheets = []
     for i, y in enumerate(BAR_Y_MM):
-        inner = np.sign(y) * -1 if abs(y) > 500 else np.sign(y)
+        inner = np.sign(y) * -1 if abs(y) > 300 else np.sign(y)
         parts = {
             "bar": (beside([_bar(layout, place, y)]), "galvanized"),
             "cams": (beside(_cams(layout, place, y, -np.sign(y))), "galvanized"),
@@ -119,8 +121,8 @@ def _handle(place: Opening, y: float, toward: float) -> list[Patch]:
 
     Levers of neighbouring bars have different heights, so that they can overlap.
     """
-    z = 1120.0 if abs(y) > 500 else 980.0
-    end = y + toward * 470.0
+    z = 1120.0 if abs(y) > 300 else 980.0
+    end = y + toward * 300.0
     return [
         _block(place, (y - 23, y + 23), (z - 34, z + 34), (_FRONT_MM + 0.5, DOOR_FACE_MM)),
         _block(place, (y, end), (z - 14, z + 14), (22.0, 34.0)),

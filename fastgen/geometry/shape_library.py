@@ -6,6 +6,7 @@ import numpy as np
 
 from fastgen.geometry.container import NOMINAL_PROFILES, build_container, container_outline
 from fastgen.geometry.divided_mesh import LENS_EDGE_MM, divided
+from fastgen.geometry.door_clearance import DoorClearance, door_clearance
 from fastgen.geometry.facets import Facets, in_fours, mesh_facets
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.ray_triangles import RayTriangles
@@ -92,6 +93,7 @@ class ShapeLibrary:
     def __init__(self) -> None:
         self._containers = lru_cache(CONTAINER_SHAPES)(build_container)
         self._outlines = lru_cache(CONTAINER_SHAPES)(container_outline)
+        self._clearances = lru_cache(CONTAINER_SHAPES)(door_clearance)
         self._touching = lru_cache(SPREADER_SHAPES)(touching_spreader)
         self._spreaders = lru_cache(SPREADER_SHAPES)(self._spreader)
 
@@ -102,6 +104,10 @@ class ShapeLibrary:
     def container_outline(self, kind: str, profiles: WallProfiles = NOMINAL_PROFILES) -> Mesh:
         """Return the same surface with as few triangles as possible."""
         return self._outlines(kind, profiles)
+
+    def door_clearance(self, kind: str, profiles: WallProfiles = NOMINAL_PROFILES) -> DoorClearance:
+        """Return the map of the door's sheet that locking gear covers."""
+        return self._clearances(self.container(kind, profiles))
 
     def spreader(
         self, kind: str, flippers_down: tuple[bool, bool], gap_mm: float = USUAL_GAP_MM

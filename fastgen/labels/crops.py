@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +11,7 @@ from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
-from fastgen.sample import Object, Sample
+from fastgen.sample import LabelledPart, Object, Sample
 from fastgen.scene import Decal
 
 _CROP_MARGIN_PX = 3
@@ -48,6 +49,29 @@ def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDA
         )
 
 
+def part_crop(image: NDArray[np.uint8], part: LabelledPart) -> NDArray[np.uint8]:
+    """Return the upright pixels of one part of a text, uint8 [h, w, 3].
+
+    Args:
+        image: The image that the part is in, uint8 [H, W, 3].
+        part: The part; its quadrilateral becomes a rectangle with a small margin.
+    """
+    quad = np.array(part.quad).reshape(4, 2)
+    upper_left, upper_right, lower_right, lower_left = quad
+    right = (upper_right + lower_right - upper_left - lower_left) / 2
+    down = (lower_left + lower_right - upper_left - upper_right) / 2
+    # pixel i of the crop has its centre at i + 0.5, as in the image; OpenCV counts from centres
+    low = _CROP_MARGIN_PX - 0.5
+    across, up = (max(round(float(np.linalg.norm(side))), 2) for side in (right, down))
+    inner = low + np.array([[0, 0], [across, 0], [across, up], [0, up]])
+    matrix = cv2.getPerspectiveTransform((quad - 0.5).astype(np.float32), inner.astype(np.float32))
+    size = (across + 2 * _CROP_MARGIN_PX, up + 2 * _CROP_MARGIN_PX)
+    warped = cv2.warpPerspective(
+        image, matrix, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return np.asarray(warped, np.uint8)
+
+
 def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
     """Test whether a text is large enough along both sides, inside the image, and hardly occluded.
 
@@ -68,7 +92,7 @@ def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
 def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
     """Return the smallest visible share of any letter; a locking bar can hide an I."""
     font = glyph_tiles()[1][decal.font]
-    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical)
+    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
     middle = np.array(lettering.size_mm) / 2
     steps = (np.arange(_LETTER_POINTS) + 0.5) / _LETTER_POINTS - 0.5
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)

@@ -6,14 +6,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.camera.projection import View
 from fastgen.classes import CONTAINER_ID, SPREADER_ID
+from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
 from fastgen.geometry.facets import Facets, mesh_facets
 from fastgen.geometry.prepared_scene import CORNER_SIGNS
 from fastgen.labels.coverage import boxes, covered, facing, project
 from fastgen.labels.damage import damage_objects
 from fastgen.labels.visibility import Shot, float_boxes, visibility
-from fastgen.sample import Keypoint, Object
+from fastgen.sample import Keypoint, LabelledPart, Object
 from fastgen.scene import Decal, Scene
 from fastgen.scene.limits import MM, NEAR_M
 from fastgen.scene.object_ids import object_ids
@@ -51,7 +53,12 @@ def decal_of(scene: Scene, object_id: int) -> Decal:
 
 
 def label(shot: Shot) -> list[Object]:
-    """Return all labelled objects of one image, including those that are not visible."""
+    """Return all labelled objects of one image, including those that are not visible.
+
+    A scene without a container has none.
+    """
+    if not shot.scene.container.present:
+        return []
     return [_container(shot), *_spreader(shot), *damage_objects(shot), *_decals(shot)]
 
 
@@ -81,6 +88,7 @@ def _decals(shot: Shot) -> list[Object]:
     outlines = edges.reshape(count, -1).tolist()
     # the outline's corners, clockwise from the upper left in reading direction
     quads = edges[:, ::EDGE_POINTS][:, ::-1].reshape(count, -1).tolist()
+    parts = _parts(surface, view)
     counts: dict[str, int] = {}
     objects = []
     for row, i in enumerate(labelled.tolist()):
@@ -99,10 +107,22 @@ def _decals(shot: Shot) -> list[Object]:
                 polygon=tuple(outlines[row]) if before[row] else (),
                 quad=tuple(quads[row]) if before[row] else (),
                 reading=("vertical" if decal.vertical else "horizontal") if decal.text else "",
+                parts=tuple(parts.get(row, ())) if before[row] else (),
                 **visibility(shot.config, area, hidden[row], int(alone.beyond[row])),
             )
         )
     return objects
+
+
+def _parts(surface: DecalSurface, view: View) -> dict[int, list[LabelledPart]]:
+    """Return the labelled parts of texts by index of their decal."""
+    found: dict[int, list[LabelledPart]] = {}
+    if surface.parts:
+        pixels, _ = view.project(surface.part_corners_mm)
+        quads = np.round(pixels, 2).reshape(-1, 8).tolist()
+        for (row, box), quad in zip(surface.parts, quads, strict=True):
+            found.setdefault(row, []).append(LabelledPart(box.role, box.text, tuple(quad)))
+    return found
 
 
 def _container(shot: Shot) -> Object:

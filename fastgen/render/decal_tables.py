@@ -98,7 +98,8 @@ def pack_decals(
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade
         row[4] = decal.torn
         if decal.kind == "text":
-            run = glyph_run(layout(decal.lines, fonts[decal.font], decal.cap_mm, decal.vertical))
+            font, upright = fonts[decal.font], decal.vertical
+            run = glyph_run(layout(decal.lines, font, decal.cap_mm, upright, decal.parts))
             row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm
             letters += len(run.glyphs)
             runs.append(run)

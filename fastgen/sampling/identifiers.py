@@ -1,99 +1,163 @@
-"""Sampling of identifiers (ISO 6346) and of the weights panel on the door."""
+"""Sampling of identifiers (ISO 6346)."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
-from fastgen.decals.iso6346 import Identifier
-from fastgen.decals.weights import split_entry, weight_lines
-from fastgen.sampling.lettering_style import Streams, Style, placed, text_decal
-from fastgen.sampling.sheet import EDGE_MM, GAP_MM, Sheet, between, tenth
+from fastgen.decals.identifier_layout import (
+    LAYOUTS,
+    TYPE_PLACES,
+    Form,
+    identifier_lines,
+    identifier_parts,
+)
+from fastgen.decals.lettering import GLYPH_PITCH_CAPS, Lettering
+from fastgen.sampling.lettering_style import Streams, Style, in_any_font, part_text, placed
+from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
 from fastgen.scene import Decal, Vec2
 from fastgen.validation import Range
 
+_TRIES = 12
+"""Positions tried for rows on both sides of a locking bar."""
 
-def _identifier_lines(identifier: Identifier, form: int) -> tuple[str, ...]:
-    owner, serial, check = identifier.owner, identifier.serial, identifier.check
-    if form == 0:
-        return (f"{owner} {serial} {check}", identifier.size_type)
-    if form == 1:
-        return (owner, f"{serial} {check}", identifier.size_type)
-    return (f"{owner} {serial[:3]}", f"{serial[3:]} {check}", identifier.size_type)
+_BAR_GAP_MM = Range(15, 60)
+"""Distance of letters from a locking bar between them."""
+
+_COLUMN_CAPS = 17.0
+"""Height of the tallest column in cap heights."""
 
 
 def sample_identifiers(
-    config: MarkingsConfig,
-    sheet: Sheet,
-    style: Style,
-    streams: Streams,
-    flats: Sequence[tuple[float, float]],
+    config: MarkingsConfig, sheet: Sheet, style: Style, streams: Streams
 ) -> list[Decal]:
     """Sample one identifier at the upper right (ISO 6346, section 7), on long sides maybe two.
 
     The second one is at the left end. Columns on a corrugated end wall are centred on outer flats.
+    Nothing on a door is covered by its gear. If a layout finds no room, the others are tried.
     """
     rng = streams(f"identifier.{sheet.face}")
     long_side = sheet.face in ("front", "back")
     count = 1 + int(long_side and rng.random() < config.second_identifier)
     found = []
     for number in range(count):
-        upright = sheet.face != "roof" and rng.random() < config.vertical
-        on_flat = sheet.face == "no_door" and bool(flats)
-        slim = on_flat or sheet.face == "door"
-        cap = between(rng, config.cap_mm)
-        upright = upright or (on_flat and rng.random() < 0.6)
-        if upright:
-            tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / 15.5)  # 11 letters are 14.5 caps high
-            cap = config.cap_mm.lo if slim else max(min(cap, tallest), config.cap_mm.lo)
-        i = style.identifier
-        lines = _identifier_lines(i, int(rng.integers(3)))
-        if upright:
-            # An outer flat, or a door leaf beside the weights, has room for one column only. The
-            # size-type code then follows below.
-            column = f"{i.owner}{i.serial}{i.check}"
-            lines = (f"{column} {i.size_type}",) if slim else (column, i.size_type)
         wear = round(float(rng.uniform(*config.text_wear)), 3)
-        decal = text_decal(lines, cap, style, wear, upright)
-        x = Range(0.99 if slim and upright else 0.86, 1.0) if number == 0 else Range(0.0, 0.12)
-        center = None
-        if upright and on_flat:
-            center = _on_flat(sheet, decal.size_mm, flats, rng)
-        center = center or sheet.place(decal.size_mm, rng, x, Range(0.82, 1.0))
-        center = center or sheet.place(decal.size_mm, rng, Range(0.0, 1.0), Range(0.4, 1.0))
-        if center:
-            found.append(placed(decal, sheet, center, "text"))
+        for form in _forms(config, sheet, rng):
+            if sheet.clearance and form.layout == "rows":
+                decal = _across_bar(sheet, in_any_font(config, style, rng), form, rng)
+            else:
+                decal = _in_one_piece(sheet, style, form, number, rng)
+            if decal:
+                found.append(replace(decal, class_name="text", wear=wear))
+                break
     return found
 
 
-def _on_flat(
-    sheet: Sheet, size: Vec2, flats: Sequence[tuple[float, float]], rng: np.random.Generator
-) -> Vec2 | None:
-    for x0, x1 in [flats[i] for i in rng.permutation(len(flats))]:
-        y = sheet.size[1] - EDGE_MM - size[1] / 2 - 1
-        center = (tenth((x0 + x1) / 2), tenth(y))
-        if sheet.claim(center, size):
-            return center
+def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> list[Form]:
+    """Return forms to try, the drawn one first, then smaller ones and other layouts."""
+    settings = config.identifiers
+    weights = settings.layouts.get(sheet.face, {"rows": 1.0})
+    names = [name for name in LAYOUTS if weights.get(name, 0.0) > 0]
+    share = np.array([weights[name] for name in names])
+    first = str(rng.choice(names, p=share / share.sum()))
+    boxed = bool(rng.random() < settings.check_digit_box)
+    cap = config.cap_mm.lo if sheet.clearance else between(rng, config.cap_mm)
+    on_ribs = sheet.face != "door" and rng.random() < settings.rib_pitch
+    made = [_form(first, cap, boxed, sheet.half_wave_mm if on_ribs else 0.0, rng)]
+    others = [name for name in LAYOUTS if name != first]
+    if sheet.face == "roof":
+        others.remove("column")
+    for name in (first, *others):
+        made.append(_form(name, config.cap_mm.lo, boxed, 0.0, rng))
+    tallest = tenth((sheet.size[1] - 2 * EDGE_MM) / _COLUMN_CAPS)
+    return [
+        replace(form, cap_mm=max(min(form.cap_mm, tallest), config.cap_mm.lo))
+        if form.layout == "column"
+        else form
+        for form in made
+    ]
+
+
+def _form(
+    layout: str, cap_mm: float, boxed: bool, pitch_mm: float, rng: np.random.Generator
+) -> Form:
+    type_place = str(rng.choice(TYPE_PLACES[layout], p=_TYPE_SHARES[layout]))
+    upright = layout == "column"
+    if upright:
+        pitch_mm = float(rng.uniform(GLYPH_PITCH_CAPS - 0.1, GLYPH_PITCH_CAPS + 0.1)) * cap_mm
+    elif layout == "rows" or pitch_mm < 0.8 * cap_mm:
+        pitch_mm = 0.0
+    return Form(
+        layout=layout,
+        type_place=type_place,
+        cap_mm=cap_mm,
+        boxed=boxed,
+        owner_gap_mm=tenth(cap_mm * rng.uniform(0.5, 1.0)),
+        check_gap_mm=tenth(cap_mm * rng.uniform(0.2, 0.5)),
+        column_gap_mm=tenth(cap_mm * rng.uniform(0.4, 1.8)),
+        pitch_mm=tenth(pitch_mm),
+    )
+
+
+_TYPE_SHARES = {"rows": (0.6, 0.25, 0.15), "block": (1.0,), "column": (0.5, 0.25, 0.25)}
+"""Probabilities of TYPE_PLACES."""
+
+
+def _written(style: Style, form: Form) -> tuple[Decal, Lettering]:
+    lines = identifier_lines(style.identifier, form)
+    parts = identifier_parts(style.identifier, form, style.font)
+    return part_text(lines, parts, form.cap_mm, style, form.layout == "column")
+
+
+def _in_one_piece(
+    sheet: Sheet, style: Style, form: Form, number: int, rng: np.random.Generator
+) -> Decal | None:
+    """Place an identifier at the upper right or, if it is the second one, at the left."""
+    text, lettering = _written(style, form)
+    center = None
+    if form.layout == "column" and sheet.face == "no_door":
+        center = _on_flat(sheet, lettering, rng)
+    if not center:
+        x = Range(0.86, 1.0) if number == 0 else Range(0.0, 0.12)
+        x = Range(0.5, 1.0) if sheet.clearance else x
+        size, boxes = lettering.size_mm, lettering.parts
+        center = sheet.place(size, rng, x, Range(0.82, 1.0), boxes)
+        center = center or sheet.place(size, rng, Range(0.0, 1.0), Range(0.3, 1.0), boxes)
+    return placed(text, sheet, center) if center else None
+
+
+def _across_bar(
+    sheet: Sheet, styles: Sequence[Style], form: Form, rng: np.random.Generator
+) -> Decal | None:
+    """Place rows on a door, the owner code left of a locking bar and the serial number right of it.
+
+    The first of `styles` that fits is taken.
+    """
+    assert sheet.clearance is not None
+    if form.type_place == "same line":
+        form = replace(form, type_place="under serial")
+    for style in styles:
+        for x0, x1 in reversed(sheet.clearance.bars):
+            left, right = between(rng, _BAR_GAP_MM), between(rng, _BAR_GAP_MM)
+            text, lettering = _written(style, replace(form, owner_gap_mm=left + x1 - x0 + right))
+            width, height = lettering.size_mm
+            x = x0 - left - lettering.parts[0].x1 + width / 2
+            for _ in range(_TRIES):
+                y = rng.uniform(0.6, 0.93) * sheet.size[1]
+                center = (tenth(x), tenth(y - height / 2))
+                if sheet.claim(center, lettering.size_mm, lettering.parts):
+                    return placed(text, sheet, center)
     return None
 
 
-def sample_weights(
-    config: MarkingsConfig, kind: str, door: Sheet, style: Style, streams: Streams
-) -> list[Decal]:
-    rng = streams("weights")
-    lines = weight_lines(kind, rng)
-    wear = round(float(rng.uniform(*config.text_wear)), 3)
-    # Beside a vertical identifier the panel only fits with two or three lines per entry.
-    halves, thirds = (tuple(p for line in lines for p in split_entry(line, n)) for n in (2, 3))
-    cap = between(rng, config.weights_cap_mm)
-    leaf = door.size[0] / 2 + GAP_MM
-    least = config.weights_cap_mm.lo
-    for rows, height in ((lines, cap), (halves, cap), (halves, least), (thirds, least)):
-        decal = text_decal(rows, height, style, wear)
-        room = door.size[0] - 2 * EDGE_MM - decal.size_mm[0]
-        start = (leaf - EDGE_MM) / room if room > 0 else 1.0
-        if start < 1.0:
-            center = door.place(decal.size_mm, rng, Range(start, 1.0), Range(0.25, 0.75))
-            if center:
-                return [placed(decal, door, center)]
-    return []
+def _on_flat(sheet: Sheet, text: Lettering, rng: np.random.Generator) -> Vec2 | None:
+    """Center the letters of the owner code on a free outer flat."""
+    owner = text.parts[0]
+    aside = text.size_mm[0] / 2 - (owner.x0 + owner.x1) / 2
+    for x0, x1 in [sheet.flats[i] for i in rng.permutation(len(sheet.flats))]:
+        y = sheet.size[1] - EDGE_MM - text.size_mm[1] / 2 - 1
+        center = (tenth((x0 + x1) / 2 + aside), tenth(y))
+        if sheet.claim(center, text.size_mm, text.parts):
+            return center
+    return None

@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fastgen.config.identifiers import IdentifierConfig
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import Brand, Font, brands, glyph_tiles
 from fastgen.decals.iso6346 import Identifier, sample_identifier
-from fastgen.decals.lettering import layout
+from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.sampling.sheet import Sheet
 from fastgen.scene import REC_709, Color, Decal, Vec2
-from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.container_kinds import SIZE_TYPES
 
 Streams = Callable[[str], np.random.Generator]
 """Function from the name of a property to its independent random generator."""
@@ -44,30 +45,68 @@ def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Strea
         albedo = _COLORED[int(rng.integers(len(_COLORED)))] if not light else YELLOW
     made = brands()
     brand = made[int(streams("brand").integers(len(made)))]
-    identifier = sample_identifier(streams("identifier"), brand.owner_codes, KINDS[kind].size_type)
+    identifier = _identifier(config.identifiers, kind, brand, streams)
     return Style(font, albedo, brand, identifier)
 
 
-def text_decal(
-    lines: tuple[str, ...], cap_mm: float, style: Style, wear: float, vertical: bool = False
-) -> Decal:
+def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Streams) -> Identifier:
+    codes = SIZE_TYPES[kind]
+    share = np.array(list(codes.values()))
+    size_type = str(streams("size_type").choice(list(codes), p=share / share.sum()))
+    owners = config.owner_codes
+    if not owners and streams("owner").random() < config.brand_codes:
+        owners = brand.owner_codes
+    return sample_identifier(streams("identifier"), owners, size_type)
+
+
+def in_any_font(config: MarkingsConfig, style: Style, rng: np.random.Generator) -> list[Style]:
+    """Return the style, then the same with other fonts, for places where only a narrow one fits."""
+    fonts = glyph_tiles()[1]
+    names = rng.permutation(config.fonts or sorted(fonts))
+    return [style, *(replace(style, font=fonts[str(name)]) for name in names)]
+
+
+def text_decal(lines: tuple[str, ...], cap_mm: float, style: Style, wear: float) -> Decal:
     """Return a text decal with its size and ink; its face and centre are not set yet."""
-    size = layout(lines, style.font, cap_mm, vertical).size_mm
-    return Decal(
+    return replace(part_text(lines, (), cap_mm, style, False)[0], wear=wear)
+
+
+def part_text(
+    lines: tuple[str, ...],
+    parts: tuple[TextPart, ...],
+    cap_mm: float,
+    style: Style,
+    vertical: bool,
+) -> tuple[Decal, Lettering]:
+    """Return a text decal whose parts have places of their own, and its layout.
+
+    Args:
+        lines: The text in reading order.
+        parts: Its parts, or none for left-aligned lines.
+        cap_mm: Height of the capitals.
+        style: Font and ink.
+        vertical: Whether the letters are below one another.
+    """
+    lettering = layout(lines, style.font, cap_mm, vertical, parts)
+    decal = Decal(
         kind="text",
         class_name="",
         face="",
         center_mm=(0.0, 0.0),
-        size_mm=size,
+        size_mm=lettering.size_mm,
         lines=lines,
+        parts=parts,
         font=style.font.name,
         vertical=vertical,
         cap_mm=cap_mm,
         albedo=style.albedo,
-        wear=wear,
     )
+    return decal, lettering
 
 
-def placed(decal: Decal, sheet: Sheet, center: Vec2, class_name: str = "") -> Decal:
+def placed(
+    decal: Decal, sheet: Sheet, center: Vec2, class_name: str = "", wear: float | None = None
+) -> Decal:
     """Return a decal at a place of a sheet."""
-    return replace(decal, face=sheet.face, center_mm=center, class_name=class_name)
+    worn = decal.wear if wear is None else wear
+    return replace(decal, face=sheet.face, center_mm=center, class_name=class_name, wear=worn)

@@ -1,12 +1,11 @@
-"""Sampling of a container's decals. Brands, plates and stickers are sampled here."""
+"""Sampling of a container's decals. Brands and height marks are sampled here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
-from fastgen.decals.artwork import stickers
-from fastgen.sampling.identifiers import sample_identifiers, sample_weights
+from fastgen.sampling.identifiers import sample_identifiers
 from fastgen.sampling.lettering_style import (
     YELLOW,
     Streams,
@@ -16,51 +15,50 @@ from fastgen.sampling.lettering_style import (
     text_decal,
 )
 from fastgen.sampling.markers import sample_markers
+from fastgen.sampling.marks import sample_marks
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
-from fastgen.scene import Color, Decal, Vec2
+from fastgen.sampling.stickers import sample_stickers, stickers_of
+from fastgen.sampling.weights_panel import sample_weights
+from fastgen.scene import Color, Decal
 from fastgen.validation import Range
-
-Flats = Mapping[str, Sequence[tuple[float, float]]]
-
-_HIGH_CUBE_SIGNS = ("height_sign", "height_triangle")
 
 
 def sample_decals(
     config: MarkingsConfig,
     kind: str,
-    sheets: Mapping[str, Vec2],
+    faces: Mapping[str, Sheet],
     paint_albedo: Color,
     streams: Streams,
-    flats: Flats | None = None,
 ) -> tuple[Decal, ...]:
     """Sample all decals of one container.
 
     Args:
         config: Probabilities and ranges.
         kind: Container kind, a key of `KINDS`.
-        sheets: Width and height of the sheet by face, mm.
+        faces: Sheets without decals by face.
         paint_albedo: Linear colour of the paint; it decides between light and dark lettering.
         streams: Function from the name of a property to its independent random generator.
-        flats: Outer flats of the corrugation by face: intervals (x0, x1) of the sheet, mm.
 
     Returns:
         Decals in painting order.
     """
-    faces = {name: Sheet(name, size) for name, size in sheets.items()}
     style = sample_style(config, kind, paint_albedo, streams)
     drawn: list[Decal] = []
     drawn += _height_marks(config, kind, faces, streams)
     for sheet in faces.values():
-        outer_flats = (flats or {}).get(sheet.face, ())
-        drawn += sample_identifiers(config, sheet, style, streams, outer_flats)
+        drawn += sample_identifiers(config, sheet, style, streams)
     drawn += sample_weights(config, kind, faces["door"], style, streams)
-    markers: list[Decal] = []
-    for face in config.marker_faces:
-        markers += sample_markers(config, faces[face], streams)
+    labelled: list[Decal] = []
+    if streams("marked").random() < config.marked_containers:
+        for face in config.marker_faces:
+            labelled += sample_markers(config, faces[face], streams)
+    labelled += sample_marks(config, faces, streams)
+    known = stickers_of(kind, streams("stickers"))
+    inks = {"lettering": style.albedo, "overpaint": paint_albedo}
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
-        drawn += _stickers(config, kind, sheet, streams(f"stickers.{sheet.face}"))
-    return (*drawn, *markers)
+        drawn += sample_stickers(config, known, sheet, inks, streams(f"stickers.{sheet.face}"))
+    return (*drawn, *labelled)
 
 
 def _brand(
@@ -95,34 +93,6 @@ def _brand(
         center = sheet.place(text.size_mm, rng, Range(0.0, 1.0), Range(0.0, 1.0))
         if center:
             made.append(placed(text, sheet, center))
-    return made
-
-
-def _stickers(
-    config: MarkingsConfig, kind: str, sheet: Sheet, rng: np.random.Generator
-) -> list[Decal]:
-    """Sample plates and stickers other than markers; they have no label."""
-    if sheet.face == "roof":
-        return []
-    known = {n: s for n, s in stickers().items() if not s.where or sheet.face in s.where}
-    if not kind.endswith("HC"):
-        known = {n: s for n, s in known.items() if n not in _HIGH_CUBE_SIGNS}
-    low, high = config.stickers_per_face
-    wanted = [n for n, s in known.items() if s.always]
-    free = sorted(set(known) - set(wanted))
-    if free:
-        wanted += [str(n) for n in rng.choice(free, size=int(rng.integers(low, high + 1)))]
-    made = []
-    for name in wanted:
-        tilt = round(float(rng.normal(0, 1.5)), 2)
-        size = known[name].size_mm
-        grown = (size[0] * 1.06 + 10, size[1] * 1.06 + 10)
-        y = Range(0.0, 0.35) if known[name].always else Range(0.0, 1.0)
-        x = Range(0.0, 0.4) if known[name].always else Range(0.0, 1.0)
-        center = sheet.place(grown, rng, x, y)
-        if center:
-            wear = round(float(rng.uniform(*config.sticker_wear)), 3)
-            made.append(Decal("sticker", "", sheet.face, center, size, tilt, name, wear=wear))
     return made
 
 

@@ -22,6 +22,7 @@ from fastgen.light.hdri import hours_of
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.markings import sample_decals
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
+from fastgen.sampling.sheet import Sheet
 from fastgen.scene import (
     Ageing,
     Camera,
@@ -86,13 +87,12 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
     scale = float(streams("corrugation").choice(config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
-    mesh = SHAPES.container(container.kind, container.profiles)
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
     environment = _environment(config, streams, environments)
     hours = hours_of(environment.name)
     moment = sample_moment(config.sensor.stamp.years, hours, streams("moment"))
-    return Scene(
+    scene = Scene(
         seed=seed,
         index=index,
         container=container,
@@ -105,14 +105,26 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         decals=sample_decals(
             config.markings,
             kind,
-            sheet_sizes(mesh),
+            _empty_sheets(container),
             surface.paint.albedo,
             streams,
-            flats=mesh.flats,
         ),
         damages=damages,
         spreader=_spreader(config.spreader, streams),
         weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
+    )
+    absent = streams("absent").random() < config.container.absent
+    return without_container(scene) if absent else scene
+
+
+def without_container(scene: Scene) -> Scene:
+    """Return a scene that shows only the surroundings of `scene`."""
+    return replace(
+        scene,
+        container=replace(scene.container, present=False),
+        decals=(),
+        damages=(),
+        spreader=replace(scene.spreader, present=False),
     )
 
 
@@ -132,6 +144,19 @@ def split_of(config: Config, seed: int, index: int) -> str:
     return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
 
 
+def _empty_sheets(container: Container) -> dict[str, Sheet]:
+    """Return the sheets of a container without decals."""
+    kind, profiles = container.kind, container.profiles
+    mesh = SHAPES.container(kind, profiles)
+    clearance = SHAPES.door_clearance(kind, profiles)
+    return {
+        face: Sheet(face, size, clearance=clearance)
+        if face == "door"
+        else Sheet(face, size, mesh.flats.get(face, ()))
+        for face, size in sheet_sizes(mesh).items()
+    }
+
+
 def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
     """Return the size of the unfolded sheet of each face that carries decals.
 
@@ -147,7 +172,10 @@ def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
 
 def _surface(config: Config, streams: Streams) -> Surface:
     c = config.surface
-    name = str(streams("paint.color").choice(list(c.colors)))
+    weights = np.array(c.weights)
+    # equal weights would give other results than no weights
+    shares = weights / weights.sum() if c.color_weights else None
+    name = str(streams("paint.color").choice(list(c.colors), p=shares))
     rust = streams("rust")
     rust_color = str(streams("rust.color").choice(c.rust_colors))
     # The square makes heavily rusted containers rare.

@@ -1,14 +1,20 @@
 """Free rectangles on the sheet of a container face while decals are placed on it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from fastgen.decals.lettering import PartBox
+from fastgen.geometry.door_clearance import DoorClearance
 from fastgen.scene import Vec2
 from fastgen.validation import Range
 
 EDGE_MM = 110.0
 """Width of the strip without decals along each sheet edge, mostly under posts and rails."""
+
+_LEAF_EDGE_MM = 15.0
+"""The same for lettering on doors."""
 
 _TRIES = 40
 """Random positions tried per call of `Sheet.place`."""
@@ -34,26 +40,43 @@ class Sheet:
     Attributes:
         face: Name of the face.
         size: Width and height, mm.
+        flats: Outer flats of the wall's corrugation as intervals (x0, x1), mm.
+        clearance: Map of the gear on a door, None on walls.
         taken: Occupied rectangles (x0, y0, x1, y1), mm from the lower left corner.
     """
 
     face: str
     size: Vec2
+    flats: Sequence[tuple[float, float]] = ()
+    clearance: DoorClearance | None = None
     taken: list[tuple[float, float, float, float]] = field(default_factory=list)
 
-    def claim(self, center: Vec2, size: Vec2) -> bool:
+    @property
+    def half_wave_mm(self) -> float:
+        """Half the pitch of the corrugation: the distance from an outer to an inner flat."""
+        return (self.flats[1][0] - self.flats[0][0]) / 2 if len(self.flats) > 1 else 0.0
+
+    def claim(self, center: Vec2, size: Vec2, parts: Sequence[PartBox] = ()) -> bool:
         """Reserve a rectangle if it is free and on the sheet.
 
         Args:
             center: Centre of the rectangle, mm from the sheet's lower left corner.
             size: Width and height, mm.
+            parts: Parts of a text that no door gear may cover. They may lie nearer to the edges of
+                a door, where no posts and rails hide them.
 
         Returns:
             True if the rectangle was reserved.
         """
         x0, y0 = center[0] - size[0] / 2, center[1] - size[1] / 2
         x1, y1 = center[0] + size[0] / 2, center[1] + size[1] / 2
-        if min(x0, y0) < EDGE_MM or x1 > self.size[0] - EDGE_MM or y1 > self.size[1] - EDGE_MM:
+        edge = _LEAF_EDGE_MM if parts and self.clearance else EDGE_MM
+        if min(x0, y0) < edge or x1 > self.size[0] - edge or y1 > self.size[1] - edge:
+            return False
+        if self.clearance and not all(
+            self.clearance.clear(x0 + part.x0, y0 + part.y0, x0 + part.x1, y0 + part.y1)
+            for part in parts
+        ):
             return False
         for a0, b0, a1, b1 in self.taken:
             if x0 < a1 + GAP_MM and a0 < x1 + GAP_MM and y0 < b1 + GAP_MM and b0 < y1 + GAP_MM:
@@ -61,7 +84,14 @@ class Sheet:
         self.taken.append((x0, y0, x1, y1))
         return True
 
-    def place(self, size: Vec2, rng: np.random.Generator, x: Range, y: Range) -> Vec2 | None:
+    def place(
+        self,
+        size: Vec2,
+        rng: np.random.Generator,
+        x: Range,
+        y: Range,
+        parts: Sequence[PartBox] = (),
+    ) -> Vec2 | None:
         """Reserve a rectangle at a random free position and return its centre.
 
         Args:
@@ -69,6 +99,7 @@ class Sheet:
             rng: Random generator of the decal.
             x: Allowed positions from left (0) to right (1).
             y: Allowed positions from bottom (0) to top (1).
+            parts: Parts of a text that no door gear may cover.
 
         Returns:
             Centre in mm from the lower left corner, or None if no free position was found.
@@ -81,6 +112,6 @@ class Sheet:
                 tenth(EDGE_MM + size[0] / 2 + room[0] * rng.uniform(x.lo, x.hi)),
                 tenth(EDGE_MM + size[1] / 2 + room[1] * rng.uniform(y.lo, y.hi)),
             )
-            if self.claim(center, size):
+            if self.claim(center, size, parts):
                 return center
         return None

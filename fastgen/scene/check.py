@@ -40,6 +40,11 @@ def check_scene(scene: Any) -> Scene:
             "Scene.from_json"
         )
     check_fields(scene, Scene, "scene")
+    if not scene.container.present and (scene.decals or scene.damages or scene.spreader.present):
+        raise ConfigError(
+            "scene.container.present: false, but the scene has decals, damages or a spreader; "
+            "remove them"
+        )
     for i, camera in enumerate(scene.cameras):
         _check_camera(camera, f"scene.cameras[{i}]", scene.container)
     for i, decal in enumerate(scene.decals):
@@ -102,6 +107,18 @@ def _check_decal(decal: Decal, path: str) -> None:
         for char in decal.text:
             if char != " ":
                 check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
+        spoken = "".join(part.text for part in decal.parts).replace(" ", "")
+        if decal.parts and spoken != "".join(decal.lines).replace(" ", ""):
+            raise ConfigError(
+                f"{path}.parts: they read {spoken!r}, which is not the text of lines; make them "
+                "agree"
+            )
+        for j, part in enumerate(decal.parts):
+            if not part.text.strip() or (part.boxed and len(part.text) != 1):
+                raise ConfigError(
+                    f"{path}.parts[{j}].text: {part.text!r}; give at least one letter, and exactly "
+                    "one in a box"
+                )
     if decal.kind in _ART_KINDS and decal.art != "stripes":
         check_known(f"{path}.art", decal.art, art_layers())
     if decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:

@@ -39,6 +39,18 @@ KINDS: Mapping[str, ContainerKind] = MappingProxyType(
 )
 
 
+SIZE_TYPES: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        "20": {"22G1": 0.88, "22G0": 0.05, "2210": 0.07},
+        "40": {"42G1": 0.87, "42G0": 0.05, "4310": 0.08},
+        "40HC": {"45G1": 0.92, "45G0": 0.04, "4510": 0.04},
+        "45HC": {"L5G1": 0.95, "L5G0": 0.05},
+    }
+)
+"""Size-type codes of dry freight containers and their relative frequency, by kind. G1 has vents, G0
+has none (ISO 6346:1995, annexes D and E); numbers alone are codes of the edition of 1984."""
+
+
 def mm_away(points_mm: Array, kind: str) -> Array:
     """Return the signed distance in mm of points from the bounding box of a container.
 

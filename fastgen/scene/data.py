@@ -15,7 +15,8 @@ import numpy as np
 from annotated_types import MaxLen
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_CLASSES, DETECTION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, DAMAGE_CLASSES
+from fastgen.decals.lettering import TextPart
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.scene.faces import SHEET_FACES
@@ -143,6 +144,8 @@ class Decal:
         art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes.
         lines: Text, one string per line. In vertical text the letters of a line are below one
             another, and lines are columns from left to right.
+        parts: Parts of a text with places of their own; they decide the layout if there are any,
+            and hold the letters of `lines` in the same order.
         font: Name of the font of a text.
         vertical: Whether a text is vertical.
         cap_mm: Height of the capitals of a text.
@@ -156,13 +159,14 @@ class Decal:
     """
 
     kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind != "stripes"))]
-    class_name: Annotated[str, OneOf(("", *DETECTION_CLASSES[1:]))]
+    class_name: Annotated[str, OneOf(("", *ALL_DETECTION_CLASSES[1:]))]
     face: Annotated[str, OneOf(SHEET_FACES)]
     center_mm: Vec2
     size_mm: tuple[_Length, _Length]
     rotation_deg: Degrees = 0.0
     art: str = ""
     lines: tuple[str, ...] = ()
+    parts: tuple[TextPart, ...] = ()
     font: str = ""
     vertical: Flag = False
     cap_mm: Millimetres = 0.0
@@ -216,10 +220,18 @@ class Damage:
 
 @dataclass(frozen=True)
 class Container:
-    """Container kind (20, 40, 40HC or 45HC) and the corrugation of its walls."""
+    """Container kind (20, 40, 40HC or 45HC) and the corrugation of its walls.
+
+    Attributes:
+        kind: Key of KINDS.
+        profiles: Corrugation of the walls.
+        present: False for a scene that shows only the surroundings. Cameras are placed as if the
+            container was there. Such a scene has no decals, damages or spreader.
+    """
 
     kind: Annotated[str, OneOf(tuple(KINDS))]
     profiles: WallProfiles
+    present: Flag = True
 
 
 @dataclass(frozen=True)

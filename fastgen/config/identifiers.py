@@ -1,0 +1,56 @@
+"""Layouts and codes of container identifiers."""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from fastgen.decals.identifier_layout import LAYOUTS
+from fastgen.errors import ConfigError
+from fastgen.scene.faces import SHEET_FACES
+from fastgen.validation import Bounds, Matching, OneOf, Share
+
+_Face = Annotated[str, OneOf(SHEET_FACES)]
+_Weights = dict[Annotated[str, OneOf(LAYOUTS)], Annotated[float, Bounds(0.0, 1e6)]]
+_OwnerCode = Annotated[
+    str, Matching("[A-Z]{3}[UJZ]", "is not an owner code; give three letters and U, J or Z")
+]
+
+
+@dataclass(frozen=True)
+class IdentifierConfig:
+    """How identifiers are written (ISO 6346, section 7, and the practice of container makers).
+
+    Attributes:
+        layouts: Relative frequency of each layout by face. rows: owner code, serial number and
+            check digit in one line, on doors on both sides of a locking bar. block: one below
+            another. column: letters below one another. A layout without room is replaced by
+            another one. A face that is not listed has rows.
+        owner_codes: Owner codes to draw from. If the list is empty, the three letters are random.
+        brand_codes: Probability that a container has an owner code of its brand; not used if
+            owner_codes is given. Most containers of a line are leased and have other codes.
+        check_digit_box: Probability of the frame around the check digit.
+        rib_pitch: Probability that the letters of a block on a corrugated wall are spaced by half
+            waves, one on each flat.
+    """
+
+    layouts: dict[_Face, _Weights] = field(
+        default_factory=lambda: {
+            "front": {"rows": 0.15, "block": 0.4, "column": 0.45},
+            "back": {"rows": 0.15, "block": 0.4, "column": 0.45},
+            "door": {"rows": 0.9, "block": 0.1},
+            "no_door": {"rows": 0.3, "block": 0.25, "column": 0.45},
+            "roof": {"rows": 1.0},
+        }
+    )
+    owner_codes: tuple[_OwnerCode, ...] = ()
+    brand_codes: Share = 0.25
+    check_digit_box: Share = 0.93
+    rib_pitch: Share = 0.35
+
+    def __post_init__(self) -> None:
+        """Refuse faces without any weight."""
+        for face, weights in self.layouts.items():
+            if sum(weights.values()) <= 0:
+                raise ConfigError(
+                    f"layouts.{face}: all weights are 0; give at least one above 0, or leave the "
+                    "face out"
+                )
