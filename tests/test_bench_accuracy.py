@@ -90,7 +90,14 @@ def test_a_reference_can_be_saved_and_loaded(tmp_path):
         assert np.abs(shown - kept).max() < 0.02
 
 
-@pytest.mark.parametrize("path", sorted(reference_set.FOLDER.glob("*.npz")), ids=lambda p: p.stem)
+STORED = sorted(reference_set.FOLDER.glob("*.npz"))
+
+
+def test_every_case_has_a_stored_reference():
+    assert [int(path.stem) for path in STORED] == [case.number for case in reference_set.cases()]
+
+
+@pytest.mark.parametrize("path", STORED, ids=lambda p: p.stem)
 def test_a_stored_reference_loads_and_matches_its_case(path):
     case = reference_set.cases()[int(path.stem)]
     reference = reference_set.load(case.number)

@@ -82,11 +82,14 @@ def test_data_yaml_pairs_images_with_labels_as_trainers_do(dataset):
 
 
 def test_door_folders_contain_the_views_of_the_two_ends(dataset):
-    for split in ("train", "val", "test"):
-        for folder, camera in (("door", "Cr"), ("no_door", "Cl")):
-            for path in (dataset / "door" / split / folder).iterdir():
-                assert path.stem.endswith(f"_{camera}")
-                assert path.read_bytes() == (dataset / "images" / split / path.name).read_bytes()
+    for folder, camera in (("door", "Cr"), ("no_door", "Cl")):
+        found = {path.relative_to(dataset / "images"): path for path in dataset.glob("images/*/*")}
+        wanted = {at for at in found if at.stem.endswith(f"_{camera}")}
+        listed = list(dataset.glob(f"door/*/{folder}/*"))
+        assert wanted
+        assert {Path(path.parts[-3], path.name) for path in listed} == wanted
+        for path in listed:
+            assert path.read_bytes() == found[Path(path.parts[-3], path.name)].read_bytes()
 
 
 def test_all_views_of_a_scene_share_a_split(dataset):
@@ -162,8 +165,11 @@ def test_a_killed_run_is_finished_to_the_same_bytes(dataset, tmp_path):
     deadline = time.monotonic() + 60
     while len(list(out.glob("shards/*.json"))) < 2 and time.monotonic() < deadline:
         time.sleep(0.02)
+    assert process.poll() is None  # a finished run cannot be killed
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+    assert len(list(out.glob("shards/*.json"))) >= 2
+    assert "digest" not in json.loads((out / "dataset.json").read_text())
     assert run(out, "--shard", "1") == 0
     assert run(tmp_path / "whole", "--shard", "1") == 0
     assert content(out) == content(tmp_path / "whole")
@@ -336,9 +342,11 @@ def test_ctrl_c_stops_cleanly_and_the_run_can_be_continued(dataset, tmp_path):
         # background jobs of a shell, such as this test run, may ignore SIGINT
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    while not (out / "dataset.json").exists():
+    deadline = time.monotonic() + 60
+    while not (out / "dataset.json").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
     time.sleep(1.0)
+    assert process.poll() is None
     os.killpg(process.pid, signal.SIGINT)
     error = process.communicate(timeout=30)[1]
     assert process.returncode == 130

@@ -66,10 +66,13 @@ def test_art_is_read_from_a_folder_whose_name_is_not_utf8(tmp_path):
 
 
 class FullLog:
+    tried = 0
+
     def isatty(self):
         return False
 
     def write(self, text):
+        self.tried += 1
         raise OSError(errno.ENOSPC, "No space left on device")
 
     def flush(self):
@@ -77,9 +80,11 @@ class FullLog:
 
 
 def test_an_unwritable_log_does_not_end_a_run():
-    progress = Progress(10, stream=FullLog())
+    log = FullLog()
+    progress = Progress(10, stream=log)
     progress.add(10)
     progress.close()
+    assert log.tried
 
 
 def test_a_new_volume_with_lost_and_found_counts_as_empty(tmp_path):
