@@ -57,7 +57,7 @@ lint: setup
 	$(BIN)/mypy
 
 test: glslang lint
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info dataset
