@@ -1,161 +1,175 @@
-"""Draw plates, stickers and invented brand emblems as SVG and convert them to PNG.
+"""Draw plates, stickers, marks and invented brand emblems, and write them as SVG and PNG.
 
     python assets/build_stickers.py
 
-Run by hand. They appear next to the markers and have no label. All drawings, names and owner codes
-are invented.
+Run by hand. Stickers have no label; marks have one where a configuration switches them on. All
+drawings, names and owner codes are invented.
 """
 
 import json
+from dataclasses import asdict, dataclass, fields
+from math import cos, pi, sin
 
 import cv2
-from build_markers import ASSETS, BLACK, WHITE, bake, words
+from drawing import ASSETS, BLACK, WHITE, bake
+from mark_drawings import MARKS
+from sticker_plates import (
+    GREEN,
+    RED,
+    code_tag,
+    customs_plate,
+    fork_here,
+    keep_dry,
+    no_walking,
+    owner_plate,
+    safety_plate,
+    svg,
+    timber_treatment,
+    washed,
+)
+from sticker_signs import (
+    anchor,
+    caution_doors,
+    caution_load,
+    height_sign,
+    height_triangle,
+    ic_mark,
+    seal,
+    sextant,
+    star_shield,
+    super_heavy,
+    width_sign,
+)
+from sticker_traces import (
+    chalk,
+    customs_seal,
+    diamond_logo,
+    inspection_label,
+    leasing_logo,
+    overpaint,
+    residue,
+    square_logo,
+)
 
-SILVER, DARK, YELLOW, GREEN = "#b9bcbf", "#2a2c2e", "#f2c200", "#1c7a3c"
+SIDES = ("front", "back")
+ENDS = ("door", "no_door")
+WALLS = (*SIDES, *ENDS)
+STANDARD, HIGH = ("20", "40"), ("40HC", "45HC")
+LOW_LEFT = (0.0, 0.4, 0.0, 0.35)
+UPPER_RIGHT = (0.7, 1.0, 0.45, 0.95)
+NAVY, ORANGE, SKY = "#12305c", "#d9541e", "#2f9ad0"
 
 
-def rect(x: float, y: float, w: float, h: float, fill: str, more: str = "") -> str:
-    return f'<rect x="{x}" y="{y}" width="{w}" height="{h}" fill="{fill}" {more}/>'
+@dataclass(frozen=True)
+class Entry:
+    """One sticker: its drawing, and how `sampling/markings.py` places it.
+
+    Attributes:
+        drawing: SVG.
+        size_mm: Width and height.
+        where: Faces that may carry it.
+        always: Present on these faces of every container.
+        weight: Relative frequency among the stickers that are drawn by number.
+        share: Probability that such a face carries it in addition to that number.
+        kinds: Container kinds that may carry it; empty for all.
+        place: Range of x, then of y, from left and bottom (0) to right and top (1).
+        ink: 'art' for the drawing's own colours; 'lettering' or 'overpaint' for one colour, that of
+            the lettering or a darker tone of the paint.
+        group: Stickers of one group are alternatives: a container has the same one everywhere.
+    """
+
+    drawing: str
+    size_mm: tuple[float, float]
+    where: tuple[str, ...]
+    always: bool = False
+    weight: float = 1.0
+    share: float = 0.0
+    kinds: tuple[str, ...] = ()
+    place: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    ink: str = "art"
+    group: str = ""
 
 
-def svg(width: int, height: int, body: str) -> str:
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}"'
-    return f'{head} preserveAspectRatio="none">\n{body}\n</svg>\n'
+def _sized(metres: str, feet: str, kinds: tuple[str, ...]) -> Entry:
+    """Return the height sign beside the identifier; most containers have it on their sides."""
+    drawing = height_sign(metres, feet)
+    return Entry(drawing, (140, 180), WALLS, False, 1.0, 0.45, kinds, UPPER_RIGHT)
 
 
-def lines(
-    x: float, y: float, widths: list[int], step: float, color: str, height: float = 12
-) -> str:
-    return "".join(rect(x, y + i * step, w, height, color) for i, w in enumerate(widths))
-
-
-def safety_plate() -> str:
-    body = rect(0, 0, 1000, 600, SILVER) + rect(
-        20, 20, 960, 560, "none", f'stroke="{DARK}" stroke-width="8"'
+def _ic(number: str) -> Entry:
+    """Return the mark of a railway in the colour of the lettering."""
+    return Entry(
+        ic_mark(number), (190, 190), SIDES, False, 0.0, 0.4, (), UPPER_RIGHT, "lettering", "ic"
     )
-    body += words("CSC SAFETY APPROVAL", 500, 110, 60, DARK)
-    return svg(1000, 600, body + lines(70, 170, [820, 640, 760, 520, 800, 690], 62, DARK, 22))
 
 
-def owner_plate() -> str:
-    body = rect(0, 0, 1000, 700, "#d8d2b8") + words("OWNER", 500, 120, 80, DARK)
-    return svg(1000, 700, body + lines(80, 200, [840, 700, 760, 500, 620], 90, DARK, 26))
+def _few(drawing: str, size: tuple[float, float], where: tuple[str, ...], **more: object) -> Entry:
+    """Return a sticker of a family with several drawings, each rarer than a single sticker."""
+    return Entry(drawing, size, where, weight=0.5, **more)  # type: ignore[arg-type]
 
 
-def customs_plate() -> str:
-    body = rect(0, 0, 1000, 400, SILVER) + words("APPROVED FOR TRANSPORT", 500, 130, 58, DARK)
-    body += words("UNDER CUSTOMS SEAL", 500, 220, 58, DARK)
-    return svg(1000, 400, body + lines(200, 290, [600], 40, DARK, 30))
-
-
-def height_triangle() -> str:
-    body = rect(0, 0, 1000, 1000, YELLOW)
-    body += f'<path d="M0 0 L1000 0 L0 1000 Z" fill="{BLACK}"/>' + words(
-        "2.9 M", 640, 760, 130, BLACK
-    )
-    return svg(1000, 1000, body + words("HC", 300, 300, 190, YELLOW))
-
-
-def height_sign() -> str:
-    body = rect(0, 0, 1000, 700, YELLOW) + rect(
-        25, 25, 950, 650, "none", f'stroke="{BLACK}" stroke-width="30"'
-    )
-    return svg(
-        1000, 700, body + words("2.9 M", 500, 330, 200, BLACK) + words("9'6", 500, 590, 160, BLACK)
-    )
-
-
-def keep_dry() -> str:
-    drops = "".join(
-        f'<path d="M{x} 90 q34 60 0 90 q-34 -30 0 -90 Z" fill="{BLACK}"/>' for x in (300, 500, 700)
-    )
-    umbrella = f'<path d="M150 520 A350 300 0 0 1 850 520 Z" fill="{BLACK}"/>'
-    handle = f'<path d="M500 500 V800 A60 60 0 0 1 380 800" fill="none" stroke="{BLACK}" stroke-width="30"/>'
-    return svg(1000, 1000, rect(0, 0, 1000, 1000, WHITE) + drops + umbrella + handle)
-
-
-def fork_here() -> str:
-    fork = (
-        rect(180, 180, 70, 560, BLACK)
-        + rect(180, 700, 640, 70, BLACK)
-        + rect(330, 250, 430, 400, BLACK)
-    )
-    return svg(1000, 1000, rect(0, 0, 1000, 1000, "#ffffff") + fork)
-
-
-def no_walking() -> str:
-    figure = f'<circle cx="500" cy="270" r="60" fill="{BLACK}"/>' + rect(450, 350, 100, 240, BLACK)
-    legs = f'<path d="M470 580 L400 780 M530 580 L600 780" stroke="{BLACK}" stroke-width="50"/>'
-    ban = '<circle cx="500" cy="500" r="400" fill="none" stroke="#c81e2a" stroke-width="70"/>'
-    bar = '<path d="M220 220 L780 780" stroke="#c81e2a" stroke-width="70"/>'
-    return svg(1000, 1000, rect(0, 0, 1000, 1000, WHITE) + figure + legs + ban + bar)
-
-
-def diamond(fill: str, inner: str) -> str:
-    return svg(1000, 1000, f'<path d="M500 0 L1000 500 L500 1000 L0 500 Z" fill="{fill}"/>{inner}')
-
-
-def limited_quantity() -> str:
-    tips = f'<path d="M500 0 L750 250 H250 Z M500 1000 L250 750 H750 Z" fill="{BLACK}"/>'
-    edge = f'<path d="M500 20 L980 500 L500 980 L20 500 Z" fill="none" stroke="{BLACK}" stroke-width="30"/>'
-    return diamond(WHITE, tips + edge)
-
-
-def company_diamond() -> str:
-    edge = f'<path d="M500 70 L930 500 L500 930 L70 500 Z" fill="none" stroke="{WHITE}" stroke-width="24"/>'
-    return diamond("#7a2a8c", edge + words("VK", 500, 610, 260, WHITE))
-
-
-def timber() -> str:
-    body = rect(0, 0, 1000, 500, "#cdbb8f") + words(
-        "TIMBER COMPONENT TREATMENT", 500, 130, 50, DARK
-    )
-    return svg(1000, 500, body + lines(120, 200, [760, 560, 660], 90, DARK, 36))
-
-
-def washed() -> str:
-    body = rect(0, 0, 1000, 600, GREEN) + words("CLEANED", 500, 260, 150, WHITE)
-    return svg(1000, 600, body + words("FOOD GRADE", 500, 450, 100, WHITE))
-
-
-def code_tag() -> str:
-    cells = "".join(
-        rect(120 + 40 * x, 120 + 40 * y, 40, 40, BLACK)
-        for x in range(19)
-        for y in range(19)
-        if (x * 7 + y * 11 + x * y * 3 + (x ^ y)) % 3 == 0 or (x < 6 and y < 6 and (x + y) % 2 == 0)
-    )
-    return svg(1000, 1000, rect(0, 0, 1000, 1000, WHITE) + cells)
-
-
-SIDES = ["front", "back"]
-ENDS = ["door", "no_door"]
+WAVES = "M120 300 q190 -150 380 0 t380 0 v120 q-190 150 -380 0 t-380 0 Z M120 560 q190 -150 380 0 t380 0 v90 q-190 150 -380 0 t-380 0 Z"
+PEAK = "M120 720 L400 180 L560 470 L640 340 L880 720 Z"
+LOOPS = "M500 120 a300 300 0 1 0 1 0 Z M500 250 a170 170 0 1 1 -1 0 Z"
 
 STICKERS = {
-    # name: (drawing, (width, height) in mm, faces, present on every container)
-    "csc_safety_approval": (safety_plate(), (250, 150), ["door"], True),
-    "owner_plate": (owner_plate(), (200, 140), ["door"], True),
-    "customs_plate": (customs_plate(), (250, 100), ["door"], False),
-    "timber_treatment": (timber(), (200, 100), ["door"], False),
-    "height_triangle": (height_triangle(), (300, 300), [*SIDES, "no_door"], False),
-    "height_sign": (height_sign(), (250, 175), [*SIDES, *ENDS], False),
-    "keep_dry": (keep_dry(), (220, 220), [*SIDES, *ENDS], False),
-    "fork_here": (fork_here(), (240, 240), SIDES, False),
-    "no_walking": (no_walking(), (250, 250), ENDS, False),
-    "limited_quantity": (limited_quantity(), (350, 350), [*SIDES, *ENDS], False),
-    "company_diamond": (company_diamond(), (330, 330), [*SIDES, *ENDS], False),
-    "washed": (washed(), (180, 110), ["door"], False),
-    "code_tag": (code_tag(), (160, 160), [*SIDES, *ENDS], False),
+    "csc_safety_approval": Entry(safety_plate(), (250, 150), ("door",), True, place=LOW_LEFT),
+    "owner_plate": Entry(owner_plate(), (200, 140), ("door",), True, place=LOW_LEFT),
+    "customs_plate": Entry(customs_plate(), (250, 100), ("door",)),
+    "timber_treatment": Entry(timber_treatment(), (200, 100), ("door",)),
+    "height_sign": _sized("2.9 m", "9'6\"", HIGH),
+    "height_sign_standard": _sized("2.6 m", "8'6\"", STANDARD),
+    "height_triangle": Entry(height_triangle(), (300, 300), (*SIDES, "no_door"), kinds=HIGH),
+    "width_sign": Entry(width_sign(), (250, 120), WALLS, kinds=("45HC",)),
+    "super_heavy_30": _few(super_heavy("30.5 t"), (280, 252), WALLS),
+    "super_heavy_32": _few(super_heavy("32.5 t"), (280, 252), WALLS),
+    "caution_load": Entry(caution_load(), (270, 243), ("door",), share=0.2),
+    "caution_doors": _few(caution_doors(), (200, 180), ENDS),
+    **{f"ic_{number}": _ic(number) for number in ("27", "33", "61", "75", "83")},
+    "seal_ostvik": _few(seal("OSTVIK REGISTER", NAVY, anchor(NAVY)), (150, 150), ("door",)),
+    "seal_haldra": _few(seal("HALDRA MARITIME", RED, sextant(RED)), (150, 150), ("door",)),
+    "seal_corvane": _few(seal("CORVANE BUREAU", GREEN, star_shield(GREEN)), (150, 150), ("door",)),
+    "leasing_halvrik": _few(leasing_logo(BLACK, WHITE, "#f2c200", "HALVRIK"), (480, 200), WALLS),
+    "leasing_quorda": _few(leasing_logo(WHITE, NAVY, SKY, "QUORDA"), (480, 200), WALLS),
+    "leasing_boxmere": _few(leasing_logo("#f2c200", RED, BLACK, "BOXMERE"), (480, 200), WALLS),
+    "line_waves": _few(square_logo(SKY, WHITE, WAVES, "NAVANTE"), (520, 520), WALLS),
+    "line_peak": _few(square_logo(RED, WHITE, PEAK, "TOROVIK"), (520, 520), WALLS),
+    "line_loop": _few(square_logo(WHITE, ORANGE, LOOPS, "OLVERA"), (520, 520), WALLS),
+    "company_diamond": _few(diamond_logo("#7a2a8c", WHITE, "VK"), (330, 330), WALLS),
+    "company_diamond_red": _few(diamond_logo(RED, WHITE, "NTL"), (330, 330), WALLS),
+    "company_diamond_white": _few(diamond_logo(WHITE, NAVY, "OM"), (330, 330), WALLS),
+    "keep_dry": _few(keep_dry(), (220, 220), WALLS),
+    "fork_here": _few(fork_here(), (240, 240), SIDES),
+    "no_walking": _few(no_walking(), (250, 250), ENDS),
+    "washed": Entry(washed(), (180, 110), ("door",)),
+    "code_tag": _few(code_tag(), (160, 160), WALLS),
+    "inspection_blue": _few(inspection_label(NAVY, "2027"), (110, 77), ("door",)),
+    "inspection_red": _few(inspection_label(RED, "2026"), (110, 77), ("door",)),
+    "customs_seal_blue": _few(
+        customs_seal(NAVY, "CUSTOMS SEAL", "No 048 213"), (260, 78), ("door",)
+    ),
+    "customs_seal_green": _few(
+        customs_seal(GREEN, "INSPECTED", "No 7715 20"), (260, 78), ("door",)
+    ),
+    "chalk_ring": _few(chalk("42", 3, True), (330, 260), WALLS),
+    "chalk_letters": _few(chalk("AK7", 5, False), (420, 300), WALLS),
+    "chalk_cross": _few(chalk("X", 8, True), (240, 240), WALLS),
+    "chalk_digits": _few(chalk("274", 11, False), (380, 280), WALLS),
+    "poster_residue_1": _few(residue(4, 0), (420, 340), WALLS),
+    "poster_residue_2": _few(residue(9, 0), (300, 420), WALLS),
+    "placard_residue": Entry(residue(13, 4), (354, 354), WALLS),
+    "overpaint_1": _few(overpaint(2), (400, 400), WALLS, ink="overpaint"),
+    "overpaint_2": _few(overpaint(6), (400, 400), WALLS, ink="overpaint"),
 }
 
 
 def emblem(body: str) -> str:
+    """Return the drawing of a brand's emblem, which takes the colour of the lettering."""
     return svg(1000, 1000, f'<g fill="{WHITE}" stroke="none">{body}</g>')
 
 
 def star(points: int, outer: float, inner: float) -> str:
-    from math import cos, pi, sin
-
+    """Return a star as a path; the radii alternate."""
     at = []
     for i in range(2 * points):
         r, a = (outer, inner)[i % 2], pi * i / points - pi / 2
@@ -193,19 +207,38 @@ BRANDS = {
 }
 
 
+def _changed(entry: Entry) -> dict[str, object]:
+    """Return size, faces, and the other fields that differ from their defaults."""
+    usual = {each.name: each.default for each in fields(Entry)}
+    return {
+        name: value
+        for name, value in asdict(entry).items()
+        if name != "drawing" and value != usual[name]
+    }
+
+
 def main() -> None:
     """Write stickers/*.svg, *.png, index.json and brands.json."""
     folder = ASSETS / "stickers"
     folder.mkdir(exist_ok=True)
-    index = {}
-    drawings = {name: (text, "sticker") for name, (text, *_) in STICKERS.items()}
-    drawings |= {f"emblem_{name}": (emblem(body), "emblem") for name, body in EMBLEMS.items()}
-    for name, (text, role) in drawings.items():
+    index: dict[str, dict[str, object]] = {}
+    drawings = {name: entry.drawing for name, entry in STICKERS.items()}
+    for name, entry in STICKERS.items():
+        index[name] = {"role": "sticker", **_changed(entry)}
+    for name, (drawing, size, where) in MARKS.items():
+        drawings[name] = drawing
+        index[name] = {"role": "mark", "size_mm": size, "where": where}
+    for name, body in EMBLEMS.items():
+        drawings[f"emblem_{name}"] = emblem(body)
+        index[f"emblem_{name}"] = {"role": "emblem", "size_mm": (1000, 1000)}
+    for old in folder.glob("*.*"):
+        if old.stem not in drawings and old.suffix in (".svg", ".png"):
+            old.unlink()
+    for name, text in drawings.items():
         (folder / f"{name}.svg").write_text(text, encoding="utf-8")
         cv2.imwrite(str(folder / f"{name}.png"), bake(text), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-        _, size, where, always = STICKERS.get(name, ("", (1000, 1000), [], False))
-        index[name] = {"role": role, "size_mm": list(size), "where": where, "always": always}
-    (folder / "index.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+    lines = ",\n".join(f" {json.dumps(name)}: {json.dumps(each)}" for name, each in index.items())
+    (folder / "index.json").write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
     brands = {
         name: {
             "emblem": f"emblem_{mark}",

@@ -21,7 +21,7 @@ from trimesh.visual.material import PBRMaterial
 
 import fastgen
 from fastgen.camera.projection import view_of
-from fastgen.errors import OutputError
+from fastgen.errors import ConfigError, OutputError
 from fastgen.files.images import png, write
 from fastgen.formats.scene_file import view_values
 from fastgen.generator import Generator
@@ -67,10 +67,15 @@ def export_glb(
             texels are wider if its atlas would be too large otherwise.
 
     Raises:
-        ConfigError: The texel is too small, or the scene cannot be drawn.
+        ConfigError: The texel is too small, the scene cannot be drawn, or it has no container.
         OutputError: The file cannot be written.
     """
     check_scene(scene)
+    if not scene.container.present:
+        raise ConfigError(
+            f"scene {scene.index}: has no container to export; take another, or set "
+            "container.absent to 0"
+        )
     cameras = scene.cameras if cameras is None else cameras
     chosen = [check_camera(camera, scene.container) for camera in cameras]
     path = Path(path)

@@ -8,7 +8,8 @@ from jsonschema import Draft202012Validator
 
 from fastgen.cli.main import main
 from fastgen.config.commented_yaml import as_yaml, meanings
-from fastgen.config.config import PRESETS, Config
+from fastgen.config.config import Config
+from fastgen.config.presets import PRESETS
 from fastgen.config.schema import json_schema
 from fastgen.config.sensor import LensConfig
 from fastgen.errors import ConfigError

@@ -11,7 +11,8 @@ import yaml
 
 from fastgen.cli.main import main
 from fastgen.config.commented_yaml import as_yaml, meanings
-from fastgen.config.config import PRESETS, Config
+from fastgen.config.config import Config
+from fastgen.config.presets import PRESETS
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import bundled_hdris
 

@@ -177,8 +177,12 @@ def test_by_default_cameras_are_perfect_and_the_sky_is_clear():
     assert all(camera.sensor is None and camera.lens is None for camera in scene.cameras)
 
 
-def test_the_crane_preset_changes_only_cameras_and_weather_and_survives_json():
-    crane, plain = Generator(Config.preset("crane"), seed=4), Generator(seed=4)
+@pytest.mark.parametrize("preset", ["crane", "gate"])
+def test_presets_of_real_cameras_share_all_other_draws_and_survive_json(preset):
+    same = {"surface": {"color_weights": {}}, "markings": {"marked_containers": 1.0}}
+    same["spreader"] = {"probability": Config.preset().spreader.probability}
+    crane = Generator(Config.from_values(same, Config.preset(preset)), seed=4)
+    plain = Generator(seed=4)
     kinds = set()
     for index in range(12):
         scene, other = crane.scene(index), plain.scene(index)

@@ -4,7 +4,8 @@ import argparse
 import re
 from pathlib import Path
 
-from fastgen.config.config import PRESETS, Config
+from fastgen.config.config import Config
+from fastgen.config.presets import PRESETS
 from fastgen.errors import ConfigError
 from fastgen.render.gl import BACKENDS
 from fastgen.render.settings import QUALITY, RenderSettings

@@ -1,6 +1,6 @@
 """Config: all parameters of the distributions that scenes are drawn from.
 
-A preset is a Config defined here; a YAML or JSON file changes single values of it. Ranges are
+A preset is a Config, see presets.py; a YAML or JSON file changes single values of it. Ranges are
 drawn from uniformly unless documented otherwise. Lengths are millimetres and angles degrees. Colors
 are sRGB hex codes, because people pick them on screens; scenes hold linear albedo.
 """
@@ -18,6 +18,7 @@ from fastgen import srgb
 from fastgen.config.cameras import CameraConfig, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
 from fastgen.config.markings import MarkingsConfig
+from fastgen.config.presets import PRESETS
 from fastgen.config.sensor import SensorConfig, WeatherConfig
 from fastgen.config.yaml_values import loaded
 from fastgen.errors import ConfigError
@@ -40,6 +41,7 @@ _Colors = Annotated[tuple[_Color, ...], MinLen(1)]
 _Reach = Annotated[Range, Bounds(1.0, 1e6, "mm")]
 _Roughness = Annotated[Range, Bounds(MIN_ROUGHNESS, 1.0)]
 _Size = Annotated[Range, Bounds(50, 1e5, "mm")]
+_Weight = Annotated[float, Bounds(0.0, 1e6)]
 _CameraName = Annotated[
     str,
     Matching(
@@ -54,7 +56,9 @@ class SurfaceConfig:
     """Paint and its ageing (SeaFront paper, section 3.2), layer by layer as in its Fig. 5.
 
     Attributes:
-        colors: Colors of undamaged paint by name; all are equally likely.
+        colors: Colors of undamaged paint by name.
+        color_weights: Relative frequency of each color; 1 for a color that is not named. Names that
+            are not in `colors` have no effect, so a file may replace a preset's colors alone.
         roughness: Perceptual GGX roughness of undamaged paint.
         tone_variation: Variation of the paint's tone over a side.
         ageing_strength: Strength of the darkening toward the corners of each panel.
@@ -95,6 +99,7 @@ class SurfaceConfig:
             "charcoal": "#3a3d40",
         }
     )
+    color_weights: dict[str, _Weight] = field(default_factory=dict)
     roughness: _Roughness = Range(0.38, 0.62)
     tone_variation: Annotated[Range, UNIT] = Range(0.02, 0.12)
     ageing_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
@@ -110,6 +115,16 @@ class SurfaceConfig:
     wear_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
     wear_scale_mm: _Size = Range(700, 2500)
 
+    def __post_init__(self) -> None:
+        """Refuse colors without any weight."""
+        if sum(self.weights) <= 0:
+            raise ConfigError("color_weights: all colors have weight 0; give at least one above 0")
+
+    @property
+    def weights(self) -> list[float]:
+        """Relative frequency of each color, in the order of `colors`."""
+        return [self.color_weights.get(name, 1.0) for name in self.colors]
+
 
 @dataclass(frozen=True)
 class ContainerConfig:
@@ -120,13 +135,16 @@ class ContainerConfig:
         depth_scale: Factors of the corrugation depth; all are equally likely. This is a list and
             not a range because each factor needs a mesh of its own. Depths that do not fit the
             frame are refused.
+        absent: Share of scenes without a container. They show only the surroundings, without a
+            spreader, and have no labels.
     """
 
-    kinds: dict[Annotated[str, OneOf(tuple(KINDS))], Annotated[float, Bounds(0.0, 1e6)]] = field(
+    kinds: dict[Annotated[str, OneOf(tuple(KINDS))], _Weight] = field(
         default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1}
     )
     profiles: WallProfiles = field(default_factory=WallProfiles)
     depth_scale: Annotated[tuple[Annotated[float, Bounds(0.2, 3.0)], ...], MinLen(1)] = (0.95, 1.06)
+    absent: Share = 0.0
 
     def __post_init__(self) -> None:
         """Refuse kinds without any weight, and depths that do not fit the frame."""
@@ -328,40 +346,6 @@ def _with_room(config: Config) -> Config:
     for name, rig in config.cameras.items():
         check_room(name, rig, kinds, config.damage.bulge_mm)
     return config
-
-
-PRESETS: dict[str, dict[str, Any]] = {
-    "seafront": {},
-    # images of real crane cameras: wide lenses, weather and sensor effects
-    "crane": {
-        "cameras": {
-            "A": {
-                "focal_mm": 22.0,
-                "lens": {"model": "fisheye", "k1": [-0.035, -0.005], "k2": [0.0, 0.006]},
-            },
-            "B": {
-                "lens": {"k1": [-0.24, -0.16], "k2": [0.03, 0.07], "p1": [-1e-3, 1e-3]},
-            },
-            "Cl": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
-            "Cr": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
-        },
-        "sensor": {
-            "defocus": {"probability": 0.15},
-            "motion": {"probability": 0.25},
-            "vignetting": [0.0, 0.5],
-            "exposure_error_ev": [-0.7, 0.7],
-            "white_balance_ev": [-0.15, 0.15],
-            "noise": {"probability": 0.9},
-            "stamp": {"probability": 0.3},
-            "jpeg_quality": [45, 92],
-        },
-        "weather": {
-            "fog_probability": 0.12,
-            "rain_probability": 0.15,
-            "wet_probability": 0.1,
-        },
-    },
-}
 
 
 def linear_color(text: str) -> tuple[float, float, float]:

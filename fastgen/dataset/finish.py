@@ -58,7 +58,8 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
             storage.make_folders([f"images/{split}", f"scenes/{split}"])
             for each in formats:
                 storage.make_folders(each.folders(split))
-                for path, content in each.dataset_files(split, _records(job, storage, split)):
+                records_of = _records(job, storage, split)
+                for path, content in each.dataset_files(split, records_of, job.config):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder) and images:
             sheet = contact_sheet(storage.root, images, formats)

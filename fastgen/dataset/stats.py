@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fastgen.classes import DAMAGE_CLASSES, MARKER_CLASSES
+from fastgen.classes import DAMAGE_CLASSES, MARK_CLASSES, MARKER_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
@@ -28,7 +28,7 @@ class _Labels:
 
     Attributes:
         by_class: Number of labels by class name.
-        sizes: Width and height of each box, except containers and texts, as shares of the image.
+        sizes: Width and height of each box of a damage or marker, as shares of the image.
         images: Number of images that have such a box.
     """
 
@@ -103,7 +103,9 @@ def _records(out: str) -> Iterator[Record]:
 
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:
-    return _table({name: [each.by_class[name] for each in found.values()] for name in task.classes})
+    rows = {name: [each.by_class[name] for each in found.values()] for name in task.classes}
+    # most datasets do not label the marks
+    return _table({n: row for n, row in rows.items() if n not in MARK_CLASSES or any(row)})
 
 
 def _table(rows: dict[str, list[int]]) -> str:

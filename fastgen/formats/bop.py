@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from fastgen.config.config import Config
 from fastgen.files.images import png
 from fastgen.formats.depth import depth_mm
 from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
@@ -47,7 +48,7 @@ class _Bop(Format):
         camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}
         if sample.view.distortion:  # an addition of ours: BOP has no lens distortion
             camera |= {key: view_values(sample.view)[key] for key in _LENS_KEYS}
-        if thing.bbox is None or thing.amodal_bbox is None:
+        if thing is None or thing.bbox is None or thing.amodal_bbox is None:
             return files, {"id": item.number, "camera": camera, "gt": [], "info": []}
         visible = np.asarray(sample.damage > 0, np.uint8) * np.uint8(255)
         files[f"{folder}/mask_visib/{name}_000000.png"] = png(visible)
@@ -66,7 +67,7 @@ class _Bop(Format):
         }
         return files, {"id": item.number, "camera": camera, "gt": [gt], "info": [info]}
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
             yield f"bop/{split}/000000/scene_{name}.json", _by_image(records, key)
         if split == SPLITS[0]:

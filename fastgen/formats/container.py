@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from fastgen.config.config import Config
 from fastgen.formats import coco
 from fastgen.formats.format import DatasetFiles, Files, Format, Records
 from fastgen.formats.item import Item
@@ -19,7 +20,7 @@ class _Container(Format):
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample = item.sample
         thing = item.container
-        if item.container_annotation is None:
+        if thing is None or item.container_annotation is None:
             return {}, []
         pose = view_values(sample.view)
         found = {
@@ -35,7 +36,7 @@ class _Container(Format):
         }
         return {}, [found]
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Corner castings of synthetic shipping containers, and the containers' poses"
         text = coco.file_text(words, CATEGORIES, records, self.name)
         yield f"container/coco_{split}.json", text

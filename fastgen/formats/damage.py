@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, SEGMENTATION_CLASSES
+from fastgen.config.config import Config
 from fastgen.files.images import decode, png
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
@@ -73,7 +74,7 @@ class _Damage(Format):
     def folders(self, split: str) -> Sequence[str]:
         return (f"damage/masks/{split}", f"damage/yolo/{split}")
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Synthetic shipping containers with damage masks"
         text = coco.file_text(words, CATEGORIES, records, self.name)
         yield f"damage/coco_{split}.json", text

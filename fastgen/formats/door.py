@@ -55,7 +55,7 @@ class _Door(Format):
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         folder = door_class(item.sample.camera)
-        if folder is None:
+        if folder is None or item.container is None:
             return {}, None
         return {f"door/{item.split}/{folder}/{item.stem}.jpg": Same(item.image_path)}, None
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.config.config import Config
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import scene_file
 
@@ -67,8 +68,14 @@ class Format(ABC):
         The shard's manifest keeps the facts; the other methods work on them.
         """
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
-        """Yield the path and content of each file that covers a whole split."""
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
+        """Yield the path and content of each file that covers a whole split.
+
+        Args:
+            split: train, val or test.
+            records: Returns the records of the split's images.
+            config: Configuration of the dataset, which decides the list of classes.
+        """
         return iter(())
 
     def folders(self, split: str) -> Sequence[str]:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, CONTAINER_ID
+from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records, Same
 from fastgen.formats.item import Item
@@ -15,12 +16,10 @@ from fastgen.labels.overlay import draw_box
 from fastgen.labels.visibility import window
 from fastgen.sampling.scene import SPLITS
 
-CATEGORIES = [{"id": i + 1, "name": name} for i, name in enumerate(DETECTION_CLASSES)]
-
 
 class _Imdg(Format):
     name = "imdg"
-    classes = DETECTION_CLASSES
+    classes = ALL_DETECTION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample, split, stem = item.sample, item.split, item.stem
@@ -37,7 +36,7 @@ class _Imdg(Format):
                 found.append(item.container_annotation)
                 continue
             part = window(sample.ids, box) == thing.id
-            category = DETECTION_CLASSES.index(thing.class_name) + 1
+            category = ALL_DETECTION_CLASSES.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
             found.append(
                 {
@@ -56,14 +55,16 @@ class _Imdg(Format):
     def folders(self, split: str) -> Sequence[str]:
         return (f"imdg/images/{split}", f"imdg/labels/{split}")
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Synthetic shipping containers with dangerous-goods markers and identifiers"
-        yield f"imdg/coco_{split}.json", coco.file_text(words, CATEGORIES, records, self.name)
+        classes = config.markings.detection_classes
+        categories = [{"id": i + 1, "name": name} for i, name in enumerate(classes)]
+        yield f"imdg/coco_{split}.json", coco.file_text(words, categories, records, self.name)
         if split == SPLITS[0]:
-            names = "".join(f"  {i}: {name}\n" for i, name in enumerate(DETECTION_CLASSES))
+            names = "".join(f"  {i}: {name}\n" for i, name in enumerate(classes))
             # without the key `path`, trainers take folders relative to this file
             head = "".join(f"{each}: images/{each}\n" for each in SPLITS)
-            yield "imdg/data.yaml", f"{head}nc: {len(DETECTION_CLASSES)}\nnames:\n{names}".encode()
+            yield "imdg/data.yaml", f"{head}nc: {len(classes)}\nnames:\n{names}".encode()
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         height, width = picture.shape[:2]
@@ -80,9 +81,9 @@ class _Imdg(Format):
             for index, values in yolo.rows(read(path).decode())
         ]
         visible = [
-            (DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
+            (ALL_DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
             for item in scene["objects"]
-            if item["class_name"] in DETECTION_CLASSES and item["bbox"] and not item["ignored"]
+            if item["class_name"] in ALL_DETECTION_CLASSES and item["bbox"] and not item["ignored"]
         ]
         if sorted(listed) != sorted(visible):
             yield f"{path}: differs from the scene file's objects"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from fastgen.classes import CONTAINER_ID, DETECTION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, CONTAINER_ID
 from fastgen.config.config import LabelConfig
 from fastgen.files.images import jpeg
 from fastgen.formats import coco
@@ -39,9 +39,9 @@ class Item:
         return f"images/{self.split}/{self.stem}.jpg"
 
     @property
-    def container(self) -> Object:
-        """The container, visible or not."""
-        return next(thing for thing in self.sample.objects if thing.id == CONTAINER_ID)
+    def container(self) -> Object | None:
+        """The container, visible or not; None if the scene has none."""
+        return next((thing for thing in self.sample.objects if thing.id == CONTAINER_ID), None)
 
     @property
     def detections(self) -> Iterator[tuple[Object, Box]]:
@@ -55,7 +55,7 @@ class Item:
     def container_annotation(self) -> dict[str, Any] | None:
         """COCO annotation of the container, category 1 of each task; None if it is not visible."""
         thing, sample = self.container, self.sample
-        if thing.bbox is None:
+        if thing is None or thing.bbox is None:
             return None
         part = window(sample.damage, thing.bbox) > 0
         return coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored)
@@ -73,5 +73,5 @@ def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
     objects are included.
     """
     for thing in objects:
-        if thing.class_name in DETECTION_CLASSES and thing.bbox is not None:
+        if thing.class_name in ALL_DETECTION_CLASSES and thing.bbox is not None:
             yield thing, thing.bbox

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from fastgen.config.config import Config
 from fastgen.files.images import png
 from fastgen.formats.format import DatasetFiles, Files, Format, Records
 from fastgen.formats.item import Item
@@ -27,7 +28,7 @@ class _Text(Format):
     def folders(self, split: str) -> Sequence[str]:
         return (f"text/{split}",)
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         lines = (
             f"{crop['file']}\t{crop['text']}\n"
             for record in records()

@@ -6,6 +6,7 @@ Pixels are numbered from 1, and boxes include their last pixel.
 from typing import Any
 from xml.etree import ElementTree
 
+from fastgen.config.config import Config
 from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
 from fastgen.formats.item import Item
 
@@ -39,7 +40,7 @@ class _Voc(Format):
             f"voc/Annotations/{item.stem}.xml": ElementTree.tostring(root),
         }, None
 
-    def dataset_files(self, split: str, records: Records) -> DatasetFiles:
+    def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         lines = (f"{record['stem']}\n" for record in records())
         yield f"voc/ImageSets/Main/{split}.txt", lines
 

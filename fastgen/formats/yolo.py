@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DETECTION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.formats import item
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Object
@@ -23,7 +23,7 @@ def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
     Ignored objects are not included, because YOLO files cannot mark them.
     """
     return [
-        (DETECTION_CLASSES.index(thing.class_name), thing, box)
+        (ALL_DETECTION_CLASSES.index(thing.class_name), thing, box)
         for thing, box in item.detections(objects)
         if not thing.ignored
     ]

@@ -12,6 +12,7 @@ from fastgen.classes import (
     CONTAINER_ID,
     DAMAGE_CLASSES,
     DAMAGE_VALUES,
+    MARK_CLASSES,
     MARKER_CLASSES,
     SPREADER_ID,
     UNDAMAGED_CONTAINER,
@@ -29,14 +30,15 @@ DAMAGE_GREYS = MappingProxyType({UNDAMAGED_CONTAINER: 200})
 _GOLDEN = (5**0.5 - 1) / 2
 
 _STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader")
+_PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 
 
 def class_color(name: str) -> tuple[int, int, int]:
     """Return the RGB colour of a class.
 
-    Markers have pale colours. All other classes have strong colours that differ clearly.
+    Markers and marks have pale colours. All other classes have strong colours that differ clearly.
     """
-    names, saturation = (_STRONG, 0.85) if name in _STRONG else (MARKER_CLASSES, 0.4)
+    names, saturation = (_STRONG, 0.85) if name in _STRONG else (_PALE, 0.4)
     return _color(names.index(name), saturation, 1.0)
 
 

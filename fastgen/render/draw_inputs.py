@@ -23,7 +23,8 @@ class Regions:
     """Parts of an image in which the passes have work. None stands for the whole image.
 
     Attributes:
-        surfaces: Disjoint rectangles; outside them the image shows only sky.
+        surfaces: Disjoint rectangles; outside them the image shows only sky. A scene without a
+            container has none.
         near_damage: Disjoint rectangles that damages may touch.
         holes: Disjoint rectangles that perforations may touch.
         cables: Rectangles that bundles of cables may touch.
@@ -42,6 +43,8 @@ class Regions:
 
 def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
     """Return where in an image container, spreader, damages and cables may be seen."""
+    if not prepared.scene.container.present:
+        return Regions(())
     touched = [region_of(view, corners_mm(item)) for item in damages]
     torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
     boxes = [box_corners(prepared.container.bounds_mm, damages)]

@@ -170,6 +170,9 @@ class Renderer:
         self._cast_shadows(prepared, inputs)
         self._set_view(prepared, camera, inputs)
         self._geometry.run(inputs)
+        if not inputs.regions.surfaces:
+            self._background.run(inputs)
+            return inputs
         if inputs.variant.traced and light.sky_rays is not None:
             rays = self._rays.get(size, lambda: RayPass(self._gl, self._programs, size))
             bodies = self._ray_bodies(prepared, camera, inputs)

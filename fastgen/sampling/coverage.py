@@ -56,6 +56,8 @@ def single_container_configs(config: ContainerConfig) -> Iterator[ContainerConfi
 def damage_variant_configs(config: Config) -> Iterator[Config]:
     """Yield configurations for undamaged, bent and perforated containers, as far as possible.
 
+    All their scenes have a container.
+
     The renderer has a shader variant for each of the three.
 
     Args:
@@ -65,6 +67,7 @@ def damage_variant_configs(config: Config) -> Iterator[Config]:
         `config` without damage, then with the damage kinds that make no hole, then with holes
         only. The last two have a damage probability of 1.
     """
+    config = replace(config, container=replace(config.container, absent=0.0))
     damage = config.damage
     yield replace(config, damage=replace(damage, probability=0.0))
     holes = ("perforation",)

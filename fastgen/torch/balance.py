@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View, view_of
-from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
@@ -45,21 +45,23 @@ def class_counts(
         cameras: Names of the cameras; None takes all that suit the task.
 
     Returns:
-        int64 [classes], in the order of class_names(task).
+        int64 [classes], in the order of class_names(task, config).
 
     Raises:
         ConfigError: A value is not valid, or the task has no classes.
     """
-    names = class_names(task)
+    config = Config.checked(config)
+    names = class_names(task, config)
     if not names:
         raise ConfigError(f"task: {task} has no classes to count")
     scenes = whole("scenes", scenes, 1)
-    config = Config.checked(config)
     chosen = chosen_cameras(task, config, cameras)
     generator = Generator(config, seed, size)
     counts = np.zeros(len(names), np.int64)
     for index in range(scenes):
         scene = generator.scene(index)
+        if not scene.container.present:
+            continue
         prepared = PreparedScene(scene)
         for name in chosen:
             camera = scene.camera(name)
@@ -96,7 +98,8 @@ def class_weights(
         float32 [classes].
     """
     counts = class_counts(task, config, seed, size, scenes, cameras)
-    absent = [name for name, count in zip(class_names(task), counts, strict=True) if not count]
+    names = class_names(task, config)
+    absent = [name for name, count in zip(names, counts, strict=True) if not count]
     if absent:
         warnings.warn(
             f"class_weights: {', '.join(absent)} have no label in {scenes} scenes and are weighted "
@@ -126,7 +129,7 @@ def _count_decals(
     area = -0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
     seen = (depth > 0).all(axis=1) & (area >= min_visible_px) & _inside(view, outlines.mean(axis=1))
     for decal, visible in zip(labelled, seen, strict=True):
-        counts[DETECTION_CLASSES.index(decal.class_name)] += bool(visible)
+        counts[ALL_DETECTION_CLASSES.index(decal.class_name)] += bool(visible)
 
 
 def _inside(view: View, points_mm: NDArray[np.float64]) -> NDArray[np.bool_]:

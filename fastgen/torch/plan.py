@@ -106,9 +106,15 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     """Return the cameras of a dataset: `cameras`, or all of the configuration that suit the task.
 
     Raises:
-        ConfigError: The task or a camera is unknown, or a camera does not suit the task.
+        ConfigError: The task or a camera is unknown, or a camera or the configuration does not
+            suit the task.
     """
     class_names(task)
+    if task == "door" and config.container.absent > 0:
+        raise ConfigError(
+            f"container.absent: {config.container.absent:g} leaves images without a class for the "
+            "door task; set it to 0"
+        )
     rig = config.cameras
     if isinstance(cameras, str) or not (cameras is None or isinstance(cameras, Iterable)):
         raise ConfigError(f"cameras: {cameras!r} is not a list; give [{cameras!r}]")
@@ -156,6 +162,11 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
         raise ConfigError(f"curriculum: epoch {epoch}: {error}") from None
     if made.damage.mask_threshold_mm != base.damage.mask_threshold_mm:
         raise ConfigError(f"curriculum: epoch {epoch} changes damage.mask_threshold_mm; leave it")
+    if made.markings.detection_classes != base.markings.detection_classes:
+        raise ConfigError(
+            f"curriculum: epoch {epoch} changes which classes there are; give markings.marks in "
+            "every epoch or in none, with 0 for no mark"
+        )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")
     return made

@@ -13,7 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
-from fastgen.config.config import LabelConfig
+from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
@@ -65,15 +65,22 @@ class ItemSettings:
             )
 
 
-def class_names(task: str) -> tuple[str, ...]:
+def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     """Return the class names of a task in label order; none for text.
 
     Labels of the detection form are 1 higher, because 0 is the background.
+
+    Args:
+        task: damage, imdg, text or door.
+        config: Configuration of the dataset. With `markings.marks` the imdg task has five more
+            classes; None stands for a configuration without.
 
     Raises:
         ConfigError: The task is unknown.
     """
     check_known("task", task, _NAMES)
+    if task == "imdg" and config is not None:
+        return config.markings.detection_classes
     return _NAMES[task]
 
 
@@ -118,6 +125,11 @@ def item_of(
         return _text_item(sample, labels, image_id, as_float)
     image = image_tensor(sample.image, as_float)
     if task == "door":
+        if not sample.scene.container.present:  # a curriculum may have set container.absent
+            raise ConfigError(
+                f"scene {sample.scene.index}: has no container, so it has no class for the door "
+                "task; set container.absent to 0"
+            )
         return image, door_number(sample.camera)
     found = _damages(sample) if task == "damage" else _markers(sample)
     if items.form == "yolo":

@@ -46,6 +46,9 @@ class GeometryPass:
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
         rest = drawn if inputs.variant.traced else [*regions.near_damage, *regions.cables]
         samples.begin(damage, drawn, rest, regions.holes)
+        if not regions.surfaces:
+            inputs.textures.update(samples.textures)
+            return
         self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self._ctx.front_face = "cw"  # clip y points down, see View.clip_matrix
         textures = {**inputs.textures, "lobe_masks": self._lobes}
