@@ -71,7 +71,7 @@ _FILES = {
     "photos": "look/*.jpg",
 }
 
-_SMOKE = Effort(6, 4, 4, 2, 4, 4, 4)
+_SMOKE = Effort(2, 2, 4, 1, 4, 4, 4)
 _SHOWN_CUES = 6
 
 

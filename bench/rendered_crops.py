@@ -21,7 +21,7 @@ from fastgen import Config, Generator
 from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, MARKER_CLASSES
 from fastgen.config.cameras import direction_from, face_frame
 from fastgen.decals.artwork import glyph_tiles
-from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
+from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS, layout
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
@@ -211,7 +211,7 @@ def aimed(
     Exposure and sensor effects are those of one of the scene's cameras.
     """
     frame = face_frame(face, scene.container.kind)
-    angles = float(rng.uniform(-35, 35)), float(rng.uniform(-15, 25))
+    angles = float(rng.uniform(-30, 30)), float(rng.uniform(-15, 25))
     distance = float(rng.uniform(1800, 6000))
     position = target_mm + direction_from(frame, *angles) * distance
     like = scene.cameras[int(rng.integers(len(scene.cameras)))]
@@ -319,15 +319,13 @@ def _text(sample: Sample, item: Object, decal: Decal) -> Text:
 def _letters_px(sample: Sample, decal: Decal) -> NDArray[np.float64]:
     """Return the centres of a text's letters in reading order, float64 [N, 2] in pixels."""
     font = glyph_tiles()[1][decal.font]
-    parts = getattr(decal, "parts", ())
-    arguments = (decal.lines, font, decal.cap_mm, decal.vertical)
-    lettering = layout(*arguments, parts) if parts else layout(*arguments)
+    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
     middle = np.array(lettering.size_mm) / 2
     centers = np.array(
         [
             ((g.x0 + g.x1) / 2, g.y0 + (TILE_BASELINE_CAPS + 0.5) * decal.cap_mm)
             for g in lettering.glyphs
-            if g.char.isalnum()
+            if g.char != BOX
         ]
     )
     sheet = (centers - middle) @ decal.turn.T + np.array(decal.center_mm)
@@ -368,6 +366,7 @@ def _panels_of(sample: Sample, rng: np.random.Generator) -> list[tuple[Pixels, s
         side = min(max(side, 40.0), 0.9 * min(height, width))
         middle = np.array([item.bbox[0] + item.bbox[2], item.bbox[1] + item.bbox[3]]) / 2
         corner = middle - side / 2 + rng.uniform(-0.15, 0.15, 2) * side
+        corner = corner.clip(0, (width - side, height - side))
         found.append((_square(sample.image, corner, side), item.class_name))
         for _ in range(12):
             x, y = rng.uniform(0, (width - side, height - side))
