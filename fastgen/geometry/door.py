@@ -18,16 +18,16 @@ from fastgen.scene.faces import FACE_AXES
 LEAF_MM = 58.0
 """Inset of the leaves' face."""
 
-SWAGE = Wave(424.0, 22.0, 110.0, 32.0, 250.0)
+SWAGE = Wave(424.0, 34.0, 110.0, 50.0, 214.0)
 """Horizontal swages. They are so shallow that the flat stiles beside them can share their
-unfolding: beside a slope, a stile is stretched by sqrt(1 + (22 / 32)^2) = 1.21."""
+unfolding: beside a slope, a stile is stretched by sqrt(1 + (34 / 50)^2) = 1.21."""
 
-GASKET_MM = 14.0
+GASKET_MM = 20.0
 """Width of the seal around each leaf, set back to _GASKET_INSET_MM."""
 
 _GASKET_INSET_MM = 72.0
 _CENTER_GAP_MM = 12.0
-_STILE_MM = 70.0
+_STILE_MM = 60.0
 _SHADE_MM = 50.0
 """Width of cells on the leaves: the shade beside a locking bar varies over this distance."""
 
