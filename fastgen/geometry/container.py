@@ -15,10 +15,10 @@ f = 14.5 mm (the sides).
 With the default profiles and max_edge_mm = 150:
 
     kind   triangles  vertices  charts  atlas in m    filled
-    20        25,146    28,078     103  11.4 x 11.1     77 %
-    40        39,606    43,110      99  13.2 x 13.7     88 %
-    40HC      42,094    45,666      99  13.2 x 14.6     87 %
-    45HC      45,890    49,622      99  14.9 x 14.6     86 %
+    20        25,290    28,222     103  11.4 x 11.1     77 %
+    40        39,750    43,254      99  13.2 x 13.7     88 %
+    40HC      42,194    45,766      99  13.2 x 14.6     87 %
+    45HC      46,054    49,786      99  14.9 x 14.6     86 %
 """
 
 from fastgen.errors import ConfigError
