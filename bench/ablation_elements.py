@@ -236,9 +236,7 @@ ELEMENTS = (
     ),
     Element("shape", "door gaskets", container=without_charts("door.gasket")),
     Element("shape", "castings' apertures", container=filled_apertures),
-    Element(
-        "shape", "underside: members, fork pockets", container=without_charts("member.", "fork.")
-    ),
+    Element("shape", "fork pockets", container=without_charts("fork.")),
     Element("shape", "spreader", lambda scene: replace(scene, spreader=Spreader())),
     Element(
         "shape",
@@ -252,7 +250,6 @@ ELEMENTS = (
     Element("light", "shadow of the sun", files=_stub("light_visibility.glsl")),
     Element("light", "bounces in occluded places", files=_stub("occluder_indirect.glsl")),
     Element("light", "light from surfaces on the spreader", indirect=False),
-    Element("light", "the sun's light from walls in recesses", files=_stub("occluder_light.glsl")),
     Element(
         "light",
         "reflections lean away from what hides the sky",

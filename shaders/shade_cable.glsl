@@ -28,8 +28,8 @@ Shaded shade_cable(vec2 center) {
     for (int axis = 0; axis < 2; ++axis) {
         vec3 normal = vec3(0.0);
         normal[axis] = view[axis] < 0.0 ? -1.0 : 1.0;
-        SkyVisibility whole = SkyVisibility(normal, 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0),
-                                            steel.albedo, NO_TRACED_LIGHT);
+        SkyVisibility whole = SkyVisibility(normal, 0.0, vec3(1.0), 1.0, 1.0, steel.albedo,
+                                            NO_TRACED_LIGHT);
         color += abs(view[axis]) * layer_color(steel, normal, view, whole, vec4(1.0));
     }
     color /= max(abs(view.x) + abs(view.y), 1e-6);

@@ -20,8 +20,6 @@ struct SkyVisibility {
     vec3 irradiance;        // Of the visible sky, relative to a whole sky about the bent normal.
     float mirror;           // Share of open sky about the mirror direction.
     float lacks_indirect;   // 1 if `irradiance` lacks light reflected by the occluders, else 0.
-    float overhead;         // Share of the occluders that is a spreader overhead, 0..1.
-    vec3 occluder_light;    // Irradiance / pi of directional lights on occluders, times their share.
     vec3 occluder_albedo;   // Albedo of the occluders.
     TracedLight traced;
 };

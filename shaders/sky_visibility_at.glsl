@@ -17,6 +17,6 @@ SkyVisibility sky_visibility_at(ivec2 sample_at, uint zone) {
     vec3 light = encoded.rgb * (255.0 / LIGHT_STEPS * fma(encoded.a, 255.0 / LIGHT_TIMES, 1.0));
     float lacks_indirect = zone < SPREADER_ZONE ? 1.0 : 0.0;
     float cone_cosine = clamp(2.0 - 2.0 * size, 0.0, 1.0);
-    return SkyVisibility(cone / size, cone_cosine, light, stored.w, lacks_indirect, 0.0, vec3(0.0),
-                         vec3(0.0), NO_TRACED_LIGHT);
+    return SkyVisibility(cone / size, cone_cosine, light, stored.w, lacks_indirect, vec3(0.0),
+                         NO_TRACED_LIGHT);
 }

@@ -15,7 +15,6 @@
 #include "zone_sample.glsl"
 #if LIGHTS
 #include "light_visibility.glsl"
-#include "occluder_light.glsl"
 #endif
 #if TRACED
 #include "traced_light.glsl"
@@ -33,8 +32,8 @@ vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
     vec3 paint = material_base[SHEET_MATERIAL].rgb;
     sky.occluder_albedo = mix(p.surface.material.albedo, paint, p.surface.printed);
     // Above a roof the occluder is the spreader.
-    sky.overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
-    sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, sky.overhead);
+    float overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
+    sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, overhead);
     vec4 light_seen = vec4(0.0);
     float depth = coarse_mean(surface_depths, sample_at).r;
     vec2 position = sample_position(sample_at) + 0.5 * vec2(coarse_offset);
@@ -43,9 +42,7 @@ vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
     sky.traced = traced_light_at(position, key, from_eye, normal);
 #endif
 #if LIGHTS && LAYER == LAYER_ALL
-    vec3 outward = p.surface.outward;
-    light_seen = light_visibility(outward, from_eye, normal, depth * pixel_angle);
-    sky.occluder_light = occluder_light(outward, from_eye, normal, sky);
+    light_seen = light_visibility(p.surface.outward, from_eye, normal, depth * pixel_angle);
 #endif
     return layer_color(p.surface.material, normal, view, sky, light_seen);
 }

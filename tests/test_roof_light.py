@@ -21,7 +21,7 @@ ROOF = Config.from_values(
         },
         "spreader": {"probability": 1},
         "damage": {"probability": 0},
-        "environment": {"names": ["park"]},
+        "environment": {"names": ["dawn"]},  # no sun
     }
 )
 

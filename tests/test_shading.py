@@ -50,7 +50,7 @@ def test_a_white_surface_in_a_white_furnace_vanishes(gl, metallic):
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " BrdfTerms r = brdf_terms(Material(vec3(1.0), x.x, x.z), vec3(0.0, 0.0, 1.0), view);"
         " return vec4(environment_reflection(r,"
-        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(1.0),"
         " NO_TRACED_LIGHT)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
@@ -67,7 +67,7 @@ def test_no_surface_returns_more_than_falls_on_it(gl):
         "vec4 f(vec4 x) { vec3 view = vec3(sqrt(1.0 - x.y * x.y), 0.0, x.y);"
         " BrdfTerms r = brdf_terms(Material(vec3(x.w), x.x, x.z), vec3(0.0, 0.0, 1.0), view);"
         " return vec4(environment_reflection(r,"
-        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, 0.0, vec3(0.0), vec3(1.0),"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), 0.0, vec3(1.0), 1.0, 1.0, vec3(1.0),"
         " NO_TRACED_LIGHT)), 1.0); }"
     )
     out = run(gl, body, rows, white_light(gl))
@@ -92,8 +92,8 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
             f" vec3 open = vec3(x.z); TracedLight rays = {rays};"
             " BrdfTerms r = brdf_terms(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view);"
             " return vec4(environment_reflection(r,"
-            " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, 0.0, vec3(0.1),"
-            " vec3(0.3), rays)), 1.0); }"
+            " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, vec3(0.3), rays)"
+            ")), 1.0); }"
         )
         return run(gl, body, rows, white_light(gl))[:, :3]
 
@@ -116,8 +116,8 @@ def test_indirect_light_has_the_occluders_colour_and_never_exceeds_the_sky(gl):
         " float share = 1.0 - x.w * x.w;"
         " BrdfTerms r = brdf_terms(Material(vec3(x.z), x.x, 0.0), vec3(0.0, 0.0, 1.0), view);"
         " return vec4(environment_reflection(r,"
-        " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, 0.0, vec3(0.0),"
-        " vec3(0.0, 0.5, 1.0), NO_TRACED_LIGHT)), 1.0); }"
+        " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(share), share, 1.0, vec3(0.0, 0.5, 1.0),"
+        " NO_TRACED_LIGHT)), 1.0); }"
     )
     black, grey, white = run(gl, body, rows, white_light(gl))[:, :3].T
     assert (black <= grey + 1e-6).all()
