@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import cv2
 from drawing import ASSETS, BLACK, FONTS, WHITE, bake, rect, width_of, words
 from marker_families import FAMILIES, PALETTE, SMALL_PRINT, Family
+from marker_fittings import FITTINGS
 
 WORDINGS = ("none", "line", "un", "two", "side", "fine")
 """Wordings of all prints except the first of a class, which is "heavy"."""
@@ -342,7 +343,7 @@ def all_looks() -> dict[str, tuple[str, Look]]:
 
 
 def main() -> None:
-    """Write markers/*.png and markers/index.json."""
+    """Write markers/*.png, markers/index.json and markers/un_numbers.json."""
     folder = ASSETS / "markers"
     folder.mkdir(exist_ok=True)
     index = {}
@@ -350,7 +351,12 @@ def main() -> None:
         image = bake(Print(FAMILIES[class_name], look).svg())
         cv2.imwrite(str(folder / f"{name}.png"), image, [cv2.IMWRITE_PNG_COMPRESSION, 9])
         index[name] = {"class": class_name, "wording": look.wording}
-    (folder / "index.json").write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+    for name, svg in FITTINGS.items():
+        cv2.imwrite(str(folder / f"{name}.png"), bake(svg), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        index[name] = {"class": "", "wording": ""}
+    un = {name: [family.hazard_number, list(family.un)] for name, family in FAMILIES.items()}
+    for name, about in (("index.json", index), ("un_numbers.json", un)):
+        (folder / name).write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -63,6 +63,13 @@ class Family:
     inhalation: bool = False
     underlined: bool = False
 
+    @property
+    def hazard_number(self) -> str:
+        """Hazard identification number on orange panels (ADR 5.3.2.3); '' for class 1."""
+        if self.letters:
+            return ""
+        return HAZARD_NUMBERS[self.digit, self.field]
+
 
 FLAMES: tuple[Symbol, ...] = symbols.FLAMES
 SKULLS: tuple[Symbol, ...] = (symbols.skull_wide, symbols.skull_crossed, symbols.skull_line)
@@ -105,15 +112,15 @@ FAMILIES = {
         BLACK,
         BOMBS,
         *_EXPLOSIVES,
-        ("0081", "0027", "0336"),
-        letters=("1.1 D", "1.3 C", "1.2 G", "1.1 A"),
+        ("0081", "0027", "0082"),
+        letters=("1.1 D", "1.1 C", "1.1 G", "1.1 A"),
     ),
     "C1.2": Family(
         "orange",
         BLACK,
         _divisions("1.4"),
         *_EXPLOSIVES,
-        ("0012", "0323", "0503"),
+        ("0012", "0323", "0336"),
         letters=("S", "G", "S", "C", "D"),
     ),
     "C1.3": Family(
@@ -230,6 +237,14 @@ FAMILIES = {
     ),
 }
 """Families in the order of fastgen.classes.MARKER_CLASSES."""
+
+HAZARD_NUMBERS = {
+    **{("2", "red"): "23", ("2", "green"): "20", ("2", "white"): "268", ("3", "red"): "33"},
+    **{("4", "white"): "40", ("4", "blue"): "423", ("4", "blue under black"): "423"},
+    **{("5.1", "yellow"): "50", ("5.2", "red"): "539", ("6", "white"): "60"},
+    **{("7", "white"): "70", ("8", "white"): "80", ("9", "white"): "90"},
+}
+"""Hazard identification number by digit and field."""
 
 SMALL_PRINT = (
     *(

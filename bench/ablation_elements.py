@@ -204,8 +204,16 @@ def _without_decals(*kinds: str) -> Callable[[Scene], Scene]:
     )
 
 
+def _without_art(*words: str) -> Callable[[Scene], Scene]:
+    return lambda scene: replace(
+        scene,
+        decals=tuple(decal for decal in scene.decals if not decal.art.startswith(words)),
+    )
+
+
 def _fresh_print(scene: Scene) -> Scene:
-    return replace(scene, decals=tuple(replace(decal, wear=0.0) for decal in scene.decals))
+    fresh = {"wear": 0.0, "fade": 0.0, "torn": (0.0,) * 4}
+    return replace(scene, decals=tuple(replace(decal, **fresh) for decal in scene.decals))
 
 
 def _stub(name: str) -> dict[str, str]:
@@ -222,6 +230,12 @@ ELEMENTS = (
     Element("decals", "markers", _without_decals("marker")),
     Element("decals", "texts", _without_decals("text")),
     Element("decals", "stickers, emblems, stripes", _without_decals("sticker", "emblem")),
+    Element(
+        "decals",
+        "holders, rivets and orange panels of markers",
+        _without_art("marker_holder", "marker_rivets", "un_panel"),
+    ),
+    Element("decals", "traces of removed markers", _without_art("overpaint", "placard_residue")),
     Element("decals", "wear of decals", _fresh_print),
     Element("shape", "damage", lambda scene: replace(scene, damages=())),
     Element(

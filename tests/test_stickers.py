@@ -5,6 +5,7 @@ from collections import Counter, defaultdict
 
 import pytest
 
+from fastgen.config.config import Config
 from fastgen.decals.artwork import stickers
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
@@ -27,7 +28,8 @@ FAMILIES = {
 
 @pytest.fixture(scope="module")
 def scenes():
-    generator = Generator(seed=12)
+    config = Config.from_values({"markings": {"removed_markers": [0, 0]}})
+    generator = Generator(config, seed=12)
     return [generator.scene(index) for index in range(COUNT)]
 
 

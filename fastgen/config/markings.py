@@ -39,6 +39,13 @@ class MarkingsConfig:
         marker_wear: Scratches, dirt and peeled patches of markers.
         marker_fade: Bleaching of markers.
         marker_torn: Probability that a marker has lost a corner, or two.
+        marker_holder: Probability that the markers of a face are in metal holders. Markers closer
+            together than 16 mm have none.
+        marker_rivets: Probability that rivets hold the markers of a face.
+        marker_un_panel: Probability of an orange panel with a UN number beside the markers of a
+            face (IMDG Code 5.3.2.1, ADR 5.3.2.2). It has no label.
+        removed_markers: Number of removed markers per face: overpainted diamonds, darker than the
+            faded paint around them, and glue residue. They have no label.
         marks: Probability of each mark of the IMDG Code on a container. A mark is on all
             marker_faces, but the fumigation warning is on the door alone. Marks that are not named
             are not drawn. If any is named, the marker task has all five as its classes 28 to 32.
@@ -68,6 +75,10 @@ class MarkingsConfig:
     marker_wear: Annotated[Range, UNIT] = Range(0.0, 0.6)
     marker_fade: Annotated[Range, UNIT] = Range(0.0, 0.5)
     marker_torn: Share = 0.12
+    marker_holder: Share = 0.12
+    marker_rivets: Share = 0.12
+    marker_un_panel: Share = 0.15
+    removed_markers: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
     marks: dict[Annotated[str, OneOf(MARK_CLASSES)], Share] = field(default_factory=dict)
     fonts: tuple[str, ...] = ()
     cap_mm: Annotated[Range, Bounds(100, 2000, "mm")] = Range(100, 165)

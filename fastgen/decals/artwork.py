@@ -136,10 +136,26 @@ def marker_prints() -> Mapping[str, tuple[str, ...]]:
 
 
 @lru_cache(maxsize=1)
+def un_numbers() -> Mapping[str, tuple[str, tuple[str, ...]]]:
+    """Return the hazard identification number and the UN numbers of each marker class.
+
+    The hazard identification number is that of ADR 5.3.2.3; it is empty for class 1.
+    """
+    numbers = _json("markers", "un_numbers.json")
+    return MappingProxyType({name: (row[0], tuple(row[1])) for name, row in numbers.items()})
+
+
+@lru_cache(maxsize=1)
 def art_layers() -> Mapping[str, int]:
     """Return the layer of each artwork by name: markers in class order, then the others."""
+    names = (*_marker_art(), *sorted(_index()))
+    return MappingProxyType({name: i for i, name in enumerate(names)})
+
+
+def _marker_art() -> list[str]:
+    """Return the names of the artwork in assets/markers, markers first."""
     markers = [art for prints in marker_prints().values() for art in prints]
-    return MappingProxyType({name: i for i, name in enumerate((*markers, *sorted(_index())))})
+    return markers + sorted(set(_json("markers", "index.json")) - set(markers))
 
 
 def art_images() -> NDArray[np.uint8]:
@@ -178,7 +194,7 @@ def art_levels() -> list[NDArray[np.uint8]]:
 
 
 def _art_paths() -> list[Path]:
-    markers = {art for prints in marker_prints().values() for art in prints}
+    markers = set(_marker_art())
     return [
         asset_path("markers" if name in markers else "stickers", f"{name}.png")
         for name in art_layers()

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from fastgen.classes import MARKER_CLASSES
 from fastgen.config.markings import MarkingsConfig
 from fastgen.sampling.identifiers import sample_identifiers
 from fastgen.sampling.lettering_style import (
@@ -14,6 +15,7 @@ from fastgen.sampling.lettering_style import (
     sample_style,
     text_decal,
 )
+from fastgen.sampling.marker_fittings import sample_fittings, sample_removed_markers
 from fastgen.sampling.markers import sample_markers
 from fastgen.sampling.marks import sample_marks
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
@@ -49,16 +51,23 @@ def sample_decals(
         drawn += sample_identifiers(config, sheet, style, streams)
     drawn += sample_weights(config, kind, faces["door"], style, streams)
     labelled: list[Decal] = []
+    held: list[Decal] = []
     if streams("marked").random() < config.marked_containers:
         for face in config.marker_faces:
             labelled += sample_markers(config, faces[face], streams)
     labelled += sample_marks(config, faces, streams)
+    for face in config.marker_faces:
+        sheet = faces[face]
+        markers = [d for d in labelled if d.face == face and d.class_name in MARKER_CLASSES]
+        below, above = sample_fittings(config, sheet, markers, streams)
+        drawn += sample_removed_markers(config, sheet, paint_albedo, streams) + below
+        held += above
     known = stickers_of(kind, streams("stickers"))
     inks = {"lettering": style.albedo, "overpaint": paint_albedo}
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
         drawn += sample_stickers(config, known, sheet, inks, streams(f"stickers.{sheet.face}"))
-    return (*drawn, *labelled)
+    return (*drawn, *labelled, *held)
 
 
 def _brand(
