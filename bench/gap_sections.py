@@ -280,8 +280,8 @@ def _groups(trial: Trial) -> Iterator[tuple[str, list[Pixels], list[Pixels]]]:
     if real.photos:
         yield "photographs", [view.image for view in trial.views], list(real.photos)
         scenes = range(HELD_OUT, HELD_OUT + trial.effort.images)
-        crane = default_views("crane", trial.seed, scenes, trial.workers)
-        yield "photographs, preset crane", [view.image for view in crane], list(real.photos)
+        gate = default_views("gate", trial.seed, scenes, trial.workers)
+        yield "photographs, preset gate", [view.image for view in gate], list(real.photos)
     if real.panels:
         theirs = [p for pair in real.panels for p in (pair.damaged, pair.undamaged)]
         yield "panels", [crop for crop, _ in trial.held_out.panels], theirs

@@ -78,7 +78,7 @@ _SHOWN_CUES = 6
 def ocr(trial: Trial, real: dict[str, Share]) -> Measures:
     """Return the identifiers that rapidocr reads on ours, by view and layout, beside `real`."""
     texts = trial.texts
-    read = read_texts([text.framed() for text in texts])
+    read = read_texts([text.framed() for text in texts], trial.workers)
     right = [
         contains_code(found, text.code, text.layout == "column")
         for found, text in zip(read, texts, strict=True)
@@ -88,9 +88,9 @@ def ocr(trial: Trial, real: dict[str, Share]) -> Measures:
     return {**ours, **real}
 
 
-def real_ocr(real: RealCrops) -> dict[str, Share]:
+def real_ocr(real: RealCrops, threads: int) -> dict[str, Share]:
     """Return the real identifiers that rapidocr reads, by view and layout."""
-    read = read_texts([one.pixels for one in real.identifiers])
+    read = read_texts([one.pixels for one in real.identifiers], threads)
     right = [
         contains_code(found, one.code, one.layout == "column")
         for found, one in zip(read, real.identifiers, strict=True)
@@ -179,7 +179,7 @@ def measure(
 ) -> tuple[dict[str, dict[str, dict[str, Any]]], dict[str, int]]:
     """Return the figures of each section, and the confused classes "true as guess" with counts."""
     kinds = list(dict.fromkeys(kind for name in wanted for kind in _CROPS.get(name, ())))
-    theirs = real_ocr(real) if "ocr" in wanted else {}
+    theirs = real_ocr(real, workers) if "ocr" in wanted else {}
     results: dict[str, list[Measures]] = {name: [] for name in wanted}
     confused: dict[str, int] = {}
     for seed in seeds:

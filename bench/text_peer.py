@@ -29,7 +29,7 @@ Text = tuple[str, float, float, float, float]
 """Letters that were read, and their box x0, y0, x1, y1 in pixels."""
 
 
-def read_texts(pictures: Sequence[Pixels]) -> list[list[Text]]:
+def read_texts(pictures: Sequence[Pixels], threads: int) -> list[list[Text]]:
     """Return the texts that rapidocr reads in each picture.
 
     Raises:
@@ -39,7 +39,8 @@ def read_texts(pictures: Sequence[Pixels]) -> list[list[Text]]:
         for number, pixels in enumerate(pictures):
             cv2.imwrite(f"{place}/{number:06d}.png", pixels[:, :, ::-1])
         out = Path(place) / "texts.json"
-        command = [str(RAPIDOCR.interpreter), str(SCRIPTS / RAPIDOCR.script), place, str(out)]
+        script = str(SCRIPTS / RAPIDOCR.script)
+        command = [str(RAPIDOCR.interpreter), script, place, str(out), str(threads)]
         variables = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
         done = subprocess.run(command, capture_output=True, text=True, env=variables)
         if done.returncode:

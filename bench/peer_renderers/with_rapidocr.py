@@ -1,4 +1,4 @@
-"""Reader rapidocr on a folder of pictures: python with_rapidocr.py PICTURES OUT.json.
+"""Reader rapidocr on a folder of pictures: python with_rapidocr.py PICTURES OUT.json THREADS.
 
 Writes, for each PNG by name, its texts as [text, x0, y0, x1, y1] with the box in pixels.
 """
@@ -11,9 +11,9 @@ import cv2
 from rapidocr_onnxruntime import RapidOCR
 
 
-def main(pictures: Path, out: Path) -> None:
+def main(pictures: Path, out: Path, threads: int) -> None:
     """Read all PNG files."""
-    reader = RapidOCR(intra_op_num_threads=1)  # the caller runs one process per core
+    reader = RapidOCR(intra_op_num_threads=threads)
     found: dict[str, list[list[object]]] = {}
     for path in sorted(pictures.glob("*.png")):
         texts, _ = reader(cv2.imread(str(path)))
@@ -30,4 +30,4 @@ def _box(corners: list[tuple[float, float]]) -> tuple[float, float, float, float
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]))
