@@ -256,7 +256,6 @@ ELEMENTS = (
         "shape",
         "spreader: cables",
         spreader=without_charts("cables."),
-        files=_stub("cables.glsl"),
     ),
     Element("shape", "spreader: headblock", spreader=without_charts("headblock.")),
     Element("shape", "spreader: flippers", spreader=without_charts(".flippers")),

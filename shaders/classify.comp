@@ -21,9 +21,6 @@
 #include "damage_law.glsl"
 #include "rest_position.glsl"
 #endif
-#if WITH_CABLES
-#include "cables.glsl"
-#endif
 
 layout(local_size_x = LIST_GROUP) in;
 
@@ -58,27 +55,6 @@ void write_labels(ivec2 pixel, uint key, float depth) {
     imageStore(depth_image, pixel, vec4(depth));
 }
 
-#if WITH_CABLES
-bool sky_or_cable(uint key) { return key == 0u || float(id_zone(key)) == cable_zone; }
-
-// Whether cables cover a part of the pixel, more than about a step of 255. bare: the pixel shows
-// nothing but sky and cables.
-bool covered_in_part(ivec2 pixel, bool bare) {
-    return bare && abs(cable_coverage(vec2(pixel) + 0.5) - 0.5) <= 0.496;
-}
-
-// Whether a pixel of a single sample shows sky, or a cable surrounded by sky and cables. A cable in
-// front of another surface must not be mixed with sky. key: surface id of the pixel. sides: those of
-// its left, right, upper and lower neighbours; neighbours outside the image count as sky.
-bool seen_bare(ivec2 pixel, uint key, uvec4 sides) {
-    ivec2 last = imageSize(label_image) - 1;
-    bvec4 beyond = bvec4(pixel.x <= 0, pixel.x >= last.x, pixel.y <= 0, pixel.y >= last.y);
-    bool alone = sky_or_cable(key);
-    for (int i = 0; i < 4; ++i) alone = alone && (beyond[i] || sky_or_cable(sides[i]));
-    return key == 0u || alone;
-}
-#endif
-
 #if COARSE
 // Adds each pixel of a 2x2 block whose bit is set to a list, one entry per pixel.
 void list_each(uint list, ivec2 block, uint bits) {
@@ -105,28 +81,13 @@ void main() {
                               textureGather(rest_z, middle).wzxy);
 #endif
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // One bit per pixel and class.
-#if WITH_CABLES
-    uint cables = 0u;
-    uvec4 left = textureGatherOffset(surface_ids, middle, ivec2(-1, 0)).wzxy;
-    uvec4 right = textureGatherOffset(surface_ids, middle, ivec2(1, 0)).wzxy;
-    uvec4 over = textureGatherOffset(surface_ids, middle, ivec2(0, -1)).wzxy;
-    uvec4 under = textureGatherOffset(surface_ids, middle, ivec2(0, 1)).wzxy;
-#endif
     for (int i = 0; i < 4; ++i) {
         ivec2 pixel = block + in_group(i);
         bool outside = any(greaterThanEqual(pixel - region.xy, region.zw));
         if (outside) key[i] = 0u;
         uint bit = 1u << i;
-#if WITH_CABLES
-        bool bare = seen_bare(pixel, key[i], uvec4(left[i], right[i], over[i], under[i]));
-        bool covered = !outside && covered_in_part(pixel, bare);
-        if (covered) cables |= bit;
-#endif
         if (key[i] == 0u) continue;
         write_labels(pixel, key[i], depth[i]);
-#if WITH_CABLES
-        if (covered) continue;
-#endif
 #if DAMAGED
         int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]));
         if (near > 1) holed |= bit;
@@ -137,9 +98,6 @@ void main() {
         else plain |= bit;
     }
     list_each(LIST_DECAL, block, decals);
-#if WITH_CABLES
-    list_each(LIST_CABLE, block, cables);
-#endif
 #if DAMAGED
     list_each(LIST_DAMAGED, block, damaged);
     list_each(LIST_HOLED, block, holed);
@@ -203,19 +161,6 @@ void main() {
     if (near > 0) list = LIST_DAMAGED;
 #endif
     if (near > 1) list = LIST_HOLED;
-#endif
-#if WITH_CABLES
-    // All samples of a pixel may miss a cable, or all may hit it; its exact coverage decides.
-#if SAMPLES_PER_AXIS == 1
-    const ivec2 right = ivec2(1, 0), under = ivec2(0, 1);
-    uvec4 sides = uvec4(surface_id_at(middle - right), surface_id_at(middle + right),
-                        surface_id_at(middle - under), surface_id_at(middle + under));
-    bool bare = seen_bare(pixel, key, sides);
-#else
-    bool bare = true;
-    for (int i = 0; i < FILTER_NEAR; ++i) bare = bare && sky_or_cable(keys[i]);
-#endif
-    if (covered_in_part(pixel, bare)) list = LIST_CABLE;
 #endif
     if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);
 }

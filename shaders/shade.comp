@@ -14,9 +14,6 @@
 #include "shade_single_surface.glsl"
 #include "shade_sky.glsl"
 #include "zone_color.glsl"
-#if CABLE_CLASS
-#include "shade_cable.glsl"
-#endif
 #if WITH_HOLES
 #include "shade_hole.glsl"
 #endif
@@ -117,9 +114,6 @@ void main() {
     } while (++part < MAX_PARTS && left != 0u);
     color /= done;   // Surfaces beyond MAX_PARTS and MAX_ORIENTATIONS look like the rest.
     s.cover = 1.0 - sky_weight / done;
-#elif CABLE_CLASS
-    Shaded s = shade_cable(vec2(pixel) + 0.5);
-    vec3 color = s.color;
 #else
     Shaded s = shade_single_surface(pixel);
     vec3 color = s.color;

@@ -157,7 +157,7 @@ def test_every_layer_that_an_ablation_leaves_out_exists():
 
 @pytest.fixture(scope="module")
 def rusty_case():
-    """Scene, camera name and frame of a case with rust, sun, spreader and cables."""
+    """Scene, camera name and frame of a case with rust, sun and a spreader."""
     case = reference_set.cases()[5]
     scene = case.drawn()
     return scene, case.camera, drawn([], scene, case.camera)

@@ -84,8 +84,8 @@ def add_all(programs, variant):
     programs.add(("background.comp",), variant)
     programs.add(("background.vert", "background.frag"), variant)
     programs.add(("fullscreen.vert", "background_by_ray.frag"), variant)
-    for damage, cables in itertools.product(DAMAGE_VARIANTS, (False, True)):
-        programs.add(("classify.comp",), replace(variant, damage=damage, cables=cables))
+    for damage in DAMAGE_VARIANTS:
+        programs.add(("classify.comp",), replace(variant, damage=damage))
     for name, lights in itertools.product(listed_classes(variant.samples_per_axis), LIGHTS):
         damage = "holed" if "damaged" in name or name == "holed" else "undamaged"
         shaded = replace(variant, pixel_class=name, damage=damage, lights=lights)

@@ -48,7 +48,7 @@ def test_each_pixel_that_sees_an_object_is_in_one_list(kind, quality):
     for frame, count in drawn(KINDS[kind], quality):
         assert count.max() == 1
         assert (count[(frame.ids > 0) | (frame.cover > 0)] == 1).all()
-        if quality == "draft":  # in draft only cables reach beyond a pixel
+        if quality == "draft":  # a pixel of one sample shows either a surface or the sky
             holes = frame.damage // 100 == 5
             shaded = (frame.ids > 0) | holes | (frame.cover > 0)
             np.testing.assert_array_equal(count == 1, shaded)

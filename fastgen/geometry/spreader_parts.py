@@ -19,7 +19,7 @@ TIERS = ("frame", "headblock", "cables")
 """Tiers of a spreader from bottom to top, each narrower than the one below. Charts are named
 spreader.TIER.PART."""
 
-CABLE_LENGTH_MM = 12000.0
+_CABLE_LENGTH_MM = 12000.0
 """Modelled length of the hoist cables, which ends above the upper edge of usual images."""
 
 FLIPPER_REACH_MM = 330.0
@@ -47,13 +47,13 @@ _HEADBLOCK_MM = (690.0, 1000.0)
 """Lower and upper edge of the headblock's beams above the spreader's lower plane."""
 
 _SHEAVE_X_MM, _SHEAVE_Z_MM, _SHEAVE_RADIUS_MM = 950.0, 1250.0, 330.0
-_CABLE_RADIUS_MM = 15.0
 
-CABLES = 8
-CABLE_CHART = "spreader.cables.falls"
+_CABLE_RADIUS_MM = 20.0
+"""Distance of a cable's four edges from its axis.
 
-CABLE_SIDE_MM = _CABLE_RADIUS_MM * 2**0.5
-"""Width of a cable, whose four sides are parallel to x and y."""
+Seen from all around, a cable is 36 mm wide on average, like a thick hoist rope. Thinner cables are
+dashes in `draft`, which takes one sample per pixel.
+"""
 
 
 @dataclass(frozen=True)
@@ -198,25 +198,17 @@ def headblock(hang: Hang) -> list[Sheet]:
 
 
 def cables(hang: Hang) -> list[Sheet]:
-    """Return eight vertical cables, two from each sheave; thinner than a pixel, with four sides."""
-    falls = [
-        prism(
-            regular((x, y), _CABLE_RADIUS_MM, 4), (z, z + CABLE_LENGTH_MM), 2, capped=(True, True)
-        )
-        for x, y, z in cable_feet_mm(hang)
-    ]
-    return [Sheet(CABLE_CHART, "roof", "cable", "frame", beside(falls))]
-
-
-def cable_feet_mm(hang: Hang) -> list[tuple[float, float, float]]:
-    """Return the lower ends of the CABLES cables' axes in the container frame, in mm."""
+    """Return eight vertical cables with four sides, two from each sheave."""
     z = hang.base + _SHEAVE_Z_MM
-    return [
-        (x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM, z)
-        for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM)
-        for side in _SIGNS
-        for turn in _SIGNS
-    ]
+    falls = []
+    for x in (-_SHEAVE_X_MM, _SHEAVE_X_MM):
+        for side in _SIGNS:
+            for turn in _SIGNS:
+                axis = (x + turn * _SHEAVE_RADIUS_MM, side * _BEAM_Y_MM)
+                outline = regular(axis, _CABLE_RADIUS_MM, 4)
+                stations = (z, z + _CABLE_LENGTH_MM)
+                falls.append(prism(outline, stations, 2, capped=(True, True)))
+    return [Sheet("spreader.cables.falls", "roof", "cable", "frame", beside(falls))]
 
 
 def _painted(name: str, patch: Patch) -> Sheet:

@@ -6,7 +6,6 @@ A shader declares a block with `#include "NAME.block"`.
 from collections.abc import Mapping
 
 from fastgen.geometry.mesh import MATERIALS
-from fastgen.geometry.spreader_parts import CABLES
 from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render.noise import NOISE_LEVELS
 from fastgen.render.uniforms import Block
@@ -69,9 +68,6 @@ VIEW_BLOCK = Block(
         ("vec4", "light_direction", MAX_LIGHTS),  # unit vector toward it; angular radius
         ("vec4", "light_irradiance", MAX_LIGHTS),  # irradiance / pi on a surface that faces it
         ("int", "light_count"),
-        ("float", "cable_zone"),  # zone of the cables, -1 without
-        ("vec4", "cable_mean_rust"),  # mean albedo under rust; share of rust
-        ("vec4", "cable_lower_end", CABLES),  # from the eye in m; pixels per unit of `aside`
     ),
 )
 

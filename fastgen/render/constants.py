@@ -15,7 +15,6 @@ from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry import damage_law
 from fastgen.geometry.mesh import MATERIALS
-from fastgen.geometry.spreader_parts import CABLE_LENGTH_MM, CABLE_SIDE_MM, CABLES
 from fastgen.light import environment
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
@@ -106,8 +105,6 @@ def _variant(v: ShaderVariant) -> Defines:
         "LIGHTS": v.lights,
         "TRACED": int(v.traced),
         "COARSE": int(v.coarse),
-        "WITH_CABLES": int(v.cables),
-        "CABLE_CLASS": int(v.pixel_class == "cable"),
         "RADIANCE": int(v.radiance),
     }
 
@@ -186,7 +183,6 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "SPREADER_ID": f"{SPREADER_ID}u",
     },
     "materials": lambda _: {
-        "CABLE_MATERIAL": MATERIALS.index("cable"),
         "SHEET_MATERIAL": MATERIALS.index("paint_sheet"),
     },
     "zones": lambda _: {
@@ -197,11 +193,6 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "ZONE_GEAR": ZONE_GEAR,
         "ZONE_SMALL": ZONE_SMALL,
         "ZONE_LEVEL": ZONE_LEVEL,
-    },
-    "cables": lambda _: {
-        "CABLES": CABLES,
-        "CABLE_LENGTH_M": f"{CABLE_LENGTH_MM / 1000:.6f}",
-        "CABLE_HALF_SIDE_M": f"{CABLE_SIDE_MM / 2000:.6f}",
     },
     "damage": lambda _: {
         "DAMAGE_FADE_START_MM": f"{damage_law.FADE_START_MM:.1f}",

@@ -27,13 +27,11 @@ class Regions:
             container has none.
         near_damage: Disjoint rectangles that damages may touch.
         holes: Disjoint rectangles that perforations may touch.
-        cables: Rectangles that bundles of cables may touch.
     """
 
     surfaces: Sequence[Region | None]
     near_damage: Sequence[Region | None] = ()
     holes: Sequence[Region | None] = ()
-    cables: Sequence[Region | None] = ()
 
     @property
     def drawn(self) -> list[Region | None]:
@@ -42,19 +40,17 @@ class Regions:
 
 
 def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
-    """Return where in an image container, spreader, damages and cables may be seen."""
+    """Return where in an image container, spreader and damages may be seen."""
     if not prepared.scene.container.present:
         return Regions(())
     touched = [region_of(view, corners_mm(item)) for item in damages]
     torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
     boxes = [box_corners(prepared.container.bounds_mm, damages)]
-    cables = []
     if prepared.spreader is not None:
         frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
         boxes = [np.concatenate([*boxes, frame]), *above]
-        cables = [region_of(view, above[-1])]
     surfaces = bands([region_of(view, box) for box in boxes])
-    return Regions(surfaces, merged(touched), merged(torn), cables)
+    return Regions(surfaces, merged(touched), merged(torn))
 
 
 @dataclass(frozen=True, eq=False)

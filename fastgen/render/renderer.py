@@ -43,7 +43,7 @@ from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes, ray_bodies
-from fastgen.render.surface_values import cable_values, damage_values, scene_values
+from fastgen.render.surface_values import damage_values, scene_values
 from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
@@ -244,15 +244,13 @@ class Renderer:
 
     def _set_view(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> None:
         """Fill the uniform block of the view."""
-        scene, view, spreader = prepared.scene, inputs.view, inputs.spreader
+        scene, view = prepared.scene, inputs.view
         lights = self.ambient(scene.environment.name).lights
         shadow = self.shadow_map if lights else None
-        materials = self._resources(prepared).materials
         exposure = self._exposure(scene, camera, view)
         values = {
             **view_values(scene, view, inputs.targets.samples, exposure),
             **light_values(lights, shadow, view.position_m),
-            **cable_values(prepared, materials, spreader.mesh if spreader else None, view),
         }
         self._set(VIEW_BLOCK, values)
 

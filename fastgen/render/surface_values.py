@@ -1,23 +1,19 @@
 """Values of the shaders' uniform blocks: materials, layers and damages of a scene."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import reach_mm
-from fastgen.geometry.mesh import MATERIALS, Mesh
+from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.geometry.spreader_parts import CABLE_CHART, CABLES, Hang, cable_feet_mm
 from fastgen.light.reflectance import DIELECTRIC_F0, mean_specular_albedo
 from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.noise import noise_tiles
 from fastgen.render.rust import rusted
-from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Color, Damage, Scene, Spreader, Surface
-from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.object_ids import mask_values
 
 _TILE_OF_SCALE = 4.0
@@ -68,32 +64,14 @@ class SceneMaterials:
         Without dirt, which changes the mean over a roof by 3 %, and wetness, which darkens soaked
         surfaces by up to 20 %.
         """
-        shape = self._prepared.spreader
+        shape, scene = self._prepared.spreader, self._prepared.scene
         meshes = (self._prepared.container, *(() if shape is None else (shape.mesh,)))
-        base, _ = self._base_and_trait
-        albedo, _ = self._rusted(meshes)
+        base, trait = _materials(scene.surface, scene.spreader)
+        rust = scene.surface.rust
+        coverage = rust.coverage * trait[:, 1:2].astype(float)
+        albedo, _ = rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
         mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
         return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
-
-    @cached_property
-    def rusted_cables(self) -> tuple[float, float, float, float]:
-        """Mean albedo of the spreader's cables under rust, and the rusted share; 0 without."""
-        shape = self._prepared.spreader
-        if shape is None:
-            return 0.0, 0.0, 0.0, 0.0
-        albedo, share = (row[MATERIALS.index("cable")] for row in self._rusted((shape.mesh,)))
-        return *map(float, albedo), float(share[0])  # type: ignore[return-value]
-
-    @cached_property
-    def _base_and_trait(self) -> tuple[np.ndarray, np.ndarray]:
-        return _materials(self._prepared.scene.surface, self._prepared.scene.spreader)
-
-    def _rusted(self, meshes: Iterable[Mesh]) -> tuple[np.ndarray, np.ndarray]:
-        """Return `rust.rusted` of the scene's materials on some meshes."""
-        rust = self._prepared.scene.surface.rust
-        base, trait = self._base_and_trait
-        coverage = rust.coverage * trait[:, 1:2].astype(float)
-        return rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
 
 
 def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
@@ -170,32 +148,3 @@ def damage_values(
 def _squared_reach(damage: Damage) -> float:
     """Return the squared radius in mm^2 of a ball around all pixels that a damage may change."""
     return float(np.square(np.array(reach_mm(damage)) + REACH_MARGIN_MM).sum())
-
-
-def cable_values(
-    prepared: PreparedScene, materials: SceneMaterials, mesh: Mesh | None, view: View
-) -> dict[str, ArrayLike]:
-    """Return the members of VIEW_BLOCK about the cables of a scene's spreader.
-
-    Args:
-        prepared: The scene.
-        materials: Its materials.
-        mesh: The spreader as it is drawn, None if the scene has none.
-        view: Projection of the camera.
-    """
-    scene = prepared.scene
-    if mesh is None:
-        none: dict[str, ArrayLike] = {"cable_zone": -1.0, "cable_mean_rust": np.zeros(4)}
-        return {**none, "cable_lower_end": np.zeros((CABLES, 4))}
-    feet = cable_feet_mm(Hang(KINDS[scene.container.kind], scene.spreader.gap_mm))
-    from_eye = np.array(feet) / 1000 - view.position_m
-    right, down = view.rotation[:2] / view.focal_px
-    # change of `aside` of cables.glsl for one pixel to the right or down, without lens distortion
-    moved = np.hypot(*(np.cross(from_eye, way)[:, 2] for way in (right, down)))
-    chart = mesh.chart_index(CABLE_CHART)
-    zone = next(i for i, zone in enumerate(mesh.zones) if zone.chart == chart)  # not the caps'
-    return {
-        "cable_zone": float(SPREADER_ZONE + zone),
-        "cable_mean_rust": materials.rusted_cables,
-        "cable_lower_end": np.column_stack([from_eye, 1 / np.maximum(moved, 1e-9)]),
-    }

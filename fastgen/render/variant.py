@@ -20,11 +20,10 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
     "damaged": ("DECALS", "DAMAGE"),
     "mixed_damaged": ("MIXED", "DECALS", "DAMAGE"),
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
-    "cable": (),
 }
 """Classes of pixels that see more than sky, with the traits of each: MIXED pixels filter several
-surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block;
-"cable" pixels are partly covered by thin cables. Each class has its list, see classify.comp."""
+surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block.
+Each class has its list, see classify.comp."""
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
@@ -42,7 +41,6 @@ class ShaderVariant:
         lights: Directional lights that the program can shade: 0, 1 or MAX_LIGHTS.
         traced: Read indirect light that rays found instead of the vertices' light.
         coarse: Classify pixels for 2x2 coarse shading.
-        cables: Classify pixels that thin cables may cover in part.
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
     """
@@ -55,7 +53,6 @@ class ShaderVariant:
     lights: int = 0
     traced: bool = False
     coarse: bool = False
-    cables: bool = False
     radiance: bool = False
     without: tuple[str, ...] = ()
 

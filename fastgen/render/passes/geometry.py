@@ -44,7 +44,7 @@ class GeometryPass:
         regions, damage = inputs.regions, inputs.variant.damage
         drawn = regions.drawn
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
-        rest = drawn if inputs.variant.traced else [*regions.near_damage, *regions.cables]
+        rest = drawn if inputs.variant.traced else regions.near_damage
         samples.begin(damage, drawn, rest, regions.holes)
         if not regions.surfaces:
             inputs.textures.update(samples.textures)

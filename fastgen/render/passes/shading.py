@@ -32,29 +32,22 @@ class ShadingPass:
         rows = targets.lists.rows
         for top in range(0, height, rows):
             band = (0, top, width, min(rows, height - top))
-            seen, near, cables = (
-                within(each, band)
-                for each in (regions.surfaces, regions.near_damage, regions.cables)
-            )
+            seen, near = within(regions.surfaces, band), within(regions.near_damage, band)
             self._ctx.memory_barrier()  # earlier clears, stores and lists are complete
             targets.lists.begin()
-            self._classify(inputs, outside(seen, [*near, *cables]), damaged=False, cables=False)
-            self._classify(inputs, outside(near, cables), damaged=True, cables=False)
-            self._classify(inputs, cables, damaged=True, cables=True)
+            self._classify(inputs, outside(seen, near), damaged=False)
+            self._classify(inputs, near, damaged=True)
             self._ctx.memory_barrier()
-            self._shade(inputs, bool(cables))
+            self._shade(inputs)
         self._ctx.memory_barrier()
 
-    def _classify(
-        self, inputs: DrawInputs, regions: Sequence[Region], damaged: bool, cables: bool
-    ) -> None:
+    def _classify(self, inputs: DrawInputs, regions: Sequence[Region], damaged: bool) -> None:
         """List the pixels of regions whose first column and row are even."""
         if not regions:
             return
         variant = replace(
             inputs.variant,
             damage=inputs.variant.damage if damaged else "undamaged",
-            cables=cables,
             lights=0,
         )
         program = self._programs.get(("classify.comp",), variant)
@@ -65,10 +58,10 @@ class ShadingPass:
             across, down = (-(-length // side) for length in region[2:])
             program.dispatch(-(-across * down // LIST_GROUP))
 
-    def _shade(self, inputs: DrawInputs, cables: bool) -> None:
+    def _shade(self, inputs: DrawInputs) -> None:
         """Shade the listed pixels of each class."""
         for name in listed_classes(inputs.variant.samples_per_axis):
-            if _occurs(name, inputs.variant, cables):
+            if _occurs(name, inputs.variant):
                 # scenes with and without damage share the programs
                 damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "undamaged"
                 variant = replace(inputs.variant, pixel_class=name, damage=damage)
@@ -77,10 +70,8 @@ class ShadingPass:
                 inputs.targets.lists.dispatch(name, program)
 
 
-def _occurs(name: str, variant: ShaderVariant, cables: bool) -> bool:
+def _occurs(name: str, variant: ShaderVariant) -> bool:
     """Return whether an image of a variant can have pixels of a class."""
-    if name == "cable":
-        return cables
     if name in ("plain", "coarse"):
         return variant.coarse == (name == "coarse")
     traits = PIXEL_CLASSES[name]
