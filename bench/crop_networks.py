@@ -1,5 +1,6 @@
 """Small networks for crops: a classifier, and a reader of identifiers."""
 
+import copy
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -95,10 +96,10 @@ def fit_classifier(
         count: Number of classes.
         steps: Training steps.
         seed: Seed of weights and order.
-        start: Classifier to train further, instead of a new one.
+        start: Classifier whose copy is trained further, instead of a new one.
     """
     torch.manual_seed(seed)
-    model = start or Classifier(count)
+    model = copy.deepcopy(start) if start else Classifier(count)
     # not equally often: a class with many crops, the background, has more variety to learn
     weights = np.bincount(classes, minlength=count).clip(1)[classes] ** -0.75
     data, targets = torch.from_numpy(pixels), torch.from_numpy(classes)
