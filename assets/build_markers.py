@@ -316,7 +316,8 @@ class Print:
         return rect(170, 448, 660, 160, WHITE) if self.look.pick % 2 else ""
 
     def has_box(self) -> bool:
-        return self.family.boxed and self.look.wording in ("line", "heavy", "none", "side")
+        shown = ("line", "heavy", "side") if self.family.bars else ("line", "heavy", "side", "none")
+        return self.family.boxed and self.look.wording in shown
 
     def extras(self, end: float) -> str:
         """Return compatibility letter and index box below the words, which reach down to `end`."""

@@ -1,4 +1,4 @@
-"""What is printed on the markers of each class: colours, symbols, wordings and UN numbers.
+"""Colours, symbols, wordings and UN numbers of the markers of each class.
 
 Sources: UN Model Regulations (IMDG Code) 5.2.2.2, ADR 5.2.2.2 and 5.3.2.2, 49 CFR 172.400 to
 172.560. The UN numbers are entries of the dangerous goods list that belong to the class.
@@ -81,7 +81,7 @@ BOMBS = tuple(partial(symbols.bomb, hand=hand) for hand in (0, 1))
 RINGS = tuple(partial(symbols.flame_over_circle, flame=flame) for flame in range(3))
 TREFOILS = (symbols.trefoil, partial(symbols.trefoil, radius=27.0))
 CORROSIONS = tuple(partial(symbols.corrosion, hand=hand) for hand in (0, 1))
-HAZARDS = (symbols.biohazard, partial(symbols.biohazard, size=5.6))
+HAZARDS = (symbols.biohazard, partial(symbols.biohazard, size=5.2))
 FISSILES = tuple(partial(symbols.fissile, font=font) for font in (0, 1))
 
 

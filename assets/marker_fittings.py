@@ -1,4 +1,4 @@
-"""Drawings of what surrounds markers: orange panels, placard holders and rivets.
+"""Drawings of orange panels, placard holders and rivets.
 
 Sizes and colours of the panels: ADR 5.3.2.2 and IMDG Code 5.3.2.1.3.
 """

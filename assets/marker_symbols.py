@@ -159,7 +159,7 @@ def _bones(y: float, angle: float, reach: float, thinner: float = 0.0) -> str:
     )
 
 
-def biohazard(ink: str, size: float = 6.4) -> str:
+def biohazard(ink: str, size: float = 5.8) -> str:
     """Three crescents over a ring. `size` is the length of one unit of the construction."""
 
     def discs(distance: float, radius: float) -> str:

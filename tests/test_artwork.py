@@ -25,7 +25,7 @@ from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path
 
 HUES = {"red": 357, "orange": 25, "yellow": 48, "green": 156, "blue": 221}
-"""Mean hue of each field colour in degrees; all inks of a colour lie within HUE_RANGE of it."""
+"""Mean hue of each field colour in degrees; all its inks lie within HUE_RANGE."""
 
 HUE_RANGE = 25
 
@@ -42,7 +42,7 @@ FIELDS = {
     "C5.1": ("yellow", "yellow"),
     "C8.1": ("white", "black"),
 }
-"""Fields by class. C4.1 is left out: it has stripes."""
+"""Fields by class. C4.1 has stripes instead of fields."""
 
 WHITE_DIGITS = ("C2.2", "C2.4", "C3.2", "C4.4", "C8.1")
 

@@ -79,7 +79,7 @@ def _frame_limit_mm(markers: Sequence[Decal]) -> float:
 def _panel(
     sheet: Sheet, markers: Sequence[Decal], wear: float, rng: np.random.Generator
 ) -> list[Decal]:
-    """Return an orange panel and its digits beside the markers; [] if there is no room."""
+    """Return an orange panel and its digits beside the markers, or nothing without room."""
     art, size, cap_mm = _PANELS[int(rng.integers(len(_PANELS)))]
     marker = markers[int(rng.integers(len(markers)))]
     hazard, numbers = un_numbers()[marker.class_name]

@@ -90,7 +90,7 @@ def _print(config: MarkingsConfig, class_name: str, rng: np.random.Generator) ->
     art = str(rng.choice(marker_prints()[class_name]))
     tint = rng.uniform(0.86, 0.98) + rng.uniform(-0.02, 0.02, 3)
     fade = rng.uniform(*config.marker_fade)
-    # The corner with the class digit is held by more paper and is torn less often.
+    # Corners that show the class digit are torn less often, or the class would be unknown.
     corners = rng.permutation(4)[: 1 + int(rng.random() < 0.25)]
     lost = rng.uniform(0.06, 0.3, 4) * (rng.random() < config.marker_torn)
     kept_digit = rng.random() < 0.8
