@@ -39,3 +39,6 @@ CONTAINER_ID = 1
 
 SPREADER_ID = 60000
 """Id of the spreader, above those of all decals."""
+
+SEAL_ID = 60001
+"""Id of a seal on the first hasp; those on the other hasps follow."""

@@ -51,14 +51,15 @@ class Object:
         ignored: Whether too little is visible for training, see LabelConfig.
         text: Text of the object, '' for objects without text.
         polygon: Points x0, y0, x1, y1, ... along the projected outline of the whole object. Empty
-            for the spreader, for damages, and for objects that are partly behind the camera.
+            for the spreader, seals and damages, and for objects that are partly behind the camera.
         quad: Four corners of a decal x0, y0, x1, y1, ..., clockwise from the text's upper left or
             the marker's left corner. Empty for other objects, and for decals that are partly behind
             the camera.
         reading: 'horizontal', or 'vertical' if the letters are below one another; '' without text.
         parts: Parts of an identifier in reading order; empty for other objects, and for decals that
             are partly behind the camera.
-        keypoints: Casting corners of the container in the order of labels.objects.CASTINGS.
+        keypoints: Casting corners of the container in the order of labels.objects.CASTINGS. Of a
+            seal, the middle of its barrel or body; of a bolt without a barrel, that of its head.
     """
 
     id: int

@@ -8,10 +8,10 @@
 #include "pixel_list.constants"
 #include "samples.constants"
 #include "variant.constants"
-#include "zones.constants"
 #include "view.block"
 #include "damage.block"
 #include "surface_id.glsl"
+#include "zone_id.glsl"
 #include "decals_near.glsl"
 #include "sample_lattice.glsl"
 #include "visibility_buffer.glsl"
@@ -50,7 +50,8 @@ ivec2 in_turn(ivec2 size) {
 }
 
 void write_labels(ivec2 pixel, uint key, float depth) {
-    uint labels = id_zone(key) >= SPREADER_ZONE ? SPREADER_ID : CONTAINER_ID | (UNDAMAGED_CONTAINER << 16);
+    uint labels = zone_id(id_zone(key));
+    if (labels != SPREADER_ID) labels |= UNDAMAGED_CONTAINER << 16;
     imageStore(label_image, pixel, uvec4(labels));
     imageStore(depth_image, pixel, vec4(depth));
 }

@@ -1,5 +1,5 @@
 // uvec4 cell_at(uint zone, vec2 atlas_mm): up to 8 decals that may cover a point of the atlas.
-// All bits are 0 on the spreader, which has no decals.
+// All bits are 0 on seals and spreader, which have no decals.
 
 #include "decals.constants"
 #include "zones.constants"
@@ -8,7 +8,7 @@
 uniform usampler2D decal_grid;
 
 uvec4 cell_at(uint zone, vec2 atlas_mm) {
-    bool bears = zone < SPREADER_ZONE;   // The grid spans the container's atlas only.
+    bool bears = zone < SEAL_ZONE;   // The grid spans the container's atlas only.
     uvec4 cell = texelFetch(decal_grid, bears ? ivec2(atlas_mm / DECAL_CELL_MM) : ivec2(0), 0);
     return bears ? cell : uvec4(0u);
 }

@@ -5,10 +5,10 @@
 #include "labels.constants"
 #include "lookups.constants"
 #include "variant.constants"
-#include "zones.constants"
 #include "view.block"
 #include "coarse_shading.glsl"
 #include "surface_id.glsl"
+#include "zone_id.glsl"
 #include "visibility_buffer.glsl"
 #include "material.glsl"
 #if WITH_DAMAGE
@@ -47,10 +47,7 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     p.footprint_mm = sqrt(coarse_pixels) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
                      inversesqrt(max(facing, 0.05));
     p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar);
-    p.id = p.surface.decal_id != 0u ? p.surface.decal_id : CONTAINER_ID;
-    if (id_zone(key) >= SPREADER_ZONE) {
-        p.id = SPREADER_ID;
-        p.damage = 0u;
-    }
+    p.id = p.surface.decal_id != 0u ? p.surface.decal_id : zone_id(id_zone(key));
+    if (p.id == SPREADER_ID) p.damage = 0u;
     return p;
 }

@@ -10,6 +10,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry import damage_law
 from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.seals import scene_seals
 from fastgen.geometry.spreader import build_spreader
 from fastgen.scene import Decal, Scene
 
@@ -17,6 +18,9 @@ _MOST_LAYERS = 12
 
 SPREADER = 60000
 """Id of the spreader's pixels."""
+
+SEAL = 60001
+"""Id of a seal at the first hasp."""
 
 
 @dataclass
@@ -116,6 +120,25 @@ def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarra
     """Return the depth in metres of the spreader along rays [N, 3], inf where they miss it."""
     held = scene.spreader
     mesh = build_spreader(scene.container.kind, held.flippers_down, held.gap_mm)
+    return first_hits(mesh, view, start, rays)[1]
+
+
+def with_seals(ids: np.ndarray, hits: Hits, scene: Scene, view: View) -> np.ndarray:
+    """Return the id target of `object_ids` with the seals of the scene in front of `hits`."""
+    seals = scene_seals(scene)
+    assert seals is not None
+    start, rays = view.rays(None)
+    triangle, depth = first_hits(seals.mesh, view, start, rays.reshape(-1, 3))
+    owner = seals.facets.owner[seals.mesh.triangles[triangle, 0]].reshape(ids.shape)
+    numbers = np.array([SEAL + seal.hasp for seal in scene.seals])
+    nearer = depth.reshape(ids.shape) < hits.depth_m
+    return np.where(nearer, numbers[owner], ids).astype(np.uint16)
+
+
+def first_hits(
+    mesh: Mesh, view: View, start: np.ndarray, rays: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the triangle that each ray [N, 3] hits first, -1 for none, and its depth in metres."""
     positions = mesh.positions_mm.astype(np.float64)
     body = RayMeshIntersector(trimesh.Trimesh(positions * 1e-3, mesh.triangles, process=False))
     triangle = body.intersects_first(np.tile(start * 1e-3, (len(rays), 1)), rays)
@@ -123,7 +146,7 @@ def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarra
     distance, *_ = _meet(positions[mesh.triangles[triangle[hit]]], start, rays[hit])
     depth = np.full(len(rays), np.inf)
     depth[hit] = view.to_view(start + distance[:, None] * rays[hit])[:, 2]
-    return depth
+    return triangle, depth
 
 
 def _meet(

@@ -80,7 +80,7 @@ def test_an_absent_container_has_no_parts_and_no_file(tmp_path):
     bare = without_container(scene)
     for part in ("decals", "spreader"):
         wrong = replace(bare, **{part: getattr(scene, part)})
-        with pytest.raises(ConfigError, match="has decals, damages or a spreader; remove them"):
+        with pytest.raises(ConfigError, match="damages, seals or a spreader; remove them"):
             generator.render(scene=wrong)
     with pytest.raises(ConfigError, match="has no container to export"):
         export_glb(generator, bare, tmp_path / "a.glb")

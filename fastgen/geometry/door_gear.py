@@ -51,13 +51,12 @@ def gear(layout: Layout) -> list[Sheet]:
     place = opening(layout)
     sheets = []
     for i, y in enumerate(BAR_Y_MM):
-        inner = np.sign(y) * -1 if abs(y) > 300 else np.sign(y)
         parts = {
             "bar": (beside([_bar(layout, place, y)]), "galvanized"),
             "cams": (beside(_cams(layout, place, y, -np.sign(y))), "galvanized"),
             "keepers": (beside(_keepers(layout, place, y)), "paint_frame"),
             "brackets": (beside(_brackets(place, y)), "galvanized"),
-            "handle": (beside(_handle(place, y, float(inner))), "galvanized"),
+            "handle": (beside(_handle(place, y, *hasp_mm(i))), "galvanized"),
         }
         for part, (patch, material) in parts.items():
             sheets.append(Sheet(f"door.{part}.{i}", "door", material, "door", patch))
@@ -116,13 +115,19 @@ def _brackets(place: Opening, y: float) -> list[Patch]:
     return patches
 
 
-def _handle(place: Opening, y: float, toward: float) -> list[Patch]:
-    """Return the hub on the bar, the lever along the leaf, and the catch at its end.
+def hasp_mm(bar: int) -> tuple[float, float]:
+    """Return y and z of the hasp of a locking bar: the middle of the catch at its handle's end.
 
     Levers of neighbouring bars have different heights, so that they can overlap.
     """
-    z = 1120.0 if abs(y) > 300 else 980.0
-    end = y + toward * 300.0
+    y = BAR_Y_MM[bar]
+    outer = abs(y) > 300
+    inward = -np.sign(y) if outer else np.sign(y)
+    return y + float(inward) * 300.0, 1120.0 if outer else 980.0
+
+
+def _handle(place: Opening, y: float, end: float, z: float) -> list[Patch]:
+    """Return the hub on the bar, the lever along the leaf to y = end, and the catch there."""
     return [
         _block(place, (y - 23, y + 23), (z - 34, z + 34), (_FRONT_MM + 0.5, DOOR_FACE_MM)),
         _block(place, (y, end), (z - 14, z + 14), (22.0, 34.0)),

@@ -18,12 +18,15 @@ from fastgen.geometry.chart_sheet import VERSION as SHEET_VERSION
 from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
 from fastgen.scene.faces import FACES, SHEET_FACES
+from fastgen.scene.limits import HASPS
 
 VERSION = 1  # raise when the stored arrays change
 
 MATERIALS = (
     *("paint_sheet", "paint_frame", "casting", "galvanized", "rubber", "underside"),
     *("spreader", "cable"),
+    *(f"seal_{hasp}" for hasp in range(HASPS)),
+    "seal_steel",
 )
 
 UNIT_CUBE = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])

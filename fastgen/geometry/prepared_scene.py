@@ -9,6 +9,7 @@ from fastgen.geometry.damage_law import deform
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.facets import Facets, damage_facets
 from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.seals import SceneSeals, scene_seals
 from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
 from fastgen.scene import Scene
 from fastgen.scene.container_kinds import KINDS
@@ -61,6 +62,11 @@ class PreparedScene:
             return None
         kind = self.scene.container.kind
         return self._shapes.spreader(kind, held.flippers_down, held.gap_mm)
+
+    @cached_property
+    def seals(self) -> SceneSeals | None:
+        """The seals at the hasps of the damaged door, None if the scene has none."""
+        return scene_seals(self.scene)
 
     @cached_property
     def usual_spreader(self) -> SpreaderShape | None:

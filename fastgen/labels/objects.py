@@ -14,6 +14,7 @@ from fastgen.geometry.facets import Facets, mesh_facets
 from fastgen.geometry.prepared_scene import CORNER_SIGNS
 from fastgen.labels.coverage import boxes, covered, facing, project
 from fastgen.labels.damage import damage_objects
+from fastgen.labels.seals import seal_objects
 from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Keypoint, LabelledPart, Object
 from fastgen.scene import Decal, Scene
@@ -59,7 +60,13 @@ def label(shot: Shot) -> list[Object]:
     """
     if not shot.scene.container.present:
         return []
-    return [_container(shot), *_spreader(shot), *damage_objects(shot), *_decals(shot)]
+    return [
+        _container(shot),
+        *_spreader(shot),
+        *damage_objects(shot),
+        *_decals(shot),
+        *seal_objects(shot),
+    ]
 
 
 def _decals(shot: Shot) -> list[Object]:

@@ -29,7 +29,7 @@ DAMAGE_GREYS = MappingProxyType({UNDAMAGED_CONTAINER: 200})
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader")
+_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal")
 _PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 
 

@@ -11,10 +11,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from fastgen.camera import tone_curve
-from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
+from fastgen.classes import CONTAINER_ID, SEAL_ID, SPREADER_ID, UNDAMAGED_CONTAINER
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry import damage_law
 from fastgen.geometry.mesh import MATERIALS
+from fastgen.geometry.seals import PARTS
 from fastgen.light import environment
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
@@ -24,6 +25,7 @@ from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattic
 from fastgen.render.variant import LAYERS, PIXEL_TRAITS, ShaderVariant, listed_classes
 from fastgen.render.zone_codes import (
     HOLE_ZONE,
+    SEAL_ZONE,
     SPREADER_ZONE,
     ZONE_GEAR,
     ZONE_LEVEL,
@@ -181,12 +183,15 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "UNDAMAGED_CONTAINER": f"{UNDAMAGED_CONTAINER}u",
         "CONTAINER_ID": f"{CONTAINER_ID}u",
         "SPREADER_ID": f"{SPREADER_ID}u",
+        "SEAL_ID": f"{SEAL_ID}u",
     },
     "materials": lambda _: {
         "SHEET_MATERIAL": MATERIALS.index("paint_sheet"),
     },
     "zones": lambda _: {
         "SPREADER_ZONE": f"{SPREADER_ZONE}u",
+        "SEAL_ZONE": f"{SEAL_ZONE}u",
+        "SEAL_PARTS": f"{len(PARTS)}u",
         "HOLE_ZONE": f"{HOLE_ZONE}u",
         "ZONE_MATERIAL": ZONE_TURN - 1,
         "ZONE_TURN": ZONE_TURN,

@@ -40,7 +40,7 @@ class Regions:
 
 
 def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
-    """Return where in an image container, spreader and damages may be seen."""
+    """Return where in an image container with seals, spreader and damages may be seen."""
     if not prepared.scene.container.present:
         return Regions(())
     touched = [region_of(view, corners_mm(item)) for item in damages]
@@ -60,7 +60,8 @@ class DrawInputs:
     Attributes:
         view: Projection of the camera.
         damages: Damages that this view may show.
-        container, spreader: Meshes with the sky visibility of the scene; no spreader is None.
+        container, seals, spreader: Meshes with the sky visibility of the scene; None for seals and
+            spreader where the scene has none.
         lit: Light at the vertices of container and spreader.
         regions: Where the passes have work.
         targets: Where the image goes.
@@ -71,6 +72,7 @@ class DrawInputs:
     view: View
     damages: tuple[Damage, ...]
     container: GpuMesh
+    seals: GpuMesh | None
     spreader: GpuMesh | None
     lit: tuple[LitMesh, ...]
     regions: Regions

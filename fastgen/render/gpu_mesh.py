@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.door_gear import is_gear
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.mesh import Chart, Mesh, Zone
 from fastgen.light.sky_visibility import open_sky
 from fastgen.render.clusters import Clusters
 from fastgen.render.textures import data_texture
@@ -27,7 +27,7 @@ def facing_groups(mesh: Mesh, position_mm: Iterable[float]) -> list[str]:
     """Return the triangle groups that a camera may see.
 
     Args:
-        mesh: Container or spreader mesh.
+        mesh: Mesh of a container, spreader or seals.
         position_mm: Position of the camera in the container frame.
 
     Returns:
@@ -100,23 +100,7 @@ class GpuMesh:
     @cached_property
     def zone_rows(self) -> NDArray[np.float32]:
         """The mesh's columns [2, zones, 4] of the zone table."""
-        zones = self.mesh.zones
-        charts = [self.mesh.charts[zone.chart] for zone in zones]
-        rows = np.zeros((2, len(zones), 4), np.float32)
-        rows[0] = [zone.rect_mm for zone in zones]
-        rows[1, :, 0] = [
-            chart.material_index
-            + ZONE_TURN * zone.quarter_turns
-            + ZONE_GEAR * is_gear(chart)
-            + ZONE_SMALL * zone.small
-            + ZONE_LEVEL * zone.level
-            for chart, zone in zip(charts, zones, strict=True)
-        ]
-        rows[1, :, 1:] = [
-            FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
-            for chart in charts
-        ]
-        return rows
+        return zone_rows(self.mesh.charts, self.mesh.zones)
 
     def set_sky_visibility(self, values: NDArray[np.uint8]) -> None:
         """Set the sky visibility of the vertices; before, every vertex sees the whole sky.
@@ -166,18 +150,38 @@ class GpuMesh:
             item.release()
 
 
-def zone_table(ctx: moderngl.Context, meshes: Mapping[int, GpuMesh]) -> moderngl.Texture:
+def zone_rows(charts: Sequence[Chart], zones: Sequence[Zone]) -> NDArray[np.float32]:
+    """Return the columns [2, zones, 4] of the zone table for the zones of some charts."""
+    of_zones = [charts[zone.chart] for zone in zones]
+    rows = np.zeros((2, len(zones), 4), np.float32)
+    rows[0] = [zone.rect_mm for zone in zones]
+    rows[1, :, 0] = [
+        chart.material_index
+        + ZONE_TURN * zone.quarter_turns
+        + ZONE_GEAR * is_gear(chart)
+        + ZONE_SMALL * zone.small
+        + ZONE_LEVEL * zone.level
+        for chart, zone in zip(of_zones, zones, strict=True)
+    ]
+    rows[1, :, 1:] = [
+        FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
+        for chart in of_zones
+    ]
+    return rows
+
+
+def zone_table(ctx: moderngl.Context, rows: Mapping[int, NDArray[np.float32]]) -> moderngl.Texture:
     """Return the table of zones that shaders/zone.glsl reads.
 
     Args:
         ctx: Current OpenGL context.
-        meshes: Meshes by the number of their first zone.
+        rows: Columns of each mesh, from `zone_rows`, by the number of its first zone.
 
     Returns:
         Texture with two rows, which the caller releases.
     """
-    count = max(first + len(each.mesh.zones) for first, each in meshes.items())
+    count = max(first + each.shape[1] for first, each in rows.items())
     table = np.zeros((2, count, 4), np.float32)
-    for first, each in meshes.items():
-        table[:, first : first + len(each.mesh.zones)] = each.zone_rows
+    for first, each in rows.items():
+        table[:, first : first + each.shape[1]] = each
     return data_texture(ctx, table)

@@ -198,6 +198,7 @@ class Renderer:
         container, spreader, lit = self._shapes.of(
             prepared, resources.materials, lens, light.ambient
         )
+        seals = self._shapes.seals(prepared, lit[0])
         self._set(SCENE_BLOCK, scene_values(scene, len(light.background)))
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
@@ -206,6 +207,7 @@ class Renderer:
             view=view,
             damages=damages,
             container=container,
+            seals=seals,
             spreader=spreader,
             lit=lit,
             regions=regions_of(view, prepared, damages),

@@ -1,22 +1,26 @@
-"""Containers and spreaders on the GPU, with the light at their vertices."""
+"""Containers, seals and spreaders on the GPU, with the light at their vertices."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.geometry.seals import nearest_gear, seal_charts
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.sky_visibility import Sky
-from fastgen.render.gpu_mesh import GpuMesh, zone_table
-from fastgen.render.recent_cache import ReleasingCache
+from fastgen.render.gpu_mesh import GpuMesh, zone_rows, zone_table
+from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.render.surface_values import SceneMaterials
-from fastgen.render.zone_codes import SPREADER_ZONE
+from fastgen.render.zone_codes import SEAL_ZONE, SPREADER_ZONE
+
+_SEAL_ROWS = zone_rows(*seal_charts())
 
 
 class Shapes:
@@ -32,6 +36,8 @@ class Shapes:
         self._programs = programs
         self._containers: ReleasingCache[GpuMesh] = ReleasingCache(16)
         self._spreaders: ReleasingCache[GpuMesh] = ReleasingCache(64)
+        self._seals: ReleasingCache[GpuMesh] = ReleasingCache(2)
+        self._gear: RecentCache[NDArray[np.int64]] = RecentCache(2)
         self._zones: ReleasingCache[moderngl.Texture] = ReleasingCache(128)
         self._probe = SkyVisibilityProbe(ctx)
 
@@ -95,16 +101,30 @@ class Shapes:
             mesh, lambda: GpuMesh(self._ctx, mesh, self._programs, SPREADER_ZONE)
         )
 
+    def seals(self, prepared: PreparedScene, container: LitMesh) -> GpuMesh | None:
+        """Return the seals of a scene in the light on its container, None if it has none.
+
+        A seal has the sky visibility of the nearest vertices of its handle and catch.
+        """
+        found = prepared.seals
+        if found is None:
+            return None
+        programs = {"undamaged": self._programs["undamaged"]}
+        drawn = self._seals.get(found, lambda: GpuMesh(self._ctx, found.mesh, programs, SEAL_ZONE))
+        gear = self._gear.get(found, lambda: nearest_gear(found.mesh, container.mesh))
+        drawn.set_sky_visibility(container.values[gear])
+        return drawn
+
     def zone_table(self, container: GpuMesh, spreader: GpuMesh | None) -> moderngl.Texture:
-        """Return the zones of both as the material layers read them."""
-        meshes = {0: container}
+        """Return the zones of both, and of seals, as the material layers read them."""
+        rows = {0: container.zone_rows, SEAL_ZONE: _SEAL_ROWS}
         if spreader is not None:
-            meshes[SPREADER_ZONE] = spreader
-        return self._zones.get(tuple(meshes.values()), lambda: zone_table(self._ctx, meshes))
+            rows[SPREADER_ZONE] = spreader.zone_rows
+        return self._zones.get((container, spreader), lambda: zone_table(self._ctx, rows))
 
     def release(self) -> None:
         """Free all GL objects."""
-        for kept in (self._containers, self._spreaders, self._zones, self._probe):
+        for kept in (self._containers, self._seals, self._spreaders, self._zones, self._probe):
             kept.release()
 
 

@@ -13,20 +13,22 @@ from fastgen.light.reflectance import DIELECTRIC_F0, mean_specular_albedo
 from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.noise import noise_tiles
 from fastgen.render.rust import rusted
-from fastgen.scene import Color, Damage, Scene, Spreader, Surface
+from fastgen.scene import Color, Damage, Scene
+from fastgen.scene.limits import HASPS
 from fastgen.scene.object_ids import mask_values
 
 _TILE_OF_SCALE = 4.0
 """Typical lengths of a noise pattern in one tile."""
 
 
-def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.ndarray]:
+def _materials(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return (albedo and roughness) and traits of each material, float32 [M, 4] each.
 
     The traits are metallic, proneness to rust and share of the paint's layers. Weathered galvanised
     steel has an albedo of about 0.35 to 0.5 (measured tables of building materials), rubber and tar
-    are near 0.03. Cables are greased steel.
+    are near 0.03. Cables are greased steel. Seals are new: they have no layers.
     """
+    surface, bodies = scene.surface, {seal.hasp: seal.albedo for seal in scene.seals}
     paint = np.array(surface.paint.albedo)
     rough = surface.paint.roughness
     rows: dict[str, tuple[ArrayLike, float, float, float, float]] = {
@@ -37,8 +39,13 @@ def _materials(surface: Surface, spreader: Spreader) -> tuple[np.ndarray, np.nda
         "galvanized": ((0.42, 0.42, 0.41), 0.55, 0.55, 1.3, 0.5),
         "rubber": ((0.022, 0.022, 0.023), 0.75, 0.0, 0.0, 0.35),
         "underside": (paint * 0.25 + 0.02, 0.85, 0.0, 1.8, 0.8),
-        "spreader": (spreader.albedo, 0.5, 0.0, 0.6, 1.0),
+        "spreader": (scene.spreader.albedo, 0.5, 0.0, 0.6, 1.0),
         "cable": ((0.07, 0.068, 0.065), 0.6, 0.3, 0.6, 0.5),
+        **{
+            f"seal_{hasp}": (bodies.get(hasp, (0.5, 0.5, 0.5)), 0.4, 0.0, 0.0, 0.0)
+            for hasp in range(HASPS)
+        },
+        "seal_steel": ((0.5, 0.5, 0.49), 0.35, 0.8, 0.0, 0.0),
     }
     base = np.array([[*np.asarray(rows[m][0]), rows[m][1]] for m in MATERIALS], np.float32)
     trait = np.array([[*rows[m][2:], 0.0] for m in MATERIALS], np.float32)
@@ -66,7 +73,7 @@ class SceneMaterials:
         """
         shape, scene = self._prepared.spreader, self._prepared.scene
         meshes = (self._prepared.container, *(() if shape is None else (shape.mesh,)))
-        base, trait = _materials(scene.surface, scene.spreader)
+        base, trait = _materials(scene)
         rust = scene.surface.rust
         coverage = rust.coverage * trait[:, 1:2].astype(float)
         albedo, _ = rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
@@ -82,7 +89,7 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
         background_size: Side of the background map in texels, 0 without one.
     """
     surface = scene.surface
-    base, trait = _materials(surface, scene.spreader)
+    base, trait = _materials(scene)
     return {
         "material_base": base,
         "material_trait": trait,

@@ -1,9 +1,13 @@
-"""Numbers by which shaders recognise the zones of container and spreader."""
+"""Numbers by which shaders recognise the zones of container, seals and spreader."""
 
 from fastgen.geometry.mesh import MAX_ZONES
+from fastgen.geometry.seals import SEAL_ZONES
 
 SPREADER_ZONE = MAX_ZONES
-"""First zone number of the spreader. The container's zones have smaller numbers."""
+"""First zone number of the spreader."""
+
+SEAL_ZONE = SPREADER_ZONE - SEAL_ZONES
+"""First zone number of the seals. The container's zones have smaller numbers."""
 
 HOLE_ZONE = 1000
 """Zone number of sheet that a perforation tore away. Real zones have smaller numbers."""

@@ -40,11 +40,17 @@ def check_scene(scene: Any) -> Scene:
             "Scene.from_json"
         )
     check_fields(scene, Scene, "scene")
-    if not scene.container.present and (scene.decals or scene.damages or scene.spreader.present):
+    carried = scene.decals or scene.damages or scene.seals or scene.spreader.present
+    if not scene.container.present and carried:
         raise ConfigError(
-            "scene.container.present: false, but the scene has decals, damages or a spreader; "
-            "remove them"
+            "scene.container.present: false, but the scene has decals, damages, seals or a "
+            "spreader; remove them"
         )
+    for hasp, count in Counter(seal.hasp for seal in scene.seals).items():
+        if count > 1:
+            raise ConfigError(
+                f"scene.seals: {count} are at hasp {hasp}, and a hasp holds one; remove some"
+            )
     for i, camera in enumerate(scene.cameras):
         _check_camera(camera, f"scene.cameras[{i}]", scene.container)
     for i, decal in enumerate(scene.decals):

@@ -23,6 +23,7 @@ from fastgen.scene.faces import SHEET_FACES
 from fastgen.scene.limits import (
     DECAL_KINDS,
     GAP_LIMITS_MM,
+    HASPS,
     MAX_DAMAGES,
     MAX_DECALS,
     WHOLE,
@@ -226,7 +227,7 @@ class Container:
         kind: Key of KINDS.
         profiles: Corrugation of the walls.
         present: False for a scene that shows only the surroundings. Cameras are placed as if the
-            container was there. Such a scene has no decals, damages or spreader.
+            container was there. Such a scene has no decals, damages, seals or spreader.
     """
 
     kind: Annotated[str, OneOf(tuple(KINDS))]
@@ -250,6 +251,26 @@ class Spreader:
     albedo: Color = (0.6, 0.35, 0.02)
     flippers_down: tuple[Flag, Flag] = (True, True)
     gap_mm: Annotated[float, Bounds(*GAP_LIMITS_MM, "mm")] = 15.0
+
+
+@dataclass(frozen=True)
+class Seal:
+    """A seal at a hasp of the door gear. A hasp without a seal has none of these.
+
+    Attributes:
+        kind: 'bolt' for a steel pin between a head and a barrel, 'cable' for a body with a steel
+            cable.
+        hasp: Hasp that it is at, 0 to 3: the locking bar that the hasp's handle turns, from left to
+            right as seen from outside.
+        state: 'locked'; or 'hanging' for one that does not secure the hasp: a bolt without its
+            barrel, or a cable with a free end.
+        albedo: Linear color of the plastic around head and barrel, or of the body.
+    """
+
+    kind: Annotated[str, OneOf(("bolt", "cable"))]
+    hasp: Annotated[int, Bounds(0, HASPS - 1)]
+    state: Annotated[str, OneOf(("locked", "hanging"))] = "locked"
+    albedo: Color = (0.8, 0.5, 0.02)
 
 
 @dataclass(frozen=True)
@@ -289,7 +310,7 @@ class Camera:
 
 @dataclass(frozen=True)
 class Scene:
-    """One container with its markings, damage, spreader, light, weather and cameras.
+    """One container with its markings, damage, seals, spreader, light, weather and cameras.
 
     Attributes:
         seed: Seed of the sequence that the scene belongs to.
@@ -304,6 +325,7 @@ class Scene:
     cameras: tuple[Camera, ...]
     decals: Annotated[tuple[Decal, ...], MaxLen(MAX_DECALS)] = ()
     damages: Annotated[tuple[Damage, ...], MaxLen(MAX_DAMAGES)] = ()
+    seals: Annotated[tuple[Seal, ...], MaxLen(HASPS)] = ()
     spreader: Spreader = field(default_factory=Spreader)
     weather: Weather = field(default_factory=Weather)
 

@@ -27,6 +27,9 @@ a * GLYPH_RANGE + b, which stays below 2^24 and is therefore exact in float32.""
 DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4}
 """Number of each decal kind in the shaders."""
 
+HASPS = 4
+"""Hasps of a door, one at the end of each locking bar's handle. Each can carry a seal."""
+
 LOBES = 5
 """Harmonics of a hole's outline; higher ones would be finer than the mesh and most pixels."""
 

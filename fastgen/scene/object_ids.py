@@ -1,13 +1,14 @@
-"""Numbers of decals in the id target and of damages in the damage target."""
+"""Numbers of decals and seals in the id target, and of damages in the damage target."""
 
 from fastgen.classes import (
     CONTAINER_ID,
     DAMAGE_CLASSES,
     DAMAGE_VALUES,
+    SEAL_ID,
     SEGMENTATION_CLASSES,
     SPREADER_ID,
 )
-from fastgen.scene.data import Damage, Scene
+from fastgen.scene.data import Damage, Scene, Seal
 
 
 def object_ids(scene: Scene) -> list[int]:
@@ -18,6 +19,11 @@ def object_ids(scene: Scene) -> list[int]:
     numbers = range(CONTAINER_ID + 1, SPREADER_ID)
     free = (number for number in numbers if number not in DAMAGE_VALUES)
     return [next(free) if decal.class_name else 0 for decal in scene.decals]
+
+
+def seal_id(seal: Seal) -> int:
+    """Return the id of a seal, which its hasp decides."""
+    return SEAL_ID + seal.hasp
 
 
 def mask_values(damages: tuple[Damage, ...]) -> list[int]:

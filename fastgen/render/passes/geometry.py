@@ -13,10 +13,10 @@ from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
 
 
 class GeometryPass:
-    """Draws container and spreader into the visibility buffer.
+    """Draws container, seals and spreader into the visibility buffer.
 
-    Spreader and undamaged parts of the container, parts that damages touch, and the interior that
-    each hole reveals have a program of their own.
+    Undamaged surfaces, those that damages touch, and the interior that each hole reveals have a
+    program of their own.
 
     Reads: the lobe masks of sky_visibility.py, which it owns, and for holes the zone table. Writes:
     the visibility buffer.
@@ -55,6 +55,9 @@ class GeometryPass:
         self._programs["undamaged"].bind(textures)
         if inputs.spreader is not None:
             inputs.spreader.draw("undamaged", inputs.spreader.seen_from(inputs.eye_mm))
+        if inputs.seals is not None:
+            # before the container: damaged surfaces behind a seal must not leave a rest position
+            inputs.seals.draw("undamaged", inputs.seals.seen_from(inputs.eye_mm))
         # a dent may tilt a face into view that the rest mesh turns away
         tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
         bent = {face for place in tilted for face in place.split(".")}

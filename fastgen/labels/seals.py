@@ -1,0 +1,57 @@
+"""Labels of seals."""
+
+import numpy as np
+
+from fastgen.classes import SEAL_ID
+from fastgen.labels.coverage import boxes, covered, facing, project
+from fastgen.labels.visibility import Shot, float_boxes, visibility
+from fastgen.sample import Keypoint, Object
+from fastgen.scene.limits import HASPS
+from fastgen.scene.object_ids import seal_id
+
+
+def seal_objects(shot: Shot) -> list[Object]:
+    """Return the seals of a scene, in the order of Scene.seals."""
+    seals = shot.prepared.seals
+    if seals is None:
+        return []
+    ids, view = shot.frame.ids, shot.view
+    own = np.array([seal_id(seal) for seal in shot.scene.seals])
+    count = len(own)
+    seen_boxes, areas = shot.boxes_on_container(ids, SEAL_ID, SEAL_ID + HASPS)
+    seen = project(seals.facets, view)
+    bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
+    polygons, owner = seen.polygons, seen.facets.owner.take(seen.facets.corners[:, 0])
+    front = facing(polygons)
+    alone = covered(polygons[front], owner[front], count, view.size)
+    pixel, whose = alone.pixels()
+    lost = whose[ids.ravel().take(pixel) != own.take(whose)]
+    hidden = np.bincount(lost, minlength=count).tolist()
+    middles = _middles(shot, own)
+    return [
+        Object(
+            id=int(own[i]),
+            class_name="seal",
+            instance=i + 1,
+            bbox=seen_boxes[own[i] - SEAL_ID],
+            amodal_bbox=bounds[i],
+            area=int(areas[own[i] - SEAL_ID]),
+            keypoints=(middles[i],),
+            **visibility(
+                shot.config, int(areas[own[i] - SEAL_ID]), hidden[i], int(alone.beyond[i])
+            ),
+        )
+        for i in range(count)
+    ]
+
+
+def _middles(shot: Shot, own: np.ndarray) -> list[Keypoint]:
+    """Return the middle of each seal; it is visible if its pixel shows the seal with this id."""
+    assert shot.prepared.seals is not None
+    pixels, depth = shot.view.project(shot.prepared.seals.middles_mm)
+    inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
+    found: list[Keypoint] = []
+    for (x, y), within, value in zip(pixels.tolist(), inside, own, strict=True):
+        shown = within and shot.frame.ids[int(y), int(x)] == value
+        found.append((round(x, 3), round(y, 3), 2 if shown else 1) if within else (0.0, 0.0, 0))
+    return found
