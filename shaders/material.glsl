@@ -19,6 +19,11 @@
 #include "decal_cell.glsl"
 #include "decal.glsl"
 #include "zone.glsl"
+#include "zone_point.glsl"
+
+const vec3 STREAK_ALBEDO = vec3(0.07, 0.06, 0.05);
+const float COLUMN_SQUEEZE = 0.12;
+const float SCRAPE_RUST = 6.0;
 
 struct SurfacePoint {
     Material material;
@@ -35,19 +40,15 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
     vec4 base = material_base[kind];   // Albedo, roughness.
     vec4 trait = material_trait[kind]; // Metallic, rust proneness, share of the paint layers, unused.
 
-    vec2 from_low = atlas_mm - rect.xy;
-    vec2 to_border = min(from_low, rect.zw - from_low);
-    float edge_mm = max(min(to_border.x, to_border.y), 0.0);
-    float corner_mm = length(max(to_border, 0.0));
-    float narrow_mm = min(rect.z, rect.w);
-    float below_mm = to_upper_side(from_low, rect.zw, code);
-    if ((code & ZONE_SMALL) != 0) {
-        edge_mm = corner_mm = below_mm = SMALL_EDGE_MM;
-        narrow_mm = SMALL_WIDE_MM;
-    }
+    ZonePoint z = zone_point(rect, texelFetch(zone_table, ivec2(int(zone), 2), 0), code, atlas_mm,
+                             footprint_mm);
     vec2 noise_mm = upright(atlas_mm, code) + noise_offset_mm;
-    NoiseSample coarse = read_without_period(0, noise_mm, rust_tile_mm, footprint_mm);
+    vec2 coarse_mm = vec2(noise_mm.x, mix(1.0, 0.6, z.steep) * noise_mm.y);
+    NoiseSample coarse = read_without_period(0, coarse_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
+
+    NoiseSample columns = read_noise(1, vec2(noise_mm.x, COLUMN_SQUEEZE * noise_mm.y), wear_tile_mm,
+                                     footprint_mm);
 
     SurfacePoint s;
     s.decal_id = 0u;
@@ -57,6 +58,11 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
 
 #if SHOWN_TONE
     albedo *= 1.0 + trait.z * tone_variation * (2.0 * coarse.value.x - 1.0);
+#endif
+#if SHOWN_AGEING
+    float bleach_share = trait.z * bleaching(z, coarse.value.x, columns.value.y);
+    albedo = bleached(albedo, bleach_share);
+    roughness = mix(roughness, 0.8, 0.6 * bleach_share);
 #endif
     float decal_alpha = 0.0;
 #if WITH_DECALS
@@ -69,25 +75,28 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
 #endif
 #endif
 #if SHOWN_AGEING
-    albedo *= 1.0 - 0.85 * trait.z * ageing(corner_mm, narrow_mm, coarse.value.x);
+    albedo *= 1.0 - 0.85 * trait.z * ageing(z, coarse.value.x);
 #endif
 #if SHOWN_REFLECTION
     roughness = worn_roughness(roughness, streaks);
 #endif
+    float bare = 0.0;
 #if SHOWN_SCRATCHES
     float scraped = trait.z * scratches(streaks);
-    albedo = mix(albedo, vec3(0.38, 0.36, 0.33), 0.5 * scraped);
+    bare = trait.z * scrapes(z, coarse, streaks, columns);
+    albedo = mix(albedo, vec3(0.38, 0.36, 0.33), max(0.5 * scraped, 0.8 * bare));
 #endif
 #if SHOWN_DIRT
-    float grime = trait.z * dirt(edge_mm, narrow_mm, streaks);
-    albedo = mix(albedo, dirt_albedo, grime);
+    float grime = trait.z * dirt(z, streaks);
+    float streak = trait.z * dirt_streak(z, columns);
+    albedo = mix(mix(albedo, dirt_albedo, grime), STREAK_ALBEDO, streak);
+    grime = max(grime, streak);
     roughness = mix(roughness, 0.9, grime);
 #endif
     float rusty = 0.0;
 #if SHOWN_RUST
     float sticker = 1.0 - 0.8 * decal_alpha;
-    Rust rust = rust_at(edge_mm, narrow_mm, below_mm, (code & ZONE_LEVEL) == 0 ? 1.0 : 0.0,
-                        coarse, trait.y);
+    Rust rust = rust_at(z, coarse, min(SCRAPE_RUST * rust_rate, 0.5) * bare, trait.y);
     albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
@@ -99,8 +108,7 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
                        step(0.01, scar));
 #endif
     float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
-    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * (0.7 + 0.6 * coarse.value.x) *
-                 mix(1.22, 0.6, old);   // 1 on average: RUST_OLD of the rust is old.
+    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * mix(1.22, 0.6, old);   // 1 on average: RUST_OLD of the rust is old.
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif

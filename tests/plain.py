@@ -7,5 +7,8 @@ EVEN_PAINT = {
     "tone_variation": 0,
     "scratch_coverage": 0,
     "wear_strength": 0,
+    "bleach": 0,
+    "dirt_streaks": 0,
+    "scrapes": 0,
 }
 """Values of `surface` for clean paint of one colour and roughness."""

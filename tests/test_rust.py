@@ -71,7 +71,8 @@ def test_most_streaks_start_at_the_top_of_a_wall(wall):
 
 
 def test_old_rust_is_darker_and_lies_inside_younger_rust(generators):
-    values = {"surface": {"colors": {"white": "#ffffff"}, **EVEN_PAINT, "rust_coverage": 0.2}}
+    surface = {**EVEN_PAINT, "rust_coverage": 0.2, "rust_colors": ["#6b3a1c"]}
+    values = {"surface": {"colors": {"white": "#ffffff"}, **surface}}
     config = Config.from_values({"damage": {"probability": 0}, **values})
     generator = generators(config, 3, (64, 64))
     scene = replace(generator.scene(0), decals=())

@@ -23,9 +23,13 @@ def test_mean_albedo_under_rust_equals_baked_textures(generators, rust):
             "surface": {
                 "colors": {"paint": "#2060c0"},
                 "rust_coverage": rust,
+                "rust_scale_mm": 200,  # so that even the castings have many patches
                 "dirt_strength": 0,
                 "ageing_strength": 0,
                 "scratch_coverage": 0,
+                "scrapes": 0,
+                "bleach": 0,
+                "dirt_streaks": 0,
             },
             "spreader": {"probability": 1.0},
             "weather": {"wet_probability": 0.0},
@@ -36,9 +40,10 @@ def test_mean_albedo_under_rust_equals_baked_textures(generators, rust):
     meshes = PreparedScene(scene).container, PreparedScene(scene).spreader.mesh
     atlases = generator.bake(scene, texel_mm=20.0), generator.bake_spreader(scene, 20.0)
     scene = replace(scene, decals=())
-    base, trait = (np.asarray(scene_values(scene, 16)[f"material_{k}"]) for k in ("base", "trait"))
-    coverage = rust * trait[:, 1:2]
-    found, _ = rusted(base[:, :3], coverage, np.array(scene.surface.rust.albedo), meshes)
+    values = scene_values(PreparedScene(scene), 16)
+    base, trait = (np.asarray(values[f"material_{k}"]) for k in ("base", "trait"))
+    rate = values["rust_rate"] * trait[:, 1:2]
+    found, _ = rusted(base[:, :3], rate, np.array(scene.surface.rust.albedo), meshes)
     for mesh, atlas, material, face in (
         (meshes[0], atlases[0], "paint_sheet", "roof"),
         (meshes[0], atlases[0], "paint_frame", None),

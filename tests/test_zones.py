@@ -25,7 +25,7 @@ DIRTY = Config.from_values(
     {
         "damage": {"probability": 0},
         "spreader": {"probability": 1},
-        "surface": {"dirt_strength": 0.9, "dirt_reach_mm": 300, "rust_coverage": 0.0},
+        "surface": {**EVEN_PAINT, "dirt_strength": 0.9, "dirt_reach_mm": 300},
     }
 )
 

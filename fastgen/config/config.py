@@ -61,18 +61,24 @@ class SurfaceConfig:
             are not in `colors` have no effect, so a file may replace a preset's colors alone.
         roughness: Perceptual GGX roughness of undamaged paint.
         tone_variation: Variation of the paint's tone over a side.
+        bleach: Loss of colour to the sun, in uneven columns and most on the roof.
         ageing_strength: Strength of the darkening toward the corners of each panel.
         ageing_reach_mm: Distance from a corner up to which it is visible.
         dirt_strength: Strength of the deposit along edges.
         dirt_reach_mm: Distance from an edge up to which it is visible.
         dirt_color: Color of the deposit.
-        rust_coverage: Share of the sheet that is rusty, not counting rust runs. The drawn position
-            in the range is squared, so low values prevail.
+        dirt_streaks: Strength of the dark streaks that run down from upper edges.
+        rust_coverage: Share of the sheet that is rusty, not counting rust runs, scrapes and
+            damages. Most of it lies along edges, above all the lower ones, and little on open
+            panels; frame and castings are rustier. The drawn position in the range is squared, so
+            low values prevail.
         rust_scale_mm: Size of the patches.
         rust_colors: Colors of the rust; all are equally likely.
         rust_roughness: Perceptual GGX roughness of rust.
         scratch_coverage: Share of the sheet under fine bright scratches; values above 0.1 add no
             more.
+        scrapes: Share of the steel that forks and spreaders have scraped, at their heights on walls
+            and doors, on the outer flats of the corrugation. On rusty containers scrapes rust.
         wear_strength: Unevenness of the paint's reflection.
         wear_scale_mm: Size of the noise of wear, scratches and dirt.
     """
@@ -102,16 +108,19 @@ class SurfaceConfig:
     color_weights: dict[str, _Weight] = field(default_factory=dict)
     roughness: _Roughness = Range(0.38, 0.62)
     tone_variation: Annotated[Range, UNIT] = Range(0.02, 0.12)
+    bleach: Annotated[Range, UNIT] = Range(0.0, 0.6)
     ageing_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
     ageing_reach_mm: _Reach = Range(300, 1100)
     dirt_strength: Annotated[Range, UNIT] = Range(0.05, 0.55)
     dirt_reach_mm: _Reach = Range(60, 320)
     dirt_color: _Color = "#a8a59c"
+    dirt_streaks: Annotated[Range, UNIT] = Range(0.0, 0.7)
     rust_coverage: Annotated[Range, UNIT] = Range(0.0, 0.12)
     rust_scale_mm: _Size = Range(500, 1400)
-    rust_colors: _Colors = ("#6b3a1c", "#7d4a20", "#5a2f1b", "#8a5425")
+    rust_colors: _Colors = ("#5e3823", "#6e4529", "#4d2c20", "#7a4f30")
     rust_roughness: _Roughness = Range(0.8, 0.95)
     scratch_coverage: Annotated[Range, UNIT] = Range(0.0, 0.003)
+    scrapes: Annotated[Range, UNIT] = Range(0.0, 0.3)
     wear_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
     wear_scale_mm: _Size = Range(700, 2500)
 

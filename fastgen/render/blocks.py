@@ -27,9 +27,12 @@ SCENE_BLOCK = Block(
         ("float", "ageing_strength"),
         ("float", "ageing_reach_mm"),
         ("float", "dirt_reach_mm"),
-        ("float", "rust_coverage"),
+        ("float", "rust_rate"),  # see rust.rate_of
         ("float", "rust_tile_mm"),
         ("float", "scratch_coverage"),
+        ("float", "scrape_share"),
+        ("float", "dirt_streaks"),
+        ("float", "bleach"),
         ("float", "wear_strength"),
         ("float", "wear_tile_mm"),
         ("float", "wetness"),

@@ -13,6 +13,7 @@ from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Chart, Mesh, Zone
 from fastgen.light.sky_visibility import open_sky
 from fastgen.render.clusters import Clusters
+from fastgen.render.rust import Flats, fold_row
 from fastgen.render.textures import data_texture
 from fastgen.render.zone_codes import ZONE_GEAR, ZONE_LEVEL, ZONE_SMALL, ZONE_TURN
 from fastgen.scene.faces import FACE_AXES, FACES
@@ -99,8 +100,8 @@ class GpuMesh:
 
     @cached_property
     def zone_rows(self) -> NDArray[np.float32]:
-        """The mesh's columns [2, zones, 4] of the zone table."""
-        return zone_rows(self.mesh.charts, self.mesh.zones)
+        """The mesh's columns [3, zones, 4] of the zone table."""
+        return zone_rows(self.mesh.charts, self.mesh.zones, self.mesh.flats)
 
     def set_sky_visibility(self, values: NDArray[np.uint8]) -> None:
         """Set the sky visibility of the vertices; before, every vertex sees the whole sky.
@@ -150,10 +151,18 @@ class GpuMesh:
             item.release()
 
 
-def zone_rows(charts: Sequence[Chart], zones: Sequence[Zone]) -> NDArray[np.float32]:
-    """Return the columns [2, zones, 4] of the zone table for the zones of some charts."""
+def zone_rows(
+    charts: Sequence[Chart], zones: Sequence[Zone], flats: Flats | None = None
+) -> NDArray[np.float32]:
+    """Return the columns [3, zones, 4] of the zone table for the zones of some charts.
+
+    Args:
+        charts: The charts.
+        zones: Their zones.
+        flats: Outermost flats of each corrugated face, see Mesh.flats; None without any.
+    """
     of_zones = [charts[zone.chart] for zone in zones]
-    rows = np.zeros((2, len(zones), 4), np.float32)
+    rows = np.zeros((3, len(zones), 4), np.float32)
     rows[0] = [zone.rect_mm for zone in zones]
     rows[1, :, 0] = [
         chart.material_index
@@ -167,6 +176,9 @@ def zone_rows(charts: Sequence[Chart], zones: Sequence[Zone]) -> NDArray[np.floa
         FACE_AXES[chart.face].out if chart.name.split(".")[0] in FACES else (0, 0, 0)
         for chart in of_zones
     ]
+    rows[2, :, :3] = [
+        fold_row(chart, zone, flats or {}) for chart, zone in zip(of_zones, zones, strict=True)
+    ]
     return rows
 
 
@@ -178,10 +190,10 @@ def zone_table(ctx: moderngl.Context, rows: Mapping[int, NDArray[np.float32]]) -
         rows: Columns of each mesh, from `zone_rows`, by the number of its first zone.
 
     Returns:
-        Texture with two rows, which the caller releases.
+        Texture with three rows, which the caller releases.
     """
     count = max(first + each.shape[1] for first, each in rows.items())
-    table = np.zeros((2, count, 4), np.float32)
+    table = np.zeros((3, count, 4), np.float32)
     for first, each in rows.items():
         table[:, first : first + each.shape[1]] = each
     return data_texture(ctx, table)

@@ -199,7 +199,7 @@ class Renderer:
             prepared, resources.materials, lens, light.ambient
         )
         seals = self._shapes.seals(prepared, lit[0])
-        self._set(SCENE_BLOCK, scene_values(scene, len(light.background)))
+        self._set(SCENE_BLOCK, scene_values(prepared, len(light.background)))
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
             self._set(DAMAGE_BLOCK, damage_values(scene, damages, threshold_mm, row))
@@ -308,7 +308,7 @@ class Renderer:
         if damage != "undamaged":
             values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
-        self._set(SCENE_BLOCK, scene_values(scene, 0))
+        self._set(SCENE_BLOCK, scene_values(prepared, 0))
         textures = self._material_textures(self._resources(prepared), mesh, None)
         program = bake_program(self._programs, damage)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
@@ -318,7 +318,7 @@ class Renderer:
         spreader = self._shapes.spreader(prepared)
         if spreader is None:
             return None
-        self._set(SCENE_BLOCK, scene_values(prepared.scene, 0))
+        self._set(SCENE_BLOCK, scene_values(prepared, 0))
         container = self._shapes.container(prepared)
         textures = self._material_textures(self._resources(prepared), container, spreader)
         program = bake_program(self._programs, "undamaged")

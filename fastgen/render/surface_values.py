@@ -12,7 +12,7 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.reflectance import DIELECTRIC_F0, mean_specular_albedo
 from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.noise import noise_tiles
-from fastgen.render.rust import rusted
+from fastgen.render.rust import rate_of, rusted
 from fastgen.scene import Color, Damage, Scene
 from fastgen.scene.limits import HASPS
 from fastgen.scene.object_ids import mask_values
@@ -75,19 +75,20 @@ class SceneMaterials:
         meshes = (self._prepared.container, *(() if shape is None else (shape.mesh,)))
         base, trait = _materials(scene)
         rust = scene.surface.rust
-        coverage = rust.coverage * trait[:, 1:2].astype(float)
-        albedo, _ = rusted(base[:, :3].astype(float), coverage, np.array(rust.albedo), meshes)
+        rate = rate_of(rust.coverage, self._prepared.container) * trait[:, 1:2].astype(float)
+        albedo, _ = rusted(base[:, :3].astype(float), rate, np.array(rust.albedo), meshes)
         mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
         return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
 
 
-def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
+def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, ArrayLike]:
     """Return the members of SCENE_BLOCK.
 
     Args:
-        scene: The scene.
+        prepared: The scene.
         background_size: Side of the background map in texels, 0 without one.
     """
+    scene = prepared.scene
     surface = scene.surface
     base, trait = _materials(scene)
     return {
@@ -103,9 +104,12 @@ def scene_values(scene: Scene, background_size: int) -> Mapping[str, ArrayLike]:
         "ageing_strength": surface.ageing.strength,
         "ageing_reach_mm": max(surface.ageing.reach_mm, 1.0),
         "dirt_reach_mm": max(surface.dirt.reach_mm, 1.0),
-        "rust_coverage": surface.rust.coverage,
+        "rust_rate": rate_of(surface.rust.coverage, prepared.container),
         "rust_tile_mm": surface.rust.scale_mm * _TILE_OF_SCALE,
         "scratch_coverage": surface.scratches.coverage,
+        "scrape_share": surface.scratches.scrapes,
+        "dirt_streaks": surface.dirt.streaks,
+        "bleach": surface.paint.bleach,
         "wear_strength": surface.wear.strength,
         "wear_tile_mm": surface.wear.scale_mm * _TILE_OF_SCALE,
         "wetness": scene.weather.wetness,

@@ -187,6 +187,7 @@ def _surface(config: Config, streams: Streams) -> Surface:
             linear_color(c.colors[name]),
             c.roughness.draw(streams("paint.roughness")),
             c.tone_variation.draw(streams("paint.tone")),
+            c.bleach.draw(streams("paint.bleach")),
         ),
         ageing=Ageing(
             c.ageing_strength.draw(streams("ageing.strength")),
@@ -196,6 +197,7 @@ def _surface(config: Config, streams: Streams) -> Surface:
             c.dirt_strength.draw(streams("dirt.strength")),
             c.dirt_reach_mm.draw(streams("dirt.reach")),
             linear_color(c.dirt_color),
+            c.dirt_streaks.draw(streams("dirt.streaks")),
         ),
         rust=Rust(
             coverage,
@@ -203,7 +205,9 @@ def _surface(config: Config, streams: Streams) -> Surface:
             linear_color(rust_color),
             c.rust_roughness.draw(streams("rust.roughness")),
         ),
-        scratches=Scratches(c.scratch_coverage.draw(streams("scratches"))),
+        scratches=Scratches(
+            c.scratch_coverage.draw(streams("scratches")), c.scrapes.draw(streams("scrapes"))
+        ),
         wear=Wear(
             c.wear_strength.draw(streams("wear")),
             c.wear_scale_mm.draw(streams("wear.scale")),

@@ -55,12 +55,14 @@ class Paint:
         albedo: Linear color.
         roughness: Perceptual GGX roughness of undamaged paint.
         tone_variation: Variation of the tone over a side.
+        bleach: Loss of colour to the sun.
     """
 
     name: str
     albedo: Color
     roughness: Share
     tone_variation: Share
+    bleach: Share = 0.0
 
 
 @dataclass(frozen=True)
@@ -73,11 +75,19 @@ class Ageing:
 
 @dataclass(frozen=True)
 class Dirt:
-    """Light grey deposit along edges; `reach_mm` is measured from an edge."""
+    """Deposit on the paint.
+
+    Attributes:
+        strength: Strength of the light grey deposit along edges.
+        reach_mm: Distance from an edge up to which it is visible.
+        albedo: Linear color of the deposit.
+        streaks: Strength of the dark streaks below upper edges.
+    """
 
     strength: Share
     reach_mm: _Reach
     albedo: Color
+    streaks: Share = 0.0
 
 
 @dataclass(frozen=True)
@@ -99,9 +109,15 @@ class Rust:
 
 @dataclass(frozen=True)
 class Scratches:
-    """Fine bright lines down to primer or steel; `coverage` is their share of the sheet."""
+    """Places without paint, down to primer or steel.
+
+    Attributes:
+        coverage: Share of the sheet under fine bright lines.
+        scrapes: Share of the steel at fork and spreader height that is scraped.
+    """
 
     coverage: Share
+    scrapes: Share = 0.0
 
 
 @dataclass(frozen=True)
