@@ -206,3 +206,28 @@ def test_scenes_with_seals_round_trip_and_files_without_them_load(scene):
 def test_seals_that_cannot_be_drawn_are_refused(generator, scene, seals, message):
     with pytest.raises(ConfigError, match=message):
         generator.render(scene=replace(scene, seals=seals))
+
+
+def test_shares_of_the_config_are_those_of_its_scenes():
+    values = {"probability": 0.6, "second": 0.5, "hanging": 0.3, "kinds": {"bolt": 3, "cable": 1}}
+    generator = Generator(Config.from_values({"seals": values}), seed=2)
+    carried = [generator.scene(index).seals for index in range(300)]
+    each = [seal for seals in carried for seal in seals]
+    with_seals = [seals for seals in carried if seals]
+    assert len(with_seals) / 300 == pytest.approx(0.6, abs=0.08)
+    assert np.mean([len(seals) == 2 for seals in with_seals]) == pytest.approx(0.5, abs=0.1)
+    assert np.mean([seal.state == "hanging" for seal in each]) == pytest.approx(0.3, abs=0.08)
+    assert np.mean([seal.kind == "bolt" for seal in each]) == pytest.approx(0.75, abs=0.08)
+    assert {seal.hasp for seal in each} == {0, 1, 2, 3}
+    assert all(len({seal.hasp for seal in seals}) == len(seals) for seals in carried)
+    assert len({seal.albedo for seal in each}) == 6
+
+
+def test_scenes_of_the_paper_have_no_seals_and_otherwise_stay_the_same():
+    plain = Generator(Config.preset(), seed=2).scene(0)
+    sealed = Generator(Config.from_values({"seals": {"probability": 1}}), seed=2).scene(0)
+    assert plain.seals == ()
+    assert sealed.seals
+    assert replace(sealed, seals=()) == plain
+    with pytest.raises(ConfigError, match=r"seals.*kinds: all weights are 0"):
+        Config.from_values({"seals": {"kinds": {"bolt": 0, "cable": 0}}})

@@ -214,6 +214,32 @@ class SpreaderConfig:
 
 
 @dataclass(frozen=True)
+class SealsConfig:
+    """Bolt and cable seals at the hasps of the door.
+
+    Attributes:
+        probability: Probability that a container carries seals.
+        second: Probability that a container with seals has two, at different hasps.
+        hanging: Share of the seals that hang open.
+        kinds: Relative frequency of each kind.
+        colors: Colors of the plastic; all are equally likely.
+    """
+
+    probability: Share = 0.0
+    second: Share = 0.25
+    hanging: Share = 0.15
+    kinds: dict[Annotated[str, OneOf(("bolt", "cable"))], _Weight] = field(
+        default_factory=lambda: {"bolt": 0.7, "cable": 0.3}
+    )
+    colors: _Colors = ("#e3b013", "#e9e9e4", "#1f7a3d", "#c02a22", "#1f4fa0", "#d8661c")
+
+    def __post_init__(self) -> None:
+        """Refuse kinds without any weight."""
+        if sum(self.kinds.values()) <= 0:
+            raise ConfigError("kinds: all weights are 0; give at least one above 0")
+
+
+@dataclass(frozen=True)
 class LabelConfig:
     """Treatment of objects that are hard to see.
 
@@ -244,6 +270,7 @@ class Config:
     markings: MarkingsConfig = field(default_factory=MarkingsConfig)
     damage: DamageConfig = field(default_factory=DamageConfig)
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
+    seals: SealsConfig = field(default_factory=SealsConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: Annotated[dict[_CameraName, CameraConfig], MinLen(1)] = field(
         default_factory=seafront_rig

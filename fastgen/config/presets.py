@@ -47,9 +47,10 @@ _OUTDOORS: dict[str, Any] = {
         "stamp": {"probability": 0.3},
         "jpeg_quality": [45, 92],
     },
+    "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Fleets, wide lenses, weather and sensor effects that all presets of real cameras share."""
+"""Fleets, seals, wide lenses, weather and sensor effects that all presets of real cameras share."""
 
 PRESETS: dict[str, dict[str, Any]] = {
     "seafront": {},

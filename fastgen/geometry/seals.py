@@ -88,7 +88,8 @@ def scene_seals(scene: Scene) -> SceneSeals | None:
     """Return the seals of a scene, None if it has none. A seal moves as a whole with its hasp."""
     if not scene.seals:
         return None
-    hasps = _hasps_mm(scene.container.kind, scene.seals, scene.damages)
+    numbers = [seal.hasp for seal in scene.seals]
+    hasps = hasps_mm(scene.container.kind, numbers, scene.damages)
     forms = [_form(seal.kind, seal.state) for seal in scene.seals]
     patches = [(seal, form.parts) for seal, form in zip(scene.seals, forms, strict=True)]
     mesh, owner = _assembled(patches, hasps)
@@ -123,9 +124,9 @@ def hasp_middle_mm(kind: str, hasp: int) -> Array:
     return np.array([KINDS[kind].length_mm / 2, *hasp_mm(hasp)])
 
 
-def _hasps_mm(kind: str, seals: Sequence[Seal], damages: tuple[Damage, ...]) -> Array:
-    """Return the middle of each seal's hasp [N, 3] after damage."""
-    rest = np.array([hasp_middle_mm(kind, seal.hasp) for seal in seals])
+def hasps_mm(kind: str, hasps: Sequence[int], damages: tuple[Damage, ...]) -> Array:
+    """Return the middle of each hasp [N, 3] after damage, see `hasp_middle_mm`."""
+    rest = np.array([hasp_middle_mm(kind, hasp) for hasp in hasps])
     on_gear = rest + (_PIN_X_MM, 0.0, 0.0)
     return np.asarray(rest + deform(damages, on_gear) - on_gear)
 

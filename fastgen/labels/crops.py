@@ -56,7 +56,16 @@ def part_crop(image: NDArray[np.uint8], part: LabelledPart) -> NDArray[np.uint8]
         image: The image that the part is in, uint8 [H, W, 3].
         part: The part; its quadrilateral becomes a rectangle with a small margin.
     """
-    quad = np.array(part.quad).reshape(4, 2)
+    return upright_crop(image, np.array(part.quad).reshape(4, 2))
+
+
+def upright_crop(image: NDArray[np.uint8], quad: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the pixels of a quadrilateral as a rectangle with a small margin, uint8 [h, w, 3].
+
+    Args:
+        image: uint8 [H, W, 3].
+        quad: Corners [4, 2] in pixels, clockwise from the upper left.
+    """
     upper_left, upper_right, lower_right, lower_left = quad
     right = (upper_right + lower_right - upper_left - lower_left) / 2
     down = (lower_left + lower_right - upper_left - upper_right) / 2

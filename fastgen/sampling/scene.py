@@ -21,6 +21,7 @@ from fastgen.geometry.shape_library import SHAPES
 from fastgen.light.hdri import hours_of
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.markings import sample_decals
+from fastgen.sampling.seals import sample_seals
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.sheet import Sheet
 from fastgen.scene import (
@@ -110,6 +111,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
             streams,
         ),
         damages=damages,
+        seals=sample_seals(config.seals, streams),
         spreader=_spreader(config.spreader, streams),
         weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
     )
@@ -124,6 +126,7 @@ def without_container(scene: Scene) -> Scene:
         container=replace(scene.container, present=False),
         decals=(),
         damages=(),
+        seals=(),
         spreader=replace(scene.spreader, present=False),
     )
 

@@ -24,6 +24,7 @@ from fastgen.torch.targets import (
     class_names,
     collate_door,
     collate_lists,
+    collate_seal,
     collate_text,
     collate_yolo,
 )
@@ -41,6 +42,7 @@ __all__ = [
     "class_weights",
     "collate_door",
     "collate_lists",
+    "collate_seal",
     "collate_text",
     "collate_yolo",
 ]

@@ -45,7 +45,7 @@ class ContainerDataset(Dataset[Item]):
     With spawned workers, `scenes.curriculum` and `items.transforms` must be functions of a module.
 
     Args:
-        task: damage, imdg, text or door; `targets.item_of` describes image and target of each.
+        task: damage, imdg, text, door or seal; `targets.item_of` describes image and target.
         config: Distribution of the scenes; by default that of the preset seafront.
         seed: Whole number of 0 or more.
         length: Images per epoch, over all ranks.

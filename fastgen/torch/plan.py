@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from fastgen.config.cameras import CameraConfig
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import always_at_an_end
@@ -118,9 +119,10 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     rig = config.cameras
     if isinstance(cameras, str) or not (cameras is None or isinstance(cameras, Iterable)):
         raise ConfigError(f"cameras: {cameras!r} is not a list; give [{cameras!r}]")
-    usable = [name for name in rig if task != "door" or always_at_an_end(rig[name])]
+    usable = [name for name in rig if _suits(task, rig[name])]
     if not usable:
-        raise ConfigError(f"cameras: none of {', '.join(rig)} looks at an end of the container")
+        where = "an end of the container" if task == "door" else "the door"
+        raise ConfigError(f"cameras: none of {', '.join(rig)} looks at {where}")
     chosen = tuple(usable if cameras is None else cameras)
     for name in chosen:
         if name not in usable:
@@ -134,6 +136,12 @@ def chosen_cameras(task: str, config: Config, cameras: Sequence[str] | None) -> 
     if not chosen or len(set(chosen)) != len(chosen):
         raise ConfigError("cameras: give at least one name, and each only once")
     return chosen
+
+
+def _suits(task: str, camera: CameraConfig) -> bool:
+    if task == "door":
+        return always_at_an_end(camera)
+    return task != "seal" or camera.face == "door"
 
 
 def config_of(curriculum: Any, base: Config, epoch: int) -> Config:

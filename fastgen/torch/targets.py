@@ -18,7 +18,9 @@ from fastgen.errors import ConfigError
 from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_number
+from fastgen.formats.seal import SEAL_CLASSES
 from fastgen.labels.crops import text_crops
+from fastgen.labels.hasp_crops import hasp_crops
 from fastgen.sample import Box, Sample
 from fastgen.validation import check_known
 
@@ -33,6 +35,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "imdg": DETECTION_CLASSES,
     "text": (),
     "door": DOOR_CLASSES,
+    "seal": SEAL_CLASSES,
 }
 
 FORMS = ("detection", "yolo")
@@ -71,7 +74,7 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     Labels of the detection form are 1 higher, because 0 is the background.
 
     Args:
-        task: damage, imdg, text or door.
+        task: damage, imdg, text, door or seal.
         config: Configuration of the dataset. With `markings.marks` the imdg task has five more
             classes; None stands for a configuration without.
 
@@ -103,7 +106,7 @@ def item_of(
 
     Args:
         sample: The sample.
-        task: damage, imdg, text or door.
+        task: damage, imdg, text, door or seal.
         items: Form of the target and dtype of the image; transforms are not applied.
         labels: Decides which texts are legible.
         image_id: Number of the image, for evaluation.
@@ -119,10 +122,15 @@ def item_of(
         [N, 4] of the visible texts) and image_id.
 
         For door, image [3, H, W] and an int, the index in DOOR_CLASSES.
+
+        For seal, a list of crops [3, h, w] of the door's hasps, and a dict of labels (int64 [N],
+        indices in SEAL_CLASSES), hasps (int64 [N], as in Seal.hasp) and image_id.
     """
     as_float = items.as_float
     if task == "text":
         return _text_item(sample, labels, image_id, as_float)
+    if task == "seal":
+        return _seal_item(sample, image_id, as_float)
     image = image_tensor(sample.image, as_float)
     if task == "door":
         if not sample.scene.container.present:  # a curriculum may have set container.absent
@@ -175,11 +183,18 @@ def collate_door(batch: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.stack([image for image, _ in batch]), labels
 
 
+def collate_seal(batch: Sequence[Item]) -> tuple[list[torch.Tensor], torch.Tensor]:
+    """Collate to all crops of the images, [3, h, w] of different sizes, and labels int64 [N]."""
+    crops = [crop for image, _ in batch for crop in image]
+    return crops, torch.cat([target["labels"] for _, target in batch])
+
+
 def collate_of(task: str, form: str) -> Collate:
     """Return the collate function for the items of a task."""
     if form == "yolo":
         return collate_yolo
-    return {"text": collate_text, "door": collate_door}.get(task, collate_lists)
+    own = {"text": collate_text, "door": collate_door, "seal": collate_seal}
+    return own.get(task, collate_lists)
 
 
 _Found = tuple[int, Box, int, NDArray[np.bool_] | None]
@@ -208,6 +223,16 @@ def _text_item(sample: Sample, labels: LabelConfig, image_id: int, as_float: boo
         "image_id": image_id,
     }
     return [image_tensor(pixels, as_float) for _, pixels in found], target
+
+
+def _seal_item(sample: Sample, image_id: int, as_float: bool) -> Item:
+    found = list(hasp_crops(sample))
+    target = {
+        "labels": torch.tensor([int(crop.sealed) for crop in found], dtype=torch.int64),
+        "hasps": torch.tensor([crop.hasp for crop in found], dtype=torch.int64),
+        "image_id": image_id,
+    }
+    return [image_tensor(crop.pixels, as_float) for crop in found], target
 
 
 def _boxes(boxes: list[Box]) -> torch.Tensor:

@@ -1,0 +1,91 @@
+"""Crops of the hasps of a door, with and without a seal."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.geometry.seals import hasps_mm
+from fastgen.labels.crops import upright_crop
+from fastgen.sample import Sample
+from fastgen.scene.limits import HASPS
+from fastgen.scene.object_ids import seal_id
+
+LEAST_PX = 32
+"""Least side of a crop. A barrel is then about 3 pixels wide."""
+
+_ACROSS_MM = 130.0
+_BELOW_MM, _ABOVE_MM = 170.0, 90.0
+"""The crop around a hasp: half its width, and its reach below and above the middle of the catch."""
+
+_DEEPEST_ASPECT = 0.4
+"""Least ratio of the crop's sides in the image; a smaller one is a view along the door."""
+
+_SHOWN = 0.85
+"""Least share of the crop that shows the container."""
+
+_SEAL_SHOWN = 0.5
+"""Least visible fraction of a seal; a hasp whose seal is hidden would look like one without."""
+
+_POINTS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class HaspCrop:
+    """One hasp in an image.
+
+    Attributes:
+        hasp: Its number, as in Seal.hasp.
+        sealed: Whether a locked seal secures it. A hanging seal does not.
+        pixels: uint8 [h, w, 3], 260 x 260 mm around the hasp, turned upright, with a margin of 3
+            pixels.
+    """
+
+    hasp: int
+    sealed: bool
+    pixels: NDArray[np.uint8]
+
+
+def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
+    """Yield the hasps of a door that an image shows well.
+
+    Such a hasp is inside the image, at least LEAST_PX large, not seen along the door, and hardly
+    occluded. At least half of its seal is visible, if it has one.
+    """
+    scene, view = sample.scene, sample.view
+    if not scene.container.present:
+        return
+    seals = {seal.hasp: seal for seal in scene.seals}
+    fractions = {thing.id: thing.visible_fraction for thing in sample.objects}
+    middles = hasps_mm(scene.container.kind, range(HASPS), scene.damages)
+    steps = np.linspace(0.0, 1.0, _POINTS)
+    across = (2 * steps - 1) * _ACROSS_MM
+    up = _ABOVE_MM - steps * (_ABOVE_MM + _BELOW_MM)
+    places = np.zeros((HASPS, _POINTS, _POINTS, 3))
+    places[..., 1], places[..., 2] = across, up[:, None]
+    places += middles[:, None, None]
+    pixels, depth = view.project(places.reshape(-1, 3))
+    within = np.logical_and(pixels >= 0, pixels < view.size)
+    inside = np.asarray(within.all(axis=1) & (depth > 0))
+    columns, rows = np.floor(np.where(inside[:, None], pixels, 0)).astype(int).T
+    shown = np.asarray(sample.damage[rows, columns] > 0).reshape(HASPS, -1).mean(axis=1)
+    whole = np.asarray(inside.reshape(HASPS, -1).all(axis=1))
+    for hasp, grid in enumerate(pixels.reshape(HASPS, _POINTS, _POINTS, 2)):
+        quad = grid[[0, 0, -1, -1], [0, -1, -1, 0]]
+        if not whole[hasp] or shown[hasp] < _SHOWN or not _large(quad):
+            continue
+        seal = seals.get(hasp)
+        if seal is None or fractions[seal_id(seal)] >= _SEAL_SHOWN:
+            sealed = seal is not None and seal.state == "locked"
+            yield HaspCrop(hasp, sealed, upright_crop(sample.image, quad))
+
+
+def _large(quad: NDArray[np.float64]) -> bool:
+    """Test whether a crop with corners [4, 2] is seen from the front, large and not slanted."""
+    sides = np.roll(quad, -1, axis=0) - quad
+    lengths = np.linalg.norm(sides, axis=1)
+    turn = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+    return bool(
+        turn > 0 and lengths.min() >= LEAST_PX and lengths.min() >= _DEEPEST_ASPECT * lengths.max()
+    )
