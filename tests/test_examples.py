@@ -26,7 +26,7 @@ NAMES = ("container", "axis", "dented")
 SIZE = (200, 100)
 
 
-@pytest.mark.parametrize("example", ["door", "imdg", "damage", "text", "imdg --full"])
+@pytest.mark.parametrize("example", ["door", "imdg", "damage", "text", "seal", "imdg --full"])
 def test_an_example_runs_and_writes_table_numbers_and_charts(example, tmp_path):
     name, *options = example.split()
     command = [sys.executable, f"examples/{name}.py", "--smoke", *options]

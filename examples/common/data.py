@@ -25,7 +25,8 @@ _REPORT_S = 30.0
 class Kept(Dataset[Any]):
     """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
-    A text item is one crop with its text.
+    A text item is one crop with its text. A seal item is one crop with a dict of its label, hasp
+    and image_id.
     """
 
     def __init__(self, items: list[dict[str, Any]]) -> None:
@@ -65,6 +66,11 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
         if data.task == "text":
             pairs = zip(image, target["texts"], strict=True)
             items += [{"jpeg": _jpeg(crop), "target": text} for crop, text in pairs]
+        elif data.task == "seal":
+            facts = zip(target["labels"].tolist(), target["hasps"].tolist(), strict=True)
+            for crop, (label, hasp) in zip(image, facts, strict=True):
+                fact = {"label": label, "hasp": hasp, "image_id": target["image_id"]}
+                items.append({"jpeg": _jpeg(crop), "target": fact})
         else:
             items.append({"jpeg": _jpeg(image), "target": _packed(target)})
         if (now := time.perf_counter()) - reported > _REPORT_S:
@@ -97,7 +103,7 @@ class Feed:
             if workers:
                 # a process that uses CUDA or OpenGL must not be forked
                 options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
-            collate = None if source.task == "text" else collate_lists
+            collate = None if source.task in ("text", "seal") else collate_lists
             self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
         else:
             self._loader = DataLoader(
