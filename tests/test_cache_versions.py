@@ -22,8 +22,8 @@ TABLE = {
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
     "sheet": (chart_sheet, 1, 12.78655, 221.09347, 198.36237),
     "sky-directions": (sky_visibility_probe, 1, 13.55746, 19.84805, 17.15882),
-    "sky-visibility": (sky_visibility_probe, 1, 13.1728, 58.24802, 51.2406),
-    "spreader": (spreader, 3, 11.03537, 33.16531, 30.23399),
+    "sky-visibility": (sky_visibility_probe, 1, 13.17265, 58.18403, 51.17683),
+    "spreader": (spreader, 4, 11.03602, 33.2031, 30.26433),
     "triangle-bounds": (mesh, 1, 11.92992, 14.59246, 13.22904),
 }
 """Producer: its module, its VERSION and the summary of its entries, see `summary`."""

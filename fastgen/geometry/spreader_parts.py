@@ -48,11 +48,11 @@ _HEADBLOCK_MM = (690.0, 1000.0)
 
 _SHEAVE_X_MM, _SHEAVE_Z_MM, _SHEAVE_RADIUS_MM = 950.0, 1250.0, 330.0
 
-_CABLE_RADIUS_MM = 20.0
+_CABLE_RADIUS_MM = 30.0
 """Distance of a cable's four edges from its axis.
 
-Seen from all around, a cable is 36 mm wide on average, like a thick hoist rope. Thinner cables are
-dashes in `draft`, which takes one sample per pixel.
+Seen from all around, a cable is 54 mm wide on average, like two hoist ropes side by side. Thinner
+cables are dashes before a bright sky, which outshines a pixel that a cable covers in part.
 """
 
 
