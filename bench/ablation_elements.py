@@ -251,6 +251,7 @@ ELEMENTS = (
     Element("shape", "door gaskets", container=without_charts("door.gasket")),
     Element("shape", "castings' apertures", container=filled_apertures),
     Element("shape", "fork pockets", container=without_charts("fork.")),
+    Element("shape", "seals", lambda scene: replace(scene, seals=())),
     Element("shape", "spreader", lambda scene: replace(scene, spreader=Spreader())),
     Element(
         "shape",

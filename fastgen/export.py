@@ -1,7 +1,7 @@
 """Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools.
 
-The file contains the damaged container, the spreader, their baked textures and the cameras. If the
-damage tears holes, it also contains the inside of the container.
+The file contains the damaged container, the spreader, their baked textures, the seals and the
+cameras. If the damage tears holes, it also contains the inside of the container.
 
 Data that glTF has no place for is stored as `extras`. The extras of the glTF scene are the
 environment and the Scene; those of a camera's node are its exposure and lens distortion. Viewers
@@ -27,10 +27,11 @@ from fastgen.formats.scene_file import view_values
 from fastgen.generator import Generator
 from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.mesh import MATERIALS, Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.constants import INSIDE_ALBEDO
 from fastgen.render.passes.bake import Atlas, atlas_size, least_texel_mm
+from fastgen.render.surface_values import SEAL_STEEL_ALBEDO
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.scene.limits import MM
@@ -94,10 +95,12 @@ def export_glb(
         baked = generator.bake_spreader(scene, max(texel_mm, least_texel_mm(spreader)))
         assert baked is not None
         parts["spreader"] = _baked_part(spreader, baked, "spreader")
+    if prepared.seals is not None:
+        parts |= _seals(prepared.seals.mesh)
 
     def complete(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"fastgen {fastgen.__version__}"
-        _complete_materials(tree)
+        _complete_materials(tree, scene)
         for camera in chosen:
             _append_camera(tree, generator, scene, camera)
 
@@ -147,6 +150,27 @@ def _inside(body: DamagedMesh) -> dict[str, trimesh.Trimesh]:
     return parts
 
 
+def _seals(mesh: Mesh) -> dict[str, trimesh.Trimesh]:
+    """Return the triangles of each material of seals. The materials have one color each."""
+    parts = {}
+    of_vertices = np.array([chart.material_index for chart in mesh.charts])[mesh.chart]
+    of_triangles = of_vertices[mesh.triangles[:, 0]]
+    for number in np.unique(of_triangles).tolist():
+        used, triangles = np.unique(mesh.triangles[of_triangles == number], return_inverse=True)
+        plain = PBRMaterial(
+            MATERIALS[number],
+            metallicFactor=0.8 if MATERIALS[number] == "seal_steel" else 0.0,
+            roughnessFactor=0.4,
+        )
+        parts[plain.name] = _part(
+            mesh.positions_mm[used],
+            mesh.normals[used],
+            triangles.reshape(-1, 3),
+            TextureVisuals(material=plain),
+        )
+    return parts
+
+
 def _part(
     positions_mm: NDArray[np.floating],
     normals: NDArray[np.floating],
@@ -174,13 +198,15 @@ def _scene_extras(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _complete_materials(tree: dict[str, Any]) -> None:
+def _complete_materials(tree: dict[str, Any], scene: Scene) -> None:
     """Name the images, and set the exact colors that trimesh has rounded to 8 bits."""
+    colors = {f"inside_{name}": albedo for name, albedo in INSIDE_ALBEDO.items()}
+    colors["seal_steel"] = SEAL_STEEL_ALBEDO
+    colors |= {f"seal_{seal.hasp}": seal.albedo for seal in scene.seals}
     for material in tree["materials"]:
         values = material["pbrMetallicRoughness"]
         if "baseColorTexture" not in values:
-            name = material["name"].removeprefix("inside_")
-            values["baseColorFactor"] = [*INSIDE_ALBEDO[name], 1.0]
+            values["baseColorFactor"] = [*colors[material["name"]], 1.0]
             continue
         for key, image in _IMAGE_NAMES.items():
             texture = tree["textures"][values[key]["index"]]

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.sparse import coo_matrix
 
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
+from fastgen.export import export_glb
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.geometry.damage_law import deform
@@ -231,3 +233,20 @@ def test_scenes_of_the_paper_have_no_seals_and_otherwise_stay_the_same():
     assert replace(sealed, seals=()) == plain
     with pytest.raises(ConfigError, match=r"seals.*kinds: all weights are 0"):
         Config.from_values({"seals": {"kinds": {"bolt": 0, "cable": 0}}})
+
+
+def test_an_exported_scene_has_its_seals(generator, scene, tmp_path):
+    path = tmp_path / "sealed.glb"
+    export_glb(generator, scene, path, cameras=[], texel_mm=16.0)
+    parts = dict(trimesh.load(path, process=False).geometry)
+    names = {f"seal_{hasp}" for hasp in range(4)} | {"seal_steel"}
+    assert set(parts) == {"container", *names}
+    seals = scene_seals(scene).mesh
+    points = np.concatenate([parts[name].vertices for name in sorted(names)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    assert [low[0], high[1]] == pytest.approx(
+        [seals.bounds_mm[0][0] / 1000, seals.bounds_mm[1][2] / 1000], abs=1e-5
+    )
+    assert sum(len(parts[name].faces) for name in names) == len(seals.triangles)
+    blue = parts["seal_1"].visual.material.baseColorFactor
+    assert blue[:3] == pytest.approx([round(255 * c) for c in ALL[1].albedo], abs=1)

@@ -21,6 +21,10 @@ _TILE_OF_SCALE = 4.0
 """Typical lengths of a noise pattern in one tile."""
 
 
+SEAL_STEEL_ALBEDO = (0.5, 0.5, 0.49)
+"""Linear albedo of the pins and cables of seals."""
+
+
 def _materials(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return (albedo and roughness) and traits of each material, float32 [M, 4] each.
 
@@ -45,7 +49,7 @@ def _materials(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
             f"seal_{hasp}": (bodies.get(hasp, (0.5, 0.5, 0.5)), 0.4, 0.0, 0.0, 0.0)
             for hasp in range(HASPS)
         },
-        "seal_steel": ((0.5, 0.5, 0.49), 0.35, 0.8, 0.0, 0.0),
+        "seal_steel": (SEAL_STEEL_ALBEDO, 0.4, 0.8, 0.0, 0.0),
     }
     base = np.array([[*np.asarray(rows[m][0]), rows[m][1]] for m in MATERIALS], np.float32)
     trait = np.array([[*rows[m][2:], 0.0] for m in MATERIALS], np.float32)
