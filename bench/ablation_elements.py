@@ -216,6 +216,16 @@ def _fresh_print(scene: Scene) -> Scene:
     return replace(scene, decals=tuple(replace(decal, **fresh) for decal in scene.decals))
 
 
+def _without_wear(part: str, name: str) -> Callable[[Scene], Scene]:
+    """Return an edit that sets the field `name` of a part of the surface to 0."""
+
+    def edit(scene: Scene) -> Scene:
+        less = replace(getattr(scene.surface, part), **{name: 0.0})
+        return replace(scene, surface=replace(scene.surface, **{part: less}))
+
+    return edit
+
+
 def _stub(name: str) -> dict[str, str]:
     return {name: (STUBS / name).read_text(encoding="utf-8")}
 
@@ -223,9 +233,12 @@ def _stub(name: str) -> dict[str, str]:
 ELEMENTS = (
     Element("surface", "tone of the paint", without=("tone",)),
     Element("surface", "ageing toward corners", without=("ageing",)),
+    Element("surface", "bleached paint", _without_wear("paint", "bleach")),
     Element("surface", "dirt along edges", without=("dirt",)),
+    Element("surface", "streaks of dirt", _without_wear("dirt", "streaks")),
     Element("surface", "rust", without=("rust",)),
     Element("surface", "scratches", without=("scratches",)),
+    Element("surface", "scrapes of forks and spreaders", _without_wear("scratches", "scrapes")),
     Element("surface", "worn reflection", without=("reflection",)),
     Element("decals", "markers", _without_decals("marker")),
     Element("decals", "texts", _without_decals("text")),
@@ -237,6 +250,7 @@ ELEMENTS = (
     ),
     Element("decals", "traces of removed markers", _without_art("overpaint", "placard_residue")),
     Element("decals", "wear of decals", _fresh_print),
+    Element("decals", "repainted patches", _without_art("patch")),
     Element("shape", "damage", lambda scene: replace(scene, damages=())),
     Element(
         "shape",

@@ -98,7 +98,7 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
         float period_mm = 4.0 * place.w;
         float wave = abs(fract((p.x + p.y) / period_mm) - 0.5) * period_mm - 0.25 * period_mm;
         albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / footprint_mm, 0.0, 1.0));
-    } else {
+    } else if (kind.x != DECAL_PATCH) {
         // Half a level finer, because trilinear filtering widens the footprint by about as much.
         float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
         vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);

@@ -22,8 +22,12 @@
 #include "zone_point.glsl"
 
 const vec3 STREAK_ALBEDO = vec3(0.07, 0.06, 0.05);
+// Height of noise relative to its width: of rust on steep parts, and of dirt and scrapes, which run down.
+const float RUST_SQUEEZE = 0.6;
 const float COLUMN_SQUEEZE = 0.12;
+// Share of a scrape that rusts, relative to the rate of rust, and its upper limit.
 const float SCRAPE_RUST = 6.0;
+const float SCRAPE_RUST_MOST = 0.5;
 
 struct SurfacePoint {
     Material material;
@@ -43,10 +47,9 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
     ZonePoint z = zone_point(rect, texelFetch(zone_table, ivec2(int(zone), 2), 0), code, atlas_mm,
                              footprint_mm);
     vec2 noise_mm = upright(atlas_mm, code) + noise_offset_mm;
-    vec2 coarse_mm = vec2(noise_mm.x, mix(1.0, 0.6, z.steep) * noise_mm.y);
+    vec2 coarse_mm = vec2(noise_mm.x, mix(1.0, RUST_SQUEEZE, z.steep) * noise_mm.y);
     NoiseSample coarse = read_without_period(0, coarse_mm, rust_tile_mm, footprint_mm);
     NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
-
     NoiseSample columns = read_noise(1, vec2(noise_mm.x, COLUMN_SQUEEZE * noise_mm.y), wear_tile_mm,
                                      footprint_mm);
 
@@ -96,7 +99,8 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
     float rusty = 0.0;
 #if SHOWN_RUST
     float sticker = 1.0 - 0.8 * decal_alpha;
-    Rust rust = rust_at(z, coarse, min(SCRAPE_RUST * rust_rate, 0.5) * bare, trait.y);
+    float bare_rust = bare * min(SCRAPE_RUST * rust_rate * trait.y, SCRAPE_RUST_MOST);
+    Rust rust = rust_at(z, coarse, bare_rust, trait.y);
     albedo = stained(albedo, sticker * rust.stain);
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
@@ -108,7 +112,8 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
                        step(0.01, scar));
 #endif
     float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
-    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * mix(1.22, 0.6, old);   // 1 on average: RUST_OLD of the rust is old.
+    // The factor is 1 on average: RUST_OLD of the rust is old.
+    vec3 ochre = rust_albedo * (0.45 + 1.1 * streaks.value.w) * mix(1.22, 0.6, old);
     albedo = mix(albedo, ochre, rusty);
     roughness = mix(roughness, rust_roughness, rusty);
 #endif

@@ -13,8 +13,8 @@ struct Rust {
     float stain;   // Stain around rust, and below it by run-off, 0..1.
 };
 
-// bare: Share of the footprint that is scraped bare and may rust. proneness: Factor of the material.
-Rust rust_at(ZonePoint z, NoiseSample noise, float bare, float proneness) {
+// bare_rust: Share of the footprint that rusts because it is scraped bare. proneness: Factor of the material.
+Rust rust_at(ZonePoint z, NoiseSample noise, float bare_rust, float proneness) {
     // Rust comes in groups on open panels. The mean of x^4 over the tone noise is 1 / CLUMP.
     float squared = noise.value.x * noise.value.x;
     float clump = CLUMP * squared * squared;
@@ -25,13 +25,13 @@ Rust rust_at(ZonePoint z, NoiseSample noise, float bare, float proneness) {
     float rate = rust_rate * proneness;
     float share = rate * (open_panel * clump + (RUST_NEAR * near_edge + RUST_FOOT * foot) *
                                                mix(1.0, clump, EDGE_CLUMP));
-    share = min(share + bare, RUST_MOST);
+    share = min(share + bare_rust, RUST_MOST);
     float threshold = normal_threshold(share);
     vec3 thresholds = vec3(threshold, normal_threshold(RUST_OLD * share), threshold - HALO);
     vec3 found = normal_covered(noise.value.y, thresholds, noise.lost.y, vec3(0.03, 0.3, HALO_SOFTNESS));
     // Run-off carries rust down from the upper edge and from rusty places.
     float below = exp(-z.below_mm / RUN_REACH_MM);
-    float wetted = min(rate * (RUN_NEAR * below + RUN_FAR * clump) + bare, RUN_MOST);
+    float wetted = min(rate * (RUN_NEAR * below + RUN_FAR * clump) + bare_rust, RUN_MOST);
     float run = normal_covered(noise.value.z, normal_threshold(wetted), noise.lost.z, RUN_SOFTNESS);
     // A share of 0 has no finite threshold.
     float rusts = step(1e-4, share);

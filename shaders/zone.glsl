@@ -7,8 +7,8 @@
 
 // One column per zone, made by gpu_mesh.py. Row 0: x0, y0, width, height in mm. Row 1: code, and the
 // outward axis of the face for panels and door gear, else 0. The code holds the material, the quarter
-// turns clockwise from +y to up, and bits for door gear, small pieces and level zones. Row 2: corrugation, see
-// rust.fold_row.
+// turns clockwise from +y to up, and bits for door gear, small pieces and level zones. Row 2:
+// corrugation, see fold_row in rust.py.
 uniform sampler2D zone_table;
 
 bool is_door_gear(uint zone) {

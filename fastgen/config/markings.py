@@ -63,6 +63,7 @@ class MarkingsConfig:
         stickers_per_face: Number of signs and stickers, in addition to the plates that every
             container has.
         sticker_wear: Scratches, dirt and peeled patches of stickers.
+        patches_per_face: Number of rectangles that were painted over with slightly different paint.
         height_marks: Probability of striped height marks on a high cube.
     """
 
@@ -96,6 +97,7 @@ class MarkingsConfig:
     brand_cap_mm: Annotated[Range, Bounds(20, 5000, "mm")] = Range(300, 620)
     stickers_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 4)
     sticker_wear: Annotated[Range, UNIT] = Range(0.0, 0.5)
+    patches_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
     height_marks: Share = 0.85
 
     @property

@@ -17,7 +17,7 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.glyph_runs import GlyphRun, glyph_run
 from fastgen.scene import Decal, Scene
-from fastgen.scene.limits import DECAL_KINDS
+from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS
 from fastgen.scene.object_ids import object_ids
 
 DECAL_TEXELS = 5
@@ -93,7 +93,7 @@ def pack_decals(
     runs: list[GlyphRun] = []
     letters = 0
     for row, decal, object_id in zip(table, decals, object_ids(scene), strict=False):
-        kind = decal.art if decal.art == "stripes" else decal.kind
+        kind = decal.art if decal.art in COMPUTED_ART else decal.kind
         row[2] = *(decal.tint if kind in ("marker", "sticker") else decal.albedo), decal.wear
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade
         row[4] = decal.torn

@@ -43,7 +43,7 @@ def _materials(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
         "galvanized": ((0.42, 0.42, 0.41), 0.55, 0.55, 1.3, 0.5),
         "rubber": ((0.022, 0.022, 0.023), 0.75, 0.0, 0.0, 0.35),
         "underside": (paint * 0.25 + 0.02, 0.85, 0.0, 1.8, 0.8),
-        "spreader": (scene.spreader.albedo, 0.5, 0.0, 0.6, 1.0),
+        "spreader": (scene.spreader.albedo, 0.5, 0.0, 0.4, 1.0),
         "cable": ((0.07, 0.068, 0.065), 0.6, 0.3, 0.6, 0.5),
         **{
             f"seal_{hasp}": (bodies.get(hasp, (0.5, 0.5, 0.5)), 0.4, 0.0, 0.0, 0.0)

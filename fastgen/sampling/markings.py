@@ -19,7 +19,7 @@ from fastgen.sampling.marker_fittings import sample_fittings, sample_removed_mar
 from fastgen.sampling.markers import sample_markers
 from fastgen.sampling.marks import sample_marks
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
-from fastgen.sampling.stickers import sample_stickers, stickers_of
+from fastgen.sampling.stickers import sample_patches, sample_stickers, stickers_of
 from fastgen.sampling.weights_panel import sample_weights
 from fastgen.scene import Color, Decal
 from fastgen.validation import Range
@@ -67,6 +67,8 @@ def sample_decals(
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
         drawn += sample_stickers(config, known, sheet, inks, streams(f"stickers.{sheet.face}"))
+        rng = streams(f"patches.{sheet.face}")
+        drawn += sample_patches(config.patches_per_face, sheet, paint_albedo, rng)
     return (*drawn, *labelled, *held)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import Sticker, stickers
-from fastgen.sampling.sheet import Sheet
+from fastgen.sampling.sheet import Sheet, between
 from fastgen.scene import Color, Decal
 from fastgen.validation import Range
 
@@ -87,3 +87,35 @@ def _placed(
     tone = _OVERPAINT if sticker.ink == "overpaint" else 1.0
     albedo = (tone * red, tone * green, tone * blue)
     return replace(decal, kind="emblem", albedo=albedo)
+
+
+def sample_patches(
+    number: tuple[int, int], sheet: Sheet, paint: Color, rng: np.random.Generator
+) -> list[Decal]:
+    """Sample the repainted rectangles of one face, beside everything that is already on it.
+
+    Args:
+        number: Least and greatest number of rectangles.
+        sheet: Sheet of the face.
+        paint: Linear albedo of the paint.
+        rng: Random generator of the face's patches.
+    """
+    anywhere = Range(0.0, 1.0)
+    made = []
+    for _ in range(int(rng.integers(number[0], number[1] + 1))):
+        size = (between(rng, Range(200, 900)), between(rng, Range(200, 700)))
+        # The new paint is darker or lighter, and not bleached.
+        tone, grey = rng.uniform(0.75, 1.15), rng.uniform(0.0, 0.1)
+        wear = round(float(rng.uniform(0.0, 0.3)), 3)
+        center = sheet.place(size, rng, anywhere, anywhere)
+        if center is not None:
+            red, green, blue = (
+                min(float(tone * (1 - grey) * c + grey * np.mean(paint)), 1.0) for c in paint
+            )
+            albedo = (red, green, blue)
+            made.append(
+                Decal(
+                    "sticker", "", sheet.face, center, size, art="patch", albedo=albedo, wear=wear
+                )
+            )
+    return made

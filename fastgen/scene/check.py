@@ -10,7 +10,16 @@ from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Container, Damage, Decal, Scene
 from fastgen.scene.container_kinds import mm_away
-from fastgen.scene.limits import FAR_M, GLYPH_RANGE, LOBE_LIMIT, LOBES, MAX_INSTANCES, MM, NEAR_M
+from fastgen.scene.limits import (
+    COMPUTED_ART,
+    FAR_M,
+    GLYPH_RANGE,
+    LOBE_LIMIT,
+    LOBES,
+    MAX_INSTANCES,
+    MM,
+    NEAR_M,
+)
 from fastgen.validation import check_fields, check_known
 
 _SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
@@ -125,7 +134,7 @@ def _check_decal(decal: Decal, path: str) -> None:
                     f"{path}.parts[{j}].text: {part.text!r}; give at least one letter, and exactly "
                     "one in a box"
                 )
-    if decal.kind in _ART_KINDS and decal.art != "stripes":
+    if decal.kind in _ART_KINDS and decal.art not in COMPUTED_ART:
         check_known(f"{path}.art", decal.art, art_layers())
     if decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
         width, height = decal.size_mm

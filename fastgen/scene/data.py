@@ -21,6 +21,7 @@ from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.scene.limits import (
+    COMPUTED_ART,
     DECAL_KINDS,
     GAP_LIMITS_MM,
     HASPS,
@@ -158,7 +159,8 @@ class Decal:
         size_mm: Width and height of the drawn rectangle before its rotation. For a marker this is
             the square that stands on its corner, for a text the tight box around its ink.
         rotation_deg: Counter-clockwise rotation on the sheet.
-        art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes.
+        art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes,
+            'patch' for a repainted rectangle.
         lines: Text, one string per line. In vertical text the letters of a line are below one
             another, and lines are columns from left to right.
         parts: Parts of a text with places of their own; they decide the layout if there are any,
@@ -166,8 +168,9 @@ class Decal:
         font: Name of the font of a text.
         vertical: Whether a text is vertical.
         cap_mm: Height of the capitals of a text.
-        albedo: Linear color of texts, emblems and stripes.
-        wear: Wear of the print. Texts, emblems and stripes lose this share of their ink in flakes.
+        albedo: Linear color of texts, emblems, stripes and patches.
+        wear: Wear of the print. Texts, emblems, stripes and patches lose this share of their ink
+            in flakes.
             Markers and stickers are scratched and dirty, and peel off in patches.
         tint: Linear color that multiplies the artwork of markers and stickers.
         fade: Bleaching of markers and stickers.
@@ -175,7 +178,7 @@ class Decal:
             left, right, top and bottom. The label keeps the whole decal.
     """
 
-    kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind != "stripes"))]
+    kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind not in COMPUTED_ART))]
     class_name: Annotated[str, OneOf(("", *ALL_DETECTION_CLASSES[1:]))]
     face: Annotated[str, OneOf(SHEET_FACES)]
     center_mm: Vec2
