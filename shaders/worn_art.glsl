@@ -19,8 +19,8 @@ vec4 worn_art(vec3 ink, vec3 tint, float wear, float fade, NoiseSample coarse, N
     float rough = 0.5 * (coarse.value.x + coarse.value.w);
     float lost = 0.5 * length(vec2(coarse.lost.x, coarse.lost.w));
     float intact = fma(wear, -0.42, 1.02);
-    float bare = covered(rough, intact, lost, 0.015);
-    float peeled = covered(rough, intact + 0.03, lost, 0.015);
+    float bare = covered(rough, intact, lost, 0.006);
+    float peeled = covered(rough, intact + 0.03, lost, 0.006);
     float scratched = streaks.value.x * covered(streaks.value.y, 1.02 - 0.7 * wear, streaks.lost.y, 0.02);
     albedo = mix(albedo, BACKING, max(bare, scratched));
     float runs = covered(streaks.value.z, 1.25 - 0.8 * wear, streaks.lost.z, 0.25);
