@@ -10,7 +10,7 @@ from fastgen.decals.lettering import (
     GLYPH_PITCH_CAPS,
     LINE_PITCH_CAPS,
     TextPart,
-    layout,
+    ink_width_mm,
 )
 
 LAYOUTS = ("rows", "block", "column")
@@ -85,8 +85,21 @@ def _frame(form: Form, font: Font) -> tuple[float, float]:
 
 
 def _width(text: str, form: Form, font: Font, pitch_mm: float = 0.0) -> float:
-    part = TextPart("", text, 0.0, 0.0, pitch_mm=pitch_mm)
-    return layout((), font, form.cap_mm, parts=(part,)).parts[0].x1
+    """Return the width of the ink of letters without spaces in one line."""
+    if not pitch_mm:
+        return ink_width_mm(text, font, form.cap_mm)
+    ends = [
+        font.glyphs[char].ink_right - font.glyphs[char].ink_left for char in text[:: len(text) - 1]
+    ]
+    return (len(text) - 1) * pitch_mm + sum(ends) / 2 * form.cap_mm
+
+
+def row_widths(identifier: Identifier, form: Form, font: Font) -> tuple[float, float]:
+    """Return the widths of the owner code, and of serial number with check digit, in a row."""
+    serial = _width(identifier.serial, form, font)
+    check_x = _check_x(identifier, form, font, serial)
+    check = _width(identifier.check, form, font) / 2
+    return _width(identifier.owner, form, font), check_x + check + (_frame(form, font)[0] or check)
 
 
 def _check_x(identifier: Identifier, form: Form, font: Font, serial_end: float) -> float:

@@ -30,6 +30,9 @@ GLYPH_PITCH_CAPS = 1.35
 """Distance between the baselines of the glyphs of a column, in cap heights."""
 
 
+_SPACE_CAPS = 0.45
+"""Width of a space in a line, in cap heights."""
+
 BOX = "\N{WHITE RECTANGLE}"
 """Character of the frame around a check digit, in every font."""
 
@@ -123,7 +126,7 @@ class Lettering:
     parts: tuple[PartBox, ...] = ()
 
 
-@lru_cache(maxsize=64)  # Sampling, renderer and labels lay out the same texts.
+@lru_cache(maxsize=256)  # Sampling, renderer and labels lay out the same texts.
 def layout(
     lines: tuple[str, ...],
     font: Font,
@@ -159,6 +162,13 @@ def layout(
     moved = [ink._replace(x=(ink.x - x0), y=(ink.y - y0)) for ink in inks]
     size = (round((x1 - x0) * cap_mm, 1), round((y1 - y0) * cap_mm, 1))
     return Lettering(size, tuple(_placed(ink, font, cap_mm) for ink in moved))
+
+
+def ink_width_mm(text: str, font: Font, cap_mm: float) -> float:
+    """Return the width of the ink of one line, as `layout` finds it."""
+    first, last = font.glyphs[text[0]], font.glyphs[text[-1]]
+    advances = sum(_SPACE_CAPS if char == " " else font.glyphs[char].advance for char in text[:-1])
+    return (advances + last.ink_right - first.ink_left) * cap_mm
 
 
 class _Ink(NamedTuple):
@@ -233,7 +243,7 @@ def _rows(lines: Sequence[str], font: Font) -> list[_Ink]:
         pen = 0.0
         for char in line:
             if char == " ":
-                pen += 0.45
+                pen += _SPACE_CAPS
                 continue
             glyph = font.glyphs[char]
             width = glyph.ink_right - glyph.ink_left

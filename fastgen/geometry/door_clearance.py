@@ -1,6 +1,8 @@
 """Where locking gear and hinges cover the door's sheet, so that lettering can keep clear."""
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -40,11 +42,21 @@ class DoorClearance:
 
     def clear(self, x0: float, y0: float, x1: float, y1: float) -> bool:
         """Test whether no gear covers a rectangle, in mm on the sheet."""
-        columns, rows = (
-            slice(max(int(low / CELL_MM), 0), int(np.ceil(high / CELL_MM)))
-            for low, high in ((x0, x1), (y0, y1))
-        )
-        return not self.covered[rows, columns].any()
+        rows, columns = self.covered.shape
+        left, low = max(int(x0 / CELL_MM), 0), max(int(y0 / CELL_MM), 0)
+        right = min(math.ceil(x1 / CELL_MM), columns)
+        high = min(math.ceil(y1 / CELL_MM), rows)
+        if left >= right or low >= high:
+            return True
+        sums = self._sums
+        inside = sums[high][right] - sums[low][right] - sums[high][left] + sums[low][left]
+        return inside == 0
+
+    @cached_property
+    def _sums(self) -> list[list[int]]:
+        """Covered cells below and left of each cell; lists are faster than arrays to look up."""
+        sums: list[list[int]] = np.pad(self.covered.cumsum(0).cumsum(1), ((1, 0), (1, 0))).tolist()
+        return sums
 
 
 def door_clearance(mesh: Mesh) -> DoorClearance:

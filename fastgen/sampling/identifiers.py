@@ -12,6 +12,7 @@ from fastgen.decals.identifier_layout import (
     Form,
     identifier_lines,
     identifier_parts,
+    row_widths,
 )
 from fastgen.decals.lettering import GLYPH_PITCH_CAPS, Lettering
 from fastgen.sampling.lettering_style import Streams, Style, in_any_font, part_text, placed
@@ -137,9 +138,15 @@ def _across_bar(
     assert sheet.clearance is not None
     if form.type_place == "same line":
         form = replace(form, type_place="under serial")
+    bars = [(-np.inf, 0.0), *sheet.clearance.bars, (sheet.size[0], np.inf)]
+    places = list(zip(bars, bars[1:], bars[2:], strict=False))[::-1]
     for style in styles:
-        for x0, x1 in reversed(sheet.clearance.bars):
+        owner, number = row_widths(style.identifier, form, style.font)
+        for (_, low), (x0, x1), (high, _) in places:
             left, right = between(rng, _BAR_GAP_MM), between(rng, _BAR_GAP_MM)
+            start, end = x0 - left - owner, x1 + right + number
+            if not (low < start and end < high and sheet.holds_lettering(start, end)):
+                continue
             text, lettering = _written(style, replace(form, owner_gap_mm=left + x1 - x0 + right))
             width, height = lettering.size_mm
             x = x0 - left - lettering.parts[0].x1 + width / 2

@@ -56,6 +56,11 @@ class Sheet:
         """Half the pitch of the corrugation: the distance from an outer to an inner flat."""
         return (self.flats[1][0] - self.flats[0][0]) / 2 if len(self.flats) > 1 else 0.0
 
+    def holds_lettering(self, x0: float, x1: float) -> bool:
+        """Test whether lettering from x0 to x1 in mm keeps clear of the left and right edge."""
+        edge = _LEAF_EDGE_MM if self.clearance else EDGE_MM
+        return x0 >= edge and x1 <= self.size[0] - edge
+
     def claim(self, center: Vec2, size: Vec2, parts: Sequence[PartBox] = ()) -> bool:
         """Reserve a rectangle if it is free and on the sheet.
 
@@ -73,14 +78,14 @@ class Sheet:
         edge = _LEAF_EDGE_MM if parts and self.clearance else EDGE_MM
         if min(x0, y0) < edge or x1 > self.size[0] - edge or y1 > self.size[1] - edge:
             return False
+        for a0, b0, a1, b1 in self.taken:
+            if x0 < a1 + GAP_MM and a0 < x1 + GAP_MM and y0 < b1 + GAP_MM and b0 < y1 + GAP_MM:
+                return False
         if self.clearance and not all(
             self.clearance.clear(x0 + part.x0, y0 + part.y0, x0 + part.x1, y0 + part.y1)
             for part in parts
         ):
             return False
-        for a0, b0, a1, b1 in self.taken:
-            if x0 < a1 + GAP_MM and a0 < x1 + GAP_MM and y0 < b1 + GAP_MM and b0 < y1 + GAP_MM:
-                return False
         self.taken.append((x0, y0, x1, y1))
         return True
 

@@ -3,14 +3,14 @@
 from itertools import product
 
 from fastgen.config.markings import MarkingsConfig
-from fastgen.decals.lettering import TextPart, layout
+from fastgen.decals.lettering import TextPart, ink_width_mm
 from fastgen.decals.weights import entries, weight_lines
 from fastgen.sampling.lettering_style import Streams, Style, in_any_font, part_text, placed
 from fastgen.sampling.sheet import Sheet, between, tenth
 from fastgen.scene import Decal
 from fastgen.validation import Range
 
-_TRIES = 40
+_TRIES = 16
 
 _LINE_CAPS = 1.35
 """Distance between the two values of an entry, in cap heights."""
@@ -49,6 +49,8 @@ def sample_weights(
         text, lettering = part_text(lines, parts, height, inked, False)
         start = bar[0] - gap[0] - across if beside else bar[1] + gap[1]
         width, tall = lettering.size_mm
+        if not door.holds_lettering(start, start + width):
+            continue
         for _ in range(_TRIES):
             y = tall / 2 + rng.uniform(0.05, 0.95) * (door.size[1] - tall)
             center = (tenth(start + width / 2), tenth(y))
@@ -70,7 +72,7 @@ def _parts(
         gap_mm: Gap between names and values; None for values below their names.
     """
     rows = [entries(line) for line in lines]
-    across = max(layout((name,), style.font, cap_mm).size_mm[0] for name, _, _ in rows)
+    across = max(ink_width_mm(name, style.font, cap_mm) for name, _, _ in rows)
     line = _LINE_CAPS * cap_mm
     x = 0.0 if gap_mm is None else tenth(across + gap_mm)
     above = line if gap_mm is None else 0.0
