@@ -101,7 +101,7 @@ class Classifier(Learner):
 
 
 def _varied(pixels: torch.Tensor) -> torch.Tensor:
-    """Return crops with varied brightness, half of them mirrored."""
+    """Vary the brightness of crops, and mirror every second one at random."""
     light = 1 + _LIGHT * torch.randn(len(pixels), 1, 1, 1, device=pixels.device)
     mirrored = torch.rand(len(pixels), 1, 1, 1, device=pixels.device) < 0.5
     return torch.where(mirrored, pixels.flip(3), pixels) * light
@@ -136,11 +136,14 @@ def group_of(target: dict[str, int], scenes: Generator) -> str:
 
 
 def precision_recall(sealed: torch.Tensor, called: torch.Tensor) -> tuple[float, float]:
-    """Return precision and recall of the class sealed in percent; nan where there is none.
+    """Return precision and recall of the class sealed in percent.
 
     Args:
         sealed: True labels, bool [N].
         called: Predictions, bool [N].
+
+    Returns:
+        Precision and recall; nan if the divisor is 0.
     """
     hits = int((sealed & called).sum())
     found, there = int(called.sum()), int(sealed.sum())

@@ -1,8 +1,9 @@
 """Bolt and cable seals at the hasps of the door, as a mesh in the frame of the container.
 
 A hasp is the catch at the end of a handle, see door_gear.py. Sizes are those of common
-high-security seals (ISO 17712): a bolt of 8 mm and about 100 mm length with a barrel of 20 mm, and
-a body of 30 x 22 x 12 mm with a cable of 4 mm. A seal has 68 to 84 triangles.
+high-security seals (ISO 17712). A bolt has a pin of 8 mm and a barrel of 20 mm, and is 110 mm long.
+The body of a cable seal measures 30 x 22 x 12 mm, and its cable is 4 mm thick. A seal has 40 to 84
+triangles.
 """
 
 from collections.abc import Sequence

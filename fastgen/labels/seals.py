@@ -21,12 +21,15 @@ def seal_objects(shot: Shot) -> list[Object]:
     seen_boxes, areas = shot.boxes_on_container(ids, SEAL_ID, SEAL_ID + HASPS)
     seen = project(seals.facets, view)
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
-    polygons, owner = seen.polygons, seen.facets.owner.take(seen.facets.corners[:, 0])
-    front = facing(polygons)
-    alone = covered(polygons[front], owner[front], count, view.size)
-    pixel, whose = alone.pixels()
-    lost = whose[ids.ravel().take(pixel) != own.take(whose)]
-    hidden = np.bincount(lost, minlength=count).tolist()
+    areas = areas.take(own - SEAL_ID)
+    hidden, beyond = np.zeros((2, count), np.int64)
+    if areas.any():  # only visible seals need their unoccluded area
+        polygons, owner = seen.polygons, seen.facets.owner.take(seen.facets.corners[:, 0])
+        front = np.flatnonzero(facing(polygons))
+        alone = covered(polygons.take(front, axis=0), owner.take(front), count, view.size)
+        pixel, whose = alone.pixels()
+        lost = whose[ids.ravel().take(pixel) != own.take(whose)]
+        hidden, beyond = np.bincount(lost, minlength=count), alone.beyond
     middles = _middles(shot, own)
     return [
         Object(
@@ -35,11 +38,9 @@ def seal_objects(shot: Shot) -> list[Object]:
             instance=i + 1,
             bbox=seen_boxes[own[i] - SEAL_ID],
             amodal_bbox=bounds[i],
-            area=int(areas[own[i] - SEAL_ID]),
+            area=int(areas[i]),
             keypoints=(middles[i],),
-            **visibility(
-                shot.config, int(areas[own[i] - SEAL_ID]), hidden[i], int(alone.beyond[i])
-            ),
+            **visibility(shot.config, int(areas[i]), int(hidden[i]), int(beyond[i])),
         )
         for i in range(count)
     ]
