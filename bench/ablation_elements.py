@@ -212,8 +212,9 @@ def _without_art(*words: str) -> Callable[[Scene], Scene]:
 
 
 def _fresh_print(scene: Scene) -> Scene:
-    fresh = {"wear": 0.0, "fade": 0.0, "torn": (0.0,) * 4}
-    return replace(scene, decals=tuple(replace(decal, **fresh) for decal in scene.decals))
+    whole = (0.0, 0.0, 0.0, 0.0)
+    fresh = [replace(decal, wear=0.0, fade=0.0, torn=whole) for decal in scene.decals]
+    return replace(scene, decals=tuple(fresh))
 
 
 def _without_wear(part: str, name: str) -> Callable[[Scene], Scene]:

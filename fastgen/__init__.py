@@ -77,7 +77,7 @@ __all__ = [
     "export_glb",
     "generate",
 ]
-__version__ = "0.24.0"
+__version__ = "0.25.0"
 
 _HOMES = {
     "Config": "config.config",

@@ -4,7 +4,6 @@
 // artistic choices.
 
 #include "reflectance.constants"
-#include "rust.constants"
 #include "variant.constants"
 #include "zones.constants"
 #include "scene.block"

@@ -50,7 +50,7 @@ class DoorClearance:
             return True
         sums = self._sums
         inside = sums[high][right] - sums[low][right] - sums[high][left] + sums[low][left]
-        return inside == 0
+        return bool(inside == 0)
 
     @cached_property
     def _sums(self) -> list[list[int]]:
