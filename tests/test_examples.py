@@ -10,7 +10,6 @@ import damage
 import door
 import numpy as np
 import pytest
-import text
 import torch
 from common.boxes import generalized_iou, iou
 from common.data import Feed, rendered
@@ -19,7 +18,7 @@ from common.detector import STRIDE, Detector, distinct, gaussians
 from common.run import Table
 from pycocotools import mask as coco_mask
 
-from fastgen.torch import ContainerDataset, ItemSettings, RenderSettings, SceneSettings
+from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings
 
 ROOT = Path(__file__).parent.parent
 NAMES = ("container", "axis", "dented")
@@ -259,20 +258,16 @@ def test_order_of_batches_depends_on_seed_and_pass():
     assert sorted(order(1, 1)) == list(range(9))
 
 
-def test_workers_render_new_strips_for_every_pass():
-    data = ContainerDataset(
-        "text",
-        seed=1,
-        length=4,
-        scenes=SceneSettings(cameras=("Cr",), all_views=False),
-        items=ItemSettings(transforms=text.strips_of),
-    )
+def test_workers_render_new_texts_for_every_pass():
+    scenes = SceneSettings(cameras=("Cr",), all_views=False)
+    data = ContainerDataset("text", seed=1, length=4, scenes=scenes)
     feed = Feed(data, 4, seed=1, workers=1)
     passes = [[batch for batch in feed.passed(number)] for number in (0, 1)]
-    for images, texts in passes[0] + passes[1]:
-        assert len(images) == len(texts) > 0
-        assert images[0].shape == (1, 24, 400)
-    assert set(passes[0][0][1]).isdisjoint(passes[1][0][1])
+    for images, targets in passes[0] + passes[1]:
+        assert len(images) == len(targets) > 0
+        assert all(target["parts"] for target in targets)
+    first, second = ({target["text"] for target in batches[0][1]} for batches in passes)
+    assert first.isdisjoint(second)
 
 
 def test_table_shows_a_dash_for_missing_values():

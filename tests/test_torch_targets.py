@@ -124,6 +124,22 @@ def test_text_crops_and_strings_equal_the_files(written):
         assert text == by_instance[int(path.stem.split("_")[2])]
 
 
+def test_parts_of_a_text_crop_are_those_of_the_object_moved_into_the_crop():
+    (crops, target), sample = view("text", position=7, size=(640, 640))
+    by_box = {item.bbox: item for item in sample.objects if item.class_name == "text"}
+    assert len(target["parts"]) == len(crops) > 0
+    for crop, box, parts in zip(crops, target["boxes"].tolist(), target["parts"], strict=True):
+        item = by_box[tuple(box)]
+        assert [part[:2] for part in parts] == [(p.role, p.text) for p in item.parts]
+        # the crop's pixel at the middle of a part is the image's pixel at the middle of that part
+        for (_, _, quad), part in zip(parts, item.parts, strict=True):
+            x, y = np.floor(np.array(part.quad).reshape(4, 2).mean(axis=0)).astype(int)
+            column, row = np.floor(quad.numpy().mean(axis=0)).astype(int)
+            np.testing.assert_array_equal(crop[:, row, column], sample.image[y, x])
+            shift = np.array(part.quad).reshape(4, 2) - quad.numpy()
+            np.testing.assert_allclose(shift, np.broadcast_to(shift.round()[0], (4, 2)), atol=1e-3)
+
+
 def test_door_labels_equal_those_of_an_image_folder(written):
     folders = sorted(p.name for p in (written / "door/train").iterdir())
     data = ContainerDataset("door", seed=2, render=RenderSettings(SMALL))

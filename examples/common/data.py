@@ -3,7 +3,7 @@
 import hashlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +25,8 @@ _REPORT_S = 30.0
 class Kept(Dataset[Any]):
     """Items made by `rendered`: an image uint8 [3, H, W] and the dataset's target.
 
-    A text item is one crop with its text. A seal item is one crop with a dict of its label, hasp
-    and image_id.
+    A text item is one crop with a dict of its text and parts. A seal item is one crop with a dict
+    of its label, hasp and image_id.
     """
 
     def __init__(self, items: list[dict[str, Any]]) -> None:
@@ -64,8 +64,8 @@ def rendered(data: ContainerDataset, folder: Path) -> Kept:
     for position in range(len(data)):
         image, target = data[position]
         if data.task == "text":
-            pairs = zip(image, target["texts"], strict=True)
-            items += [{"jpeg": _jpeg(crop), "target": text} for crop, text in pairs]
+            pairs = zip(*collate_texts([(image, target)]), strict=True)
+            items += [{"jpeg": _jpeg(crop), "target": fact} for crop, fact in pairs]
         elif data.task == "seal":
             facts = zip(target["labels"].tolist(), target["hasps"].tolist(), strict=True)
             for crop, (label, hasp) in zip(image, facts, strict=True):
@@ -103,7 +103,7 @@ class Feed:
             if workers:
                 # a process that uses CUDA or OpenGL must not be forked
                 options |= {"persistent_workers": True, "multiprocessing_context": "spawn"}
-            collate = None if source.task in ("text", "seal") else collate_lists
+            collate = _COLLATES.get(source.task, collate_lists)
             self._loader = Loader(source, batch, shuffle=True, collate_fn=collate, **options)
         else:
             self._loader = DataLoader(
@@ -119,6 +119,21 @@ class Feed:
         if isinstance(self._loader, Loader):
             self._loader.set_epoch(number)
         return iter(self._loader)
+
+
+def collate_texts(batch: Sequence[Any]) -> Batch:
+    """Collate text items to all crops of the images, and a dict of text and parts for each."""
+    crops = [crop for image, _ in batch for crop in image]
+    facts = [
+        {"text": text, "parts": parts}
+        for _, target in batch
+        for text, parts in zip(target["texts"], target["parts"], strict=True)
+    ]
+    return crops, facts
+
+
+_COLLATES: dict[str, Any] = {"text": collate_texts, "seal": None}
+"""Collate functions by task; None for the dataset's own, whose targets are labels."""
 
 
 def in_order(source: Dataset[Any], batch: int) -> Iterator[Batch]:

@@ -11,7 +11,7 @@ from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
-from fastgen.sample import LabelledPart, Object, Sample
+from fastgen.sample import Box, LabelledPart, Object, Sample
 from fastgen.scene import Decal
 
 _CROP_MARGIN_PX = 3
@@ -33,20 +33,30 @@ def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDA
     Yields:
         The text's object and its pixels uint8 [h, w, 3] with a small margin, as a view.
     """
-    width, height = sample.view.size
     for item in sample.objects:
         if item.class_name != "text" or not _legible(sample, item, min_text_px):
             continue
         assert item.bbox is not None
-        x0, y0, x1, y1 = item.bbox
-        margin = _CROP_MARGIN_PX
-        yield (
-            item,
-            sample.image[
-                max(y0 - margin, 0) : min(y1 + margin, height),
-                max(x0 - margin, 0) : min(x1 + margin, width),
-            ],
-        )
+        x0, y0, x1, y1 = crop_box(item.bbox, sample.view.size)
+        yield item, sample.image[y0:y1, x0:x1]
+
+
+def crop_box(box: Box, size: tuple[int, int]) -> Box:
+    """Return the box of a text's crop: its visible box with a small margin, inside the image.
+
+    Args:
+        box: Visible box of the text.
+        size: (width, height) of the image.
+    """
+    x0, y0, x1, y1 = box
+    width, height = size
+    margin = _CROP_MARGIN_PX
+    return (
+        max(x0 - margin, 0),
+        max(y0 - margin, 0),
+        min(x1 + margin, width),
+        min(y1 + margin, height),
+    )
 
 
 def part_crop(image: NDArray[np.uint8], part: LabelledPart) -> NDArray[np.uint8]:

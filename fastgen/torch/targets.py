@@ -19,9 +19,9 @@ from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_number
 from fastgen.formats.seal import SEAL_CLASSES
-from fastgen.labels.crops import text_crops
+from fastgen.labels.crops import crop_box, text_crops
 from fastgen.labels.hasp_crops import hasp_crops
-from fastgen.sample import Box, Sample
+from fastgen.sample import Box, Object, Sample
 from fastgen.validation import check_known
 
 Item = tuple[Any, Any]
@@ -119,7 +119,10 @@ def item_of(
         class from 0, then center x, center y, width and height as fractions of the image.
 
         For text, a list of crops [3, h, w], and a dict of texts (list of str), boxes (float32
-        [N, 4] of the visible texts) and image_id.
+        [N, 4] of the visible texts), parts and image_id. `parts` has a list for each crop, with
+        (role, text, quad) of each part of the identifier in reading order. The roles are 'owner',
+        'serial', 'check' and 'type'. The quad is float32 [4, 2]: x and y in pixels of the crop,
+        clockwise from the upper left corner of the letters.
 
         For door, image [3, H, W] and an int, the index in DOOR_CLASSES.
 
@@ -220,9 +223,20 @@ def _text_item(sample: Sample, labels: LabelConfig, image_id: int, as_float: boo
     target = {
         "texts": [thing.text for thing, _ in found],
         "boxes": _boxes([thing.bbox for thing, _ in found if thing.bbox]),
+        "parts": [_parts_in_crop(thing, sample.view.size) for thing, _ in found],
         "image_id": image_id,
     }
     return [image_tensor(pixels, as_float) for _, pixels in found], target
+
+
+def _parts_in_crop(thing: Object, size: tuple[int, int]) -> list[tuple[str, str, torch.Tensor]]:
+    """Return role, text and quad of each part of a text, in pixels of its crop."""
+    assert thing.bbox is not None
+    origin = torch.tensor(crop_box(thing.bbox, size)[:2])
+    return [
+        (part.role, part.text, torch.tensor(part.quad).reshape(4, 2) - origin)
+        for part in thing.parts
+    ]
 
 
 def _seal_item(sample: Sample, image_id: int, as_float: bool) -> Item:
