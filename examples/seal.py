@@ -22,7 +22,7 @@ from fastgen import Config, Generator
 from fastgen.torch import ContainerDataset, RenderSettings, SceneSettings, class_names
 
 PLANS = {
-    "cpu": Plan(images=500, test_images=150, size=(480, 480), batch=32, passes=12, rate=4e-3),
+    "cpu": Plan(images=500, test_images=150, size=(480, 480), batch=32, passes=6, rate=4e-3),
     "full": Plan(
         images=8000, test_images=1000, size=(640, 640), batch=32, passes=20, rate=2e-3, workers=12
     ),
