@@ -117,7 +117,7 @@ def test_a_marker_behind_a_locking_bar_shows_up_to_the_bar():
             marker = next(decal for decal in scene.decals if decal.kind == "marker")
             place = {"face": "door", "center_mm": (1091.0, 1400.0), "size_mm": (900.0, 900.0)}
             fresh = {"wear": 0.0, "fade": 0.0, "torn": (0.0,) * 4}
-                white = replace(marker, art="C6.1", class_name="C6.1", **fresh, **place)
+            white = replace(marker, art="C6.1", class_name="C6.1", **fresh, **place)
             alone = replace(scene, decals=(white,))
             shown = generator.render(scene=alone, layer="decals").image
             images.append(DECODED[shown])
