@@ -1,6 +1,6 @@
-"""Settings in datasets and loader states keep the form of version 0.23, so that tools can read both.
+"""Settings in datasets and loader states keep the form of version 0.23, so tools can read both.
 
-The configuration is left out: versions add keys to it, and a dataset is resumed only by its version.
+The configuration is left out: versions add keys to it, and only its own version resumes a dataset.
 """
 
 import hashlib
@@ -24,13 +24,13 @@ def digest(state):
 
 
 def with_floats(value):
-    """Turn all numbers into floats, as one state may have 12 and the other 12.0, and drop config."""
+    """Turn all numbers into floats, as one state may have 12 and the other 12.0.
+
+    The configuration and the digests of a curriculum's configurations are dropped.
+    """
     if isinstance(value, dict):
-        return {
-            key: with_floats(item)
-            for key, item in value.items()
-            if key not in ("config", "curriculum")
-        }
+        kept = {key: item for key, item in value.items() if key not in ("config", "curriculum")}
+        return {key: with_floats(item) for key, item in kept.items()}
     if isinstance(value, list | tuple):
         return [with_floats(item) for item in value]
     return float(value) if isinstance(value, int | float) else value
