@@ -49,6 +49,7 @@ CONFIG = Config.from_values(
 )
 
 _FACES = ("no_door", "door")
+_FITTINGS = ("marker_holder", "marker_rivets")
 _EDGE_MM = 130.0  # because sheets reach a little under posts and rails
 _GAP_MM = 12.0
 _SIDE_MM = (215.0, 270.0)
@@ -60,12 +61,17 @@ _LEAST_SEEN = 0.6
 def crowded(scene: Scene) -> Scene:
     """Return `scene` with its ends filled with markers, without overlap with texts and stickers.
 
+    They replace the markers of the ends and the holders and rivets of these.
     Positions are drawn one after another and rejected if the marker touches another decal. Two
     diamonds touch if the L1 distance of their centres is below the diagonal.
     """
     mesh = build_container(scene.container.kind, scene.container.profiles)
     sizes = sheet_sizes(mesh)
-    kept = tuple(d for d in scene.decals if d.kind != "marker" or d.face not in _FACES)
+    kept = tuple(
+        d
+        for d in scene.decals
+        if d.face not in _FACES or (d.kind != "marker" and d.art not in _FITTINGS)
+    )
     made: list[Decal] = []
     for face in _FACES:
         rng = stream(scene.seed, scene.index, f"crowd.{face}")
