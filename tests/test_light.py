@@ -27,7 +27,8 @@ def generator(request, tmp_path_factory):
         write_exr(folder / f"{name}.exr", np.ascontiguousarray(sky[..., order], np.float32))
     plain = Config.from_values(
         {
-            "surface": {"colors": {"grey": GREY}, "rust_coverage": [0, 0]},
+            # scraped steel and its rust are coloured
+            "surface": {"colors": {"grey": GREY}, "rust_coverage": [0, 0], "scrapes": [0, 0]},
             "spreader": {"colors": [GREY]},
             "damage": {"probability": 0},
         }
