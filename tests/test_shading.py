@@ -93,7 +93,7 @@ def test_ray_traced_light_replaces_the_hidden_sky(gl):
             " BrdfTerms r = brdf_terms(Material(vec3(0.5), x.x, 0.0), vec3(0.0, 0.0, 1.0), view);"
             " return vec4(environment_reflection(r,"
             " SkyVisibility(vec3(0.0, 0.0, 1.0), x.w, vec3(0.2), x.w, 1.0, vec3(0.3), rays)"
-            ")), 1.0); }"
+            "), 1.0); }"
         )
         return run(gl, body, rows, white_light(gl))[:, :3]
 
