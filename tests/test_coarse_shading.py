@@ -81,7 +81,7 @@ def test_pixels_share_a_colour_only_where_they_see_one_facet(drawn, kind):
         # a shared colour is close to the mean of the pixels, as it has the same layers and light
         changed = moved.any(axis=-1)
         apart = np.abs(each.mean(axis=2) - one.mean(axis=2)).max(axis=-1)[changed]
-        # On scraped, rusty walls it reaches 3.0, an eighth of the contrast in a block, as elsewhere.
+        # on scraped, rusty walls it reaches 3.0: an eighth of the contrast in a block, as elsewhere
         assert np.median(apart) < 3.5
         assert (apart > 24).mean() < 0.03
     assert shared > 0.25 * pixels
