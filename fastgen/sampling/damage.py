@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastgen.config.damage import DamageConfig
+from fastgen.sampling.streams import Streams
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.limits import LOBES
 from fastgen.validation import Range
@@ -63,7 +64,7 @@ class _Form:
 def sample_damages(
     config: DamageConfig,
     size_mm: Vec3,
-    streams: Callable[[str], np.random.Generator],
+    streams: Streams,
 ) -> tuple[Damage, ...]:
     """Sample the damages of one container.
 

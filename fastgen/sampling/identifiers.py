@@ -15,16 +15,14 @@ from fastgen.decals.identifier_layout import (
     row_widths,
 )
 from fastgen.decals.lettering import GLYPH_PITCH_CAPS, Lettering
-from fastgen.sampling.lettering_style import Streams, Style, in_any_font, part_text, placed
+from fastgen.sampling.lettering_style import BAR_GAP_MM, Style, in_any_font, part_text, placed
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
+from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import Decal, Vec2
 from fastgen.validation import Range
 
 _TRIES = 12
 """Positions tried for rows on both sides of a locking bar."""
-
-_BAR_GAP_MM = Range(15, 60)
-"""Distance of letters from a locking bar between them."""
 
 _COLUMN_CAPS = 17.0
 """Height of the tallest column in cap heights."""
@@ -59,9 +57,7 @@ def _forms(config: MarkingsConfig, sheet: Sheet, rng: np.random.Generator) -> li
     """Return forms to try, the drawn one first, then smaller ones and other layouts."""
     settings = config.identifiers
     weights = settings.layouts.get(sheet.face, {"rows": 1.0})
-    names = [name for name in LAYOUTS if weights.get(name, 0.0) > 0]
-    share = np.array([weights[name] for name in names])
-    first = str(rng.choice(names, p=share / share.sum()))
+    first = weighted_choice(rng, {name: weights.get(name, 0.0) for name in LAYOUTS})
     boxed = bool(rng.random() < settings.check_digit_box)
     cap = config.cap_mm.lo if sheet.clearance else between(rng, config.cap_mm)
     on_ribs = sheet.face != "door" and rng.random() < settings.rib_pitch
@@ -143,7 +139,7 @@ def _across_bar(
     for style in styles:
         owner, number = row_widths(style.identifier, form, style.font)
         for (_, low), (x0, x1), (high, _) in places:
-            left, right = between(rng, _BAR_GAP_MM), between(rng, _BAR_GAP_MM)
+            left, right = between(rng, BAR_GAP_MM), between(rng, BAR_GAP_MM)
             start, end = x0 - left - owner, x1 + right + number
             if not (low < start and end < high and sheet.holds_lettering(start, end)):
                 continue

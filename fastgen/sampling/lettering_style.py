@@ -1,6 +1,5 @@
 """Sampling of what all texts of one container share, and text decals in that style."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,11 +10,13 @@ from fastgen.decals.artwork import Brand, Font, brands, glyph_tiles
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.sampling.sheet import Sheet
+from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import REC_709, Color, Decal, Vec2
 from fastgen.scene.container_kinds import SIZE_TYPES
+from fastgen.validation import Range
 
-Streams = Callable[[str], np.random.Generator]
-"""Function from the name of a property to its independent random generator."""
+BAR_GAP_MM = Range(15, 60)
+"""Distance of letters from a locking bar between them."""
 
 _LIGHT: Color = (0.76, 0.76, 0.74)
 _DARK: Color = (0.018, 0.018, 0.02)
@@ -50,9 +51,7 @@ def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Strea
 
 
 def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Streams) -> Identifier:
-    codes = SIZE_TYPES[kind]
-    share = np.array(list(codes.values()))
-    size_type = str(streams("size_type").choice(list(codes), p=share / share.sum()))
+    size_type = weighted_choice(streams("size_type"), SIZE_TYPES[kind])
     owners = config.owner_codes
     if not owners and streams("owner").random() < config.brand_codes:
         owners = brand.owner_codes

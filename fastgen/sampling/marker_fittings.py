@@ -9,8 +9,8 @@ import numpy as np
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import glyph_tiles, un_numbers
 from fastgen.decals.lettering import layout
-from fastgen.sampling.lettering_style import Streams
 from fastgen.sampling.sheet import GAP_MM, Sheet, between, tenth
+from fastgen.sampling.streams import Streams
 from fastgen.scene import Color, Decal, Vec2
 from fastgen.validation import Range
 

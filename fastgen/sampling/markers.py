@@ -8,8 +8,8 @@ import numpy as np
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import marker_prints
-from fastgen.sampling.lettering_style import Streams
 from fastgen.sampling.sheet import Sheet, between, tenth
+from fastgen.sampling.streams import Streams
 from fastgen.scene import Decal, Vec2
 from fastgen.validation import Range
 

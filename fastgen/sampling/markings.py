@@ -9,7 +9,6 @@ from fastgen.config.markings import MarkingsConfig
 from fastgen.sampling.identifiers import sample_identifiers
 from fastgen.sampling.lettering_style import (
     YELLOW,
-    Streams,
     Style,
     placed,
     sample_style,
@@ -20,6 +19,7 @@ from fastgen.sampling.markers import sample_markers
 from fastgen.sampling.marks import sample_marks
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
 from fastgen.sampling.stickers import sample_patches, sample_stickers, stickers_of
+from fastgen.sampling.streams import Streams
 from fastgen.sampling.weights_panel import sample_weights
 from fastgen.scene import Color, Decal
 from fastgen.validation import Range

@@ -7,8 +7,8 @@ import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import Mark, marks
-from fastgen.sampling.lettering_style import Streams
 from fastgen.sampling.sheet import Sheet, tenth
+from fastgen.sampling.streams import Streams
 from fastgen.scene import Decal
 from fastgen.validation import Range
 

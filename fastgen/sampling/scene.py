@@ -6,7 +6,7 @@ draws therefore leave all other properties of a scene unchanged.
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
 
@@ -24,6 +24,7 @@ from fastgen.sampling.markings import sample_decals
 from fastgen.sampling.seals import sample_seals
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.sheet import Sheet
+from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import (
     Ageing,
     Camera,
@@ -42,8 +43,6 @@ from fastgen.scene import (
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.validation import Range, nearest
-
-Streams = Callable[[str], np.random.Generator]
 
 SPLITS = ("train", "val", "test")
 
@@ -83,9 +82,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     def streams(name: str) -> np.random.Generator:
         return stream(seed, index, name)
 
-    kinds = config.container.kinds
-    weights = np.array(list(kinds.values()))
-    kind = str(streams("kind").choice(list(kinds), p=weights / weights.sum()))
+    kind = weighted_choice(streams("kind"), config.container.kinds)
     scale = float(streams("corrugation").choice(config.container.depth_scale))
     container = Container(kind, config.container.profiles.deepened(scale))
     surface = _surface(config, streams)
@@ -232,8 +229,7 @@ def _environment(
                 f"environment.names: HDRI {name!r} is not available{nearest(name, environments)}"
             )
     weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
-    share = np.array(list(weights.values())) / sum(weights.values())
-    name = str(streams("environment").choice(list(weights), p=share))
+    name = weighted_choice(streams("environment"), weights)
     return EnvironmentView(name, config.environment.yaw_deg.draw(streams("environment.yaw")))
 
 

@@ -1,19 +1,16 @@
 """Sampling of the seals at the hasps of a door."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from fastgen.config.config import SealsConfig, linear_color
+from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import Seal
 
 _HASP_WEIGHTS = (1.0, 1.0, 3.0, 3.0)
 """Relative frequency of each hasp. The right leaf opens first, so seals are mostly on it."""
 
 
-def sample_seals(
-    config: SealsConfig, streams: Callable[[str], np.random.Generator]
-) -> tuple[Seal, ...]:
+def sample_seals(config: SealsConfig, streams: Streams) -> tuple[Seal, ...]:
     """Sample the seals of a container.
 
     Args:
@@ -26,10 +23,9 @@ def sample_seals(
     count = 1 + int(rng.random() < config.second)
     weights = np.array(_HASP_WEIGHTS)
     hasps = rng.choice(len(weights), count, replace=False, p=weights / weights.sum())
-    kinds = np.array(list(config.kinds.values()))
     return tuple(
         Seal(
-            kind=str(rng.choice(list(config.kinds), p=kinds / kinds.sum())),
+            kind=weighted_choice(rng, config.kinds),
             hasp=hasp,
             state="hanging" if rng.random() < config.hanging else "locked",
             albedo=linear_color(str(rng.choice(config.colors))),

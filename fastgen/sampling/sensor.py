@@ -1,11 +1,11 @@
 """Sampling of lenses, sensor effects and weather, each part from its own random stream."""
 
-from collections.abc import Callable
 from datetime import datetime, timedelta
 
 import numpy as np
 
 from fastgen.config.sensor import LensConfig, SensorConfig, WeatherConfig
+from fastgen.sampling.streams import Streams
 from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 from fastgen.validation import Range
 
@@ -28,7 +28,7 @@ def sample_sensor(
     config: SensorConfig,
     distance_mm: float,
     moment: datetime,
-    streams: Callable[[str], np.random.Generator],
+    streams: Streams,
 ) -> Sensor | None:
     """Sample the sensor effects of one image.
 
@@ -75,7 +75,7 @@ def sample_moment(
     return day + timedelta(days=int(rng.integers(364)), seconds=seconds)
 
 
-def sample_weather(config: WeatherConfig, streams: Callable[[str], np.random.Generator]) -> Weather:
+def sample_weather(config: WeatherConfig, streams: Streams) -> Weather:
     """Sample the weather of a scene.
 
     Args:

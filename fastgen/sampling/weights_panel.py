@@ -5,8 +5,9 @@ from itertools import product
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.lettering import TextPart, ink_width_mm
 from fastgen.decals.weights import entries, weight_lines
-from fastgen.sampling.lettering_style import Streams, Style, in_any_font, part_text, placed
+from fastgen.sampling.lettering_style import BAR_GAP_MM, Style, in_any_font, part_text, placed
 from fastgen.sampling.sheet import Sheet, between, tenth
+from fastgen.sampling.streams import Streams
 from fastgen.scene import Decal
 from fastgen.validation import Range
 
@@ -17,9 +18,6 @@ _LINE_CAPS = 1.35
 
 _ENTRY_CAPS = Range(3.2, 4.0)
 """Distance between entries, in cap heights."""
-
-_BAR_GAP_MM = Range(15, 60)
-"""Distance of letters from the locking bar between them."""
 
 
 def sample_weights(
@@ -43,7 +41,7 @@ def sample_weights(
         (least, inner, False),
     )
     for inked, (height, bar, beside) in product(in_any_font(config, style, rng), shapes):
-        gap = (between(rng, _BAR_GAP_MM), between(rng, _BAR_GAP_MM))
+        gap = (between(rng, BAR_GAP_MM), between(rng, BAR_GAP_MM))
         columns = sum(gap) + bar[1] - bar[0] if beside else None
         parts, across = _parts(lines, inked, height, step, columns)
         text, lettering = part_text(lines, parts, height, inked, False)
