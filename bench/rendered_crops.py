@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from fastgen import Config, Generator
 from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, MARKER_CLASSES
 from fastgen.config.cameras import direction_from, face_frame
-from fastgen.decals.artwork import glyph_tiles
-from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS, layout
+from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
@@ -318,8 +317,7 @@ def _text(sample: Sample, item: Object, decal: Decal) -> Text:
 
 def _letters_px(sample: Sample, decal: Decal) -> NDArray[np.float64]:
     """Return the centres of a text's letters in reading order, float64 [N, 2] in pixels."""
-    font = glyph_tiles()[1][decal.font]
-    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
+    lettering = decal.lettering
     middle = np.array(lettering.size_mm) / 2
     centers = np.array(
         [

@@ -12,7 +12,7 @@ from fastgen.labels.crops import text_crops
 def letters_of(decal):
     """Yield decals of one letter each with the same ink as `decal`."""
     font = glyph_tiles()[1][decal.font]
-    whole = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
+    whole = decal.lettering
     assert decal.rotation_deg == 0
     for glyph in whole.glyphs:
         alone = layout((glyph.char,), font, decal.cap_mm)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config
-from fastgen.decals.artwork import art_layers, glyph_tiles
+from fastgen.decals.artwork import art_layers
 from fastgen.geometry.container import build_container
 from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.decal_tables import CELL_SLOTS, MARGIN_MM, SceneError, pack_decals
@@ -16,7 +16,7 @@ from fastgen.scene import Decal
 
 def packed(scene):
     mesh = build_container(scene.container.kind, scene.container.profiles)
-    return mesh, pack_decals(scene, mesh, art_layers(), glyph_tiles()[1])
+    return mesh, pack_decals(scene, mesh, art_layers())
 
 
 def with_decals(*decals):

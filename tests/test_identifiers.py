@@ -37,8 +37,7 @@ def identifiers(scenes, face=None):
 
 
 def boxes(decal):
-    font = glyph_tiles()[1][decal.font]
-    return layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts).parts
+    return decal.lettering.parts
 
 
 def test_the_parts_are_the_identifier_of_iso_6346(scenes):

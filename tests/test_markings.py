@@ -157,8 +157,7 @@ def test_columns_on_the_end_wall_stand_on_outer_flats(scenes):
         middles = [(a + b) / 2 for a, b in mesh.flats["no_door"]]
         for decal in scene.decals:
             if decal.vertical and decal.face == "no_door":
-                font = glyph_tiles()[1][decal.font]
-                owner = layout(decal.lines, font, decal.cap_mm, True, decal.parts).parts[0]
+                owner = decal.lettering.parts[0]
                 left = decal.center_mm[0] - decal.size_mm[0] / 2
                 column = left + (owner.x0 + owner.x1) / 2
                 assert min(abs(column - m) for m in middles) < 0.2

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.artwork import glyph_tiles
-from fastgen.decals.lettering import PartBox, layout
+from fastgen.decals.lettering import PartBox
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.decal_outlines import Outlines
 from fastgen.geometry.facets import Facets, clip, padded
@@ -116,14 +115,13 @@ class DecalSurface:
     @cached_property
     def parts(self) -> list[tuple[int, PartBox]]:
         """Index into `decals` and box of each labelled part of a text, in scene order."""
-        fonts = glyph_tiles()[1]
-        found = []
-        for row, decal in enumerate(self.decals):
-            if decal.parts:
-                font, upright = fonts[decal.font], decal.vertical
-                text = layout(decal.lines, font, decal.cap_mm, upright, decal.parts)
-                found += [(row, box) for box in text.parts if box.role]
-        return found
+        return [
+            (row, box)
+            for row, decal in enumerate(self.decals)
+            if decal.parts
+            for box in decal.lettering.parts
+            if box.role
+        ]
 
     @cached_property
     def part_corners_mm(self) -> Array:

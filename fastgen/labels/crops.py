@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.decals.artwork import glyph_tiles
-from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
+from fastgen.decals.lettering import TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
@@ -111,7 +111,7 @@ def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
 def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
     """Return the smallest visible share of any letter; a locking bar can hide an I."""
     font = glyph_tiles()[1][decal.font]
-    lettering = layout(decal.lines, font, decal.cap_mm, decal.vertical, decal.parts)
+    lettering = decal.lettering
     middle = np.array(lettering.size_mm) / 2
     steps = (np.arange(_LETTER_POINTS) + 0.5) / _LETTER_POINTS - 0.5
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)

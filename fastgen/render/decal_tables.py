@@ -10,8 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.artwork import Font
-from fastgen.decals.lettering import layout
 from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import Mesh
 from fastgen.render.constants import DECAL_CELL_MM
@@ -63,16 +61,13 @@ class DecalTables:
     glyphs: NDArray[np.float32]
 
 
-def pack_decals(
-    scene: Scene, mesh: Mesh, art_layers: Mapping[str, int], fonts: Mapping[str, Font]
-) -> DecalTables:
+def pack_decals(scene: Scene, mesh: Mesh, art_layers: Mapping[str, int]) -> DecalTables:
     """Compute the decal tables of a scene.
 
     Args:
         scene: Scene with the decals.
         mesh: Mesh of the scene's container.
         art_layers: Texture layer of each artwork by name.
-        fonts: Fonts by name.
 
     Returns:
         Tables for the shader.
@@ -98,8 +93,7 @@ def pack_decals(
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade
         row[4] = decal.torn
         if decal.kind == "text":
-            font, upright = fonts[decal.font], decal.vertical
-            run = glyph_run(layout(decal.lines, font, decal.cap_mm, upright, decal.parts))
+            run = glyph_run(decal.lettering)
             row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm
             letters += len(run.glyphs)
             runs.append(run)

@@ -109,7 +109,7 @@ class Renderer:
         for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
             self._blocks[block.name].bind_to_uniform_block(block.binding)
         self._art_layers = art_layers()
-        tiles, self._fonts = glyph_tiles()
+        tiles, _ = glyph_tiles()
         table = dfg_table()
         dfg = self.ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
         dfg.repeat_x = dfg.repeat_y = False
@@ -337,7 +337,7 @@ class Renderer:
 
     def _resources(self, prepared: PreparedScene) -> SceneResources:
         return self._scenes.get(
-            prepared, lambda: SceneResources(self.ctx, prepared, self._art_layers, self._fonts)
+            prepared, lambda: SceneResources(self.ctx, prepared, self._art_layers)
         )
 
     def _material_textures(

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import moderngl
 
-from fastgen.decals.artwork import Font
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.decal_tables import pack_decals
 from fastgen.render.decals_near import decals_near
@@ -23,7 +22,6 @@ class SceneResources:
         ctx: The context that draws.
         prepared: The scene.
         art_layers: Texture layer of each artwork, see decal_tables.pack_decals.
-        fonts: Fonts by name.
     """
 
     def __init__(
@@ -31,10 +29,9 @@ class SceneResources:
         ctx: moderngl.Context,
         prepared: PreparedScene,
         art_layers: Mapping[str, int],
-        fonts: Mapping[str, Font],
     ) -> None:
         scene, mesh = prepared.scene, prepared.container
-        tables = pack_decals(scene, mesh, art_layers, fonts)
+        tables = pack_decals(scene, mesh, art_layers)
         near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm)
         self.materials = SceneMaterials(prepared)
         self.textures = {

@@ -16,7 +16,8 @@ from annotated_types import MaxLen
 from numpy.typing import NDArray
 
 from fastgen.classes import ALL_DETECTION_CLASSES, DAMAGE_CLASSES
-from fastgen.decals.lettering import TextPart
+from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.scene.faces import SHEET_FACES
@@ -200,6 +201,12 @@ class Decal:
     def text(self) -> str:
         """The lines joined by single spaces; '' for markers and stickers."""
         return " ".join(self.lines)
+
+    @property
+    def lettering(self) -> Lettering:
+        """Size of a text, and position of each of its glyphs and parts."""
+        font = glyph_tiles()[1][self.font]
+        return layout(self.lines, font, self.cap_mm, self.vertical, self.parts)
 
     @property
     def turn(self) -> NDArray[np.float64]:
