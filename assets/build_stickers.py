@@ -2,13 +2,14 @@
 
     python assets/build_stickers.py
 
-Run by hand. Stickers have no label; marks have one where a configuration switches them on. All
+Run by hand; needs fastgen. Stickers have no label; marks have one where a configuration switches them on. All
 drawings, names and owner codes are invented.
 """
 
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from math import cos, pi, sin
+from typing import Any
 
 import cv2
 from drawing import ASSETS, BLACK, WHITE, bake
@@ -51,6 +52,8 @@ from sticker_traces import (
     square_logo,
 )
 
+from fastgen.decals.artwork import Sticker
+
 SIDES = ("front", "back")
 ENDS = ("door", "no_door")
 WALLS = (*SIDES, *ENDS)
@@ -60,52 +63,37 @@ UPPER_RIGHT = (0.7, 1.0, 0.45, 0.95)
 NAVY, ORANGE, SKY = "#12305c", "#d9541e", "#2f9ad0"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One sticker: its drawing, and how `sampling/markings.py` places it.
+Entry = tuple[str, Sticker]
+"""SVG of a sticker, and how `sampling/stickers.py` places it. Its name is the key in STICKERS."""
 
-    Attributes:
+
+def _one(drawing: str, size: tuple[float, float], where: tuple[str, ...], **more: Any) -> Entry:
+    """Return a sticker.
+
+    Args:
         drawing: SVG.
-        size_mm: Width and height.
+        size: Width and height in mm.
         where: Faces that may carry it.
-        always: Present on these faces of every container.
-        weight: Relative frequency among the stickers that are drawn by number.
-        share: Probability that such a face carries it in addition to that number.
-        kinds: Container kinds that may carry it; empty for all.
-        place: Range of x, then of y, from left and bottom (0) to right and top (1).
-        ink: 'art' for the drawing's own colours; 'lettering' or 'overpaint' for one colour, that of
-            the lettering or a darker tone of the paint.
-        group: Stickers of one group are alternatives: a container has the same one everywhere.
+        more: Further fields of Sticker.
     """
-
-    drawing: str
-    size_mm: tuple[float, float]
-    where: tuple[str, ...]
-    always: bool = False
-    weight: float = 1.0
-    share: float = 0.0
-    kinds: tuple[str, ...] = ()
-    place: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
-    ink: str = "art"
-    group: str = ""
+    return drawing, Sticker("", size, where, **more)
 
 
 def _sized(metres: str, feet: str, kinds: tuple[str, ...]) -> Entry:
     """Return the height sign beside the identifier; most containers have it on their sides."""
     drawing = height_sign(metres, feet)
-    return Entry(drawing, (140, 180), WALLS, False, 1.0, 0.45, kinds, UPPER_RIGHT)
+    return _one(drawing, (140, 180), WALLS, share=0.45, kinds=kinds, place=UPPER_RIGHT)
 
 
 def _ic(number: str) -> Entry:
     """Return the mark of a railway in the colour of the lettering."""
-    return Entry(
-        ic_mark(number), (190, 190), SIDES, False, 0.0, 0.4, (), UPPER_RIGHT, "lettering", "ic"
-    )
+    how = {"weight": 0.0, "share": 0.4, "place": UPPER_RIGHT, "ink": "lettering", "group": "ic"}
+    return _one(ic_mark(number), (190, 190), SIDES, **how)
 
 
-def _few(drawing: str, size: tuple[float, float], where: tuple[str, ...], **more: object) -> Entry:
+def _few(drawing: str, size: tuple[float, float], where: tuple[str, ...], **more: Any) -> Entry:
     """Return a sticker of a family with several drawings, each rarer than a single sticker."""
-    return Entry(drawing, size, where, weight=0.5, **more)  # type: ignore[arg-type]
+    return _one(drawing, size, where, weight=0.5, **more)
 
 
 WAVES = "M120 300 q190 -150 380 0 t380 0 v120 q-190 150 -380 0 t-380 0 Z M120 560 q190 -150 380 0 t380 0 v90 q-190 150 -380 0 t-380 0 Z"
@@ -113,17 +101,17 @@ PEAK = "M120 720 L400 180 L560 470 L640 340 L880 720 Z"
 LOOPS = "M500 120 a300 300 0 1 0 1 0 Z M500 250 a170 170 0 1 1 -1 0 Z"
 
 STICKERS = {
-    "csc_safety_approval": Entry(safety_plate(), (250, 150), ("door",), True, place=LOW_LEFT),
-    "owner_plate": Entry(owner_plate(), (200, 140), ("door",), True, place=LOW_LEFT),
-    "customs_plate": Entry(customs_plate(), (250, 100), ("door",)),
-    "timber_treatment": Entry(timber_treatment(), (200, 100), ("door",)),
+    "csc_safety_approval": _one(safety_plate(), (250, 150), ("door",), always=True, place=LOW_LEFT),
+    "owner_plate": _one(owner_plate(), (200, 140), ("door",), always=True, place=LOW_LEFT),
+    "customs_plate": _one(customs_plate(), (250, 100), ("door",)),
+    "timber_treatment": _one(timber_treatment(), (200, 100), ("door",)),
     "height_sign": _sized("2.9 m", "9'6\"", HIGH),
     "height_sign_standard": _sized("2.6 m", "8'6\"", STANDARD),
-    "height_triangle": Entry(height_triangle(), (300, 300), (*SIDES, "no_door"), kinds=HIGH),
-    "width_sign": Entry(width_sign(), (250, 120), WALLS, kinds=("45HC",)),
+    "height_triangle": _one(height_triangle(), (300, 300), (*SIDES, "no_door"), kinds=HIGH),
+    "width_sign": _one(width_sign(), (250, 120), WALLS, kinds=("45HC",)),
     "super_heavy_30": _few(super_heavy("30.5 t"), (280, 252), WALLS),
     "super_heavy_32": _few(super_heavy("32.5 t"), (280, 252), WALLS),
-    "caution_load": Entry(caution_load(), (270, 243), ("door",), share=0.2),
+    "caution_load": _one(caution_load(), (270, 243), ("door",), share=0.2),
     "caution_doors": _few(caution_doors(), (200, 180), ENDS),
     **{f"ic_{number}": _ic(number) for number in ("27", "33", "61", "75", "83")},
     "seal_ostvik": _few(seal("OSTVIK REGISTER", NAVY, anchor(NAVY)), (150, 150), ("door",)),
@@ -141,7 +129,7 @@ STICKERS = {
     "keep_dry": _few(keep_dry(), (220, 220), WALLS),
     "fork_here": _few(fork_here(), (240, 240), SIDES),
     "no_walking": _few(no_walking(), (250, 250), ENDS),
-    "washed": Entry(washed(), (180, 110), ("door",)),
+    "washed": _one(washed(), (180, 110), ("door",)),
     "code_tag": _few(code_tag(), (160, 160), WALLS),
     "inspection_blue": _few(inspection_label(NAVY, "2027"), (110, 77), ("door",)),
     "inspection_red": _few(inspection_label(RED, "2026"), (110, 77), ("door",)),
@@ -157,7 +145,7 @@ STICKERS = {
     "chalk_digits": _few(chalk("274", 11, False), (380, 280), WALLS),
     "poster_residue_1": _few(residue(4, 0), (420, 340), WALLS),
     "poster_residue_2": _few(residue(9, 0), (300, 420), WALLS),
-    "placard_residue": Entry(residue(13, 4), (354, 354), WALLS),
+    "placard_residue": _one(residue(13, 4), (354, 354), WALLS),
     "overpaint_1": _few(overpaint(2), (400, 400), WALLS, ink="overpaint"),
     "overpaint_2": _few(overpaint(6), (400, 400), WALLS, ink="overpaint"),
 }
@@ -207,13 +195,13 @@ BRANDS = {
 }
 
 
-def _changed(entry: Entry) -> dict[str, object]:
+def _changed(sticker: Sticker) -> dict[str, object]:
     """Return size, faces, and the other fields that differ from their defaults."""
-    usual = {each.name: each.default for each in fields(Entry)}
+    usual = {each.name: each.default for each in fields(Sticker)}
     return {
         name: value
-        for name, value in asdict(entry).items()
-        if name != "drawing" and value != usual[name]
+        for name, value in asdict(sticker).items()
+        if name != "name" and value != usual[name]
     }
 
 
@@ -222,9 +210,9 @@ def main() -> None:
     folder = ASSETS / "stickers"
     folder.mkdir(exist_ok=True)
     index: dict[str, dict[str, object]] = {}
-    drawings = {name: entry.drawing for name, entry in STICKERS.items()}
-    for name, entry in STICKERS.items():
-        index[name] = {"role": "sticker", **_changed(entry)}
+    drawings = {name: drawing for name, (drawing, _) in STICKERS.items()}
+    for name, (_, sticker) in STICKERS.items():
+        index[name] = {"role": "sticker", **_changed(sticker)}
     for name, (drawing, size, where) in MARKS.items():
         drawings[name] = drawing
         index[name] = {"role": "mark", "size_mm": size, "where": where}
