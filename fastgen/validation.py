@@ -166,6 +166,14 @@ def check_known(name: str, value: Any, choices: Collection[str]) -> None:
         raise ConfigError(f"{name}: {_short(value)} is unknown{nearest(value, choices)}")
 
 
+def check_weights(
+    name: str, weights: Iterable[float], hint: str = "give at least one above 0"
+) -> None:
+    """Raise ConfigError, starting with `name`, if no weight is above 0; `hint`: what to do."""
+    if sum(weights) <= 0:
+        raise ConfigError(f"{name}: all weights are 0; {hint}")
+
+
 def check_distinct(name: str, values: Collection[str], hint: str) -> None:
     """Raise ConfigError, starting with `name`, if a value is repeated; `hint`: what to do."""
     if len(set(values)) < len(values):

@@ -32,6 +32,7 @@ from fastgen.validation import (
     Range,
     Share,
     check_known,
+    check_weights,
     from_plain,
     to_plain,
 )
@@ -157,8 +158,7 @@ class ContainerConfig:
 
     def __post_init__(self) -> None:
         """Refuse kinds without any weight, and depths that do not fit the frame."""
-        if sum(self.kinds.values()) <= 0:
-            raise ConfigError("kinds: all weights are 0; give at least one above 0")
+        check_weights("kinds", self.kinds.values())
         for i, scale in enumerate(self.depth_scale):
             try:
                 self.profiles.deepened(scale)
@@ -235,8 +235,7 @@ class SealsConfig:
 
     def __post_init__(self) -> None:
         """Refuse kinds without any weight."""
-        if sum(self.kinds.values()) <= 0:
-            raise ConfigError("kinds: all weights are 0; give at least one above 0")
+        check_weights("kinds", self.kinds.values())
 
 
 @dataclass(frozen=True)

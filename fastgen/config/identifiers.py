@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastgen.decals.identifier_layout import LAYOUTS
-from fastgen.errors import ConfigError
 from fastgen.scene.faces import SHEET_FACES
-from fastgen.validation import Bounds, Matching, OneOf, Share
+from fastgen.validation import Bounds, Matching, OneOf, Share, check_weights
 
 _Face = Annotated[str, OneOf(SHEET_FACES)]
 _Weights = dict[Annotated[str, OneOf(LAYOUTS)], Annotated[float, Bounds(0.0, 1e6)]]
@@ -49,8 +48,5 @@ class IdentifierConfig:
     def __post_init__(self) -> None:
         """Refuse faces without any weight."""
         for face, weights in self.layouts.items():
-            if sum(weights.values()) <= 0:
-                raise ConfigError(
-                    f"layouts.{face}: all weights are 0; give at least one above 0, or leave the "
-                    "face out"
-                )
+            hint = "give at least one above 0, or leave the face out"
+            check_weights(f"layouts.{face}", weights.values(), hint)
