@@ -25,7 +25,7 @@ def sample_weights(
 ) -> list[Decal]:
     """Sample the weights: names left of the right leaf's outer locking bar, values right of it.
 
-    If there is no room, names stand above their values in one column beside a bar.
+    If there is no room, each name is above its values, in one column beside a bar.
     """
     rng = streams("weights")
     lines = weight_lines(kind, rng)
