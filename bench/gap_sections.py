@@ -76,7 +76,7 @@ class Effort:
     images: int = 40
     mined: int = 40
     marker_steps: int = 700
-    reader_steps: int = 600
+    reader_steps: int = 900
     damage_steps: int = 400
 
 

@@ -1,5 +1,6 @@
 """The example that reads identifiers: layouts and letter places from parts, reads, and scores."""
 
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -8,11 +9,19 @@ import numpy as np
 import pytest
 import text
 import torch
-from common.reader import CANVAS, Reader, varied_batch, whole_canvas
+from common.reader import (
+    CANVAS,
+    DIGITS,
+    LETTERS,
+    Reader,
+    best_identifier,
+    varied_batch,
+    whole_canvas,
+)
 
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.identifier_layout import TYPE_PLACES, Form, identifier_parts
-from fastgen.decals.iso6346 import Identifier
+from fastgen.decals.iso6346 import Identifier, check_digit
 from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS, layout
 
 CODE = "CSQU3054383"
@@ -35,12 +44,34 @@ def test_edit_distance_equals_exhaustive_search():
         assert text.edit_distance(a, b) == shortest(a, b)
 
 
-def test_reads_are_scored_by_characters_and_check_digit():
-    # the last read is wrong with a right check digit
+def test_reads_are_scored_by_whole_codes_and_characters():
     found = text.measured([CODE] * 4, [CODE, "CSQU3054384", "CSQU305438", "CSQU3054399"])
     assert found["exact"] == pytest.approx(25)
     assert found["character errors"] == pytest.approx(100 * 4 / 44)
-    assert found["check digit right"] == found["exact among these"] == 50
+
+
+def test_the_reader_returns_the_most_likely_identifier_with_the_right_check_digit():
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        # two candidates at each place, so that all codes can be tried
+        tables = [(LETTERS, 4), (DIGITS, 6)]
+        candidates = [
+            {str(c): float(rng.normal()) for c in rng.choice(list(characters), 2, replace=False)}
+            for characters, count in tables
+            for _ in range(count)
+        ]
+        last = rng.normal(size=10)
+        letters, digits = (
+            np.array([[each.get(c, -np.inf) for c in characters] for each in part])
+            for (characters, _), part in zip(tables, (candidates[:4], candidates[4:]), strict=True)
+        )
+        scores = {}
+        for code in itertools.product(*candidates):
+            end = check_digit("".join(code))
+            score = sum(each[c] for each, c in zip(candidates, code, strict=True)) + last[end]
+            scores["".join(code) + str(end)] = score
+        found = best_identifier(letters, np.concatenate([digits, last[None]]))
+        assert found == max(scores, key=scores.get)
 
 
 def written(layout_name, type_place, font, boxed, matrix):

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from torch import nn
 from torch.nn import functional
 
+from fastgen.decals.iso6346 import character_value
+
 Pixels = NDArray[np.uint8]
 """RGB picture [H, W, 3]."""
 
@@ -137,16 +139,45 @@ class Reader(nn.Module):
 
     @torch.no_grad()
     def read(self, pictures: Sequence[tuple[Pixels, str]]) -> list[str]:
-        """Return the 11 characters of each picture, given with its layout."""
+        """Return the most likely valid identifier in each picture, given with its layout."""
         self.eval()
         device = self.digits.weight.device
         found = []
         for pixels, layout in pictures:
             grey = torch.from_numpy(whole_canvas(pixels, layout))[None, None].float()
             letters, digits, _ = self(grey.to(device), layout)
-            owner = "".join(LETTERS[k] for k in letters[0].argmax(1).tolist())
-            found.append(owner + "".join(DIGITS[k] for k in digits[0].argmax(1).tolist()))
+            found.append(
+                best_identifier(
+                    letters[0].log_softmax(1).cpu().numpy(), digits[0].log_softmax(1).cpu().numpy()
+                )
+            )
         return found
+
+
+def best_identifier(letters: NDArray[np.floating], digits: NDArray[np.floating]) -> str:
+    """Return the most likely identifier whose check digit is right (ISO 6346:1995, annex A).
+
+    Characters are independent, so the search is a Viterbi search over the weighted sum modulo 11.
+
+    Args:
+        letters: Log probabilities of LETTERS at the first four places, [4, 26].
+        digits: Log probabilities of DIGITS at the other seven places, [7, 10].
+    """
+    best = {0: (0.0, "")}  # remainder of the weighted sum: score and text of the best beginning
+    tables = [(LETTERS, row) for row in letters] + [(DIGITS, row) for row in digits[:-1]]
+    for place, (characters, row) in enumerate(tables):
+        longer: dict[int, tuple[float, str]] = {}
+        for remainder, (score, text) in best.items():
+            for character, value in zip(characters, row.tolist(), strict=True):
+                key = (remainder + (character_value(character) << place)) % 11
+                longer[key] = max(longer.get(key, (-np.inf, "")), (score + value, text + character))
+        best = longer
+    last = digits[-1]
+    ends = [
+        (score + float(last[remainder % 10]), text + DIGITS[remainder % 10])
+        for remainder, (score, text) in best.items()
+    ]
+    return max(ends)[1]
 
 
 def whole_canvas(pixels: Pixels, layout: str) -> Pixels:

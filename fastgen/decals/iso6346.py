@@ -54,6 +54,11 @@ def check_digit(owner_and_serial: str) -> int:
     return _remainder(text) % 10
 
 
+def character_value(character: str) -> int:
+    """Return the value of a capital letter or digit in the sum (ISO 6346:1995, annex A)."""
+    return _LETTER_VALUES[character] if character.isalpha() else int(character)
+
+
 def sample_identifier(
     rng: np.random.Generator, owner_codes: Sequence[str], size_type: str
 ) -> Identifier:
@@ -85,5 +90,4 @@ def sample_identifier(
 
 
 def _remainder(text: str) -> int:
-    values = (_LETTER_VALUES[c] if c.isalpha() else int(c) for c in text)
-    return sum(value << i for i, value in enumerate(values)) % 11
+    return sum(character_value(c) << i for i, c in enumerate(text)) % 11
