@@ -29,6 +29,9 @@ class IdentifierConfig:
         check_digit_box: Probability of the frame around the check digit.
         rib_pitch: Probability that the letters of a block on a corrugated wall are spaced by half
             waves, one on each flat.
+        painted_over: Probability that a container has an older identifier under a patch of fresh
+            paint, below or beside the present one. Its letters may show faintly through the paint
+            and have no label.
     """
 
     layouts: dict[_Face, _Weights] = field(
@@ -44,6 +47,7 @@ class IdentifierConfig:
     brand_codes: Share = 0.25
     check_digit_box: Share = 0.93
     rib_pitch: Share = 0.35
+    painted_over: Share = 0.12
 
     def __post_init__(self) -> None:
         """Refuse faces without any weight."""

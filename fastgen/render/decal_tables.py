@@ -15,13 +15,13 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.glyph_runs import GlyphRun, glyph_run
 from fastgen.scene import Decal, Scene
-from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS
+from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS, MOST_NEARBY
 from fastgen.scene.object_ids import object_ids
 
 DECAL_TEXELS = 5
 """Texels of one row of the decal table."""
 
-CELL_SLOTS = 8
+CELL_SLOTS = MOST_NEARBY
 """Most decals that one cell of the grid can list."""
 
 GLYPH_COLUMNS = 256

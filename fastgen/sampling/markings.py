@@ -17,6 +17,7 @@ from fastgen.sampling.lettering_style import (
 from fastgen.sampling.marker_fittings import sample_fittings, sample_removed_markers
 from fastgen.sampling.markers import sample_markers
 from fastgen.sampling.marks import sample_marks
+from fastgen.sampling.painted_over import sample_painted_over
 from fastgen.sampling.sheet import EDGE_MM, Sheet, between, tenth
 from fastgen.sampling.stickers import sample_patches, sample_stickers, stickers_of
 from fastgen.sampling.streams import Streams
@@ -69,7 +70,10 @@ def sample_decals(
         drawn += sample_stickers(config, known, sheet, inks, streams(f"stickers.{sheet.face}"))
         rng = streams(f"patches.{sheet.face}")
         drawn += sample_patches(config.patches_per_face, sheet, paint_albedo, rng)
-    return (*drawn, *labelled, *held)
+    decals = [*drawn, *labelled, *held]
+    # last, so that nothing makes room for it
+    older = sample_painted_over(config, faces, style, paint_albedo, decals, streams)
+    return (*older, *decals)
 
 
 def _brand(

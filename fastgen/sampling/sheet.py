@@ -7,7 +7,8 @@ import numpy as np
 
 from fastgen.decals.lettering import PartBox
 from fastgen.geometry.door_clearance import DoorClearance
-from fastgen.scene import Vec2
+from fastgen.scene import Decal, Vec2
+from fastgen.scene.limits import MOST_NEARBY, NEARBY_MM
 from fastgen.validation import Range
 
 EDGE_MM = 110.0
@@ -120,3 +121,32 @@ class Sheet:
             if self.claim(center, size, parts):
                 return center
         return None
+
+
+def has_slots(added: Sequence[Decal], others: Sequence[Decal]) -> bool:
+    """Test whether the renderer can draw more decals on a face.
+
+    Args:
+        added: The new decals.
+        others: Decals that are on this face already.
+
+    Returns:
+        False if more than MOST_NEARBY decals would be near one place.
+    """
+    boxes = np.array([_surroundings(decal) for decal in (*added, *others)])
+    low, high = boxes[:, 0], boxes[:, 1]
+    mine = slice(0, len(added))
+    near = ((low[mine, None] < high) & (low < high[mine, None])).all(axis=2).any(axis=0)
+    low, high = low[near], high[near]
+    # boxes that share a place also share the lower left corner of their intersection
+    x, y = (corner.ravel() for corner in np.meshgrid(low[:, 0], low[:, 1]))
+    columns = (low[:, 0] <= x[:, None]) & (x[:, None] < high[:, 0])
+    rows = (low[:, 1] <= y[:, None]) & (y[:, None] < high[:, 1])
+    return bool((columns & rows).sum(axis=1).max() <= MOST_NEARBY)
+
+
+def _surroundings(decal: Decal) -> list[Vec2]:
+    """Return the lowest and the highest corner of a decal's box and half of NEARBY_MM around it."""
+    across, up = abs(decal.turn) @ decal.size_mm / 2 + NEARBY_MM / 2
+    x, y = decal.center_mm
+    return [(x - across, y - up), (x + across, y + up)]

@@ -17,6 +17,11 @@ MAX_DAMAGES = 128
 MAX_DECALS = 4096
 """Decals per scene; a texture has a row for each, and every driver supports several times more."""
 
+MOST_NEARBY, NEARBY_MM = 8, 116.0
+"""Most decals that the renderer draws near one place, and the distance of boxes that are near.
+
+The distance is a cell of the renderer's grid, and the margin of a decal on both sides."""
+
 MAX_INSTANCES = 99
 """Damages of one kind per scene. A mask value is class * 100 + instance."""
 
