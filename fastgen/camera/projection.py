@@ -6,7 +6,7 @@ axis, metres (the OpenCV convention). Hartley and Zisserman 2004, section 6.1. L
 applies between the division by depth and the camera matrix, see lens.py.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.camera.lens import PINHOLE, Distortion
 from fastgen.errors import ConfigError
-from fastgen.scene import Camera
+from fastgen.scene import Camera, Pose
+from fastgen.scene.boxes import rotation_of
 from fastgen.scene.limits import FAR_M, MM, NEAR_M
 from fastgen.scene.optics import Lens
 
@@ -52,6 +53,14 @@ class View:
     def translation_mm(self) -> NDArray[np.float64]:
         """World origin in view space, float64 [3]; with `rotation` the pose of the container."""
         return -self.rotation @ self.position_m / MM
+
+    def in_frame(self, pose: Pose) -> "View":
+        """Return the same view with the frame of a body as its world."""
+        turn = rotation_of(pose)
+        origin_m = np.array(pose.position_mm) * MM
+        return replace(
+            self, rotation=self.rotation @ turn, position_m=turn.T @ (self.position_m - origin_m)
+        )
 
     def to_view(self, points_mm: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return world points [..., 3] in mm as view space points [..., 3] in metres."""

@@ -1,5 +1,6 @@
 """The geometry of one scene that all its cameras share."""
 
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +12,35 @@ from fastgen.geometry.facets import Facets, damage_facets
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.seals import SceneSeals, scene_seals
 from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
-from fastgen.scene import Scene
+from fastgen.scene import Pose, Scene, Spreader
+from fastgen.scene.boxes import OrientedBox, container_box
 from fastgen.scene.container_kinds import KINDS
 
 CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
 """Corners of a container's outer box, int [8, 3]: -1 or 1 along x and y, 0 or 1 along z."""
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One container of a scene.
+
+    Attributes:
+        number: 0 for Scene.container, k for Scene.neighbours[k - 1].
+        pose: Where its frame is in the world.
+        prepared: The scene with this container alone, in the frame of the container. The cameras
+            stay in the world.
+    """
+
+    number: int
+    pose: Pose
+    prepared: "PreparedScene"
+
+    @cached_property
+    def box(self) -> OrientedBox:
+        """Outer box of the container in the world."""
+        return container_box(self.prepared.scene.container.kind, self.pose)
 
 
 class PreparedScene:
@@ -36,6 +59,32 @@ class PreparedScene:
         self.scene = scene
         self._shapes = shapes
         self._damage_facets: list[Facets | None] = [None] * len(scene.damages)
+
+    @cached_property
+    def members(self) -> tuple["Member", ...]:
+        """All containers of the scene, the first one and its neighbours, each in its own frame.
+
+        Only the first one has the spreader.
+        """
+        scene = self.scene
+        found = [Member(0, Pose(), self)]
+        for number, each in enumerate(scene.neighbours, 1):
+            turned = scene.environment.yaw_deg - each.pose.yaw_deg
+            own = replace(
+                scene,
+                container=each.container,
+                surface=each.surface,
+                environment=replace(scene.environment, yaw_deg=turned),
+                decals=each.decals,
+                damages=each.damages,
+                seals=each.seals,
+                spreader=Spreader(),
+                neighbours=(),
+                ground=None,
+                props=(),
+            )
+            found.append(Member(number, each.pose, PreparedScene(own, self._shapes)))
+        return tuple(found)
 
     @cached_property
     def container(self) -> Mesh:

@@ -2,26 +2,22 @@
 
 from fastgen.scene.data import (
     REC_709,
-    Ageing,
     Camera,
-    Color,
     Container,
     Damage,
     Decal,
-    Dirt,
     EnvironmentView,
-    Paint,
-    Rust,
+    Ground,
+    Neighbour,
+    Pose,
+    Prop,
     Scene,
-    Scratches,
     Seal,
     Spreader,
-    Surface,
-    Vec2,
     Vec3,
-    Wear,
 )
 from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.surface import Ageing, Color, Dirt, Paint, Rust, Scratches, Surface, Vec2, Wear
 
 __all__ = [
     "REC_709",
@@ -34,9 +30,13 @@ __all__ = [
     "Defocus",
     "Dirt",
     "EnvironmentView",
+    "Ground",
     "Lens",
+    "Neighbour",
     "Noise",
     "Paint",
+    "Pose",
+    "Prop",
     "Rain",
     "Rust",
     "Scene",

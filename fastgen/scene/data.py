@@ -25,127 +25,27 @@ from fastgen.scene.limits import (
     COMPUTED_ART,
     DECAL_KINDS,
     GAP_LIMITS_MM,
+    GROUNDS,
     HASPS,
     MAX_DAMAGES,
     MAX_DECALS,
+    MAX_NEIGHBOURS,
+    MAX_PROPS,
     WHOLE,
     Degrees,
     Millimetres,
     Number,
 )
 from fastgen.scene.optics import Lens, Sensor, Weather
+from fastgen.scene.surface import Color, Surface, Vec2
 from fastgen.validation import Bounds, Flag, OneOf, Share, from_plain, to_plain
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue in the luminance; ITU-R BT.709-6, section 3.2."""
 
-Color = tuple[Share, Share, Share]
-Vec2 = tuple[Number, Number]
 Vec3 = tuple[Number, Number, Number]
 
-_Reach = Annotated[float, Bounds(0.0, 1e6, "mm")]
-_Scale = Annotated[float, Bounds(1.0, 1e6, "mm")]
 _Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
-
-
-@dataclass(frozen=True)
-class Paint:
-    """Base coat.
-
-    Attributes:
-        name: Name of the color in the configuration.
-        albedo: Linear color.
-        roughness: Perceptual GGX roughness of undamaged paint.
-        tone_variation: Variation of the tone over a side.
-        bleach: Loss of colour to the sun.
-    """
-
-    name: str
-    albedo: Color
-    roughness: Share
-    tone_variation: Share
-    bleach: Share = 0.0
-
-
-@dataclass(frozen=True)
-class Ageing:
-    """Darkening toward the corners of each panel; `reach_mm` is measured from a corner."""
-
-    strength: Share
-    reach_mm: _Reach
-
-
-@dataclass(frozen=True)
-class Dirt:
-    """Deposit on the paint.
-
-    Attributes:
-        strength: Strength of the light grey deposit along edges.
-        reach_mm: Distance from an edge up to which it is visible.
-        albedo: Linear color of the deposit.
-        streaks: Strength of the dark streaks below upper edges.
-    """
-
-    strength: Share
-    reach_mm: _Reach
-    albedo: Color
-    streaks: Share = 0.0
-
-
-@dataclass(frozen=True)
-class Rust:
-    """Ochre corrosion that breaks through the paint.
-
-    Attributes:
-        coverage: Share of the sheet that is rusty.
-        scale_mm: Size of the patches.
-        albedo: Linear color.
-        roughness: Perceptual GGX roughness.
-    """
-
-    coverage: Share
-    scale_mm: _Scale
-    albedo: Color
-    roughness: Share
-
-
-@dataclass(frozen=True)
-class Scratches:
-    """Places without paint, down to primer or steel.
-
-    Attributes:
-        coverage: Share of the sheet under fine bright lines.
-        scrapes: Share of the steel at fork and spreader height that is scraped.
-    """
-
-    coverage: Share
-    scrapes: Share = 0.0
-
-
-@dataclass(frozen=True)
-class Wear:
-    """Uneven reflection of worn paint.
-
-    Attributes:
-        strength: How far noise spreads the roughness of exposed paint.
-        scale_mm: Size of the noise tile, which scratches and dirt share.
-    """
-
-    strength: Share
-    scale_mm: _Scale
-
-
-@dataclass(frozen=True)
-class Surface:
-    """All material layers of one container; `noise_offset_mm` shifts their noise."""
-
-    paint: Paint
-    ageing: Ageing
-    dirt: Dirt
-    rust: Rust
-    scratches: Scratches
-    wear: Wear
-    noise_offset_mm: Vec2
 
 
 @dataclass(frozen=True)
@@ -300,6 +200,76 @@ class Seal:
 
 
 @dataclass(frozen=True)
+class Pose:
+    """Position of a body's frame in the world, and its counter-clockwise turn about z."""
+
+    position_mm: Vec3 = (0.0, 0.0, 0.0)
+    yaw_deg: Degrees = 0.0
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """Another container of a scene, in a frame of its own that `pose` places in the world."""
+
+    pose: Pose
+    container: Container
+    surface: Surface
+    decals: Annotated[tuple[Decal, ...], MaxLen(MAX_DECALS)] = ()
+    damages: Annotated[tuple[Damage, ...], MaxLen(MAX_DAMAGES)] = ()
+    seals: Annotated[tuple[Seal, ...], MaxLen(HASPS)] = ()
+
+
+@dataclass(frozen=True)
+class Prop:
+    """A box or a cylinder below the containers, such as a beam or a wheel of a trailer.
+
+    Attributes:
+        shape: 'box', or 'cylinder' with its axis along its own y axis.
+        pose: Its centre, and its turn about z.
+        size_mm: Size along its own x, y and z axes. A cylinder's x and z are its diameter.
+        albedo: Linear color.
+        roughness: Perceptual GGX roughness.
+    """
+
+    shape: Annotated[str, OneOf(("box", "cylinder"))]
+    pose: Pose
+    size_mm: tuple[_Length, _Length, _Length]
+    albedo: Color
+    roughness: Share = 0.7
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Level plane below the containers, which blends into the ground of the HDRI.
+
+    Attributes:
+        kind: 'asphalt', 'concrete' or 'paving'.
+        height_mm: Height of the plane in the world, at most 0.
+        albedo: Mean linear color of the dry ground.
+        wetness: Wetness; puddles cover low places first.
+        wear: Strength of stains, cracks and patches.
+        line_albedo: Linear color of the painted lines.
+        lines: Remaining share of the paint of the lines; 0 for no lines.
+        line_yaw_deg: Direction of the lines.
+        line_spacing_mm: Distance between parallel lines.
+        reach_mm: Horizontal distance from the origin at which the HDRI has replaced the plane.
+        noise_offset_mm: Shift of the noise of stains, cracks and puddles.
+    """
+
+    kind: Annotated[str, OneOf(GROUNDS)]
+    height_mm: Annotated[float, Bounds(-1e5, 0.0, "mm")] = 0.0
+    albedo: Color = (0.1, 0.1, 0.1)
+    wetness: Share = 0.0
+    wear: Share = 0.5
+    line_albedo: Color = (0.6, 0.6, 0.58)
+    lines: Share = 0.0
+    line_yaw_deg: Degrees = 0.0
+    line_spacing_mm: _Length = 3500.0
+    reach_mm: _Length = 40000.0
+    noise_offset_mm: Vec2 = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class EnvironmentView:
     """HDRI that lights the scene, turned counter-clockwise about the vertical by `yaw_deg`."""
 
@@ -341,6 +311,9 @@ class Scene:
     Attributes:
         seed: Seed of the sequence that the scene belongs to.
         index: Number of the scene in its sequence.
+        neighbours: Further containers. The boxes around containers may not overlap.
+        ground: Plane below all containers; None to see only the HDRI.
+        props: Boxes and cylinders on the ground, below the containers. They need a ground.
     """
 
     seed: Annotated[int, WHOLE]
@@ -353,6 +326,9 @@ class Scene:
     damages: Annotated[tuple[Damage, ...], MaxLen(MAX_DAMAGES)] = ()
     seals: Annotated[tuple[Seal, ...], MaxLen(HASPS)] = ()
     spreader: Spreader = field(default_factory=Spreader)
+    neighbours: Annotated[tuple[Neighbour, ...], MaxLen(MAX_NEIGHBOURS)] = ()
+    ground: Ground | None = None
+    props: Annotated[tuple[Prop, ...], MaxLen(MAX_PROPS)] = ()
     weather: Weather = field(default_factory=Weather)
 
     def camera(self, name: str) -> Camera:

@@ -1,0 +1,117 @@
+"""Upright boxes in the world: whether they overlap, and in which order an eye sees them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.errors import ConfigError
+from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.data import Pose
+
+_TOUCHING_MM = 1e-3
+"""Overlap that counts as touching, because poses are rounded."""
+
+Array = NDArray[np.float64]
+
+
+def rotation_of(pose: Pose) -> Array:
+    """Return the rotation [3, 3] from the frame of a body to the world."""
+    angle = np.deg2rad(pose.yaw_deg)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedBox:
+    """A box turned about the vertical.
+
+    Attributes:
+        center_mm: Centre [3] in the world.
+        half_mm: Half of its size [3] along its own axes.
+        rotation: [3, 3], from its own axes to the world.
+    """
+
+    center_mm: Array
+    half_mm: Array
+    rotation: Array
+
+    @cached_property
+    def corners_mm(self) -> Array:
+        """Its corners [8, 3] in the world."""
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        return self.center_mm + (signs * self.half_mm) @ self.rotation.T
+
+    @cached_property
+    def axes(self) -> Array:
+        """Its axes [3, 3], one per row, in the world."""
+        return self.rotation.T
+
+
+def container_box(kind: str, pose: Pose) -> OrientedBox:
+    """Return the outer box of a container of a kind."""
+    size = KINDS[kind]
+    half = np.array([size.length_mm, size.width_mm, size.height_mm]) / 2
+    turn = rotation_of(pose)
+    middle = np.array(pose.position_mm) + turn @ np.array([0.0, 0.0, half[2]])
+    return OrientedBox(middle, half, turn)
+
+
+def gaps(one: OrientedBox, other: OrientedBox) -> tuple[Array, Array]:
+    """Return the axes [A, 3] that may separate two boxes, and the gap [A] along each.
+
+    Both boxes are upright, so their own axes suffice (separating axis theorem). An axis points from
+    the first box to the other. A gap is negative where the boxes overlap along its axis.
+    """
+    axes = np.concatenate([one.axes, other.axes[:2]])
+    apart = axes @ (other.center_mm - one.center_mm)
+    reach = sum(np.abs(axes @ box.rotation) @ box.half_mm for box in (one, other))
+    return axes * np.where(apart < 0, -1.0, 1.0)[:, None], np.abs(apart) - reach
+
+
+def overlap(one: OrientedBox, other: OrientedBox) -> bool:
+    """Return whether two boxes share more than a face."""
+    return bool(gaps(one, other)[1].max() < -_TOUCHING_MM)
+
+
+def back_to_front(boxes: Sequence[OrientedBox], eye_mm: Array) -> list[int]:
+    """Return the order in which boxes can be drawn over one another.
+
+    Args:
+        boxes: Boxes that do not overlap.
+        eye_mm: The eye [3], outside of all boxes.
+
+    Returns:
+        Indices of the boxes; a box never hides one that comes later.
+
+    Raises:
+        ConfigError: Boxes hide one another in a circle.
+    """
+    count = len(boxes)
+    hides = np.zeros((count, count), bool)
+    for i in range(count):
+        for j in range(i):
+            axes, gap = gaps(boxes[i], boxes[j])
+            apart = gap >= -_TOUCHING_MM
+            face = axes @ boxes[i].center_mm + np.abs(axes @ boxes[i].rotation) @ boxes[i].half_mm
+            beyond = axes @ eye_mm - face
+            # a plane between two boxes: the one on the side of the eye is not hidden by the other
+            hides[i, j] = not (apart & (beyond >= gap)).any()
+            hides[j, i] = not (apart & (beyond <= 0)).any()
+            between = (apart & (beyond > 0) & (beyond < gap)).any()
+            if between:
+                hides[i, j] = hides[j, i] = False
+    order: list[int] = []
+    left = list(range(count))
+    while left:
+        free = [i for i in left if not any(hides[i, j] for j in left if j != i)]
+        if not free:
+            raise ConfigError(
+                f"scene.neighbours: containers {left} hide one another in a circle from this "
+                "camera; move one of them or the camera"
+            )
+        order += free
+        left = [i for i in left if i not in free]
+    return order
