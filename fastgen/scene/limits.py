@@ -22,6 +22,15 @@ MOST_NEARBY, NEARBY_MM = 8, 116.0
 
 The distance is a cell of the renderer's grid, and the margin of a decal on both sides."""
 
+MAX_NEIGHBOURS = 15
+"""Containers of a scene beside the first; see object_ids for the ids of each."""
+
+MAX_PROPS = 64
+"""Props of a scene; the ground pass tests each pixel against all of them."""
+
+GROUNDS = ("asphalt", "concrete", "paving")
+"""Kinds of ground."""
+
 MAX_INSTANCES = 99
 """Damages of one kind per scene. A mask value is class * 100 + instance."""
 
