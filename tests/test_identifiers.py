@@ -109,7 +109,9 @@ def test_no_letter_on_a_door_is_behind_its_gear(scenes):
     for scene in scenes[:25]:
         mesh = SHAPES.container(scene.container.kind, scene.container.profiles)
         a, b, c = gear_triangles(mesh).transpose(1, 0, 2)
-        doors = [d for d in scene.decals if d.face == "door" and d.parts]
+        written = [d for d in scene.decals if d.face == "door" and d.parts]
+        # gear may hide identifiers that were painted over
+        doors = [d for d in written if d.class_name or not d.parts[0].role]
         for decal in doors:
             for box in boxes(decal):
                 x, y = np.meshgrid(np.linspace(box.x0, box.x1, 9), np.linspace(box.y0, box.y1, 5))
