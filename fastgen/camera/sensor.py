@@ -1,7 +1,7 @@
 """The camera model: linear light to the image that a real camera would deliver.
 
 Order of the effects: fog and rain, defocus, motion blur, vignetting, exposure error, noise and
-white balance, all in linear light; then tone-mapping, encoding, stamp and JPEG. Only the image
+white balance, all in linear light; then the tone or response curve, stamp and JPEG. Only the image
 changes. Labels describe the sharp scene at the middle of the exposure.
 """
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fastgen.camera.blur import blur_radius_px, defocused, motion_blurred
 from fastgen.camera.electronics import compress_jpeg, noisy, stamped, vignette
 from fastgen.camera.projection import View
+from fastgen.camera.response import respond
 from fastgen.camera.tone_curve import Light, tone_map_and_encode
 from fastgen.camera.weather import add_fog, add_rain
 from fastgen.frame import Frame
@@ -54,7 +55,9 @@ def apply_camera_model(
         assert frame.radiance is not None, "render with radiance=True"
         sky = np.array(airlight, np.float32)
         light = _through_weather(frame.radiance, frame, view, weather, sky)
-        image = tone_map_and_encode(_recorded(light, frame, view, camera, sensor))
+        light = _recorded(light, frame, view, camera, sensor)
+        curve = sensor.response
+        image = respond(light, curve) if curve else tone_map_and_encode(light)
     if sensor.stamp:
         image = stamped(image, sensor.stamp)
     if sensor.jpeg_quality:

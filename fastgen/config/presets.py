@@ -44,6 +44,7 @@ _OUTDOORS: dict[str, Any] = {
         "exposure_error_ev": [-0.7, 0.7],
         "white_balance_ev": [-0.15, 0.15],
         "noise": {"probability": 0.9},
+        "response": {"probability": 1.0},
         "stamp": {"probability": 0.3},
         "jpeg_quality": [45, 92],
     },

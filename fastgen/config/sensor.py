@@ -7,7 +7,7 @@ from annotated_types import MinLen
 
 from fastgen.errors import ConfigError
 from fastgen.scene.limits import CORNERS
-from fastgen.scene.optics import LENS_MODELS
+from fastgen.scene.optics import CLIP_LIMITS, CONTRAST_LIMITS, LENS_MODELS
 from fastgen.validation import UNIT, Bounds, OneOf, Range, Share
 
 _ZERO = Range(0.0, 0.0)
@@ -68,6 +68,24 @@ class NoiseConfig:
 
 
 @dataclass(frozen=True)
+class ResponseConfig:
+    """Response curve of a camera. It clips bright light, as the neutral tone curve does not.
+
+    Attributes:
+        probability: Probability that an image has a camera's curve; others have the neutral one.
+        clip: Linear light that becomes white; a white surface in metered light is about 1. The
+            curve is straight up to 2 - clip and then bends toward white.
+        contrast: Slope of the encoded curve at middle grey.
+        saturation: Factor of each colour's distance from grey.
+    """
+
+    probability: Share = 0.0
+    clip: Annotated[Range, Bounds(*CLIP_LIMITS)] = Range(1.0, 1.5)
+    contrast: Annotated[Range, Bounds(*CONTRAST_LIMITS)] = Range(1.0, 1.3)
+    saturation: Annotated[Range, Bounds(0.0, 3.0)] = Range(0.9, 1.3)
+
+
+@dataclass(frozen=True)
 class StampConfig:
     """Date and time burnt into the image.
 
@@ -121,7 +139,6 @@ class SensorConfig:
     Attributes:
         vignetting: Share of the light that is lost in the corners.
         exposure_error_ev: Exposure error after the lens, in addition to exposure_ev of the camera.
-            Highlights clip.
         white_balance_ev: Deviation of red and of blue from green.
         jpeg_quality: Quality of the camera's own JPEG encoder, 0 for none.
     """
@@ -132,6 +149,7 @@ class SensorConfig:
     exposure_error_ev: Annotated[Range, Bounds(-6.0, 6.0, "stops")] = _ZERO
     white_balance_ev: Annotated[Range, Bounds(-2.0, 2.0, "stops")] = _ZERO
     noise: NoiseConfig = field(default_factory=NoiseConfig)
+    response: ResponseConfig = field(default_factory=ResponseConfig)
     stamp: StampConfig = field(default_factory=StampConfig)
     jpeg_quality: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 0)
 

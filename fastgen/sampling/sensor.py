@@ -4,9 +4,9 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from fastgen.config.sensor import LensConfig, SensorConfig, WeatherConfig
+from fastgen.config.sensor import LensConfig, ResponseConfig, SensorConfig, WeatherConfig
 from fastgen.sampling.streams import Streams
-from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Response, Sensor, Stamp, Weather
 from fastgen.validation import Range
 
 
@@ -50,6 +50,7 @@ def sample_sensor(
         exposure_error_ev=_drawn(streams("exposure"), config.exposure_error_ev),
         gains=_gains(config.white_balance_ev, streams("white balance")),
         noise=_noise(config, streams("noise")),
+        response=_response(config.response, streams("response")),
         stamp=_stamp(config, moment, streams("stamp")),
         jpeg_quality=int(streams("jpeg").integers(*config.jpeg_quality, endpoint=True)),
     )
@@ -134,6 +135,14 @@ def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
     low, high = np.log(config.noise.full_well_e)
     full_well = round(float(np.exp(rng.uniform(low, high))))
     return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))
+
+
+def _response(config: ResponseConfig, rng: np.random.Generator) -> Response | None:
+    if rng.random() >= config.probability:
+        return None
+    return Response(
+        _drawn(rng, config.clip), _drawn(rng, config.contrast), _drawn(rng, config.saturation)
+    )
 
 
 def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> Stamp | None:

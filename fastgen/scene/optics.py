@@ -10,6 +10,13 @@ from fastgen.validation import Bounds, OneOf, Share, check_known
 LENS_MODELS = {"brown_conrady": 5, "fisheye": 4}
 """Number of coefficients of each lens model, which are in OpenCV's order."""
 
+CLIP_LIMITS = (1.0, 2.0)
+"""Linear light that a response curve maps to white; its straight part ends at 2 - clip."""
+
+CONTRAST_LIMITS = (0.8, 2.0)
+"""Slope of a response curve at middle grey. Lower values would be too steep near black for the
+table that the curve is stored in."""
+
 _Move = Annotated[float, Bounds(-1.0, 1.0)]
 _Gain = Annotated[float, Bounds(0.0, 1000.0)]
 
@@ -83,6 +90,21 @@ class Defocus:
 
 
 @dataclass(frozen=True)
+class Response:
+    """Response curve of a camera, which clips bright light to white; see camera/response.py.
+
+    Attributes:
+        clip: Linear light that becomes white. A white surface in metered light is about 1.
+        contrast: Slope of the encoded curve at middle grey; 1 for no change.
+        saturation: Factor of each colour's distance from grey; 1 for no change.
+    """
+
+    clip: Annotated[float, Bounds(*CLIP_LIMITS)]
+    contrast: Annotated[float, Bounds(*CONTRAST_LIMITS)]
+    saturation: Annotated[float, Bounds(0.0, 3.0)]
+
+
+@dataclass(frozen=True)
 class Sensor:
     """Effects of one camera on one image, applied by camera/sensor.py. The defaults do nothing.
 
@@ -93,6 +115,7 @@ class Sensor:
         exposure_error_ev: Exposure error in stops.
         gains: White balance error: factors of red, green and blue.
         noise: Sensor noise, or None.
+        response: Response curve; None for the neutral tone curve of the renderer.
         stamp: Text burnt into the image, or None.
         jpeg_quality: Quality of the camera's own JPEG encoder, 0 for none.
     """
@@ -103,6 +126,7 @@ class Sensor:
     exposure_error_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     gains: tuple[_Gain, _Gain, _Gain] = (1.0, 1.0, 1.0)
     noise: Noise | None = None
+    response: Response | None = None
     stamp: Stamp | None = None
     jpeg_quality: Annotated[int, Bounds(0, 100)] = 0
 
