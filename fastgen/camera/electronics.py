@@ -1,4 +1,4 @@
-"""Vignetting and noise of linear light; stamps and JPEG compression of the encoded image."""
+"""Vignetting and noise of linear light; what cameras do to the encoded image."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,10 @@ import simplejpeg
 from numpy.typing import NDArray
 
 from fastgen.camera.tone_curve import Light
-from fastgen.scene.optics import Noise, Stamp
+from fastgen.scene.optics import ChromaNoise, Noise, Sharpening, Stamp
+
+_CHROMA_TO_RGB = np.array([[0, 1.402], [-0.344136, -0.714136], [1.772, 0]])
+"""Red, green and blue per unit of Cb and Cr at constant luma (ITU-R BT.601, as in JFIF)."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0
@@ -49,6 +52,29 @@ def noisy(light: Light, noise: Noise) -> Light:
     spread /= well
     spread += light
     return np.asarray(spread, np.float32)
+
+
+def with_chroma_noise(image: NDArray[np.uint8], noise: ChromaNoise) -> NDArray[np.uint8]:
+    """Return the image [H, W, 3] with blotches of colour.
+
+    Cb and Cr change independently and the luma stays, except where a channel clips. The strength is
+    the same at all levels of light, because encoding makes shot noise nearly uniform.
+    """
+    rng = np.random.Generator(np.random.SFC64(noise.seed))
+    height, width = image.shape[:2]
+    rows, columns = (max(round(n / noise.scale_px), 1) + 1 for n in (height, width))
+    # bilinear interpolation leaves 2/3 of the standard deviation on average over a cell
+    codes = 255 * 1.5 * noise.strength * rng.standard_normal((rows, columns, 2), np.float32)
+    coarse = np.asarray(codes @ _CHROMA_TO_RGB.T.astype(np.float32), np.float32)
+    blotches = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.add(image, blotches, dtype=cv2.CV_8U), np.uint8)
+
+
+def sharpened(image: NDArray[np.uint8], sharpening: Sharpening) -> NDArray[np.uint8]:
+    """Return the image [H, W, 3] plus a multiple of its difference to a Gaussian blur."""
+    blurred = cv2.GaussianBlur(image, (0, 0), sharpening.radius_px)
+    amount = sharpening.amount
+    return np.asarray(cv2.addWeighted(image, 1 + amount, blurred, -amount, 0), np.uint8)
 
 
 def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:

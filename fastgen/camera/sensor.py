@@ -1,8 +1,9 @@
 """The camera model: linear light to the image that a real camera would deliver.
 
 Order of the effects: fog and rain, defocus, motion blur, vignetting, exposure error, noise and
-white balance, all in linear light; then the tone or response curve, stamp and JPEG. Only the image
-changes. Labels describe the sharp scene at the middle of the exposure.
+white balance, all in linear light; then the tone or response curve, chroma noise, sharpening,
+stamp and JPEG. Only the image changes. Labels describe the sharp scene at the middle of the
+exposure.
 """
 
 from dataclasses import replace
@@ -12,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.blur import blur_radius_px, defocused, motion_blurred
-from fastgen.camera.electronics import compress_jpeg, noisy, stamped, vignette
+from fastgen.camera.electronics import (
+    compress_jpeg,
+    noisy,
+    sharpened,
+    stamped,
+    vignette,
+    with_chroma_noise,
+)
 from fastgen.camera.projection import View
 from fastgen.camera.response import respond
 from fastgen.camera.tone_curve import Light, tone_map_and_encode
@@ -30,8 +38,8 @@ def is_needed(camera: Camera, weather: Weather) -> bool:
 def needs_radiance(camera: Camera, weather: Weather) -> bool:
     """Return whether the camera model works on linear light, not only on the encoded image."""
     sensor = camera.sensor or Sensor()
-    encoding = replace(Sensor(), stamp=sensor.stamp, jpeg_quality=sensor.jpeg_quality)
-    return sensor != encoding or _has_fog_or_rain(weather)
+    linear = replace(sensor, chroma_noise=None, sharpening=None, stamp=None, jpeg_quality=0)
+    return linear != Sensor() or _has_fog_or_rain(weather)
 
 
 def apply_camera_model(
@@ -58,6 +66,10 @@ def apply_camera_model(
         light = _recorded(light, frame, view, camera, sensor)
         curve = sensor.response
         image = respond(light, curve) if curve else tone_map_and_encode(light)
+    if sensor.chroma_noise:
+        image = with_chroma_noise(image, sensor.chroma_noise)
+    if sensor.sharpening:
+        image = sharpened(image, sensor.sharpening)
     if sensor.stamp:
         image = stamped(image, sensor.stamp)
     if sensor.jpeg_quality:

@@ -45,6 +45,8 @@ _OUTDOORS: dict[str, Any] = {
         "white_balance_ev": [-0.15, 0.15],
         "noise": {"probability": 0.9},
         "response": {"probability": 1.0},
+        "chroma_noise": {"probability": 0.7},
+        "sharpening": {"probability": 0.8},
         "stamp": {"probability": 0.3},
         "jpeg_quality": [45, 92],
     },

@@ -86,6 +86,36 @@ class ResponseConfig:
 
 
 @dataclass(frozen=True)
+class ChromaNoiseConfig:
+    """Blotches of colour that denoising leaves. The luma of a pixel is unchanged.
+
+    Attributes:
+        probability: Probability that an image has chroma noise.
+        strength: Standard deviation of Cb and Cr as a share of white.
+        scale_px: Size of the blotches.
+    """
+
+    probability: Share = 0.0
+    strength: Annotated[Range, Bounds(0.0, 0.5)] = Range(0.002, 0.01)
+    scale_px: Annotated[Range, Bounds(1.0, 100.0, "pixels")] = Range(2.5, 8)
+
+
+@dataclass(frozen=True)
+class SharpeningConfig:
+    """Unsharp mask of the camera, which leaves halos along edges.
+
+    Attributes:
+        probability: Probability that an image is sharpened.
+        amount: Factor of the difference to the blurred image that is added.
+        radius_px: Standard deviation of the blur.
+    """
+
+    probability: Share = 0.0
+    amount: Annotated[Range, Bounds(0.0, 10.0)] = Range(0.2, 1.0)
+    radius_px: Annotated[Range, Bounds(0.1, 20.0, "pixels")] = Range(0.6, 1.6)
+
+
+@dataclass(frozen=True)
 class StampConfig:
     """Date and time burnt into the image.
 
@@ -150,6 +180,8 @@ class SensorConfig:
     white_balance_ev: Annotated[Range, Bounds(-2.0, 2.0, "stops")] = _ZERO
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     response: ResponseConfig = field(default_factory=ResponseConfig)
+    chroma_noise: ChromaNoiseConfig = field(default_factory=ChromaNoiseConfig)
+    sharpening: SharpeningConfig = field(default_factory=SharpeningConfig)
     stamp: StampConfig = field(default_factory=StampConfig)
     jpeg_quality: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 0)
 

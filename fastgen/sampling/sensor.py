@@ -4,9 +4,27 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from fastgen.config.sensor import LensConfig, ResponseConfig, SensorConfig, WeatherConfig
+from fastgen.config.sensor import (
+    ChromaNoiseConfig,
+    LensConfig,
+    ResponseConfig,
+    SensorConfig,
+    SharpeningConfig,
+    WeatherConfig,
+)
 from fastgen.sampling.streams import Streams
-from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Response, Sensor, Stamp, Weather
+from fastgen.scene.optics import (
+    ChromaNoise,
+    Defocus,
+    Lens,
+    Noise,
+    Rain,
+    Response,
+    Sensor,
+    Sharpening,
+    Stamp,
+    Weather,
+)
 from fastgen.validation import Range
 
 
@@ -51,6 +69,8 @@ def sample_sensor(
         gains=_gains(config.white_balance_ev, streams("white balance")),
         noise=_noise(config, streams("noise")),
         response=_response(config.response, streams("response")),
+        chroma_noise=_chroma_noise(config.chroma_noise, streams("chroma noise")),
+        sharpening=_sharpening(config.sharpening, streams("sharpening")),
         stamp=_stamp(config, moment, streams("stamp")),
         jpeg_quality=int(streams("jpeg").integers(*config.jpeg_quality, endpoint=True)),
     )
@@ -143,6 +163,20 @@ def _response(config: ResponseConfig, rng: np.random.Generator) -> Response | No
     return Response(
         _drawn(rng, config.clip), _drawn(rng, config.contrast), _drawn(rng, config.saturation)
     )
+
+
+def _chroma_noise(config: ChromaNoiseConfig, rng: np.random.Generator) -> ChromaNoise | None:
+    if rng.random() >= config.probability:
+        return None
+    return ChromaNoise(
+        round(config.strength.draw(rng), 5), _drawn(rng, config.scale_px), _seed(rng)
+    )
+
+
+def _sharpening(config: SharpeningConfig, rng: np.random.Generator) -> Sharpening | None:
+    if rng.random() >= config.probability:
+        return None
+    return Sharpening(_drawn(rng, config.amount), _drawn(rng, config.radius_px))
 
 
 def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> Stamp | None:

@@ -105,6 +105,34 @@ class Response:
 
 
 @dataclass(frozen=True)
+class ChromaNoise:
+    """Blotches of colour that denoising leaves, applied by camera/electronics.py.
+
+    Attributes:
+        strength: Standard deviation of Cb and Cr (ITU-R BT.601), as a share of white.
+        scale_px: Size of the blotches in pixels.
+        seed: Seed of the blotches of this image.
+    """
+
+    strength: Annotated[float, Bounds(0.0, 0.5)]
+    scale_px: Annotated[float, Bounds(1.0, 100.0, "pixels")]
+    seed: Annotated[int, WHOLE]
+
+
+@dataclass(frozen=True)
+class Sharpening:
+    """Unsharp mask of the camera, which leaves halos along edges.
+
+    Attributes:
+        amount: Factor of the difference to the blurred image that is added.
+        radius_px: Standard deviation of the blur in pixels.
+    """
+
+    amount: Annotated[float, Bounds(0.0, 10.0)]
+    radius_px: Annotated[float, Bounds(0.1, 20.0, "pixels")]
+
+
+@dataclass(frozen=True)
 class Sensor:
     """Effects of one camera on one image, applied by camera/sensor.py. The defaults do nothing.
 
@@ -116,6 +144,8 @@ class Sensor:
         gains: White balance error: factors of red, green and blue.
         noise: Sensor noise, or None.
         response: Response curve; None for the neutral tone curve of the renderer.
+        chroma_noise: Blotches of colour, or None.
+        sharpening: Unsharp mask, or None.
         stamp: Text burnt into the image, or None.
         jpeg_quality: Quality of the camera's own JPEG encoder, 0 for none.
     """
@@ -127,6 +157,8 @@ class Sensor:
     gains: tuple[_Gain, _Gain, _Gain] = (1.0, 1.0, 1.0)
     noise: Noise | None = None
     response: Response | None = None
+    chroma_noise: ChromaNoise | None = None
+    sharpening: Sharpening | None = None
     stamp: Stamp | None = None
     jpeg_quality: Annotated[int, Bounds(0, 100)] = 0
 
