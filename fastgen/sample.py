@@ -1,6 +1,9 @@
 """Sample: the result of one render, with the Objects that label it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.frame import Frame
@@ -60,6 +63,10 @@ class Object:
             are partly behind the camera.
         keypoints: Casting corners of the container in the order of labels.objects.CASTINGS. Of a
             seal, the middle of its barrel or body; of a bolt without a barrel, that of its head.
+        container: Number of the container that the object is or belongs to: 0, or k for
+            Scene.neighbours[k - 1].
+        background: Whether the object is a container of the panorama around the scene. It has no
+            amodal box, polygon or keypoints, and no pixels in the id target; see Sample.background.
     """
 
     id: int
@@ -78,16 +85,29 @@ class Object:
     reading: str = ""
     parts: tuple[LabelledPart, ...] = ()
     keypoints: tuple[Keypoint, ...] = ()
+    container: int = 0
+    background: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Sample(Frame):
-    """Frame with its labels, and the scene and camera that it shows."""
+    """Frame with its labels, and the scene and camera that it shows.
+
+    Attributes:
+        scene: The scene.
+        camera: The camera.
+        view: Projection of the camera.
+        objects: The labels.
+        background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container that a pixel shows,
+            0 elsewhere. None if these containers are not labelled: they are unknown in photographs,
+            and LabelConfig.background may switch them off.
+    """
 
     scene: Scene
     camera: Camera
     view: View
     objects: list[Object]
+    background: NDArray[np.uint16] | None = field(default=None, kw_only=True)
 
     def __repr__(self) -> str:
         """Return one line, because notebooks print samples and arrays would fill pages."""

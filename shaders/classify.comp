@@ -8,6 +8,7 @@
 #include "pixel_list.constants"
 #include "samples.constants"
 #include "variant.constants"
+#include "scene.block"
 #include "view.block"
 #include "damage.block"
 #include "surface_id.glsl"
@@ -51,7 +52,7 @@ ivec2 in_turn(ivec2 size) {
 
 void write_labels(ivec2 pixel, uint key, float depth) {
     uint labels = zone_id(id_zone(key));
-    if (labels != SPREADER_ID) labels |= UNDAMAGED_CONTAINER << 16;
+    if (labels != SPREADER_ID) labels |= uint(undamaged_value) << 16;
     imageStore(label_image, pixel, uvec4(labels));
     imageStore(depth_image, pixel, vec4(depth));
 }

@@ -12,7 +12,7 @@
 #include "output_images.glsl"
 #include "pixel_list.glsl"
 #include "shade_single_surface.glsl"
-#include "shade_sky.glsl"
+#include "shade_behind.glsl"
 #include "zone_color.glsl"
 #if WITH_HOLES
 #include "shade_hole.glsl"
@@ -39,9 +39,9 @@ void main() {
     // once per surface id, which is an orientation within a zone.
     uint keys[FILTER_SAMPLES] = filter_surface_ids(middle);
     uint left = 0u;   // One bit per sample that is still to be shaded.
-    float sky_weight = 0.0;
+    float behind_weight = 0.0;
     for (int i = 0; i < FILTER_SAMPLES; ++i) {
-        if (keys[i] == 0u) sky_weight += FILTER_WEIGHT[i];
+        if (keys[i] == 0u) behind_weight += FILTER_WEIGHT[i];
         else left |= 1u << i;
 #if WITH_HOLES
         int hole = hole_at(rest_at(middle + FILTER_OFFSET[i]));
@@ -49,10 +49,11 @@ void main() {
             keys[i] = (HOLE_ZONE + 1u) | (uint(hole) << 10);
 #endif
     }
-    bool sees_sky = keys[0] == 0u;
-    Shaded s = shade_sky(view_ray(center));
-    vec3 color = sky_weight * s.color;
-    float done = sky_weight;
+    bool at_body = keys[0] != 0u;
+    Shaded behind = shade_behind(pixel, view_ray(center));
+    Shaded s = behind;
+    vec3 color = vec3(0.0);
+    float done = 0.0;
     // Conditions are at the end of loops, because llvmpipe executes a body once more for a condition
     // at the start. At least one sample of a mixed pixel sees a surface.
     int part = 0;
@@ -85,7 +86,7 @@ void main() {
         } while (++lookup < lookups);
         p.surface = mean;
 #endif
-        bool at_center = part == 0 && !sees_sky;
+        bool at_center = part == 0 && at_body;
         if (at_center) s = Shaded(vec3(0.0), p.id, p.damage, p.depth, 1.0);
         int side = 0;
         do {
@@ -102,26 +103,32 @@ void main() {
             vec3 lit_color = zone_color(p, middle + side_offset, key, view);
 #if WITH_HOLES
             if (zone == HOLE_ZONE) {
-                Shaded through = shade_hole(middle + offset, key, ray);
+                Shaded through = shade_hole(middle + offset, key, behind);
                 lit_color = through.color;
-                if (through.cover == 0.0) sky_weight += weight;
                 if (at_center && side == 0) s = through;
+                if (through.id == 0u) {
+                    behind_weight += weight;
+                    weight = 0.0;
+                }
             }
 #endif
             color += weight * lit_color;
             done += weight;
         } while (++side < MAX_ORIENTATIONS && of_part != 0u);
     } while (++part < MAX_PARTS && left != 0u);
-    color /= done;   // Surfaces beyond MAX_PARTS and MAX_ORIENTATIONS look like the rest.
-    s.cover = 1.0 - sky_weight / done;
+    // Surfaces beyond MAX_PARTS and MAX_ORIENTATIONS look like the rest.
+    float share = behind_weight / (behind_weight + done);
+    color = before(color / max(done, 1e-6), behind, share);
+    s.cover = 1.0 - share * (1.0 - behind.cover);
 #else
     Shaded s = shade_single_surface(pixel);
-    vec3 color = s.color;
+    vec3 color = display_color(s.color);
+    const bool at_body = true;
 #endif
 #if RADIANCE
     vec4 shown = vec4(color, s.cover);
 #else
-    uvec4 shown = uvec4(packUnorm4x8(vec4(display_color(color), s.cover)));
+    uvec4 shown = uvec4(packUnorm4x8(vec4(color, s.cover)));
 #endif
 #if WITH_COARSE
     for (int i = 0; i < 4; ++i)
@@ -130,6 +137,9 @@ void main() {
     imageStore(color_image, pixel, shown);
 #endif
     // For other classes classify.comp has written labels and depth.
+#if OVER
+    if (!at_body) return;   // What lies behind has its labels already.
+#endif
 #if WITH_DECALS || WITH_DAMAGE
     imageStore(label_image, pixel, uvec4(s.id | (s.damage << 16)));
 #endif

@@ -1,24 +1,24 @@
-// Shaded shade_hole(ivec2 sample_at, uint key, vec3 ray): the view through a hole, at the interior of the
-// container or at the sky through another hole.
+// Shaded shade_hole(ivec2 sample_at, uint key, Shaded behind): the view through a hole, at the interior of
+// the container, or through another hole at what lies behind. Its id is then 0.
 // key: Surface id of the sample, with the index of the hole in place of the normal.
 
-#include "labels.constants"
 #include "variant.constants"
 #include "damage.block"
+#include "scene.block"
 #include "view.block"
 #include "damage_law.glsl"
 #include "interior.glsl"
 #include "rest_position.glsl"
-#include "shade_sky.glsl"
+#include "shaded.glsl"
 #include "surface_id.glsl"
 #include "visibility_buffer.glsl"
 
-Shaded shade_hole(ivec2 sample_at, uint key, vec3 ray) {
+Shaded shade_hole(ivec2 sample_at, uint key, Shaded behind) {
     ivec2 inner_at = ivec2(textureSize(surface_ids, 0).x - 1 - sample_at.x, sample_at.y + inner_row);
     uint inner_key = surface_id_at(inner_at);
     vec3 rest_mm = rest_at(inner_at);
     float depth = texelFetch(surface_depths, inner_at, 0).r;
-    Shaded s = shade_sky(ray);
+    Shaded s = behind;
     if (inner_key != 0u) {
         vec3 normal = -id_normal(inner_key);   // The inner view sees surfaces from behind.
 #if LAYER == LAYER_NORMALS
@@ -30,7 +30,7 @@ Shaded shade_hole(ivec2 sample_at, uint key, vec3 ray) {
 #else
         vec3 seen = interior_albedo(normal, rest_mm);
 #endif
-        s = Shaded(seen, CONTAINER_ID, 0u, depth, 1.0);
+        s = Shaded(seen, uint(container_id), 0u, depth, 1.0);
     }
     s.damage = uint(damage_shape[3 * int(key >> 10) + 2].w);
     return s;

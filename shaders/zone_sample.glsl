@@ -5,6 +5,7 @@
 #include "labels.constants"
 #include "lookups.constants"
 #include "variant.constants"
+#include "scene.block"
 #include "view.block"
 #include "coarse_shading.glsl"
 #include "surface_id.glsl"
@@ -32,7 +33,7 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     vec2 atlas_mm = coarse_mean(atlas_positions, sample_at).xy;
     vec3 normal = id_normal(key);
     ZoneSample p;
-    p.damage = UNDAMAGED_CONTAINER;
+    p.damage = uint(undamaged_value);
     p.depth = coarse_mean(surface_depths, sample_at).r;
     p.scar = 0.0;
 #if WITH_DAMAGE

@@ -13,6 +13,7 @@ from fastgen.geometry.damage_law import (
     local_coordinates,
     reach_mm,
 )
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
@@ -55,7 +56,7 @@ def damages():
 
 def asked(gl, scene, body, points):
     """Return GLSL `vec4 f(vec4 x)` at points [N, 3] as [N, 4], and the damages in shader order."""
-    values = damage_values(scene, scene.damages, THRESHOLD_MM, 0)
+    values = damage_values(PreparedScene(scene), scene.damages, THRESHOLD_MM, 0)
     kept = blocks(gl, **values)
     rows = np.column_stack([points, np.zeros(len(points))])
     out = run(gl, f'#include "damage_law.glsl"\n{body}', rows, damage="holed")

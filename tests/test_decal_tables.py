@@ -12,11 +12,12 @@ from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.decal_tables import CELL_SLOTS, MARGIN_MM, SceneError, pack_decals
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Decal
+from fastgen.scene.object_ids import object_ids
 
 
 def packed(scene):
     mesh = build_container(scene.container.kind, scene.container.profiles)
-    return mesh, pack_decals(scene, mesh, art_layers())
+    return mesh, pack_decals(scene.decals, object_ids(scene), mesh, art_layers())
 
 
 def with_decals(*decals):

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.facets import Facets, damage_facets
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.mesh import UNIT_CUBE, UNIT_CUBE_TRIANGLES, Mesh
 from fastgen.geometry.seals import SceneSeals, scene_seals
 from fastgen.geometry.shape_library import SHAPES, ShapeLibrary, SpreaderShape
+from fastgen.geometry.solids import Body
 from fastgen.scene import Pose, Scene, Spreader
-from fastgen.scene.boxes import OrientedBox, container_box
+from fastgen.scene.boxes import OrientedBox, container_box, rotation_of
 from fastgen.scene.container_kinds import KINDS
+from fastgen.scene.object_ids import Numbers, scene_numbers
 
 CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
 """Corners of a container's outer box, int [8, 3]: -1 or 1 along x and y, 0 or 1 along z."""
@@ -53,10 +55,18 @@ class PreparedScene:
     Args:
         scene: A checked scene.
         shapes: Library of the meshes.
+        numbers: Numbers of the container and what it carries, by default those of the first one.
+
+    Attributes:
+        scene: The scene.
+        numbers: The numbers.
     """
 
-    def __init__(self, scene: Scene, shapes: ShapeLibrary = SHAPES) -> None:
+    def __init__(
+        self, scene: Scene, shapes: ShapeLibrary = SHAPES, numbers: Numbers | None = None
+    ) -> None:
         self.scene = scene
+        self.numbers = scene_numbers(scene)[0] if numbers is None else numbers
         self._shapes = shapes
         self._damage_facets: list[Facets | None] = [None] * len(scene.damages)
 
@@ -68,6 +78,7 @@ class PreparedScene:
         """
         scene = self.scene
         found = [Member(0, Pose(), self)]
+        numbers = scene_numbers(scene)
         for number, each in enumerate(scene.neighbours, 1):
             turned = scene.environment.yaw_deg - each.pose.yaw_deg
             own = replace(
@@ -83,7 +94,26 @@ class PreparedScene:
                 ground=None,
                 props=(),
             )
-            found.append(Member(number, each.pose, PreparedScene(own, self._shapes)))
+            found.append(
+                Member(number, each.pose, PreparedScene(own, self._shapes, numbers[number]))
+            )
+        return tuple(found)
+
+    @cached_property
+    def others(self) -> tuple[Body | None, ...]:
+        """Outer boxes of all other containers in the frame of each member, None without any."""
+        found: list[Body | None] = []
+        for member in self.members:
+            turn, origin = rotation_of(member.pose), np.array(member.pose.position_mm)
+            corners = [
+                (other.box.corners_mm - origin) @ turn
+                for other in self.members
+                if other is not member
+            ]
+            firsts = np.arange(len(corners), dtype=np.uint32) * len(UNIT_CUBE)
+            triangles = (UNIT_CUBE_TRIANGLES + firsts[:, None, None]).reshape(-1, 3)
+            positions = np.array(corners, np.float32).reshape(-1, 3)
+            found.append(Body(positions, triangles.astype(np.uint32)) if corners else None)
         return tuple(found)
 
     @cached_property

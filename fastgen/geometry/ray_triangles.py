@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.mesh import Mesh
+from fastgen.geometry.solids import Solid
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ class RayTriangles:
     faster than building and querying a bounding volume hierarchy.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Solid) -> None:
         corners = mesh.positions_mm.take(mesh.triangles, axis=0).astype(np.float64)
         a, b, c = np.ascontiguousarray(corners.transpose(1, 2, 0))
         self._first, self._to_second, self._to_third = a, b - a, c - a

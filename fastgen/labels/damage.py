@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_VALUES, UNDAMAGED_CONTAINER
+from fastgen.classes import DAMAGE_VALUES
 from fastgen.geometry.damage_law import amount_mm, in_hole, may_be_seen
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
@@ -11,7 +11,6 @@ from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Box, Object
 from fastgen.scene import Damage
 from fastgen.scene.limits import MM
-from fastgen.scene.object_ids import mask_values
 
 _DEPTH_SLACK = 1e-3
 """A point counts as visible up to this fraction of its depth behind the depth target."""
@@ -31,7 +30,7 @@ def damage_objects(shot: Shot) -> list[Object]:
         shot.frame.damage, DAMAGE_VALUES.start, DAMAGE_VALUES.stop
     )
     objects = []
-    for number, value in enumerate(mask_values(damages)):
+    for number, value in enumerate(shot.prepared.numbers.damages):
         bbox, area = seen_boxes[value - DAMAGE_VALUES.start], areas[value - DAMAGE_VALUES.start]
         hidden, beyond, bounds = _alone(shot, number, value, bbox)
         (amodal_bbox,) = float_boxes(bounds[None])
@@ -103,7 +102,7 @@ def _damaged(
     depth, drawn = shot.frame.depth.ravel().take(place), shot.frame.damage.ravel().take(place)
     # where the sheet is visible, the damage target has the answer
     known = points.within & (points.depth_m <= depth * (1 + _DEPTH_SLACK))
-    known &= (drawn == UNDAMAGED_CONTAINER) | (drawn == value)
+    known &= (drawn == shot.prepared.numbers.undamaged) | (drawn == value)
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm

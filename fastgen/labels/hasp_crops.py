@@ -10,7 +10,7 @@ from fastgen.geometry.seals import hasps_mm
 from fastgen.labels.crops import upright_crop
 from fastgen.sample import Sample
 from fastgen.scene.limits import HASPS
-from fastgen.scene.object_ids import seal_id
+from fastgen.scene.object_ids import scene_numbers
 
 LEAST_PX = 32
 """Least side of a crop. A barrel is then about 3 pixels wide."""
@@ -56,7 +56,7 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     scene, view = sample.scene, sample.view
     if not scene.container.present:
         return
-    seals = {seal.hasp: seal for seal in scene.seals}
+    numbers, seals = scene_numbers(scene)[0], {seal.hasp: seal for seal in scene.seals}
     fractions = {thing.id: thing.visible_fraction for thing in sample.objects}
     middles = hasps_mm(scene.container.kind, range(HASPS), scene.damages)
     steps = np.linspace(0.0, 1.0, _POINTS)
@@ -69,14 +69,18 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
     within = np.logical_and(pixels >= 0, pixels < view.size)
     inside = np.asarray(within.all(axis=1) & (depth > 0))
     columns, rows = np.floor(np.where(inside[:, None], pixels, 0)).astype(int).T
-    shown = np.asarray(sample.damage[rows, columns] > 0).reshape(HASPS, -1).mean(axis=1)
+    shown = (
+        np.asarray(np.isin(sample.damage[rows, columns], [numbers.undamaged, *numbers.damages]))
+        .reshape(HASPS, -1)
+        .mean(axis=1)
+    )
     whole = np.asarray(inside.reshape(HASPS, -1).all(axis=1))
     for hasp, grid in enumerate(pixels.reshape(HASPS, _POINTS, _POINTS, 2)):
         quad = grid[[0, 0, -1, -1], [0, -1, -1, 0]]
         if not whole[hasp] or shown[hasp] < _SHOWN or not _large(quad):
             continue
         seal = seals.get(hasp)
-        if seal is None or fractions[seal_id(seal)] >= _SEAL_SHOWN:
+        if seal is None or fractions[numbers.seal(seal)] >= _SEAL_SHOWN:
             sealed = seal is not None and seal.state == "locked"
             yield HaspCrop(hasp, sealed, upright_crop(sample.image, quad))
 

@@ -1,5 +1,6 @@
 """Labels of one image: boxes, areas and visibility of all labelled objects."""
 
+from collections import Counter
 from dataclasses import replace
 
 import cv2
@@ -7,19 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.classes import CONTAINER_ID, SPREADER_ID
+from fastgen.classes import DAMAGE_VALUES, SPREADER_ID
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
 from fastgen.geometry.facets import Facets, mesh_facets
 from fastgen.geometry.prepared_scene import CORNER_SIGNS
+from fastgen.geometry.ray_triangles import RayTriangles
 from fastgen.labels.coverage import boxes, covered, facing, project
 from fastgen.labels.damage import damage_objects
 from fastgen.labels.seals import seal_objects
-from fastgen.labels.visibility import Shot, float_boxes, visibility
+from fastgen.labels.visibility import Shot, float_boxes, mask_box, visibility
 from fastgen.sample import Keypoint, LabelledPart, Object
 from fastgen.scene import Decal, Scene
 from fastgen.scene.limits import MM, NEAR_M
-from fastgen.scene.object_ids import object_ids
+from fastgen.scene.object_ids import scene_numbers
 
 _PIECES = 24
 """Pieces along each edge of the container's outer box in images with lens distortion."""
@@ -47,19 +49,39 @@ def decal_of(scene: Scene, object_id: int) -> Decal:
     Raises:
         KeyError: No decal has this id.
     """
-    ids = object_ids(scene)
-    if object_id < 2 or object_id not in ids:
-        raise KeyError(f"no decal has id {object_id} in scene {scene.index}")
-    return scene.decals[ids.index(object_id)]
+    carried = [scene.decals, *(each.decals for each in scene.neighbours)]
+    for decals, numbers in zip(carried, scene_numbers(scene), strict=True):
+        if object_id and object_id in numbers.decals:
+            return decals[numbers.decals.index(object_id)]
+    raise KeyError(f"no decal has id {object_id} in scene {scene.index}")
 
 
 def label(shot: Shot) -> list[Object]:
     """Return all labelled objects of one image, including those that are not visible.
 
-    A scene without a container has none.
+    A scene without a container has none. The objects of the first container come first, then those
+    of its neighbours; instances of a class count up over all containers.
     """
     if not shot.scene.container.present:
         return []
+    if not shot.scene.neighbours:
+        return _label(shot)
+    found: list[Object] = []
+    for member in shot.prepared.members:
+        before = Counter(item.class_name for item in found)
+        found += [
+            replace(
+                item,
+                container=member.number,
+                # instances of damages count up over the scene already
+                instance=item.instance + before[item.class_name] * (item.id not in DAMAGE_VALUES),
+            )
+            for item in _label(shot.of_member(member))
+        ]
+    return found
+
+
+def _label(shot: Shot) -> list[Object]:
     return [
         _container(shot),
         *_spreader(shot),
@@ -74,10 +96,10 @@ def _decals(shot: Shot) -> list[Object]:
     surface = shot.prepared.decals
     if not surface.decals:
         return []
-    ids = np.array(object_ids(scene), np.int64)
+    ids = np.array(shot.prepared.numbers.decals, np.int64)
     labelled = np.flatnonzero(ids)
     count, own = len(labelled), ids[labelled]
-    least = CONTAINER_ID + 1
+    least = int(own.min())
     seen_boxes, areas = shot.boxes_on_container(frame.ids, least, int(own.max()) + 1)
     seen = project(surface.facets, view)
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
@@ -135,7 +157,7 @@ def _parts(surface: DecalSurface, view: View) -> dict[int, list[LabelledPart]]:
 def _container(shot: Shot) -> Object:
     """Return the container, whose pixels include those of its decals.
 
-    Its outer box replaces it where the spreader hides it and outside the image. The box is a few
+    Its outer box replaces it where something hides it and outside the image. The box is a few
     millimetres larger than rails and sheets, which makes the visible fraction accurate to one
     percent.
     """
@@ -152,17 +174,19 @@ def _container(shot: Shot) -> Object:
     if shot.lens:
         sides = _pieces(sides)
     polygons = project(Facets.of(sides, np.zeros(len(sides), np.int64)), view).polygons
-    # void pixels within the box are not hidden; only the spreader hides any
-    asked = shot.spreader_box or (0, 0, 0, 0)
-    alone = covered(polygons, np.zeros(len(polygons), np.int64), 1, view.size, asked)
-    hidden = int(alone.shown(shot.spreader_shown)[0]) if shot.spreader_box else 0
+    # void pixels within the box are not hidden; only the spreader and other containers hide any
+    asked = None if shot.hiding is None else mask_box(shot.hiding)
+    alone = covered(
+        polygons, np.zeros(len(polygons), np.int64), 1, view.size, asked or (0, 0, 0, 0)
+    )
+    hidden = 0 if shot.hiding is None or asked is None else int(alone.shown(shot.hiding)[0])
     castings, polygon = _castings(shot, corners)
     (amodal_bbox,) = float_boxes(bounds[None])
     told = visibility(shot.config, area, hidden, int(alone.beyond[0]))
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
         told["truncated"] = True  # damage bulges out of the box
     return Object(
-        id=CONTAINER_ID,
+        id=prepared.numbers.container,
         class_name="container",
         instance=1,
         bbox=shot.container_box,
@@ -214,16 +238,18 @@ def _castings(
     """Return the castings' outer corners as keypoints, and the polygon around them.
 
     A corner of a convex body is visible if any of the planes that meet in it faces the camera and
-    the spreader does not hide it.
+    neither the spreader nor the outer box of another container hides it.
     """
     spreader, eye_mm = shot.prepared.spreader, shot.view.position_m / MM
     pixels, depth = shot.view.project(corners)
     outward = np.where(CORNER_SIGNS == 0, -1, CORNER_SIGNS)
     faces = np.any((eye_mm - corners) * outward > 0, axis=1)
     inside = (depth > 0) & ((pixels >= 0) & (pixels < shot.view.size)).all(axis=1)
-    if spreader is not None:
+    blocking = [] if spreader is None else [spreader.ray_triangles]
+    blocking += [] if shot.blocking is None else [RayTriangles(shot.blocking)]
+    for each in blocking:
         asked = np.flatnonzero(faces & inside)
-        faces[asked] = ~spreader.ray_triangles.hide(eye_mm, corners[asked])
+        faces[asked] = ~each.hide(eye_mm, corners[asked])
     found: list[Keypoint] = [
         (round(x, 3), round(y, 3), 2 if face else 1) if within else (0.0, 0.0, 0)
         for (x, y), face, within in zip(

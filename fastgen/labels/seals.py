@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from fastgen.classes import SEAL_ID
 from fastgen.labels.coverage import boxes, covered, facing, project
 from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Keypoint, Object
 from fastgen.scene.limits import HASPS
-from fastgen.scene.object_ids import seal_id
 
 
 def seal_objects(shot: Shot) -> list[Object]:
@@ -16,12 +14,14 @@ def seal_objects(shot: Shot) -> list[Object]:
     if seals is None:
         return []
     ids, view = shot.frame.ids, shot.view
-    own = np.array([seal_id(seal) for seal in shot.scene.seals])
+    numbers = shot.prepared.numbers
+    own = np.array([numbers.seal(seal) for seal in shot.scene.seals])
+    least = numbers.first_seal
     count = len(own)
-    seen_boxes, areas = shot.boxes_on_container(ids, SEAL_ID, SEAL_ID + HASPS)
+    seen_boxes, areas = shot.boxes_on_container(ids, least, least + HASPS)
     seen = project(seals.facets, view)
     bounds = float_boxes(boxes(seen.pixels, seen.facets.owner, count))
-    areas = areas.take(own - SEAL_ID)
+    areas = areas.take(own - least)
     hidden, beyond = np.zeros((2, count), np.int64)
     if areas.any():  # only visible seals need their unoccluded area
         polygons, owner = seen.polygons, seen.facets.owner.take(seen.facets.corners[:, 0])
@@ -36,7 +36,7 @@ def seal_objects(shot: Shot) -> list[Object]:
             id=int(own[i]),
             class_name="seal",
             instance=i + 1,
-            bbox=seen_boxes[own[i] - SEAL_ID],
+            bbox=seen_boxes[own[i] - least],
             amodal_bbox=bounds[i],
             area=int(areas[i]),
             keypoints=(middles[i],),

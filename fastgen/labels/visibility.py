@@ -1,6 +1,6 @@
 """Visibility of labelled objects: boxes, fractions and flags that all kinds of labels share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypedDict
 
@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.classes import SPREADER_ID
+from fastgen.classes import DAMAGE_VALUES, SPREADER_ID
 from fastgen.config.config import Config
 from fastgen.frame import Frame
-from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.geometry.prepared_scene import Member, PreparedScene
+from fastgen.geometry.solids import Body
 from fastgen.sample import Box
 from fastgen.scene import Scene
 
@@ -32,12 +33,32 @@ class Shot:
         prepared: The scene.
         view: Projection of the camera.
         config: Configuration whose label rules apply.
+        foreign: Pixels [H, W] that show other containers, None without any.
+        blocking: Triangles around the other containers, in the frame of this one.
     """
 
     frame: Frame
     prepared: PreparedScene
     view: View
     config: Config
+    foreign: NDArray[np.bool_] | None = None
+    blocking: Body | None = None
+
+    def of_member(self, member: Member) -> "Shot":
+        """Return the image with one container of its scene alone, in the frame of the container."""
+        numbers, damage = member.prepared.numbers, self.frame.damage
+        known = np.zeros(max(int(damage.max()), *DAMAGE_VALUES) + 1, damage.dtype)
+        values = np.array([numbers.undamaged, *numbers.damages])
+        known[values] = values
+        own = known.take(damage)
+        return Shot(
+            replace(self.frame, damage=own),
+            member.prepared,
+            self.view.in_frame(member.pose),
+            self.config,
+            (damage > 0) & (own == 0),
+            self.prepared.others[member.number],
+        )
 
     @property
     def scene(self) -> Scene:
@@ -68,6 +89,13 @@ class Shot:
         """Pixels [H, W] that show the spreader."""
         shown: NDArray[np.bool_] = self.frame.ids == SPREADER_ID
         return shown
+
+    @cached_property
+    def hiding(self) -> NDArray[np.bool_] | None:
+        """Pixels [H, W] that show what may hide the container; None if nothing is in the scene."""
+        if self.foreign is not None:
+            return self.spreader_shown | self.foreign
+        return self.spreader_shown if self.prepared.spreader else None
 
     @cached_property
     def spreader_box(self) -> Box | None:

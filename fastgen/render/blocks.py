@@ -37,6 +37,9 @@ SCENE_BLOCK = Block(
         ("float", "wear_tile_mm"),
         ("float", "wetness"),
         ("float", "background_size"),  # texels along a side of the environment map
+        ("int", "container_id"),
+        ("int", "first_seal_id"),
+        ("int", "undamaged_value"),  # of the container in the damage image
         ("vec4", "above"),  # albedo of the spreader above the container; 1 if there is one
     ),
 )

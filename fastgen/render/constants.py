@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from fastgen.camera import tone_curve
-from fastgen.classes import CONTAINER_ID, SEAL_ID, SPREADER_ID, UNDAMAGED_CONTAINER
+from fastgen.classes import SPREADER_ID
 from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry import damage_law
 from fastgen.geometry.mesh import MATERIALS
@@ -108,6 +108,7 @@ def _variant(v: ShaderVariant) -> Defines:
         "TRACED": int(v.traced),
         "COARSE": int(v.coarse),
         "RADIANCE": int(v.radiance),
+        "OVER": int(v.over),
     }
 
 
@@ -180,10 +181,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "SKY_DEPTH": _SKY_DEPTH,
     },
     "labels": lambda _: {
-        "UNDAMAGED_CONTAINER": f"{UNDAMAGED_CONTAINER}u",
-        "CONTAINER_ID": f"{CONTAINER_ID}u",
         "SPREADER_ID": f"{SPREADER_ID}u",
-        "SEAL_ID": f"{SEAL_ID}u",
     },
     "materials": lambda _: {
         "SHEET_MATERIAL": MATERIALS.index("paint_sheet"),

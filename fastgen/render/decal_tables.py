@@ -14,9 +14,8 @@ from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import Mesh
 from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.glyph_runs import GlyphRun, glyph_run
-from fastgen.scene import Decal, Scene
+from fastgen.scene import Decal
 from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS, MOST_NEARBY
-from fastgen.scene.object_ids import object_ids
 
 DECAL_TEXELS = 5
 """Texels of one row of the decal table."""
@@ -61,12 +60,15 @@ class DecalTables:
     glyphs: NDArray[np.float32]
 
 
-def pack_decals(scene: Scene, mesh: Mesh, art_layers: Mapping[str, int]) -> DecalTables:
-    """Compute the decal tables of a scene.
+def pack_decals(
+    decals: Sequence[Decal], ids: Sequence[int], mesh: Mesh, art_layers: Mapping[str, int]
+) -> DecalTables:
+    """Compute the decal tables of a container.
 
     Args:
-        scene: Scene with the decals.
-        mesh: Mesh of the scene's container.
+        decals: The decals.
+        ids: Object id of each decal, 0 without a label.
+        mesh: Mesh of the container.
         art_layers: Texture layer of each artwork by name.
 
     Returns:
@@ -75,7 +77,7 @@ def pack_decals(scene: Scene, mesh: Mesh, art_layers: Mapping[str, int]) -> Deca
     Raises:
         SceneError: A decal lies outside its sheet, or a cell has more than CELL_SLOTS decals.
     """
-    decals, count = scene.decals, len(scene.decals)
+    count = len(decals)
     rects = [mesh.charts[mesh.chart_index(decal.face)].rect_mm for decal in decals]
     corner, sheet = np.split(np.array(rects).reshape(count, 4), 2, axis=1)
     center = corner + np.array([decal.center_mm for decal in decals]).reshape(count, 2)
@@ -87,7 +89,7 @@ def pack_decals(scene: Scene, mesh: Mesh, art_layers: Mapping[str, int]) -> Deca
     table[:count, 1] = np.concatenate([center, half], axis=1)
     runs: list[GlyphRun] = []
     letters = 0
-    for row, decal, object_id in zip(table, decals, object_ids(scene), strict=False):
+    for row, decal, object_id in zip(table, decals, ids, strict=False):
         kind = decal.art if decal.art in COMPUTED_ART else decal.kind
         row[2] = *(decal.tint if kind in ("marker", "sticker") else decal.albedo), decal.wear
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade

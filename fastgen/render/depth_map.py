@@ -8,6 +8,7 @@ import numpy as np
 
 from fastgen.geometry.solids import Solid
 from fastgen.light.occluders import Array
+from fastgen.render.gl_enums import GL_DEPTH_CLAMP
 from fastgen.render.program import shader_text
 
 _SUNK_MM = 50.0
@@ -77,6 +78,7 @@ class DepthMap:
         self._target.use()
         ctx.scissor = None
         ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        ctx.enable_direct(GL_DEPTH_CLAMP)  # occluders may be outside the depth range of a view
         ctx.front_face = "ccw"
         for view in views:
             self._target.clear(depth=1.0, viewport=view.tile)
@@ -86,6 +88,7 @@ class DepthMap:
             if view.thick:
                 self._draw_sunk(view.thick, view.to_map)
         ctx.cull_face = "back"
+        ctx.disable_direct(GL_DEPTH_CLAMP)
 
     def _draw_sunk(self, bodies: Sequence[DrawnBody], to_map: Array) -> None:
         sunk = to_map.copy()

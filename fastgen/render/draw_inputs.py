@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -16,6 +17,20 @@ from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.scene import Damage
 from fastgen.scene.limits import MM
+
+
+class DrawOptions(NamedTuple):
+    """Choices of one image.
+
+    Attributes:
+        layer: "all", or one of LAYERS to see a single material layer unlit.
+        radiance: Write exposed linear radiance.
+        over: Containers are drawn over an image that has its background already.
+    """
+
+    layer: str = "all"
+    radiance: bool = False
+    over: bool = False
 
 
 @dataclass(frozen=True)

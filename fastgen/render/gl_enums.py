@@ -5,6 +5,7 @@ contexts/egl.py says why PyOpenGL's constants are not used.
 
 GL_COLOR = 0x1800
 GL_DEPTH_ATTACHMENT = 0x8D00
+GL_DEPTH_CLAMP = 0x864F
 GL_DEPTH_COMPONENT = 0x1902
 GL_FLOAT = 0x1406
 GL_FRAMEBUFFER = 0x8D40

@@ -66,13 +66,17 @@ class ImageTargets:
         self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, tested, 0)
         return True
 
-    def bind_images(self) -> None:
-        """Let compute shaders write colour, labels and depth as images 0 to 2."""
+    def bind_images(self, over: bool = False) -> None:
+        """Let compute shaders write colour, labels and depth as images 0 to 2.
+
+        Args:
+            over: Let them read the colour as well.
+        """
         color, labels, depth = self._image
         if self.radiance:
-            color.bind_to_image(0, read=False, write=True)
+            color.bind_to_image(0, read=over, write=True)
         else:  # four bytes of display colour are stored as one number
-            color.bind_to_image(0, read=False, write=True, format=GL_R32UI)
+            color.bind_to_image(0, read=over, write=True, format=GL_R32UI)
         labels.bind_to_image(1, read=False, write=True)
         depth.bind_to_image(2, read=False, write=True)
 

@@ -12,20 +12,19 @@ from typing import Any, Self
 
 import moderngl
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.camera.projection import View, view_of
 from fastgen.decals.artwork import art_layers, art_levels, glyph_coverage, glyph_tiles
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
-from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.light.environment import Ambient, EnvironmentLight, to_map_frame
+from fastgen.geometry.prepared_scene import Member, PreparedScene
+from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
 from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import dfg_table
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
-from fastgen.render.depth_map import occluder_program
-from fastgen.render.draw_inputs import DrawInputs, regions_of
+from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
 from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
@@ -42,6 +41,7 @@ from fastgen.render.sample_lattice import fitting
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
+from fastgen.render.shadows import Shadows
 from fastgen.render.shapes import Shapes, ray_bodies
 from fastgen.render.surface_values import damage_values, scene_values
 from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
@@ -50,6 +50,11 @@ from fastgen.render.variant import ShaderVariant
 from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Camera, Scene
+from fastgen.scene.boxes import back_to_front
+from fastgen.scene.limits import MAX_NEIGHBOURS, MM
+
+_CONTAINERS = 2 + MAX_NEIGHBOURS
+"""Containers whose tables are cached: those of one scene, and one more."""
 
 _Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 
@@ -59,7 +64,6 @@ class Renderer:
 
     Attributes:
         ctx: The moderngl context.
-        shadow_map: Shadows of the directional lights of the last scene.
     """
 
     def __init__(
@@ -95,13 +99,12 @@ class Renderer:
         self._normals = NormalsPass(self.ctx, programs)
         self._rays: ReleasingCache[RayPass] = ReleasingCache(2)
         self._targets: ReleasingCache[ImageTargets] = ReleasingCache(2)
-        self._bodies: RecentCache[RayBodies] = RecentCache(2)
+        self._bodies: RecentCache[RayBodies] = RecentCache(_CONTAINERS)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
         self._backgrounds = BackgroundTextures(gl)
-        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(2)
-        self._occluder = occluder_program(self.ctx)
-        self.shadow_map = ShadowMap(self.ctx, self._occluder, quality.shadow_detail)
+        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(_CONTAINERS)
+        self._shadows = Shadows(self.ctx, quality.shadow_detail)
         self._blocks = {
             block.name: self.ctx.buffer(reserve=block.size)
             for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
@@ -134,15 +137,15 @@ class Renderer:
 
         Args:
             prepared: A scene that `check_scene` accepts.
-            camera: Any camera outside the container.
+            camera: Any camera outside the containers and above the ground.
             size: (width, height) in pixels.
             layer: "all", or one of LAYERS to see a single material layer unlit.
             radiance: Return exposed linear radiance in `Frame.radiance`, and a black image.
             normals: Return surface normals in `Frame.normals`.
         """
-        inputs = self._draw(prepared, camera, size, layer, radiance)
-        frame = inputs.targets.read()
-        return replace(frame, normals=self._normals.run(inputs)) if normals else frame
+        found = np.zeros((*size[::-1], 3), np.float32) if normals else None
+        frame = self._draw(prepared, view_of(camera, size), camera, layer, radiance, found).read()
+        return replace(frame, normals=found)
 
     def draw(self, prepared: PreparedScene, camera: Camera, size: tuple[int, int]) -> ImageTargets:
         """Draw a scene and leave the image on the GPU until the next draw.
@@ -154,46 +157,66 @@ class Renderer:
             camera: Any camera outside the container.
             size: (width, height) in pixels.
         """
-        return self._draw(prepared, camera, size).targets
+        return self._draw(prepared, view_of(camera, size), camera)
 
     def _draw(
         self,
         prepared: PreparedScene,
+        view: View,
         camera: Camera,
-        size: tuple[int, int],
         layer: str = "all",
         radiance: bool = False,
-    ) -> DrawInputs:
-        environment = prepared.scene.environment
-        light = self._light(environment.name)
-        inputs = self._inputs(prepared, camera, view_of(camera, size), layer, radiance)
-        self._cast_shadows(prepared, inputs)
-        self._set_view(prepared, camera, inputs)
-        self._geometry.run(inputs)
-        if not inputs.regions.surfaces:
-            self._background.run(inputs)
-            return inputs
-        if inputs.variant.traced and light.sky_rays is not None:
-            rays = self._rays.get(size, lambda: RayPass(self._gl, self._programs, size))
-            bodies = self._ray_bodies(prepared, camera, inputs)
-            rays.run(inputs, bodies, light.sky_rays, environment.yaw_deg)
-        self._background.run(inputs)
-        self._shading.run(inputs)
-        return inputs
+        normals: NDArray[np.float32] | None = None,
+    ) -> ImageTargets:
+        """Draw a scene, and fill `normals` [H, W, 3] if given.
 
-    def _inputs(
-        self, prepared: PreparedScene, camera: Camera, view: View, layer: str, radiance: bool
-    ) -> DrawInputs:
+        Containers do not overlap. Several are drawn over one another from back to front.
+        """
+        scene = prepared.scene
+        exposure = self._exposure(scene, camera, view)
+        several = bool(scene.neighbours or scene.ground)
+        options = DrawOptions(layer, radiance, over=several)
+        inputs = self._inputs(prepared, view, options)
+        self._light(inputs, prepared.members[0], prepared, exposure)
+        if not several:
+            self._geometry.run(inputs)
+            self._trace(inputs, prepared)
+            self._background.run(inputs)
+            self._shade(inputs, normals)
+            return inputs.targets
+        self._background.run(inputs)
+        present = [m for m in prepared.members if m.prepared.scene.container.present]
+        for number in back_to_front([each.box for each in present], view.position_m / MM):
+            member = present[number]
+            inputs = self._inputs(member.prepared, view.in_frame(member.pose), options)
+            if inputs.regions.surfaces:
+                self._light(inputs, member, prepared, exposure)
+                self._geometry.run(inputs)
+                self._trace(inputs, member.prepared)
+                self._shade(inputs, normals)
+        return inputs.targets
+
+    def _shade(self, inputs: DrawInputs, normals: NDArray[np.float32] | None) -> None:
+        """Shade the surfaces in the visibility buffer, and write their normals if asked."""
+        if inputs.regions.surfaces:
+            inputs.targets.bind_images(inputs.variant.over)
+            self._shading.run(inputs)
+        if normals is not None:
+            found = self._normals.run(inputs)
+            np.copyto(normals, found, where=found.any(axis=-1, keepdims=True))
+
+    def _inputs(self, prepared: PreparedScene, view: View, options: DrawOptions) -> DrawInputs:
         """Collect what the passes share, and fill the uniform blocks of scene and damages."""
-        scene, size, lens = prepared.scene, view.size, camera.lens is not None
-        damages = seen_damages(scene.damages, camera.position_mm)
+        scene, size, lens = prepared.scene, view.size, view.distortion is not None
+        damages = seen_damages(scene.damages, tuple((view.position_m / MM).tolist()))
         damage = variant(damages)
         limit = self.ctx.info["GL_MAX_TEXTURE_SIZE"]
         per_axis = fitting(self._quality.samples_per_axis, size, limit)
         targets = self._targets.get(
-            (size, per_axis, radiance), lambda: ImageTargets(self._gl, size, per_axis, radiance)
+            (size, per_axis, options.radiance),
+            lambda: ImageTargets(self._gl, size, per_axis, options.radiance),
         )
-        light = self._light(scene.environment.name)
+        light = self._gpu_light(scene.environment.name)
         resources = self._resources(prepared)
         container, spreader, lit = self._shapes.of(
             prepared, resources.materials, lens, light.ambient
@@ -202,7 +225,7 @@ class Renderer:
         self._set(SCENE_BLOCK, scene_values(prepared, len(light.background)))
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
-            self._set(DAMAGE_BLOCK, damage_values(scene, damages, threshold_mm, row))
+            self._set(DAMAGE_BLOCK, damage_values(prepared, damages, threshold_mm, row))
         return DrawInputs(
             view=view,
             damages=damages,
@@ -215,13 +238,14 @@ class Renderer:
             variant=ShaderVariant(
                 samples_per_axis=per_axis,
                 lookups=self._quality.lookups,
-                layer=layer,
+                layer=options.layer,
                 damage=damage,
                 lights=shader_lights(light.ambient.lights),
-                traced=light.sky_rays is not None and layer == "all",
+                traced=light.sky_rays is not None and options.layer == "all",
                 coarse=self._quality.coarse and per_axis == 1,
-                radiance=radiance,
+                radiance=options.radiance,
                 without=self._without,
+                over=options.over,
             ),
             textures={
                 **self._material_textures(resources, container, spreader),
@@ -231,38 +255,42 @@ class Renderer:
             },
         )
 
-    def _cast_shadows(self, prepared: PreparedScene, inputs: DrawInputs) -> None:
-        """Draw what the directional lights leave in the shade, if there are any."""
-        scene, spreader = prepared.scene, prepared.spreader
-        lights = self.ambient(scene.environment.name).lights
-        if not lights:
-            return
-        toward = to_map_frame([each.direction for each in lights], -scene.environment.yaw_deg)
-        outline = prepared.container_outline
-        container = prepared.container if scene.damages else outline  # only fine triangles bend
-        solid = None if spreader is None else spreader.solid
-        self.shadow_map.cast(container, solid, toward, scene.damages, outline)
-        inputs.textures["shadow_map"] = self.shadow_map.depth
+    def _light(
+        self, inputs: DrawInputs, member: Member, whole: PreparedScene, exposure: float
+    ) -> None:
+        """Cast the shadows of the directional lights, and fill the uniform block of the view.
 
-    def _set_view(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> None:
-        """Fill the uniform block of the view."""
-        scene, view = prepared.scene, inputs.view
+        Args:
+            inputs: The image.
+            member: The container that is drawn.
+            whole: The scene, whose other containers cast shadows on it.
+            exposure: Factor on radiance.
+        """
+        scene, view = member.prepared.scene, inputs.view
         lights = self.ambient(scene.environment.name).lights
-        shadow = self.shadow_map if lights else None
-        exposure = self._exposure(scene, camera, view)
+        shadow = self._shadows.cast(member, whole, lights)
+        if shadow is not None:
+            inputs.textures["shadow_map"] = shadow.depth
         values = {
             **view_values(scene, view, inputs.targets.samples, exposure),
             **light_values(lights, shadow, view.position_m),
         }
         self._set(VIEW_BLOCK, values)
 
-    def _ray_bodies(self, prepared: PreparedScene, camera: Camera, inputs: DrawInputs) -> RayBodies:
-        """Return what rays hit in a scene; its cameras share it."""
-        ambient = self.ambient(prepared.scene.environment.name)
-        materials, lens = self._resources(prepared).materials, camera.lens is not None
-        return self._bodies.get(
-            (prepared, lens), lambda: ray_bodies(prepared, materials, lens, inputs.lit, ambient)
+    def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
+        """Light the visible surfaces by rays, if the quality asks for it."""
+        environment = prepared.scene.environment
+        light = self._gpu_light(environment.name)
+        if not inputs.variant.traced or light.sky_rays is None or not inputs.regions.surfaces:
+            return
+        size, lens = inputs.view.size, inputs.view.distortion is not None
+        rays = self._rays.get(size, lambda: RayPass(self._gl, self._programs, size))
+        materials = self._resources(prepared).materials
+        bodies = self._bodies.get(
+            (prepared, lens),
+            lambda: ray_bodies(prepared, materials, lens, inputs.lit, light.ambient),
         )
+        rays.run(inputs, bodies, light.sky_rays, environment.yaw_deg)
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Prepare the shapes of a scene, so that drawing them takes no more time or memory.
@@ -277,7 +305,7 @@ class Renderer:
 
     def preload_environment(self, name: str) -> None:
         """Prepare the light and the background of an environment."""
-        self._backgrounds.get(self._light(name))
+        self._backgrounds.get(self._gpu_light(name))
 
     def programs_key(self, prepared: PreparedScene, camera: Camera) -> Hashable:
         """Return a key that is equal for all draws at one image size that use the same programs.
@@ -291,22 +319,27 @@ class Renderer:
         spreader = prepared.scene.spreader.present
         return variant(damages), lights, camera.lens is not None, spreader
 
-    def _light(self, environment: str) -> GpuLight:
+    def _gpu_light(self, environment: str) -> GpuLight:
         return self._lights.get(
             environment,
             lambda: GpuLight(self._gl, self._light_of(environment), self._quality.traced),
         )
 
+    @property
+    def shadow_map(self) -> ShadowMap:
+        """Shadows of the directional lights on the first container of the last scene."""
+        return self._shadows.of(0)
+
     def ambient(self, environment: str) -> Ambient:
         """Return the light of an environment as the CPU uses it."""
-        return self._light(environment).ambient
+        return self._gpu_light(environment).ambient
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""
         scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
         if damage != "undamaged":
-            values = damage_values(scene, scene.damages, self._mask_threshold_mm, 0)
+            values = damage_values(prepared, scene.damages, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
         self._set(SCENE_BLOCK, scene_values(prepared, 0))
         textures = self._material_textures(self._resources(prepared), mesh, None)
@@ -358,10 +391,9 @@ class Renderer:
         owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
         owners += [
             self._backgrounds,
-            self.shadow_map,
+            self._shadows,
             self._geometry,
             self._programs,
-            self._occluder,
             *self._blocks.values(),
         ]
         for item in [*owners, *self._tables.values()]:

@@ -31,7 +31,7 @@ class SceneResources:
         art_layers: Mapping[str, int],
     ) -> None:
         scene, mesh = prepared.scene, prepared.container
-        tables = pack_decals(scene, mesh, art_layers)
+        tables = pack_decals(scene.decals, prepared.numbers.decals, mesh, art_layers)
         near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm)
         self.materials = SceneMaterials(prepared)
         self.textures = {

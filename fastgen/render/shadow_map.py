@@ -142,6 +142,7 @@ class ShadowMap:
         toward: Array,
         damages: tuple[Damage, ...] = (),
         outline: Mesh | None = None,
+        others: Body | None = None,
     ) -> None:
         """Draw the map unless it already shows the same.
 
@@ -151,8 +152,9 @@ class ShadowMap:
             toward: Unit vectors [S, 3] toward the lights in world space, 1 to MAX_LIGHTS.
             damages: Damages of the container.
             outline: The same container with fewer triangles, for charts that no damage touches.
+            others: Further bodies that cast shadows on the container.
         """
-        shown = (container, outline, spreader, tuple(toward.ravel().tolist()), damages)
+        shown = (container, outline, spreader, others, tuple(toward.ravel().tolist()), damages)
         if shown == self._shown:
             return
         self._shown = ()  # stays empty if drawing fails
@@ -178,9 +180,11 @@ class ShadowMap:
             shown = [drawn[solid] for solid in solids]
             return MapView(shown, matrix, tile, shown[:1] if thick else [])
 
-        views = [view([plain, *bodies[1:]], to_tiles[0], tiles[0])]
+        further = [] if others is None else [others]
+        views = [view([plain, *bodies[1:], *further], to_tiles[0], tiles[0])]
         views += [
-            view(bodies, matrix, tile) for matrix, tile in zip(to_tiles[1:], tiles[1:], strict=True)
+            view([*bodies, *further], matrix, tile)
+            for matrix, tile in zip(to_tiles[1:], tiles[1:], strict=True)
         ]
         self.toward = toward
         self._to_map = _in_map(to_tiles, np.array(tiles), self._layout)
@@ -190,14 +194,14 @@ class ShadowMap:
             from_mm = float(np.abs(container.bounds_mm[int(side > 0)][0])) - _END_DEPTH_MM
             # occluders of such a point are farther out, except for the border of filtered lookups
             from_border = from_mm - _END_BORDER_MM
-            container_end, *others = (_beyond(body, side, from_border) for body in bodies)
+            container_end, *rest = (_beyond(body, side, from_border) for body in bodies)
             # deep damage may leave no triangle
-            ends = [end for end in (container_end, *others) if len(end.triangles)]
+            ends = [end for end in (container_end, *rest) if len(end.triangles)]
             if ends:
                 self.end, matrix, tile = _end_tile(
                     to_tiles[0], self._to_map[0], ends, side, from_mm, self._layout
                 )
-                views.append(view(ends, matrix, tile, ends[0] is container_end))
+                views.append(view([*ends, *further], matrix, tile, ends[0] is container_end))
         self._map.draw(views)
         for item in drawn.values():
             item.release()

@@ -15,7 +15,6 @@ from fastgen.render.noise import noise_tiles
 from fastgen.render.rust import rate_of, rusted
 from fastgen.scene import Color, Damage, Scene
 from fastgen.scene.limits import HASPS
-from fastgen.scene.object_ids import mask_values
 
 _TILE_OF_SCALE = 4.0
 """Typical lengths of a noise pattern in one tile."""
@@ -118,24 +117,27 @@ def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, 
         "wear_tile_mm": surface.wear.scale_mm * _TILE_OF_SCALE,
         "wetness": scene.weather.wetness,
         "background_size": float(background_size),
+        "container_id": prepared.numbers.container,
+        "first_seal_id": prepared.numbers.first_seal,
+        "undamaged_value": prepared.numbers.undamaged,
         "above": (*scene.spreader.albedo, float(scene.spreader.present)),
     }
 
 
 def damage_values(
-    scene: Scene, shown: tuple[Damage, ...], threshold_mm: float, inner_row: int
+    prepared: PreparedScene, shown: tuple[Damage, ...], threshold_mm: float, inner_row: int
 ) -> Mapping[str, ArrayLike]:
     """Return the members of DAMAGE_BLOCK.
 
     Args:
-        scene: The scene.
+        prepared: The scene.
         shown: Those of its damages that are drawn, at least one.
         threshold_mm: Displacement above which a surface counts as damaged.
         inner_row: First row of the interior in the visibility buffer.
     """
     valued = [
         (damage, value)
-        for damage, value in zip(scene.damages, mask_values(scene.damages), strict=True)
+        for damage, value in zip(prepared.scene.damages, prepared.numbers.damages, strict=True)
         if damage in shown
     ]
     order = ("perforation", "dented", "concave", "axis")

@@ -43,6 +43,7 @@ class ShaderVariant:
         coarse: Classify pixels for 2x2 coarse shading.
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
+        over: Draw over an image that already shows what lies behind, not over the sky.
     """
 
     samples_per_axis: int = 1
@@ -55,6 +56,7 @@ class ShaderVariant:
     coarse: bool = False
     radiance: bool = False
     without: tuple[str, ...] = ()
+    over: bool = False
 
     @property
     def traits(self) -> tuple[str, ...]:

@@ -82,6 +82,7 @@ class VisibilityBuffer:
         seen: Sequence[Region | None],
         rest: Sequence[Region | None] = (),
         holes: Sequence[Region | None] = (),
+        over: bool = False,
     ) -> None:
         """Clear the parts of the buffer that will be read, and bind it for undamaged surfaces.
 
@@ -90,12 +91,13 @@ class VisibilityBuffer:
             seen: Regions of the image that will be read; None is the whole image.
             rest: Regions where rest positions will be read.
             holes: Regions that `limit_inside` will name.
+            over: The surfaces are drawn over an image, which has its sky already.
         """
         self._make_room(damage)
         for box in (*map(self._texels, seen), *map(self._texels_inside, holes)):
             self._clear(self._keys, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
-        outer = [None] if self.per_axis == 1 else seen
+        outer = [None] if self.per_axis == 1 and not over else seen
         for box in (*map(self._texels, outer), *map(self._texels_inside, holes)):
             self._clear(self.depth_buffer, box, DEPTHS, 1.0)
         for box in map(self._texels, rest) if damage != "undamaged" else ():

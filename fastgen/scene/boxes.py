@@ -76,6 +76,24 @@ def overlap(one: OrientedBox, other: OrientedBox) -> bool:
     return bool(gaps(one, other)[1].max() < -_TOUCHING_MM)
 
 
+def away_mm(box: OrientedBox, point_mm: Array) -> float:
+    """Return the signed distance of a point [3] from a box, negative inside."""
+    outside = np.abs(box.axes @ (point_mm - box.center_mm)) - box.half_mm
+    most = float(outside.max())
+    return most if most < 0 else float(np.linalg.norm(np.maximum(outside, 0)))
+
+
+def stops(box: OrientedBox, eye_mm: Array, points_mm: Array) -> NDArray[np.bool_]:
+    """Return whether a box is between an eye [3] and each of the points [P, 3]."""
+    start = box.axes @ (eye_mm - box.center_mm)
+    way = (points_mm - eye_mm) @ box.rotation
+    way = np.where(way == 0, 1e-9, way)
+    ends = np.stack([-box.half_mm - start, box.half_mm - start]) [:, None] / way
+    enters, leaves = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+    found: NDArray[np.bool_] = (enters < leaves) & (leaves > 0) & (enters < 1 - 1e-6)
+    return found
+
+
 def back_to_front(boxes: Sequence[OrientedBox], eye_mm: Array) -> list[int]:
     """Return the order in which boxes can be drawn over one another.
 

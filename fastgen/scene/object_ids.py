@@ -1,4 +1,6 @@
-"""Numbers of decals and seals in the id target, and of damages in the damage target."""
+"""Numbers of containers, decals and seals in the id target, and of damages in the damage target."""
+
+from dataclasses import dataclass
 
 from fastgen.classes import (
     CONTAINER_ID,
@@ -7,23 +9,60 @@ from fastgen.classes import (
     SEAL_ID,
     SEGMENTATION_CLASSES,
     SPREADER_ID,
+    UNDAMAGED_CONTAINER,
 )
-from fastgen.scene.data import Damage, Scene, Seal
+from fastgen.scene.data import Damage, Decal, Scene, Seal
+from fastgen.scene.limits import HASPS
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of one container and what it carries. No two objects of a scene share a number.
+
+    Attributes:
+        container: Id of the container.
+        decals: Id of each decal in scene order, 0 for decals without a label.
+        first_seal: Id of a seal at the first hasp; those of the other hasps follow.
+        undamaged: Value of undamaged container in the damage target: category * 100 + instance.
+        damages: Value of each damage there, which is also its id.
+    """
+
+    container: int
+    decals: tuple[int, ...]
+    first_seal: int
+    undamaged: int
+    damages: tuple[int, ...]
+
+    def seal(self, seal: Seal) -> int:
+        """Return the id of a seal, which its hasp decides."""
+        return self.first_seal + seal.hasp
+
+
+def scene_numbers(scene: Scene) -> list[Numbers]:
+    """Return the numbers of the first container and of each neighbour.
+
+    Ids count up from CONTAINER_ID, container by container, and skip the values of damages.
+    Instances of damages count up over all containers (SeaFront paper, section 3.3.4).
+    """
+    free = (number for number in range(CONTAINER_ID, SPREADER_ID) if number not in DAMAGE_VALUES)
+    carried: list[tuple[tuple[Decal, ...], tuple[Damage, ...]]] = [(scene.decals, scene.damages)]
+    carried += [(each.decals, each.damages) for each in scene.neighbours]
+    values = iter(mask_values(tuple(damage for _, damages in carried for damage in damages)))
+    return [
+        Numbers(
+            container=next(free),
+            decals=tuple(next(free) if decal.class_name else 0 for decal in decals),
+            first_seal=SEAL_ID + HASPS * number,
+            undamaged=UNDAMAGED_CONTAINER + number,
+            damages=tuple(next(values) for _ in damages),
+        )
+        for number, (decals, damages) in enumerate(carried)
+    ]
 
 
 def object_ids(scene: Scene) -> list[int]:
-    """Return the id of each decal in the id target, in scene order.
-
-    Labelled decals get 2, 3, ..., skipping the values of damages. Unlabelled decals get 0.
-    """
-    numbers = range(CONTAINER_ID + 1, SPREADER_ID)
-    free = (number for number in numbers if number not in DAMAGE_VALUES)
-    return [next(free) if decal.class_name else 0 for decal in scene.decals]
-
-
-def seal_id(seal: Seal) -> int:
-    """Return the id of a seal, which its hasp decides."""
-    return SEAL_ID + seal.hasp
+    """Return the id of each decal of the first container, 0 for decals without a label."""
+    return list(scene_numbers(scene)[0].decals)
 
 
 def mask_values(damages: tuple[Damage, ...]) -> list[int]:

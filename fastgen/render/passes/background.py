@@ -15,8 +15,8 @@ _OCTAHEDRON = 24
 class BackgroundPass:
     """Shades at least the pixels that see only sky, and clears labels and depth.
 
-    Reads: the background map, and with single samples the depth of the visibility buffer. Writes:
-    colour, labels and depth of the image.
+    Reads: the background map, and with single samples the depth of the visibility buffer, unless
+    surfaces are drawn over the sky later. Writes: colour, labels and depth of the image.
     """
 
     def __init__(self, ctx: moderngl.Context, programs: Programs, by_compute: bool) -> None:
@@ -47,18 +47,19 @@ class BackgroundPass:
         per_pixel = single_layer or inputs.view.distortion is not None
         by_ray = ("fullscreen.vert", "background_by_ray.frag")
         stages = by_ray if per_pixel else ("background.vert", "background.frag")
-        program = self._programs.get(stages, replace(inputs.variant, damage="undamaged", lights=0))
+        program = self._programs.get(
+            stages, replace(inputs.variant, damage="undamaged", lights=0, over=False)
+        )
         self._ctx.scissor = None
-        only_sky = inputs.targets.begin()
+        only_sky = inputs.targets.begin() and not inputs.variant.over
         self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
         program.bind(inputs.textures)
         program.draw_vertices(3 if per_pixel else _OCTAHEDRON)
 
     def _store(self, inputs: DrawInputs) -> None:
         """Shade all pixels as sky, and store their labels and depth."""
-        program = self._programs.get(
-            ("background.comp",), replace(inputs.variant, damage="undamaged", lights=0)
-        )
+        variant = replace(inputs.variant, damage="undamaged", lights=0, over=False)
+        program = self._programs.get(("background.comp",), variant)
         program.bind(inputs.textures)
         width, height = inputs.targets.size
         program.dispatch(-(-width // LIST_GROUP), height)

@@ -45,7 +45,7 @@ class GeometryPass:
         drawn = regions.drawn
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
         rest = drawn if inputs.variant.traced else regions.near_damage
-        samples.begin(damage, drawn, rest, regions.holes)
+        samples.begin(damage, drawn, rest, regions.holes, inputs.variant.over)
         if not regions.surfaces:
             inputs.textures.update(samples.textures)
             return
