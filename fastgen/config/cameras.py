@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -25,6 +25,7 @@ _ROUNDED_MM = 0.1
 
 Array = NDArray[np.float64]
 
+_Aim = Annotated[Range, Bounds(-2.0, 2.0)]
 _Angle = Annotated[Range, Bounds(-89.0, 89.0, "degrees")]
 
 
@@ -48,6 +49,9 @@ class CameraConfig:
             of the container is horizontal.
         target_shift_mm: Shift of the point that the camera looks at from the middle of the face,
             along both axes of the face.
+        aim_right: Further shift to the right, as a share of half the width of the face: -1 for its
+            left edge, 1 for its right edge.
+        aim_up: Further shift upward, as a share of half the height of the face.
         sensor_width_mm: Width of the sensor, which spans the width of the image.
         exposure_ev: Deviation from the metered exposure.
         lens: Distortion, null for a pinhole.
@@ -60,6 +64,8 @@ class CameraConfig:
     elevation_deg: _Angle = Range(-8, 18)
     roll_deg: Annotated[Range, Bounds(-180.0, 180.0, "degrees")] = Range(-1.5, 1.5)
     target_shift_mm: Annotated[Range, Bounds(-1e4, 1e4, "mm")] = Range(-350, 350)
+    aim_right: _Aim = Range(0, 0)
+    aim_up: _Aim = Range(0, 0)
     sensor_width_mm: Annotated[float, Bounds(0.1, 1000.0, "mm")] = 36.0
     exposure_ev: Annotated[Range, Bounds(-10.0, 10.0, "stops")] = Range(-0.5, 0.4)
     lens: LensConfig | None = None
@@ -79,13 +85,14 @@ class FaceFrame(NamedTuple):
     """Axes and middle of a face in the container frame, seen from outside.
 
     `outward`, `right` and `up` are unit vectors [3]. On roof and underside, `right` points to the
-    door end.
+    door end. `half_mm` is half the width and half the height of the face.
     """
 
     outward: Array
     right: Array
     up: Array
     middle_mm: Array
+    half_mm: tuple[float, float]
 
 
 @functools.cache
@@ -102,7 +109,9 @@ def face_frame(face: str, kind: str) -> FaceFrame:
     }[face]
     axis = np.array(outward, float)
     right = np.cross((0, 0, 1), axis) if axis[2] == 0 else np.array([1.0, 0.0, 0.0])
-    return FaceFrame(axis, right, np.cross(axis, right), np.array(middle_mm))
+    up = np.cross(axis, right)
+    across, along = (float(abs(side) @ (length, width, height)) / 2 for side in (right, up))
+    return FaceFrame(axis, right, up, np.array(middle_mm), (across, along))
 
 
 def direction_from(frame: FaceFrame, azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> Array:
@@ -142,6 +151,38 @@ def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: flo
             )
 
 
+def check_above_ground(
+    name: str, rig: CameraConfig, grounded: Collection[str], bulge_mm: float
+) -> None:
+    """Check that a camera that is raised above the ground cannot come too close to a container.
+
+    Args:
+        name: Name of the camera in the rig.
+        rig: Ranges of the camera.
+        grounded: Names of the arrangements that may occur and have ground below the container.
+        bulge_mm: Largest outward displacement by damage.
+
+    Raises:
+        ConfigError: if the camera might have no room above the ground.
+    """
+    if not grounded or rig.face == "roof":
+        return
+    where = f"above the ground of placement.arrangements {', '.join(sorted(grounded))}"
+    if rig.face == "underside":
+        raise ConfigError(
+            f"cameras.{name}.face: a camera that sees the underside is not {where}; give them "
+            "weight 0, or another face"
+        )
+    widest = np.deg2rad([np.abs(rig.azimuth_deg).max(), np.abs(rig.elevation_deg).max()])
+    least_mm = NEAR_M / MM + bulge_mm
+    if rig.distance_mm.lo * np.cos(widest).prod() < least_mm:
+        raise ConfigError(
+            f"cameras.{name}.elevation_deg: the camera may have to be raised to be {where}, and "
+            f"would then be within {least_mm:g} mm of the container; give angles closer to 0 or a "
+            "larger distance_mm"
+        )
+
+
 def _nearest_mm(rig: CameraConfig, kind: str) -> float:
     """Return the smallest distance of the camera from an undamaged container in millimetres."""
     frame = face_frame(rig.face, kind)
@@ -149,8 +190,10 @@ def _nearest_mm(rig: CameraConfig, kind: str) -> float:
     def away_mm(direction: Array, distance_mm: Array) -> Array:
         offset = distance_mm[..., None] * direction
         # the target shift that brings the camera nearest to the middle of the face
-        for axis in (frame.right, frame.up):
-            shift = np.clip(-(offset @ axis), *rig.target_shift_mm)
+        sides = (frame.right, frame.up), (rig.aim_right, rig.aim_up), frame.half_mm
+        for axis, aim, half in zip(*sides, strict=True):
+            lo, hi = np.add(rig.target_shift_mm, np.multiply(aim, half))
+            shift = np.clip(-(offset @ axis), lo, hi)
             offset = offset + shift[..., None] * axis
         return mm_away(frame.middle_mm + offset, kind)
 

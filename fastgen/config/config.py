@@ -15,11 +15,12 @@ import yaml
 from annotated_types import MinLen
 
 from fastgen import srgb
-from fastgen.config.cameras import CameraConfig, check_room, seafront_rig
+from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
 from fastgen.config.markings import MarkingsConfig
 from fastgen.config.presets import PRESETS
 from fastgen.config.sensor import SensorConfig, WeatherConfig
+from fastgen.config.surroundings import GroundConfig, PlacementConfig
 from fastgen.config.yaml_values import loaded
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
@@ -270,6 +271,8 @@ class Config:
     damage: DamageConfig = field(default_factory=DamageConfig)
     spreader: SpreaderConfig = field(default_factory=SpreaderConfig)
     seals: SealsConfig = field(default_factory=SealsConfig)
+    placement: PlacementConfig = field(default_factory=PlacementConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
     environment: EnvironmentConfig = field(default_factory=EnvironmentConfig)
     cameras: Annotated[dict[_CameraName, CameraConfig], MinLen(1)] = field(
         default_factory=seafront_rig
@@ -280,7 +283,7 @@ class Config:
     split: SplitConfig = field(default_factory=SplitConfig)
 
     def __post_init__(self) -> None:
-        """Refuse splits without shares, and camera names that differ only in case."""
+        """Refuse splits without shares, camera names that differ only in case, and lone twins."""
         if self.split.train + self.split.val + self.split.test <= 0:
             raise ConfigError("split: all shares are 0; give at least one above 0")
         taken: dict[str, str] = {}
@@ -291,6 +294,13 @@ class Config:
                     f"cameras.{name}: its files would be those of {alike} on disks that ignore "
                     "case; rename one"
                 )
+        others = {kind for kind, weight in self.container.kinds.items() if weight > 0} - {"20"}
+        if self.placement.chosen == {"twin"} and others:
+            raise ConfigError(
+                "placement.arrangements: only twin has a weight, and twins are 20-foot containers; "
+                f"give another arrangement a weight, or take {', '.join(sorted(others))} out of "
+                "container.kinds"
+            )
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
@@ -380,6 +390,7 @@ def _with_room(config: Config) -> Config:
     kinds = [kind for kind, weight in config.container.kinds.items() if weight > 0]
     for name, rig in config.cameras.items():
         check_room(name, rig, kinds, config.damage.bulge_mm)
+        check_above_ground(name, rig, config.placement.grounded, config.damage.bulge_mm)
     return config
 
 

@@ -14,6 +14,9 @@ from fastgen.scene.data import Pose
 _TOUCHING_MM = 1e-3
 """Overlap that counts as touching, because poses are rounded."""
 
+_CABLES_MM = 5e4
+"""Height of the space above a container that a spreader holds; cables lead up through it."""
+
 Array = NDArray[np.float64]
 
 
@@ -59,6 +62,13 @@ def container_box(kind: str, pose: Pose) -> OrientedBox:
     return OrientedBox(middle, half, turn)
 
 
+def spreader_box(kind: str) -> OrientedBox:
+    """Return the box above the first container in which its spreader and the cables hang."""
+    length, width, height = KINDS[kind].size_mm
+    half = np.array([length, width, _CABLES_MM]) / 2
+    return OrientedBox(np.array([0.0, 0.0, height + half[2]]), half, np.eye(3))
+
+
 def gaps(one: OrientedBox, other: OrientedBox) -> tuple[Array, Array]:
     """Return the axes [A, 3] that may separate two boxes, and the gap [A] along each.
 
@@ -88,7 +98,7 @@ def stops(box: OrientedBox, eye_mm: Array, points_mm: Array) -> NDArray[np.bool_
     start = box.axes @ (eye_mm - box.center_mm)
     way = (points_mm - eye_mm) @ box.rotation
     way = np.where(way == 0, 1e-9, way)
-    ends = np.stack([-box.half_mm - start, box.half_mm - start]) [:, None] / way
+    ends = np.stack([-box.half_mm - start, box.half_mm - start])[:, None] / way
     enters, leaves = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
     found: NDArray[np.bool_] = (enters < leaves) & (leaves > 0) & (enters < 1 - 1e-6)
     return found

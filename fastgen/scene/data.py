@@ -27,6 +27,7 @@ from fastgen.scene.limits import (
     GAP_LIMITS_MM,
     GROUNDS,
     HASPS,
+    LOWEST_GROUND_MM,
     MAX_DAMAGES,
     MAX_DECALS,
     MAX_NEIGHBOURS,
@@ -257,7 +258,7 @@ class Ground:
     """
 
     kind: Annotated[str, OneOf(GROUNDS)]
-    height_mm: Annotated[float, Bounds(-1e5, 0.0, "mm")] = 0.0
+    height_mm: Annotated[float, Bounds(LOWEST_GROUND_MM, 0.0, "mm")] = 0.0
     albedo: Color = (0.1, 0.1, 0.1)
     wetness: Share = 0.0
     wear: Share = 0.5

@@ -28,6 +28,9 @@ MAX_NEIGHBOURS = 15
 MAX_PROPS = 64
 """Props of a scene; the ground pass tests each pixel against all of them."""
 
+LOWEST_GROUND_MM = -1e5
+"""Lowest height of the ground."""
+
 GROUNDS = ("asphalt", "concrete", "paving")
 """Kinds of ground."""
 
