@@ -35,6 +35,7 @@ def test_every_shader_and_asset_is_in_the_wheel(names):
     for folder, pattern in (
         ("shaders", "*.*"),
         ("assets/hdri", "*.exr"),
+        ("assets/hdri", "*.png"),
         ("assets/markers", "*.png"),
         ("assets/stickers", "*.png"),
         ("assets/stickers", "*.json"),

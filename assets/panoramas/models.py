@@ -217,10 +217,13 @@ def truck() -> bpy.types.Mesh:
     return s.mesh("truck")
 
 
-def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], float]]:
+def ship(
+    length: float, beam: float, wide_deck: bool
+) -> tuple[bpy.types.Mesh, Callable[[float], float]]:
     """Return the hull and house of a container ship, bow to +x, waterline at z = 0, deck at z = 13.
 
-    Also returns a function that gives half the width of the deck at x.
+    Also returns a function that gives half the width of the deck at x, which is that of the beam
+    everywhere with `wide_deck`.
     """
     s = Shape()
     stations = np.linspace(-length / 2, length / 2, 41)
@@ -263,7 +266,7 @@ def ship(length: float, beam: float) -> tuple[bpy.types.Mesh, Callable[[float], 
     s.beam((0.46 * length, 0, 13), (0.46 * length, 0, 27), 0.6, 0.6, "white")
 
     def half_deck(x: float) -> float:
-        return float(np.interp(x, stations, rows[-1]))
+        return beam / 2 if wide_deck else float(np.interp(x, stations, rows[-1]))
 
     for x in np.arange(-length / 2, 0.42 * length, 3.0):  # railing posts
         edge = half_deck(x) - 0.3

@@ -45,6 +45,8 @@ class Variant:
         cranes: x and raised boom of each quay crane.
         ship_m: x of the middle of the ship at the quay, or None.
         end_m: x of the end of the quay.
+        wide_deck: The ship's load and railing stand as if its deck were equally wide everywhere.
+            Panoramas that were rendered so keep this geometry for their container maps.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Variant:
     cranes: tuple[tuple[float, bool], ...] = ((-75.0, False), (62.0, False), (150.0, True))
     ship_m: float | None = 40.0
     end_m: float = 2500.0
+    wide_deck: bool = False
 
 
 class Builder:
@@ -72,6 +75,7 @@ class Builder:
     def __init__(self, variant: Variant) -> None:
         self.v = variant
         self.rng = np.random.default_rng(variant.seed)
+        self.containers = 0
         painter = np.random.default_rng(1)  # separate, so that liveries do not affect the layout
         self.boxes = {
             feet: [models.container(feet, painted, painter) for painted in (0, 0, 1, 1, 1, 1)]
@@ -108,7 +112,9 @@ class Builder:
         mesh = self.boxes[feet][int(self.rng.integers(6))]
         tone = self.rng.uniform(0.75, 1.15)
         if has_room:
-            place(mesh, position, turn, tuple(tone * c for c in PALETTE[color]))
+            self.containers += 1
+            color = tuple(tone * c for c in PALETTE[color])
+            place(mesh, position, turn, color).pass_index = self.containers
 
     def _ground(self) -> None:
         s, end = Shape(), self.v.end_m
@@ -165,7 +171,7 @@ class Builder:
 
     def _ship(self, x: float, y: float, turn: float = 0.0) -> None:
         length, beam = 290.0, 40.0
-        mesh, half_deck = models.ship(length, beam)
+        mesh, half_deck = models.ship(length, beam, self.v.wide_deck)
         color = ((0.02, 0.03, 0.07), (0.16, 0.02, 0.02), (0.02, 0.08, 0.06))[self.v.seed % 3]
         place(mesh, (x, y - beam / 2, SEA_M), turn, color)
         if turn:  # the distant ship is empty
