@@ -49,8 +49,11 @@ class ImageTargets:
         )
         self._clear = texture_clearing(gl)
 
-    def begin(self) -> bool:
+    def begin(self, over: bool = False) -> bool:
         """Clear labels and depth, and bind the colour alone.
+
+        Args:
+            over: The whole image gets a background, before any surface is drawn.
 
         Returns:
             Whether a depth of 1 in the bound depth buffer marks the pixels that see only sky.
@@ -59,7 +62,7 @@ class ImageTargets:
         self._clear(labels, (0, 0, *self.size), NUMBERS, 0)
         self._clear(depth, (0, 0, *self.size), FLOATS, np.inf)
         self._color.use()
-        if self.samples.per_axis > 1:
+        if over or self.samples.per_axis > 1:
             return False
         # moderngl requires attachments of one size; the depth of holed scenes has more rows
         tested = self.samples.depth_buffer.glo

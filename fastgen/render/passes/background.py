@@ -51,7 +51,7 @@ class BackgroundPass:
             stages, replace(inputs.variant, damage="undamaged", lights=0, over=False)
         )
         self._ctx.scissor = None
-        only_sky = inputs.targets.begin() and not inputs.variant.over
+        only_sky = inputs.targets.begin(inputs.variant.over)
         self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
         program.bind(inputs.textures)
         program.draw_vertices(3 if per_pixel else _OCTAHEDRON)
