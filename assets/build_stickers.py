@@ -50,6 +50,7 @@ from sticker_traces import (
     overpaint,
     residue,
     square_logo,
+    streaks,
 )
 
 from fastgen.decals.artwork import Sticker
@@ -183,6 +184,14 @@ EMBLEMS = {
     'M500 220 L250 365 V635 L500 780 L750 635 V365 Z"/>',
 }
 
+RUNS = {
+    "run_wide_1": streaks(3, 7),
+    "run_wide_2": streaks(5, 10),
+    "run_wide_3": streaks(8, 5),
+    "run_thin_1": streaks(11, 1),
+    "run_thin_2": streaks(14, 2),
+}
+
 BRANDS = {
     "Varnholm": ("compass", ["VHLU", "VARU"], "VARNHOLM", ["VARNHOLM LINE", "NORTH ROUTE"]),
     "Tessaro": ("wave", ["TSRU", "TEOU"], "TESSARO", ["TESSARO MARINE", "TESSARO"]),
@@ -219,6 +228,9 @@ def main() -> None:
     for name, body in EMBLEMS.items():
         drawings[f"emblem_{name}"] = emblem(body)
         index[f"emblem_{name}"] = {"role": "emblem", "size_mm": (1000, 1000)}
+    for name, drawing in RUNS.items():
+        drawings[name] = drawing
+        index[name] = {"role": "run", "size_mm": (1000, 1000)}
     for old in folder.glob("*.*"):
         if old.stem not in drawings and old.suffix in (".svg", ".png"):
             old.unlink()

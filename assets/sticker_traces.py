@@ -1,4 +1,4 @@
-"""Drawings of logos, chalk, customs seals, inspection labels and residue."""
+"""Drawings of logos, chalk, customs seals, inspection labels, residue and streaks."""
 
 from itertools import pairwise
 from math import cos, pi, sin
@@ -137,3 +137,24 @@ def inspection_label(color: str, year: str) -> str:
     body = rect(0, 0, 1000, 700, color) + frame(1000, 700, WHITE, 24, 40)
     body += words("NEXT EXAM", 500, 240, 110, WHITE)
     return svg(1000, 700, body + words(year, 500, 560, 220, WHITE))
+
+
+def streaks(seed: int, count: int) -> str:
+    """Streaks that run down from the upper edge and fade; the renderer gives them their colour."""
+    rng = np.random.default_rng(seed)
+    few = count <= 2
+    blur = f"<feGaussianBlur stdDeviation='{30 if few else 8} 5'/>"
+    made, fades = "", f"<filter id='b' x='-1' width='3'>{blur}</filter>"
+    for i in range(count):
+        width = 900 / count if few else rng.uniform(150, 560) / count
+        length = rng.uniform(750 if few else 350, 950)
+        x = rng.uniform(40, 960 - width)
+        peak = 0.8 if i == 0 else rng.uniform(0.3, 0.8)
+        fades += f"<linearGradient id='f{i}' x2='0' y2='1'>"
+        for at, share in ((0, 0.2), (0.07, 0.85), (0.15, 1.0), (0.5, 0.6), (1, 0.0)):
+            fades += f"<stop offset='{at}' stop-color='#fff' stop-opacity='{share * peak:.2f}'/>"
+        fades += "</linearGradient>"
+        # narrower at the lower end
+        d = f"M{x:.0f} 0 h{width:.0f} l{-0.3 * width:.0f} {length:.0f} h{-0.4 * width:.0f} Z"
+        made += path(d, f"url(#f{i})", "filter='url(#b)'")
+    return svg(1000, 1000, f"<defs>{fades}</defs>{made}")

@@ -64,6 +64,8 @@ class MarkingsConfig:
             container has.
         sticker_wear: Scratches, dirt and peeled patches of stickers.
         patches_per_face: Number of rectangles that were painted over with slightly different paint.
+        runs: Probability that dirt has run down from a marker or sticker, and rust from a hole or
+            dent; less on clean containers. About as many runs are below nothing.
         height_marks: Probability of striped height marks on a high cube.
     """
 
@@ -98,6 +100,7 @@ class MarkingsConfig:
     stickers_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 4)
     sticker_wear: Annotated[Range, UNIT] = Range(0.0, 0.5)
     patches_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
+    runs: Share = 0.2
     height_marks: Share = 0.85
 
     @property

@@ -21,6 +21,7 @@ from fastgen.geometry.shape_library import SHAPES
 from fastgen.light.hdri import hours_of
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.markings import sample_decals
+from fastgen.sampling.runs import sample_runs
 from fastgen.sampling.seals import sample_seals
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.sheet import Sheet
@@ -87,6 +88,11 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
     container = Container(kind, config.container.profiles.deepened(scale))
     surface = _surface(config, streams)
     damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
+    decals = sample_decals(
+        config.markings, kind, _empty_sheets(container), surface.paint.albedo, streams
+    )
+    mesh = SHAPES.container(kind, container.profiles)
+    runs = sample_runs(config.markings.runs, mesh, decals, damages, surface, streams)
     environment = _environment(config, streams, environments)
     hours = hours_of(environment.name)
     moment = sample_moment(config.sensor.stamp.years, hours, streams("moment"))
@@ -100,13 +106,7 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
             _with_sensor(_camera(name, rig, kind, streams), config, moment, streams)
             for name, rig in config.cameras.items()
         ),
-        decals=sample_decals(
-            config.markings,
-            kind,
-            _empty_sheets(container),
-            surface.paint.albedo,
-            streams,
-        ),
+        decals=(*decals, *runs),
         damages=damages,
         seals=sample_seals(config.seals, streams),
         spreader=_spreader(config.spreader, streams),

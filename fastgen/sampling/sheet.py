@@ -1,5 +1,6 @@
 """Free rectangles on the sheet of a container face while decals are placed on it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -10,6 +11,9 @@ from fastgen.geometry.door_clearance import DoorClearance
 from fastgen.scene import Decal, Vec2
 from fastgen.scene.limits import MOST_NEARBY, NEARBY_MM
 from fastgen.validation import Range
+
+_Box = tuple[float, float, float, float]
+"""Left, lower, right and upper end, mm."""
 
 EDGE_MM = 110.0
 """Width of the strip without decals along each sheet edge, mostly under posts and rails."""
@@ -133,20 +137,27 @@ def has_slots(added: Sequence[Decal], others: Sequence[Decal]) -> bool:
     Returns:
         False if more than MOST_NEARBY decals would be near one place.
     """
-    boxes = np.array([_surroundings(decal) for decal in (*added, *others)])
-    low, high = boxes[:, 0], boxes[:, 1]
-    mine = slice(0, len(added))
-    near = ((low[mine, None] < high) & (low < high[mine, None])).all(axis=2).any(axis=0)
-    low, high = low[near], high[near]
+    mine = [_surroundings(decal) for decal in added]
+    theirs = [box for box in map(_surroundings, others) if any(_meet(box, one) for one in mine)]
+    boxes = mine + theirs
+    if len(boxes) <= MOST_NEARBY:
+        return True
+    left, low, right, high = np.array(boxes).T
     # boxes that share a place also share the lower left corner of their intersection
-    x, y = (corner.ravel() for corner in np.meshgrid(low[:, 0], low[:, 1]))
-    columns = (low[:, 0] <= x[:, None]) & (x[:, None] < high[:, 0])
-    rows = (low[:, 1] <= y[:, None]) & (y[:, None] < high[:, 1])
-    return bool((columns & rows).sum(axis=1).max() <= MOST_NEARBY)
+    x, y = (corner.reshape(-1, 1) for corner in np.meshgrid(left, low))
+    over = (left <= x) & (x < right) & (low <= y) & (y < high)
+    return bool(over.sum(axis=1).max() <= MOST_NEARBY)
 
 
-def _surroundings(decal: Decal) -> list[Vec2]:
-    """Return the lowest and the highest corner of a decal's box and half of NEARBY_MM around it."""
-    across, up = abs(decal.turn) @ decal.size_mm / 2 + NEARBY_MM / 2
-    x, y = decal.center_mm
-    return [(x - across, y - up), (x + across, y + up)]
+def _surroundings(decal: Decal) -> _Box:
+    """Return the box around a decal and half of NEARBY_MM on each side."""
+    (x, y), (width, height) = decal.center_mm, decal.size_mm
+    angle = math.radians(decal.rotation_deg)
+    cos, sin = abs(math.cos(angle)), abs(math.sin(angle))
+    across = (cos * width + sin * height + NEARBY_MM) / 2
+    up = (sin * width + cos * height + NEARBY_MM) / 2
+    return x - across, y - up, x + across, y + up
+
+
+def _meet(a: _Box, b: _Box) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
