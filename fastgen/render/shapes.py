@@ -14,11 +14,15 @@ from fastgen.geometry.seals import nearest_gear, seal_charts
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
 from fastgen.light.sky_visibility import Sky
+from fastgen.light.surrounding_light import SurroundingLight
 from fastgen.render.gpu_mesh import GpuMesh, zone_rows, zone_table
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.zone_codes import SEAL_ZONE, SPREADER_ZONE
+
+_SURROUNDED = 16
+"""Containers between others whose light is cached."""
 
 _SEAL_ROWS = zone_rows(*seal_charts())
 
@@ -38,11 +42,17 @@ class Shapes:
         self._spreaders: ReleasingCache[GpuMesh] = ReleasingCache(64)
         self._seals: ReleasingCache[GpuMesh] = ReleasingCache(2)
         self._gear: RecentCache[NDArray[np.int64]] = RecentCache(2)
+        self._surrounded: RecentCache[NDArray[np.uint8]] = RecentCache(_SURROUNDED)
         self._zones: ReleasingCache[moderngl.Texture] = ReleasingCache(128)
         self._probe = SkyVisibilityProbe(ctx)
 
     def of(
-        self, prepared: PreparedScene, materials: SceneMaterials, lens: bool, light: Ambient
+        self,
+        prepared: PreparedScene,
+        materials: SceneMaterials,
+        lens: bool,
+        light: Ambient,
+        surroundings: SurroundingLight | None = None,
     ) -> tuple[GpuMesh, GpuMesh | None, tuple[LitMesh, ...]]:
         """Return the container and spreader of a scene, ready to be drawn.
 
@@ -51,6 +61,7 @@ class Shapes:
             materials: Its materials.
             lens: Whether the image has lens distortion.
             light: Light of the scene's environment.
+            surroundings: What other containers and the ground change in the light on the container.
 
         Returns:
             The container, the spreader or None, and the light at the vertices of each.
@@ -59,7 +70,12 @@ class Shapes:
         usual = prepared.usual_spreader
         sky = Sky(light, prepared.scene.environment.yaw_deg)
         below = self._probe.container_light(mesh.mesh, None if usual is None else usual.mesh, sky)
-        mesh.set_sky_visibility(below.values)
+        values = below.values
+        if surroundings is not None:
+            values = self._surrounded.get(
+                (below, surroundings), lambda: surroundings.applied(below.values, mesh.mesh)
+            )
+        mesh.set_sky_visibility(values)
         if shape is None or usual is None:
             return mesh, None, (below,)
         spreader = self._drawn_spreader(shape.drawn(lens))

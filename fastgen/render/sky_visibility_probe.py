@@ -53,7 +53,7 @@ Paints = tuple[tuple[float, float, float], ...]
 """Diffuse reflectance of each of mesh.MATERIALS."""
 
 _CAPACITY = 128
-_LIT_CAPACITY = 2  # a scene needs two, again for each camera
+_LIT_CAPACITY = 18  # a scene needs one per container and one for the spreader, for each camera
 
 
 def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:

@@ -83,6 +83,11 @@ class SceneMaterials:
         mirrored = np.array([[mean_specular_albedo(DIELECTRIC_F0, float(row[3]))] for row in base])
         return tuple(map(tuple, (mirrored + (1 - mirrored) * albedo).tolist()))
 
+    @property
+    def sheet(self) -> Color:
+        """Reflectance of the painted sheet."""
+        return self.reflectances[MATERIALS.index("paint_sheet")]
+
 
 def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, ArrayLike]:
     """Return the members of SCENE_BLOCK.

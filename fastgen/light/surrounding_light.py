@@ -1,0 +1,291 @@
+"""What the surroundings of a container change in its light: other containers and the ground.
+
+The light of a container in the open is known at its vertices (sky_visibility.py). Boxes around it
+and the ground change it smoothly, so factors on that light are computed at few points of its outer
+box, and interpolated. Containers count as boxes with one radiance per face. Form factors are exact
+for faces before the receiving plane; see ground_light.form_factors.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.geometry.mesh import Mesh
+from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
+from fastgen.light.ground_light import form_factors
+from fastgen.light.sky_visibility import sky_directions
+from fastgen.scene.boxes import OrientedBox
+
+_STEP_MM = 1000.0
+"""Largest distance between points on a face of the outer box."""
+
+_LIFT_MM = 5.0
+_MOST_HIDDEN = 0.97
+_GROUND_MM = (300.0, 900.0, 2700.0)
+"""Distances in front of a wall at which the ground is lit to represent what the wall sees."""
+
+_FACES = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
+"""Axis and direction of the faces of a box, in the order of all arrays here."""
+
+Array = NDArray[np.float64]
+
+
+class Paving(NamedTuple):
+    """The ground as a reflector: height of the plane in mm, and its linear albedo."""
+
+    height_mm: float
+    albedo: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class SurroundingLight:
+    """Change of the light on one container.
+
+    Attributes:
+        factor: float32 [P, 3], factor on the light without directional lights at each point.
+        open_bits: uint8 [P, DIRECTIONS / 8], directions of the container's frame that no other
+            container hides, packed by np.packbits.
+    """
+
+    factor: NDArray[np.float32]
+    open_bits: NDArray[np.uint8]
+
+    def applied(self, values: NDArray[np.uint8], mesh: Mesh) -> NDArray[np.uint8]:
+        """Return vertex bytes in these surroundings.
+
+        Args:
+            values: Vertex bytes [V, VERTEX_BYTES] of the container in the open, see
+                SkyVisibility.vertex_bytes.
+            mesh: Its mesh.
+        """
+        corner, weight = _lattice_places(mesh)
+        factor = np.zeros((len(values), 3), np.float32)
+        for points, share in zip(corner, weight, strict=True):
+            factor += share[:, None] * self.factor.take(points, axis=0)
+        found = values.copy()
+        found[:, 4:7] = np.minimum(values[:, 4:7] * factor + 0.5, 255)
+        nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
+        found[:, 8:] &= self.open_bits.take(nearest, axis=0)
+        return found
+
+
+def _counts(size_mm: Array) -> list[tuple[int, int]]:
+    """Return the points along the two other axes of each face of a box [3]."""
+    along = (np.ceil(size_mm / _STEP_MM).astype(int) + 1).tolist()
+    others = [[k for k in range(3) if k != axis] for axis, _ in _FACES]
+    return [(along[a], along[b]) for a, b in others]
+
+
+def _lattice(half_mm: Array) -> tuple[Array, Array]:
+    """Return the points [P, 3] on a box around the origin, and the normals [P, 3]."""
+    points, normals = [], []
+    for (axis, sign), counts in zip(_FACES, _counts(2 * half_mm), strict=True):
+        a, b = (k for k in range(3) if k != axis)
+        u, v = (
+            np.linspace(-0.98, 0.98, count) * half_mm[k]
+            for count, k in zip(counts, (a, b), strict=True)
+        )
+        face = np.zeros((counts[0] * counts[1], 3))
+        face[:, a], face[:, b] = (each.ravel() for each in np.meshgrid(u, v, indexing="ij"))
+        face[:, axis] = sign * (half_mm[axis] + _LIFT_MM)
+        normal = np.zeros(3)
+        normal[axis] = sign
+        points.append(face)
+        normals.append(np.broadcast_to(normal, face.shape))
+    return np.concatenate(points), np.concatenate(normals)
+
+
+@lru_cache(maxsize=32)
+def _lattice_places(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """Return the four points [4, V] around each vertex, and their bilinear weights [4, V]."""
+    low, high = (np.asarray(bound, np.float64) for bound in mesh.bounds_mm)
+    counts = _counts(high - low)
+    first = np.cumsum([0, *(a * b for a, b in counts)])
+    axis = np.abs(mesh.normals).argmax(axis=1)
+    row = np.arange(len(axis))
+    face = 2 * axis + (mesh.normals[row, axis] > 0)
+    corner = np.zeros((4, len(axis)), np.intp)
+    weight = np.zeros((4, len(axis)), np.float32)
+    share = (mesh.positions_mm - low) / (high - low)
+    for number, (a_count, b_count) in enumerate(counts):
+        chosen = np.flatnonzero(face == number)
+        a, b = (k for k in range(3) if k != number // 2)
+        x = share[chosen, a] * (a_count - 1)
+        y = share[chosen, b] * (b_count - 1)
+        i, j = x.astype(int).clip(0, a_count - 2), y.astype(int).clip(0, b_count - 2)
+        dx, dy = (x - i).clip(0, 1), (y - j).clip(0, 1)
+        for k, (p, q) in enumerate(((0, 0), (0, 1), (1, 0), (1, 1))):
+            corner[k, chosen] = first[number] + (i + p) * b_count + j + q
+            weight[k, chosen] = (dx if p else 1 - dx) * (dy if q else 1 - dy)
+    return corner, weight
+
+
+def surrounding_light(
+    boxes: Sequence[OrientedBox],
+    albedos: Sequence[tuple[float, float, float]],
+    bounds: Sequence[tuple[NDArray[np.floating], NDArray[np.floating]]],
+    light: Ambient,
+    yaw_deg: float,
+    paving: Paving | None,
+) -> list[SurroundingLight]:
+    """Return the change of the light on each container of a scene.
+
+    Args:
+        boxes: Outer boxes of the containers in the world.
+        albedos: Mean linear albedo of each.
+        bounds: Lowest and highest coordinates [3] of each container's mesh in its own frame.
+        light: The environment.
+        yaw_deg: Its rotation.
+        paving: The ground, None without one.
+    """
+    faces = [_Faces.of(box) for box in boxes]
+    radiance = [
+        _face_radiance(i, faces, boxes, light, yaw_deg) * np.array(albedo)
+        for i, albedo in enumerate(albedos)
+    ]
+    found = []
+    for i, box in enumerate(boxes):
+        low, high = (np.asarray(bound, np.float64) for bound in bounds[i])
+        local, normals = _lattice((high - low) / 2)
+        middle = (low + high) / 2 - (0, 0, box.half_mm[2])
+        points = box.center_mm + (local + middle) @ box.rotation.T
+        toward = normals @ box.rotation.T
+        others = [j for j in range(len(boxes)) if j != i]
+        hidden, bounced = _seen(
+            points, toward, [faces[j] for j in others], [radiance[j] for j in others]
+        )
+        whole = np.maximum(sky_irradiance(light, toward, yaw_deg), 1e-9)
+        factor = 1 - hidden[:, None] + bounced / whole
+        if paving is not None:
+            factor += _from_ground(points, toward, boxes, faces, light, yaw_deg, paving) / whole
+        bits = _open_bits(points, box, [boxes[j] for j in others])
+        found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits))
+    return found
+
+
+class _Faces(NamedTuple):
+    """The faces of a box: corners [6, 4, 3] counter-clockwise from outside, normals, middles."""
+
+    corners: Array
+    normals: Array
+    middles: Array
+
+    @staticmethod
+    def of(box: OrientedBox) -> "_Faces":
+        corners, normals = [], []
+        for axis, sign in _FACES:
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            if sign < 0:
+                a, b = b, a
+            face = np.zeros((4, 3))
+            face[:, axis] = sign
+            face[:, a], face[:, b] = (-1, 1, 1, -1), (-1, -1, 1, 1)
+            corners.append(box.center_mm + (face * box.half_mm) @ box.rotation.T)
+            normals.append(sign * box.axes[axis])
+        every = np.array(corners)
+        return _Faces(every, np.array(normals), every.mean(axis=1))
+
+
+def _seen(
+    points: Array, toward: Array, faces: Sequence[_Faces], radiance: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Return the share [P] of the hemispheres that boxes cover, and the light off them [P, 3]."""
+    hidden, bounced = np.zeros(len(points)), np.zeros((len(points), 3))
+    for each, shone in zip(faces, radiance, strict=True):
+        apart = each.corners[:, :, None] - points  # [6, 4, P, 3]
+        vectors = form_factors(apart.transpose(3, 1, 0, 2).reshape(3, 4, -1)).reshape(3, 6, -1)
+        factor = np.maximum(np.einsum("cfp,pc->fp", vectors, toward), 0.0)
+        factor[((points - each.middles[:, None]) * each.normals[:, None]).sum(axis=-1) <= 0] = 0.0
+        hidden += factor.sum(axis=0)
+        bounced += factor.T @ shone
+    scale = np.minimum(1.0, _MOST_HIDDEN / np.maximum(hidden, 1e-9))
+    return hidden * scale, bounced * scale[:, None]
+
+
+def _face_radiance(
+    number: int,
+    faces: Sequence[_Faces],
+    boxes: Sequence[OrientedBox],
+    light: Ambient,
+    yaw_deg: float,
+) -> Array:
+    """Return irradiance / pi [6, 3] in the middle of each face of a box between the others."""
+    own = faces[number]
+    start = own.middles + _LIFT_MM * own.normals
+    others = [each for j, each in enumerate(faces) if j != number]
+    dark = [np.zeros((6, 3))] * len(others)
+    hidden, _ = _seen(start, own.normals, others, dark)
+    found = sky_irradiance(light, own.normals, yaw_deg) * (1 - hidden[:, None])
+    return found + _from_lights(start, own.normals, boxes, light, yaw_deg)
+
+
+def _from_lights(
+    points: Array, normals: Array, boxes: Sequence[OrientedBox], light: Ambient, yaw_deg: float
+) -> Array:
+    """Return irradiance / pi [P, 3] from directional lights that no box hides."""
+    found = np.zeros((len(points), 3))
+    for each in light.lights:
+        toward = to_map_frame(each.direction, -yaw_deg)
+        lit = np.maximum(normals @ toward, 0.0)
+        for box in boxes:
+            lit = lit * ~_meets(points, toward[None], box)[:, 0]
+        found += lit[:, None] * np.array(each.light)
+    return found
+
+
+def _from_ground(
+    points: Array,
+    toward: Array,
+    boxes: Sequence[OrientedBox],
+    faces: Sequence[_Faces],
+    light: Ambient,
+    yaw_deg: float,
+    paving: Paving,
+) -> Array:
+    """Return the change of irradiance / pi [P, 3] as the ground replaces the HDRI's lower half."""
+    share = (1 - toward[:, 2]) / 2
+    up = np.array([0.0, 0.0, 1.0])
+    found = np.zeros((len(points), 3))
+    steps = np.array(_GROUND_MM)
+    height = np.maximum(points[:, 2] - paving.height_mm, 1.0)
+    # a wall sees the ground at about its own height away most
+    near = 1 / (1 + (np.log(height[:, None] / steps)) ** 2)
+    near /= near.sum(axis=1, keepdims=True)
+    for weight, step in zip(near.T, steps, strict=True):
+        at = points + step * toward * (1, 1, 0)
+        at[:, 2] = paving.height_mm + _LIFT_MM
+        normals = np.broadcast_to(up, at.shape)
+        hidden, _ = _seen(at, normals, faces, [np.zeros((6, 3))] * len(faces))
+        lit = sky_irradiance(light, normals, yaw_deg) * (1 - hidden[:, None])
+        lit = lit + _from_lights(at, normals, boxes, light, yaw_deg)
+        found += weight[:, None] * lit
+    below = sky_irradiance(light, -up[None], yaw_deg)
+    return share[:, None] * (np.array(paving.albedo) * found - below)
+
+
+def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -> NDArray[np.uint8]:
+    """Return the directions, in the frame of a box, that no other box hides; packed, [P, D / 8]."""
+    directions = sky_directions()
+    hidden = np.zeros((len(points), len(directions)), bool)
+    for other in others:
+        hidden |= _meets(points, directions @ box.rotation.T, other)
+    return np.packbits(~hidden, axis=1)
+
+
+def _meets(points: Array, toward: Array, box: OrientedBox) -> NDArray[np.bool_]:
+    """Return whether rays from P points in D directions meet a box, bool [P, D]."""
+    start = (points - box.center_mm) @ box.rotation
+    along = toward @ box.rotation
+    along = np.where(np.abs(along) < 1e-9, 1e-9, along)
+    near = np.full((len(points), len(toward)), 0.0)
+    far = np.full((len(points), len(toward)), np.inf)
+    for axis in range(3):
+        middle = -start[:, axis, None] / along[:, axis]
+        reach = box.half_mm[axis] / np.abs(along[:, axis])
+        near = np.maximum(near, middle - reach)
+        far = np.minimum(far, middle + reach)
+    return near < far

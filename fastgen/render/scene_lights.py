@@ -1,0 +1,93 @@
+"""Light of scenes: environments on the GPU, exposure, shadows, and what surroundings change."""
+
+from collections.abc import Callable, Mapping
+
+import moderngl
+
+from fastgen.camera.projection import View
+from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.light.environment import Ambient, EnvironmentLight
+from fastgen.light.exposure import metered_exposure
+from fastgen.light.surrounding_light import Paving, SurroundingLight, surrounding_light
+from fastgen.render.environment_textures import BackgroundTextures, GpuLight
+from fastgen.render.gl import GLContext
+from fastgen.render.recent_cache import RecentCache, ReleasingCache
+from fastgen.render.scene_resources import SceneResources
+from fastgen.render.settings import Quality
+from fastgen.render.shadows import Shadows
+from fastgen.scene import Camera, Scene
+
+Around = Mapping[PreparedScene, SurroundingLight]
+"""Change of the light on each container of a scene."""
+
+
+class SceneLights:
+    """Light of the scenes that were drawn last. Owned by the renderer, which releases it.
+
+    Args:
+        gl: Current context.
+        light: Returns the prefiltered environment of a name.
+        quality: Detail of shadows, and whether rays find indirect light.
+
+    Attributes:
+        shadows: Shadow maps of the directional lights.
+    """
+
+    def __init__(
+        self, gl: GLContext, light: Callable[[str], EnvironmentLight], quality: Quality
+    ) -> None:
+        self._gl = gl
+        self._light_of = light
+        self._traced = quality.traced
+        self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
+        self._backgrounds = BackgroundTextures(gl)
+        self._around: RecentCache[Around] = RecentCache(2)
+        self.shadows = Shadows(gl.ctx, quality.shadow_detail)
+
+    def of(self, environment: str) -> GpuLight:
+        """Return the light of an environment."""
+        return self._lights.get(
+            environment, lambda: GpuLight(self._gl, self._light_of(environment), self._traced)
+        )
+
+    def ambient(self, environment: str) -> Ambient:
+        """Return the light of an environment as the CPU uses it."""
+        return self.of(environment).ambient
+
+    def background(self, environment: str) -> moderngl.Texture:
+        """Return the background map of an environment."""
+        return self._backgrounds.get(self.of(environment))
+
+    def exposure(self, scene: Scene, camera: Camera, view: View) -> float:
+        """Return the factor on radiance, before the tone curve, that a camera applies."""
+        light, paint = self.ambient(scene.environment.name), scene.surface.paint.albedo
+        return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
+
+    def around(
+        self, prepared: PreparedScene, resources: Callable[[PreparedScene], SceneResources]
+    ) -> Around:
+        """Return what other containers and the ground change in the light of each container.
+
+        Args:
+            prepared: The scene.
+            resources: Returns what the renderer keeps for each container.
+        """
+
+        def found() -> Around:
+            scene, members, ground = prepared.scene, prepared.members, prepared.scene.ground
+            changes = surrounding_light(
+                [each.box for each in members],
+                [resources(each.prepared).materials.sheet for each in members],
+                [each.prepared.container.bounds_mm for each in members],
+                self.ambient(scene.environment.name),
+                scene.environment.yaw_deg,
+                Paving(ground.height_mm, ground.albedo) if ground else None,
+            )
+            return {each.prepared: one for each, one in zip(members, changes, strict=True)}
+
+        return self._around.get(prepared, found)
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        for item in (self._lights, self._backgrounds, self.shadows):
+            item.release()
