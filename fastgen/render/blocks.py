@@ -1,4 +1,4 @@
-"""Uniform blocks that the shaders read: one of the scene, one of the view, one of the damages.
+"""Uniform blocks that the shaders read: of the scene, the view, the damages and the ground.
 
 A shader declares a block with `#include "NAME.block"`.
 """
@@ -9,7 +9,7 @@ from fastgen.geometry.mesh import MATERIALS
 from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render.noise import NOISE_LEVELS
 from fastgen.render.uniforms import Block
-from fastgen.scene.limits import MAX_DAMAGES
+from fastgen.scene.limits import MAX_DAMAGES, MAX_NEIGHBOURS, MAX_PROPS
 
 SCENE_BLOCK = Block(
     "SceneBlock",
@@ -96,5 +96,43 @@ DAMAGE_BLOCK = Block(
     ),
 )
 
-BLOCKS: Mapping[str, Block] = {"scene": SCENE_BLOCK, "view": VIEW_BLOCK, "damage": DAMAGE_BLOCK}
+MAX_BOXES = 1 + MAX_NEIGHBOURS
+"""Containers around which the ground is drawn."""
+
+GROUND_BLOCK = Block(
+    "GroundBlock",
+    3,
+    (
+        # boxes of the containers, then from MAX_BOXES the props
+        ("vec4", "body_center", MAX_BOXES + MAX_PROPS),  # in m; cosine of its turn
+        ("vec4", "body_half", MAX_BOXES + MAX_PROPS),  # half of its size in m; sine of its turn
+        # albedo; for boxes the height in m of the gap below it, for cylinders a number above 1
+        ("vec4", "body_paint", MAX_BOXES + MAX_PROPS),
+        ("vec4", "face_radiance", 4 * MAX_BOXES),  # of the -x, +x, -y and +y side of each box
+        ("vec4", "grid_transform"),  # scale and offset from world m to the grid's coordinates
+        ("vec3", "ground_albedo"),
+        ("float", "ground_height_m"),
+        ("vec3", "line_albedo"),
+        ("float", "ground_reach_m"),
+        ("vec2", "line_direction"),
+        ("vec2", "ground_noise_mm"),
+        ("float", "line_spacing_mm"),
+        ("float", "ground_wear"),
+        # thresholds on uniform or normal noise
+        ("float", "line_threshold"),
+        ("float", "stain_threshold"),
+        ("float", "damp_threshold"),
+        ("float", "puddle_threshold"),
+        ("float", "slab_mm"),
+        ("int", "box_count"),
+        ("int", "prop_count"),
+    ),
+)
+
+BLOCKS: Mapping[str, Block] = {
+    "scene": SCENE_BLOCK,
+    "view": VIEW_BLOCK,
+    "damage": DAMAGE_BLOCK,
+    "ground": GROUND_BLOCK,
+}
 """The blocks by the name that shaders include."""

@@ -20,9 +20,16 @@ from fastgen.light import environment
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.render import glyph_runs, rust
+from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattice
-from fastgen.render.variant import LAYERS, PIXEL_TRAITS, ShaderVariant, listed_classes
+from fastgen.render.variant import (
+    GROUND_TRAITS,
+    LAYERS,
+    PIXEL_TRAITS,
+    ShaderVariant,
+    listed_classes,
+)
 from fastgen.render.zone_codes import (
     HOLE_ZONE,
     SEAL_ZONE,
@@ -71,6 +78,9 @@ steps are surfaces at a grazing angle, or two surfaces with a gap between them."
 _SKY_DEPTH = 1 - 2**-18
 """Clip-space depth of the background over w: below 1 because clipping may round, and behind
 everything nearer than 198 m."""
+
+GROUND_FADE_START = 0.5
+"""Share of the ground's reach at which it starts to fade into the panorama."""
 
 _SHADOW_TEXELS = 1.0
 """Least distance in texels between shadow lookups for the first directional light; closer lookups
@@ -168,6 +178,14 @@ def _environment(_: ShaderVariant) -> Defines:
     }
 
 
+def _ground(v: ShaderVariant) -> Defines:
+    return {
+        **{f"GROUND_{name.upper()}": int(name in v.ground) for name in GROUND_TRAITS},
+        "GROUND_FADE_START": GROUND_FADE_START,
+        "MAX_BOXES": MAX_BOXES,
+    }
+
+
 CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
     "variant": _variant,
     "pixel_list": _lists,
@@ -203,6 +221,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
         "HOLE_REACH": f"{damage_law.HOLE_REACH:g}",
     },
+    "ground": _ground,
     "inside": lambda _: {
         "INSIDE_LIGHT": _INSIDE_LIGHT,
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},

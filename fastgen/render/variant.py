@@ -25,6 +25,10 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
 surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block.
 Each class has its list, see classify.comp."""
 
+GROUND_TRAITS = ("asphalt", "concrete", "paving", "wet", "fades", "props")
+"""Traits of the ground's programs: the kind of ground, and whether a program draws wet ground, the
+fade into the panorama, and props."""
+
 PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
 
@@ -44,6 +48,7 @@ class ShaderVariant:
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
         over: Draw over an image that already shows what lies behind, not over the sky.
+        ground: Those of GROUND_TRAITS that a program of the ground has.
     """
 
     samples_per_axis: int = 1
@@ -57,6 +62,7 @@ class ShaderVariant:
     radiance: bool = False
     without: tuple[str, ...] = ()
     over: bool = False
+    ground: tuple[str, ...] = ()
 
     @property
     def traits(self) -> tuple[str, ...]:

@@ -1,0 +1,88 @@
+"""Values of the ground's uniform block: containers as boxes, props, and the look of the plane."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fastgen.geometry.prepared_scene import Member
+from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
+from fastgen.render.blocks import MAX_BOXES
+from fastgen.scene import Ground, Prop
+from fastgen.scene.boxes import OrientedBox, rotation_of
+from fastgen.scene.limits import MM
+
+_STAINED = 0.045
+"""Share of the ground under stains of oil at full wear."""
+
+_NO_GAP_M = 1e6
+"""Height of a gap below a box for which the grid of light is fine enough."""
+
+_LEAST_GAP_M = 1e-3
+
+
+def prop_box(prop: Prop) -> OrientedBox:
+    """Return the box around a prop."""
+    center, half = np.array(prop.pose.position_mm), np.array(prop.size_mm) / 2
+    return OrientedBox(center, half, rotation_of(prop.pose))
+
+
+def ground_values(
+    ground: Ground, members: Sequence[Member], props: Sequence[Prop], light: GroundLight
+) -> Mapping[str, ArrayLike]:
+    """Return the members of GROUND_BLOCK.
+
+    Args:
+        ground: The plane.
+        members: Containers of the scene that are present.
+        props: Props of the scene.
+        light: Light on the plane around `members`.
+    """
+    bodies = [member.box for member in members] + [prop_box(prop) for prop in props]
+    rows = np.zeros((3, MAX_BOXES + len(props), 4))
+    places = [*range(len(members)), *range(MAX_BOXES, MAX_BOXES + len(props))]
+    for place, body in zip(places, bodies, strict=True):
+        rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
+        rows[1, place] = *body.half_mm * MM, body.rotation[1, 0]
+    for place, member in enumerate(members):
+        rows[2, place, :3] = member.prepared.scene.surface.paint.albedo
+        center, half = member.box.center_mm[2] * MM, member.box.half_mm[2] * MM
+        gap = center - half - ground.height_mm * MM
+        rows[2, place, 3] = max(gap, _LEAST_GAP_M) if gap < LOW_GAP_M else _NO_GAP_M
+    for place, prop in enumerate(props, MAX_BOXES):
+        rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
+    scale = 1 / (light.step_m * GRID)
+    yaw = np.deg2rad(ground.line_yaw_deg)
+    wet = ground.wetness
+    return {
+        "body_center": rows[0],
+        "body_half": rows[1],
+        "body_paint": rows[2],
+        "face_radiance": np.insert(light.face_radiance.reshape(-1, 3), 3, 0.0, axis=1),
+        "grid_transform": (*scale, *(0.5 / np.array(GRID) - light.low_m * scale)),
+        "ground_albedo": ground.albedo,
+        "ground_height_m": ground.height_mm * MM,
+        "line_albedo": ground.line_albedo,
+        "ground_reach_m": ground.reach_mm * MM,
+        "line_direction": (np.cos(yaw), np.sin(yaw)),
+        "ground_noise_mm": ground.noise_offset_mm,
+        "line_spacing_mm": ground.line_spacing_mm,
+        "ground_wear": ground.wear,
+        # thresholds just outside of 0..1 leave nothing or everything however blurred
+        "line_threshold": 1.3 - 1.6 * ground.lines if ground.lines else 9.0,
+        "stain_threshold": _normal_threshold(_STAINED * ground.wear),
+        "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
+        "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
+        "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
+        "box_count": len(members),
+        "prop_count": len(props),
+    }
+
+
+def _normal_threshold(share: float) -> float:
+    """Return the deviation from the mean that a share of a normal distribution exceeds.
+
+    Abramowitz and Stegun 1964, 26.2.22, for shares up to a half.
+    """
+    t = np.sqrt(-2 * np.log(max(share, 1e-6)))
+    return float(t - (2.30753 + 0.27061 * t) / (1 + t * (0.99229 + 0.04481 * t)))

@@ -1,0 +1,49 @@
+// vec4 ground_ambient(vec2 at_m): irradiance / pi of sky and containers on the ground, and the share of
+// an even sky that is seen there. See fastgen/light/ground_light.py.
+// float below_boxes(vec3 at): share of that light which reaches below containers with a low gap.
+// vec3 ground_lights(vec3 at, vec3 normal, float blur_m): irradiance / pi of the directional lights.
+
+#include "ground.constants"
+#include "ground.block"
+#include "variant.constants"
+#include "view.block"
+#include "ground_bodies.glsl"
+
+uniform sampler2D ground_grid;
+
+vec4 ground_ambient(vec2 at_m) {
+    return textureLod(ground_grid, fma(at_m, grid_transform.xy, grid_transform.zw), 0.0);
+}
+
+// A gap of height h that is open along one straight edge shows a point at depth d below the box the
+// share 1 - d / sqrt(d^2 + h^2) of what is seen at the edge.
+float below_boxes(vec3 at) {
+    float open = 1.0;
+    for (int i = 0; i < box_count; ++i) {
+        vec2 inside = body_half[i].xy - abs(in_body(at - body_center[i].xyz, i).xy);
+        float depth = max(min(inside.x, inside.y), 0.0), gap = body_paint[i].w;
+        open *= 1.0 - depth * inversesqrt(fma(depth, depth, gap * gap));
+    }
+    return open;
+}
+
+// blur_m: Radius over which the shadows of containers are filtered.
+vec3 ground_lights(vec3 at, vec3 normal, float blur_m) {
+    vec3 sum = vec3(0.0);
+#if LIGHTS > 0
+    for (int i = 0; i < min(LIGHTS, light_count); ++i) {
+        vec4 light = light_direction[i];
+        float hidden = 0.0;
+        for (int k = 0; k < box_count; ++k)
+            hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+#if GROUND_PROPS
+        if (i == 0)   // The other lights are too faint for the shadows of props.
+            for (int k = MAX_BOXES; k < MAX_BOXES + prop_count; ++k)
+                hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+#endif
+        float facing = max(dot(normal, light.xyz), 0.0) * max(1.0 - hidden, 0.0);
+        sum += light_irradiance[i].rgb * facing;
+    }
+#endif
+    return sum;
+}
