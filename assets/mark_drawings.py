@@ -31,13 +31,12 @@ def environmentally_hazardous() -> str:
 
 
 def elevated_temperature() -> str:
-    """White panel with a red triangle around a thermometer."""
-    body = rect(0, 0, 1000, 880, WHITE)
-    body += line("M500 90 L930 820 H70 Z", RED, 56, "stroke-linejoin='round'")
+    """Triangle with a red border around a thermometer; it fills the drawing."""
+    body = path("M500 0 L1000 866 H0 Z", RED) + path("M500 124 L893 804 H107 Z", WHITE)
     body += f'<circle cx="500" cy="690" r="68" fill="{RED}"/>' + rect(478, 390, 44, 300, RED)
     body += line("M440 650 V360 A60 60 0 0 1 560 360 V650", RED, 18)
     ticks = "".join(f"M580 {y} h60 " for y in (400, 460, 520, 580))
-    return svg(1000, 880, body + line(ticks, RED, 18))
+    return svg(1000, 866, body + line(ticks, RED, 18))
 
 
 def fumigation_warning() -> str:
@@ -81,8 +80,8 @@ MARKS = {
     # name: (drawing, (width, height) in mm, faces; none stands for those with markers)
     "limited_quantity": (limited_quantity(), (354, 354), []),
     "environmentally_hazardous": (environmentally_hazardous(), (354, 354), []),
-    "elevated_temperature": (elevated_temperature(), (290, 255), []),
+    "elevated_temperature": (elevated_temperature(), (250, 217), []),
     "fumigation_warning": (fumigation_warning(), (400, 300), ["door"]),
     "lithium_battery": (lithium_battery(), (200, 200), []),
 }
-"""Smallest sizes are those of the code on containers; diamonds have sides of 250 mm."""
+"""Smallest sizes are those of the code on containers; sides of diamonds and triangle are 250 mm."""

@@ -27,6 +27,12 @@ float inside_box(vec2 p, vec2 half_size) {
     return min(d.x, d.y);
 }
 
+// Distance in mm to the nearest side of the triangle on the lower side of a box, positive inside.
+float inside_triangle(vec2 p, vec2 half_size) {
+    vec2 side = vec2(2.0 * half_size.y, half_size.x);   // Normal of the right side.
+    return min(half_size.y + p.y, dot(side, vec2(-abs(p.x), half_size.y - p.y)) / length(side));
+}
+
 // Ink coverage of one glyph at d mm from its centre. The distance field gives sharp outlines nearby
 // (Green 2007, Improved Alpha-Tested Magnification for Vector Textures and Special Effects). Averaged
 // distances lose or gain ink once the footprint nears the width of a stroke, so mip-mapped coverage
@@ -86,7 +92,7 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
     vec4 kind = decal_texel(decal, 3);
     float inside_mm = kind.x == DECAL_MARKER
         ? (place.z - abs(p.x) - abs(p.y)) * 0.70710678
-        : inside_box(p, place.zw);
+        : kind.x == DECAL_TRIANGLE ? inside_triangle(p, place.zw) : inside_box(p, place.zw);
     if (inside_mm < -footprint_mm) return;
     vec4 ink = decal_texel(decal, 2);
     float alpha = clamp(0.5 + inside_mm / footprint_mm, 0.0, 1.0);
@@ -102,7 +108,7 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
         // Half a level finer, because trilinear filtering widens the footprint by about as much.
         float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
         vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
-        if (kind.x != DECAL_MARKER) alpha *= texel.a;
+        if (kind.x == DECAL_STICKER || kind.x == DECAL_EMBLEM) alpha *= texel.a;
         if (kind.x != DECAL_EMBLEM) {
             float tear_mm = inside_tear(p, place.zw, decal_texel(decal, 4), coarse);
             vec4 aged = worn_art(srgb_decode(texel.rgb), ink.rgb, ink.a, kind.w, coarse, streaks);
@@ -111,7 +117,7 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
         }
     }
     // Painted decals wear off in flakes.
-    if (kind.x != DECAL_MARKER && kind.x != DECAL_STICKER)
+    if (kind.x != DECAL_MARKER && kind.x != DECAL_STICKER && kind.x != DECAL_TRIANGLE)
         alpha *= 1.0 - ink.a * covered(coarse.value.w, 0.6, coarse.lost.w, 0.15);
     hit.albedo = mix(hit.albedo, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);

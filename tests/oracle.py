@@ -172,7 +172,7 @@ def _between(corners: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 
 def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
-    """Return whether sheet points [..., 2] lie in the decal's diamond or rectangle, bool [...]."""
+    """Return whether sheet points [..., 2] lie in the decal's outline, bool [...]."""
     angle = np.deg2rad(decal.rotation_deg)
     offset = sheet_mm - np.array(decal.center_mm)
     x = offset @ np.array([np.cos(angle), np.sin(angle)])
@@ -180,6 +180,10 @@ def inside(decal: Decal, sheet_mm: np.ndarray) -> np.ndarray:
     half_width, half_height = np.array(decal.size_mm) / 2
     if decal.kind == "marker":
         within: np.ndarray = np.abs(x) / half_width + np.abs(y) / half_height <= 1
+    elif decal.kind == "triangle":
+        # the width shrinks evenly from the lower side to the tip
+        left = (half_height - y) / (2 * half_height)
+        within = (y >= -half_height) & (np.abs(x) <= left * half_width)
     else:
         within = (np.abs(x) <= half_width) & (np.abs(y) <= half_height)
     return within

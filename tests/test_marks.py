@@ -18,8 +18,10 @@ from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
 from fastgen.decals.artwork import stickers
 from fastgen.generator import Generator
+from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import decal_of
 from fastgen.render.settings import RenderSettings
+from tests import oracle
 
 SHARE = 0.7
 MARKED = Config.from_values({"markings": {"marks": dict.fromkeys(MARK_CLASSES, SHARE)}})
@@ -63,7 +65,7 @@ def test_marks_have_at_least_the_size_that_the_code_requires():
         if decal.art in ("limited_quantity", "environmentally_hazardous"):
             assert width / math.sqrt(2) >= 250  # IMDG Code 3.4.5.5.4, 5.3.2.3.2
         elif decal.art == "elevated_temperature":
-            assert 0.86 * width >= 248  # side of the triangle in the drawing; 5.3.2.2.1
+            assert min(width, math.hypot(width / 2, height)) >= 250  # sides; 5.3.2.2.1
         elif decal.art == "fumigation_warning":
             assert width >= 400  # 5.5.2.3.2
             assert height >= 300
@@ -99,6 +101,33 @@ def test_labels_of_marks_cover_the_pixels_that_they_change(generators):
                 assert (changed & mask).sum() > 0.6 * mask.sum()
                 seen.add(thing.class_name)
     assert seen == set(MARK_CLASSES)
+
+
+def test_the_label_of_the_triangle_bounds_the_triangle_and_not_its_rectangle(generators):
+    generator = generators(MARKED, seed=8, size=(480, 480))
+    seen = 0
+    for index in range(14):
+        scene = replace(generator.scene(index), damages=())
+        mine = [d for d in scene.decals if d.class_name == "elevated_temperature"]
+        for camera in ("Cl", "Cr") if mine else ():
+            sample = generator.render(scene=scene, camera=camera)
+            mesh = SHAPES.container(scene.container.kind, scene.container.profiles)
+            expected = oracle.object_ids(scene, mesh, oracle.cast(mesh, sample.view, scene))
+            for thing in (t for t in sample.objects if t.class_name == "elevated_temperature"):
+                if thing.area < 60 or thing.occluded or thing.truncated:
+                    continue
+                true, mask = expected == thing.id, sample.ids == thing.id
+                assert (true != mask).sum() <= max(0.03 * mask.sum(), 2)
+                ys, xs = np.nonzero(true)
+                np.testing.assert_allclose(
+                    thing.bbox, (xs.min(), ys.min(), xs.max() + 1, ys.max() + 1), atol=1
+                )
+                outline = np.array(thing.polygon, np.float32).reshape(-1, 2)
+                assert cv2.contourArea(outline) == pytest.approx(mask.sum(), rel=0.15)
+                x0, y0, x1, y1 = thing.amodal_bbox
+                assert mask.sum() < 0.62 * (x1 - x0) * (y1 - y0)
+                seen += 1
+    assert seen > 5
 
 
 @pytest.fixture(scope="module")

@@ -26,6 +26,9 @@ CELL_SLOTS = MOST_NEARBY
 GLYPH_COLUMNS = 256
 """Width of the glyph table."""
 
+_PAPER = ("marker", "sticker", "triangle")
+"""Kinds of decals that are tinted; all others have a colour."""
+
 MARGIN_MM = 26.0
 """Margin around a decal within which antialiasing blends its edge.
 
@@ -91,7 +94,7 @@ def pack_decals(
     letters = 0
     for row, decal, object_id in zip(table, decals, ids, strict=False):
         kind = decal.art if decal.art in COMPUTED_ART else decal.kind
-        row[2] = *(decal.tint if kind in ("marker", "sticker") else decal.albedo), decal.wear
+        row[2] = *(decal.tint if kind in _PAPER else decal.albedo), decal.wear
         row[3] = DECAL_KINDS[kind], object_id, art_layers.get(decal.art, 0), decal.fade
         row[4] = decal.torn
         if decal.kind == "text":

@@ -12,8 +12,12 @@ from fastgen.sampling.streams import Streams
 from fastgen.scene import Decal
 from fastgen.validation import Range
 
-_DIAMONDS = ("limited_quantity", "environmentally_hazardous")
-"""Marks that are squares standing on a corner, like markers."""
+_KINDS = {
+    "limited_quantity": "marker",
+    "environmentally_hazardous": "marker",
+    "elevated_temperature": "triangle",
+}
+"""Kind of decal of each mark that is no rectangle."""
 
 _SCALES = Range(1.0, 1.25)
 """Sizes of marks relative to the smallest that the code allows."""
@@ -47,6 +51,6 @@ def _placed(
     wear = round(config.marker_wear.draw(rng), 3)
     if center is None:
         return []
-    kind = "marker" if mark.name in _DIAMONDS else "sticker"
+    kind = _KINDS.get(mark.name, "sticker")
     size = (width, height)
     return [Decal(kind, mark.name, sheet.face, center, size, tilt_deg, mark.name, wear=wear)]

@@ -117,7 +117,7 @@ def sample_runs(
 
 
 def _sheds_water(decal: Decal) -> bool:
-    drawn = decal.kind in ("marker", "sticker") and decal.art not in COMPUTED_ART
+    drawn = decal.kind in ("marker", "sticker", "triangle") and decal.art not in COMPUTED_ART
     return drawn and not decal.art.startswith(_FITTINGS)
 
 

@@ -31,7 +31,7 @@ _DIVISORS = {"dented": (0, 3, 5), "perforation": (0,)}
 _FARTHEST_MM = (FAR_M - 20.0) / MM
 """Largest distance of a camera from the container: the whole container is before the far plane."""
 
-_ART_KINDS = ("marker", "sticker", "emblem")
+_ART_KINDS = ("marker", "sticker", "triangle", "emblem")
 
 
 def check_scene(scene: Any) -> Scene:

@@ -54,12 +54,13 @@ class Decal:
     """One thing printed or stuck on the sheet.
 
     Attributes:
-        kind: 'marker', 'text', 'sticker' or 'emblem'.
+        kind: 'marker', 'text', 'sticker', 'triangle' or 'emblem'.
         class_name: Label class; '' for decals without a label.
         face: Face that it lies on.
         center_mm: Centre in sheet coordinates.
         size_mm: Width and height of the drawn rectangle before its rotation. For a marker this is
-            the square that stands on its corner, for a text the tight box around its ink.
+            the square that stands on its corner, for a text the tight box around its ink. A
+            triangle has its tip in the middle of the upper side.
         rotation_deg: Counter-clockwise rotation on the sheet.
         art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes,
             'patch' for a repainted rectangle.
@@ -74,8 +75,8 @@ class Decal:
         wear: Wear of the print. Texts, emblems, stripes and patches lose this share of their ink
             in flakes.
             Markers and stickers are scratched and dirty, and peel off in patches.
-        tint: Linear color that multiplies the artwork of markers and stickers.
-        fade: Bleaching of markers and stickers.
+        tint: Linear color that multiplies the artwork of markers, stickers and triangles.
+        fade: Bleaching of markers, stickers and triangles.
         torn: Shares of the half width and half height that are torn off a marker or sticker at its
             left, right, top and bottom. The label keeps the whole decal.
     """

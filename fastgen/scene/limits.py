@@ -41,7 +41,10 @@ GLYPH_RANGE = 4096
 """Upper limit of the letters in a text, exclusive. Two letter numbers a and b are stored as
 a * GLYPH_RANGE + b, which stays below 2^24 and is therefore exact in float32."""
 
-DECAL_KINDS = {"marker": 0, "text": 1, "sticker": 2, "emblem": 3, "stripes": 4, "patch": 5}
+DECAL_KINDS = {
+    **{"marker": 0, "text": 1, "sticker": 2, "emblem": 3},
+    **{"stripes": 4, "patch": 5, "triangle": 6},
+}
 """Number of each decal kind in the shaders."""
 
 COMPUTED_ART = ("stripes", "patch")
