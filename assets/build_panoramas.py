@@ -140,7 +140,9 @@ def write_index(folder: Path) -> None:
         file = f"{v.name}.exr"
         if not (folder / file).exists():
             continue
+        lux = {key: value for key, value in index.get(v.name, {}).items() if key == "lux"}
         index[v.name] = {
+            **lux,
             "file": file,
             "kind": list(v.kind),
             "licence": "Apache-2.0",

@@ -105,7 +105,7 @@ class Drawer:
 
     def exposure(self, case: Case, scene: Scene) -> float:
         """Return the exposure of the case's camera."""
-        return self._session.renderer().exposure(scene, scene.camera(case.camera), SIZE)
+        return self._session.renderer().exposure(scene, scene.camera(case.camera), SIZE).factor
 
 
 @dataclass(frozen=True, eq=False)

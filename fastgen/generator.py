@@ -181,8 +181,9 @@ class Generator:
             radiance = modelled and needs_radiance(camera, scene.weather)
             frame = renderer.render(prepared, camera, self.size, layer, radiance, normals)
             if modelled:
-                airlight = self._airlight(renderer, scene, camera)
-                image = apply_camera_model(frame, view, camera, scene.weather, airlight)
+                exposure = renderer.exposure(scene, camera, self.size)
+                airlight = self._airlight(renderer, scene, exposure.factor)
+                image = apply_camera_model(frame, view, camera, scene.weather, airlight, exposure)
                 frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)
         objects = label(Shot(frame, prepared, view, config))
@@ -199,12 +200,12 @@ class Generator:
             normals=frame.normals,
         )
 
-    def _airlight(self, renderer: Renderer, scene: Scene, camera: Camera) -> Color:
+    def _airlight(self, renderer: Renderer, scene: Scene, exposure: float) -> Color:
         """Return the exposed radiance of fog and rain: the mean of the light from all around."""
         light = renderer.ambient(scene.environment.name)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
-        mean = mean * renderer.exposure(scene, camera, self.size)
+        mean = mean * exposure
         red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
         return red, green, blue
 
@@ -255,7 +256,8 @@ class Generator:
         """Return the factor on linear radiance that a camera applies before the tone curve."""
         with self.gpu.drawing() as renderer:
             checked = self._prepared(scene).scene
-            return renderer.exposure(checked, check_camera(camera, checked.container), self.size)
+            camera = check_camera(camera, checked.container)
+            return renderer.exposure(checked, camera, self.size).factor
 
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
         """Prepare every light, shape and program that scenes may need.

@@ -168,7 +168,7 @@ def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     sample = generator.render(scene=scene, camera=camera)
     clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
     with generator.gpu.drawing() as renderer:
-        air = np.array(generator._airlight(renderer, scene, camera))
+        air = np.array(generator._airlight(renderer, scene, generator.exposure(scene, camera)))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
     away = np.minimum(sample.depth / (rays @ forward), 300)

@@ -55,6 +55,23 @@ CHOSEN = {
     "warehouse": (PMNDRS, "warehouse", ("industrial", "interior")),
     "workshop": (PMNDRS, "workshop", ("industrial", "interior")),
 }
+LUX = {
+    "city": 30000,
+    "courtyard": 20000,
+    "forest": 10000,
+    "night": 15,
+    "sunrise": 11000,
+    "sunset": 400,
+    "dawn": 400,
+    "forest_2": 5000,
+    "night_2": 15,
+    "park": 15000,
+    "sky": 86000,
+    "sunset_2": 400,
+    "venice": 2000,
+}
+"""Estimated illuminance of level ground, where the kind's is a poor estimate; see SOURCES.md."""
+
 _HALF_MAX = 65504.0
 _NOISE = 0.01  # compression alone gives values down to a few thousandths below 0
 _DWA_LEVEL = 20.0  # the default of 45 shows blocks in night skies
@@ -136,6 +153,7 @@ def collect(wheel: Path, tarball: Path, out: Path) -> None:
                 "kind": list(kinds),
                 "licence": LICENCE,
                 "source": f"{package[0]}: {member}",
+                **({"lux": LUX[name]} if name in LUX else {}),
             }
     (out / "index.json").write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8")
 

@@ -37,15 +37,17 @@ def vignette(size: tuple[int, int], corner_loss: float) -> Light:
     return np.asarray(((1 + steep * square) ** -2)[..., None], np.float32)
 
 
-def noisy(light: Light, noise: Noise) -> Light:
+def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
     """Return light with shot noise and read noise.
+
+    Light of 1 is the full well divided by the gain, in electrons.
 
     EMVA 1288 release 4.0, section 2.2: sigma^2 = sigma_d^2 + mu electrons. A normal distribution
     approximates the Poisson distribution of the electron count, which is close above ten electrons.
     The channels of a pixel are independent; demosaicing is not modelled.
     """
     rng = np.random.Generator(np.random.SFC64(noise.seed))
-    well = np.float32(noise.full_well_e)
+    well = np.float32(noise.full_well_e / gain)
     variance = np.maximum(light, 0) * well + np.float32(noise.read_noise_e**2)
     spread = np.sqrt(variance, out=variance)
     spread *= rng.standard_normal(light.shape, np.float32)
@@ -54,17 +56,21 @@ def noisy(light: Light, noise: Noise) -> Light:
     return np.asarray(spread, np.float32)
 
 
-def with_chroma_noise(image: NDArray[np.uint8], noise: ChromaNoise) -> NDArray[np.uint8]:
+def with_chroma_noise(
+    image: NDArray[np.uint8], noise: ChromaNoise, gain: float = 1.0
+) -> NDArray[np.uint8]:
     """Return the image [H, W, 3] with blotches of colour.
 
     Cb and Cr change independently and the luma stays, except where a channel clips. The strength is
-    the same at all levels of light, because encoding makes shot noise nearly uniform.
+    the same at all levels of light, because encoding makes shot noise nearly uniform. It grows with
+    the square root of the gain, as shot noise does.
     """
     rng = np.random.Generator(np.random.SFC64(noise.seed))
     height, width = image.shape[:2]
     rows, columns = (max(round(n / noise.scale_px), 1) + 1 for n in (height, width))
     # bilinear interpolation leaves 2/3 of the standard deviation on average over a cell
-    codes = 255 * 1.5 * noise.strength * rng.standard_normal((rows, columns, 2), np.float32)
+    deviation = 255 * 1.5 * noise.strength * gain**0.5
+    codes = deviation * rng.standard_normal((rows, columns, 2), np.float32)
     coarse = np.asarray(codes @ _CHROMA_TO_RGB.T.astype(np.float32), np.float32)
     blotches = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
     return np.asarray(cv2.add(image, blotches, dtype=cv2.CV_8U), np.uint8)

@@ -21,6 +21,7 @@ from fastgen.camera.electronics import (
     vignette,
     with_chroma_noise,
 )
+from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View
 from fastgen.camera.response import respond
 from fastgen.camera.tone_curve import Light, tone_map_and_encode
@@ -28,6 +29,11 @@ from fastgen.camera.weather import add_fog, add_rain
 from fastgen.frame import Frame
 from fastgen.scene import Camera, Color
 from fastgen.scene.optics import Sensor, Weather
+
+_UNMETERED = Exposure(1.0)
+
+_METER_STEP = 8
+"""Distance in pixels between the pixels in which a meter looks for highlights."""
 
 
 def is_needed(camera: Camera, weather: Weather) -> bool:
@@ -43,7 +49,12 @@ def needs_radiance(camera: Camera, weather: Weather) -> bool:
 
 
 def apply_camera_model(
-    frame: Frame, view: View, camera: Camera, weather: Weather, airlight: Color
+    frame: Frame,
+    view: View,
+    camera: Camera,
+    weather: Weather,
+    airlight: Color,
+    exposure: Exposure = _UNMETERED,
 ) -> NDArray[np.uint8]:
     """Return the image that a camera records of a rendered frame.
 
@@ -53,6 +64,7 @@ def apply_camera_model(
         camera: Its `sensor` holds the parameters of the model.
         weather: Fog and rain between the camera and the scene.
         airlight: Mean linear light of the sky in the exposure of the frame: colour of fog and rain.
+        exposure: Exposure of the frame, for cameras with a meter.
 
     Returns:
         uint8 [H, W, 3], sRGB.
@@ -63,11 +75,14 @@ def apply_camera_model(
         assert frame.radiance is not None, "render with radiance=True"
         sky = np.array(airlight, np.float32)
         light = _through_weather(frame.radiance, frame, view, weather, sky)
-        light = _recorded(light, frame, view, camera, sensor)
+        if sensor.meter:
+            times = _for_highlights(light, sensor)
+            light, exposure = light * np.float32(times), exposure.lowered(times)
+        light = _recorded(light, frame, view, camera, exposure)
         curve = sensor.response
         image = respond(light, curve) if curve else tone_map_and_encode(light)
     if sensor.chroma_noise:
-        image = with_chroma_noise(image, sensor.chroma_noise)
+        image = with_chroma_noise(image, sensor.chroma_noise, exposure.gain)
     if sensor.sharpening:
         image = sharpened(image, sensor.sharpening)
     if sensor.stamp:
@@ -90,18 +105,31 @@ def _through_weather(light: Light, frame: Frame, view: View, weather: Weather, s
     return light
 
 
-def _recorded(light: Light, frame: Frame, view: View, camera: Camera, sensor: Sensor) -> Light:
-    width, _ = view.size
+def _for_highlights(light: Light, sensor: Sensor) -> float:
+    """Return the factor, 0.5 to 1, that lets the meter's share of the pixels clip."""
+    assert sensor.meter is not None
+    some = light[::_METER_STEP, ::_METER_STEP].max(axis=2).ravel()
+    clipped = min(int(sensor.meter.highlights * some.size), some.size - 1)
+    brightest = np.partition(some, some.size - 1 - clipped)[some.size - 1 - clipped]
+    white = sensor.response.clip if sensor.response else 1.0
+    return min(max(white / max(float(brightest), white), 0.5), 1.0)
+
+
+def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: Exposure) -> Light:
+    sensor, (width, _) = camera.sensor or Sensor(), view.size
     if sensor.defocus:
         light = defocused(light, blur_radius_px(sensor.defocus, camera, width, frame.depth))
-    right, down = sensor.motion
+    right, down = (
+        moved + exposure.shutter_s * speed
+        for moved, speed in zip(sensor.motion, sensor.speed, strict=True)
+    )
     light = motion_blurred(light, (right * width, down * width))
     if sensor.vignetting:
         light = light * vignette(view.size, sensor.vignetting)
     if sensor.exposure_error_ev:
         light = light * np.float32(2.0**sensor.exposure_error_ev)
     if sensor.noise:
-        light = noisy(light, sensor.noise)
+        light = noisy(light, sensor.noise, exposure.gain)
     if sensor.gains != (1, 1, 1):
         planes = zip(cv2.split(light), sensor.gains, strict=True)
         light = np.asarray(cv2.merge([plane * np.float32(gain) for plane, gain in planes]))

@@ -24,7 +24,7 @@ from fastgen.config.surroundings import GroundConfig, PlacementConfig
 from fastgen.config.yaml_values import loaded
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
-from fastgen.scene.limits import GAP_LIMITS_MM, MIN_ROUGHNESS
+from fastgen.scene.limits import GAP_LIMITS_MM, ILLUMINANCE_LIMITS_LX, MIN_ROUGHNESS
 from fastgen.validation import (
     UNIT,
     Bounds,
@@ -176,10 +176,16 @@ class EnvironmentConfig:
             has the bundled ones. If the list is empty, all HDRIs of --hdri are used. Without
             --hdri these are the bundled ones except interiors, ports more often than others.
         yaw_deg: Rotation of the environment about the vertical.
+        illuminance_lx: Light on level ground under the sky of an HDRI, by its name, for cameras
+            with a meter (sensor.meter). Bundled HDRIs that are not listed have the estimates of
+            assets/hdri/index.json, and other HDRIs 10,000 lx, which is an overcast day.
     """
 
     names: tuple[str, ...] = ()
     yaw_deg: Annotated[Range, Bounds(-360.0, 360.0, "degrees")] = Range(0, 360)
+    illuminance_lx: dict[str, Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")]] = field(
+        default_factory=dict
+    )
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,8 @@ _OUTDOORS: dict[str, Any] = {
     "cameras": _LENSES,
     "sensor": {
         "defocus": {"probability": 0.15},
-        "motion": {"probability": 0.25},
+        "motion": {"probability": 0.5},
+        "meter": {"probability": 1.0},
         "vignetting": [0.0, 0.5],
         "exposure_error_ev": [-0.7, 0.7],
         "white_balance_ev": [-0.15, 0.15],

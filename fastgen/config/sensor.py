@@ -7,7 +7,14 @@ from annotated_types import MinLen
 
 from fastgen.errors import ConfigError
 from fastgen.scene.limits import CORNERS
-from fastgen.scene.optics import CLIP_LIMITS, CONTRAST_LIMITS, LENS_MODELS
+from fastgen.scene.optics import (
+    CLIP_LIMITS,
+    CONTRAST_LIMITS,
+    ISO_LIMITS,
+    LENS_MODELS,
+    SHUTTER_LIMITS_S,
+    SPEED_LIMIT,
+)
 from fastgen.validation import UNIT, Bounds, OneOf, Range, Share
 
 _ZERO = Range(0.0, 0.0)
@@ -57,8 +64,8 @@ class NoiseConfig:
 
     Attributes:
         probability: Probability that an image has noise.
-        full_well_e: Electrons of a white pixel, drawn log-uniformly. Pixels of small outdoor
-            cameras hold 5,000 to 20,000.
+        full_well_e: Electrons of a white pixel without gain, drawn log-uniformly. Pixels of small
+            outdoor cameras hold 5,000 to 20,000. The gain of a meter divides it.
         read_noise_e: Standard deviation without light.
     """
 
@@ -91,7 +98,8 @@ class ChromaNoiseConfig:
 
     Attributes:
         probability: Probability that an image has chroma noise.
-        strength: Standard deviation of Cb and Cr as a share of white.
+        strength: Standard deviation of Cb and Cr as a share of white, without gain. The gain of a
+            meter multiplies it by its square root.
         scale_px: Size of the blotches.
     """
 
@@ -155,11 +163,40 @@ class MotionConfig:
 
     Attributes:
         probability: Probability that an image has motion blur.
-        extent: Length of the motion as a share of the image width.
+        extent: Length of the motion as a share of the image width, for cameras without a meter.
+        speed: Speed of the motion in image widths per second, for cameras with a meter. Its shutter
+            time decides the length.
     """
 
     probability: Share = 0.0
     extent: Annotated[Range, Bounds(0.0, 0.2)] = Range(0.001, 0.012)
+    speed: Annotated[Range, Bounds(0.0, SPEED_LIMIT)] = Range(0.02, 0.3)
+
+
+@dataclass(frozen=True)
+class MeterConfig:
+    """Limits of automatic exposure, by which dim scenes become dark, noisy and blurred.
+
+    Without a meter, every scene is exposed to the same mean, however dark it is. The illuminance of
+    each HDRI is a key of `environment`.
+
+    Attributes:
+        probability: Probability that a camera has these limits.
+        f_number: F-number of the aperture, which is fixed.
+        longest_s: Longest time that the shutter is open.
+        largest_iso: Highest sensitivity, drawn log-uniformly; 100 is without gain.
+        dim_target: Linear value that the metered mean is exposed to at 10 lx and below. It rises to
+            0.18 at 1000 lx.
+        highlights: Share of the pixels that may clip. The exposure is lowered by up to one stop to
+            keep it; 1 for no lowering.
+    """
+
+    probability: Share = 0.0
+    f_number: Annotated[Range, Bounds(0.5, 64.0)] = Range(1.4, 2.8)
+    longest_s: Annotated[Range, Bounds(*SHUTTER_LIMITS_S, "s")] = Range(0.01, 0.04)
+    largest_iso: Annotated[Range, Bounds(*ISO_LIMITS)] = Range(800, 3200)
+    dim_target: Annotated[Range, Bounds(0.001, 0.18)] = Range(0.05, 0.08)
+    highlights: Annotated[Range, UNIT] = Range(0.01, 0.06)
 
 
 @dataclass(frozen=True)
@@ -175,6 +212,7 @@ class SensorConfig:
 
     defocus: DefocusConfig = field(default_factory=DefocusConfig)
     motion: MotionConfig = field(default_factory=MotionConfig)
+    meter: MeterConfig = field(default_factory=MeterConfig)
     vignetting: Annotated[Range, Bounds(0.0, 0.95)] = _ZERO
     exposure_error_ev: Annotated[Range, Bounds(-6.0, 6.0, "stops")] = _ZERO
     white_balance_ev: Annotated[Range, Bounds(-2.0, 2.0, "stops")] = _ZERO

@@ -2,21 +2,19 @@
 
 import numpy as np
 
+from fastgen.camera.exposure import MIDDLE_GREY, Exposure, limited_exposure
 from fastgen.camera.projection import View
 from fastgen.light.environment import Ambient, irradiance_at, metered_luminance
-from fastgen.scene import REC_709, Camera, Color
-
-MIDDLE_GREY = 0.18
-"""Reflectance that a meter exposes as a mid-tone (ISO 2720:1974 calibrates near 0.18)."""
+from fastgen.scene import REC_709, Camera, Color, EnvironmentView
 
 _CENTER_WEIGHT = 0.65
 _MIN_LUMINANCE = 1e-6
 
 
 def metered_exposure(
-    light: Ambient, yaw_deg: float, view: View, camera: Camera, paint: Color
-) -> float:
-    """Return the exposure: the factor on radiance that brings the metered mean to MIDDLE_GREY.
+    light: Ambient, environment: EnvironmentView, view: View, camera: Camera, paint: Color
+) -> Exposure:
+    """Return the exposure that brings the metered mean to MIDDLE_GREY, or to a meter's target.
 
     The metered mean is geometric: 65 % the container, 35 % the background in view. The container
     is taken as a plane that faces the camera squarely in azimuth: upright, or level if the camera
@@ -25,11 +23,12 @@ def metered_exposure(
 
     Args:
         light: Light of the environment.
-        yaw_deg: Counter-clockwise rotation of the environment about the vertical, seen from above.
+        environment: Rotation of the light, and its illuminance for cameras with a meter.
         view: Projection of the camera.
-        camera: Its `exposure_ev` is added in stops.
+        camera: Its `exposure_ev` is added in stops. The meter of its sensor limits the exposure.
         paint: Linear albedo of the container.
     """
+    yaw_deg = environment.yaw_deg
     forward = view.rotation[2]
     level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     steep = abs(forward[2]) > np.linalg.norm(forward * level)
@@ -41,4 +40,9 @@ def metered_exposure(
     center = max(reflectance * falling, _MIN_LUMINANCE)
     behind = max(behind, _MIN_LUMINANCE)
     metered = np.exp(_CENTER_WEIGHT * np.log(center) + (1 - _CENTER_WEIGHT) * np.log(behind))
-    return float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev)
+    meter = camera.sensor.meter if camera.sensor else None
+    if meter is None:
+        return Exposure(float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev))
+    up = float(irradiance_at(light, [[0, 0, 1]])[0] @ REC_709)
+    cd_m2 = environment.illuminance_lx / (np.pi * max(up, _MIN_LUMINANCE))
+    return limited_exposure(float(metered), cd_m2, meter, camera.exposure_ev)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fastgen.errors import AssetError
 from fastgen.resources import asset_path
+from fastgen.scene.limits import OVERCAST_LX
 
 HALF_MAX = 65504.0
 """Largest finite value of IEEE 754 binary16, the format of the maps on a GPU."""
@@ -72,6 +73,16 @@ def hdris_by_name(folder: str | Path) -> dict[str, Path]:
 
 _HOURS = {"dawn": (5, 7), "sunset": (17, 20), "dusk": (18, 21), "night": (21, 28)}
 _DAYTIME = (8, 17)
+_KIND_LX = {
+    "interior": 500.0,
+    "night": 20.0,
+    "dusk": 200.0,
+    "sunset": 5e3,
+    "overcast": OVERCAST_LX,
+    "dawn": 2e3,
+    "day": 5e4,
+}
+"""Illuminance of level ground by kind; the first that fits counts."""
 
 
 def bundled_hdris() -> dict[str, Path]:
@@ -104,6 +115,21 @@ def hours_of(name: str) -> tuple[int, int]:
         return 0, 24
     kinds = _index()[name]["kind"]
     return next((hours for kind, hours in _HOURS.items() if kind in kinds), _DAYTIME)
+
+
+@lru_cache
+def illuminance_of(name: str) -> float:
+    """Return the estimated light on level ground under an environment's open sky, in lux.
+
+    The index has an estimate for most bundled environments, see assets/hdri/SOURCES.md. Others have
+    that of their kind, and environments that are not bundled OVERCAST_LX.
+    """
+    if name not in _index():
+        return OVERCAST_LX
+    entry = _index()[name]
+    if "lux" in entry:
+        return float(entry["lux"])
+    return next((lux for kind, lux in _KIND_LX.items() if kind in entry["kind"]), OVERCAST_LX)
 
 
 def _index() -> dict[str, dict[str, Any]]:

@@ -14,6 +14,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
 from fastgen.decals.artwork import art_layers, art_levels, glyph_coverage, glyph_tiles
 from fastgen.frame import Frame
@@ -173,7 +174,7 @@ class Renderer:
         Containers do not overlap. Several are drawn over one another from back to front.
         """
         scene = prepared.scene
-        exposure = self._exposure(scene, camera, view)
+        exposure = self._exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)
         inputs = self._inputs(prepared, view, options)
@@ -359,14 +360,14 @@ class Renderer:
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )
 
-    def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> float:
-        """Return the factor on radiance, before the tone curve, that a camera applies."""
+    def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
+        """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
         return self._exposure(scene, camera, view_of(camera, size))
 
-    def _exposure(self, scene: Scene, camera: Camera, view: View) -> float:
+    def _exposure(self, scene: Scene, camera: Camera, view: View) -> Exposure:
         light = self.ambient(scene.environment.name)
         paint = scene.surface.paint.albedo
-        return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
+        return metered_exposure(light, scene.environment, view, camera, paint)
 
     def _resources(self, prepared: PreparedScene) -> SceneResources:
         return self._scenes.get(

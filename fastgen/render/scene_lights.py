@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 
 import moderngl
 
+from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
@@ -58,10 +59,10 @@ class SceneLights:
         """Return the background map of an environment."""
         return self._backgrounds.get(self.of(environment))
 
-    def exposure(self, scene: Scene, camera: Camera, view: View) -> float:
-        """Return the factor on radiance, before the tone curve, that a camera applies."""
+    def exposure(self, scene: Scene, camera: Camera, view: View) -> Exposure:
+        """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
         light, paint = self.ambient(scene.environment.name), scene.surface.paint.albedo
-        return metered_exposure(light, scene.environment.yaw_deg, view, camera, paint)
+        return metered_exposure(light, scene.environment, view, camera, paint)
 
     def around(
         self, prepared: PreparedScene, resources: Callable[[PreparedScene], SceneResources]

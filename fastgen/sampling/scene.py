@@ -18,7 +18,7 @@ from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.light.hdri import hours_of
+from fastgen.light.hdri import hours_of, illuminance_of
 from fastgen.sampling.damage import sample_damages
 from fastgen.sampling.markings import sample_decals
 from fastgen.sampling.runs import sample_runs
@@ -230,7 +230,9 @@ def _environment(
             )
     weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
     name = weighted_choice(streams("environment"), weights)
-    return EnvironmentView(name, config.environment.yaw_deg.draw(streams("environment.yaw")))
+    yaw_deg = config.environment.yaw_deg.draw(streams("environment.yaw"))
+    lx = config.environment.illuminance_lx.get(name, illuminance_of(name))
+    return EnvironmentView(name, yaw_deg, lx)
 
 
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:

@@ -7,6 +7,8 @@ import numpy as np
 from fastgen.config.sensor import (
     ChromaNoiseConfig,
     LensConfig,
+    MeterConfig,
+    MotionConfig,
     ResponseConfig,
     SensorConfig,
     SharpeningConfig,
@@ -17,6 +19,7 @@ from fastgen.scene.optics import (
     ChromaNoise,
     Defocus,
     Lens,
+    Meter,
     Noise,
     Rain,
     Response,
@@ -61,9 +64,11 @@ def sample_sensor(
     """
     if config == SensorConfig():  # Seeding the streams would take longer than all draws.
         return None
+    meter = _meter(config.meter, streams("meter"))
     sensor = Sensor(
         defocus=_defocus(config, distance_mm, streams("defocus")),
-        motion=_motion(config, streams("motion")),
+        meter=meter,
+        **_motion(config.motion, meter is not None, streams("motion")),
         vignetting=_drawn(streams("vignetting"), config.vignetting),
         exposure_error_ev=_drawn(streams("exposure"), config.exposure_error_ev),
         gains=_gains(config.white_balance_ev, streams("white balance")),
@@ -136,11 +141,28 @@ def _defocus(config: SensorConfig, distance_mm: float, rng: np.random.Generator)
     return Defocus(round(focus), _drawn(rng, config.defocus.f_number))
 
 
-def _motion(config: SensorConfig, rng: np.random.Generator) -> tuple[float, float]:
-    if rng.random() >= config.motion.probability:
-        return 0.0, 0.0
-    extent, angle = config.motion.extent.draw(rng), rng.uniform(0, 2 * np.pi)
-    return round(float(extent * np.cos(angle)), 6), round(float(extent * np.sin(angle)), 6)
+def _meter(config: MeterConfig, rng: np.random.Generator) -> Meter | None:
+    if rng.random() >= config.probability:
+        return None
+    return Meter(
+        f_number=_drawn(rng, config.f_number),
+        longest_s=float(f"{config.longest_s.draw(rng):.4g}"),
+        largest_iso=float(round(_log_uniform(rng, config.largest_iso))),
+        dim_target=_drawn(rng, config.dim_target),
+        highlights=_drawn(rng, config.highlights),
+    )
+
+
+def _motion(
+    config: MotionConfig, metered: bool, rng: np.random.Generator
+) -> dict[str, tuple[float, float]]:
+    """Return the speed of a camera with a meter, and the motion of one without."""
+    if rng.random() >= config.probability:
+        return {}
+    length = (config.speed if metered else config.extent).draw(rng)
+    angle = rng.uniform(0, 2 * np.pi)
+    right, down = (round(float(length * turn(angle)), 6) for turn in (np.cos, np.sin))
+    return {"speed" if metered else "motion": (right, down)}
 
 
 def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
@@ -151,9 +173,7 @@ def _gains(ev: Range, rng: np.random.Generator) -> tuple[float, float, float]:
 def _noise(config: SensorConfig, rng: np.random.Generator) -> Noise | None:
     if rng.random() >= config.noise.probability:
         return None
-    # Log-uniform: each doubling of the full well is equally likely.
-    low, high = np.log(config.noise.full_well_e)
-    full_well = round(float(np.exp(rng.uniform(low, high))))
+    full_well = round(_log_uniform(rng, config.noise.full_well_e))
     return Noise(full_well, _drawn(rng, config.noise.read_noise_e), _seed(rng))
 
 
@@ -190,6 +210,12 @@ def _stamp(config: SensorConfig, moment: datetime, rng: np.random.Generator) -> 
 
 def _drawn(rng: np.random.Generator, values: Range) -> float:
     return round(values.draw(rng), 4)
+
+
+def _log_uniform(rng: np.random.Generator, values: Range) -> float:
+    """Draw a value such that each doubling within the range is equally likely."""
+    low, high = np.log(values)
+    return float(np.exp(rng.uniform(low, high)))
 
 
 def _seed(rng: np.random.Generator) -> int:

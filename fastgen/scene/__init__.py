@@ -16,13 +16,26 @@ from fastgen.scene.data import (
     Spreader,
     Vec3,
 )
-from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.optics import (
+    ChromaNoise,
+    Defocus,
+    Lens,
+    Meter,
+    Noise,
+    Rain,
+    Response,
+    Sensor,
+    Sharpening,
+    Stamp,
+    Weather,
+)
 from fastgen.scene.surface import Ageing, Color, Dirt, Paint, Rust, Scratches, Surface, Vec2, Wear
 
 __all__ = [
     "REC_709",
     "Ageing",
     "Camera",
+    "ChromaNoise",
     "Color",
     "Container",
     "Damage",
@@ -32,17 +45,20 @@ __all__ = [
     "EnvironmentView",
     "Ground",
     "Lens",
+    "Meter",
     "Neighbour",
     "Noise",
     "Paint",
     "Pose",
     "Prop",
     "Rain",
+    "Response",
     "Rust",
     "Scene",
     "Scratches",
     "Seal",
     "Sensor",
+    "Sharpening",
     "Spreader",
     "Stamp",
     "Surface",

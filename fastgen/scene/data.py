@@ -27,11 +27,13 @@ from fastgen.scene.limits import (
     GAP_LIMITS_MM,
     GROUNDS,
     HASPS,
+    ILLUMINANCE_LIMITS_LX,
     LOWEST_GROUND_MM,
     MAX_DAMAGES,
     MAX_DECALS,
     MAX_NEIGHBOURS,
     MAX_PROPS,
+    OVERCAST_LX,
     WHOLE,
     Degrees,
     Millimetres,
@@ -273,10 +275,17 @@ class Ground:
 
 @dataclass(frozen=True)
 class EnvironmentView:
-    """HDRI that lights the scene, turned counter-clockwise about the vertical by `yaw_deg`."""
+    """HDRI that lights the scene.
+
+    Attributes:
+        name: Name of its file without extension.
+        yaw_deg: Counter-clockwise rotation about the vertical.
+        illuminance_lx: Light on level ground under an open sky; only cameras with a meter use it.
+    """
 
     name: str
     yaw_deg: Degrees
+    illuminance_lx: Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")] = OVERCAST_LX
 
 
 @dataclass(frozen=True)

@@ -70,6 +70,12 @@ Agopian 2018, Physically Based Rendering in Filament)."""
 CORNERS = tuple(f"{level} {side}" for level in ("top", "bottom") for side in ("left", "right"))
 """Corners of an image, for date stamps."""
 
+OVERCAST_LX = 1e4
+"""Illuminance of level ground on an overcast day, in lux."""
+
+ILLUMINANCE_LIMITS_LX = (1e-3, 2e5)
+"""Illuminance of level ground: from starlight to more than the sun in the zenith, in lux."""
+
 WHOLE = Bounds(0, 2**63 - 1)
 """Bounds of seeds and indices."""
 

@@ -17,6 +17,17 @@ CONTRAST_LIMITS = (0.8, 2.0)
 """Slope of a response curve at middle grey. Lower values would be too steep near black for the
 table that the curve is stored in."""
 
+SHUTTER_LIMITS_S = (1e-5, 0.5)
+"""Shortest and longest time that a shutter may be open."""
+
+ISO_LIMITS = (100.0, 1e6)
+"""Lowest and highest sensitivity of a sensor; the lowest is without gain."""
+
+SPEED_LIMIT = 2.0
+"""Fastest movement of an image in widths per second; at the longest shutter time it blurs over the
+whole width."""
+
+_Speed = Annotated[float, Bounds(-SPEED_LIMIT, SPEED_LIMIT)]
 _Move = Annotated[float, Bounds(-1.0, 1.0)]
 _Gain = Annotated[float, Bounds(0.0, 1000.0)]
 
@@ -53,7 +64,7 @@ class Noise:
     """Noise of a sensor, applied by camera/electronics.py.
 
     Attributes:
-        full_well_e: Electrons of a white pixel.
+        full_well_e: Electrons of a white pixel without gain.
         read_noise_e: Standard deviation without light, in electrons.
         seed: Seed of the noise of this image.
     """
@@ -109,7 +120,7 @@ class ChromaNoise:
     """Blotches of colour that denoising leaves, applied by camera/electronics.py.
 
     Attributes:
-        strength: Standard deviation of Cb and Cr (ITU-R BT.601), as a share of white.
+        strength: Standard deviation of Cb and Cr (ITU-R BT.601) without gain, as a share of white.
         scale_px: Size of the blotches in pixels.
         seed: Seed of the blotches of this image.
     """
@@ -133,12 +144,35 @@ class Sharpening:
 
 
 @dataclass(frozen=True)
+class Meter:
+    """Automatic exposure within the limits of a camera, applied by camera/exposure.py.
+
+    Attributes:
+        f_number: F-number of the aperture, which is fixed.
+        longest_s: Longest time that the shutter is open.
+        largest_iso: Highest sensitivity; 100 is the sensitivity without gain.
+        dim_target: Linear value that the metered mean is exposed to at 10 lx and below. It rises
+            to 0.18 at 1000 lx.
+        highlights: Share of the pixels that may clip. The exposure is lowered by up to one stop
+            to keep it; 1 for no lowering.
+    """
+
+    f_number: Annotated[float, Bounds(0.5, 64.0)]
+    longest_s: Annotated[float, Bounds(*SHUTTER_LIMITS_S, "s")]
+    largest_iso: Annotated[float, Bounds(*ISO_LIMITS)]
+    dim_target: Annotated[float, Bounds(0.001, 0.18)] = 0.18
+    highlights: Share = 1.0
+
+
+@dataclass(frozen=True)
 class Sensor:
     """Effects of one camera on one image, applied by camera/sensor.py. The defaults do nothing.
 
     Attributes:
         defocus: Focus and aperture; None for a sharp image.
+        meter: Limits of automatic exposure; None for a camera that exposes any light equally well.
         motion: Movement of the image during the exposure, right and down, as a share of its width.
+        speed: Further movement, in widths per second of the meter's shutter time.
         vignetting: Share of the light that is lost in the corners.
         exposure_error_ev: Exposure error in stops.
         gains: White balance error: factors of red, green and blue.
@@ -151,7 +185,9 @@ class Sensor:
     """
 
     defocus: Defocus | None = None
+    meter: Meter | None = None
     motion: tuple[_Move, _Move] = (0.0, 0.0)
+    speed: tuple[_Speed, _Speed] = (0.0, 0.0)
     vignetting: Annotated[float, Bounds(0.0, 0.95)] = 0.0
     exposure_error_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     gains: tuple[_Gain, _Gain, _Gain] = (1.0, 1.0, 1.0)
@@ -161,6 +197,11 @@ class Sensor:
     sharpening: Sharpening | None = None
     stamp: Stamp | None = None
     jpeg_quality: Annotated[int, Bounds(0, 100)] = 0
+
+    def __post_init__(self) -> None:
+        """Refuse a speed without the shutter time of a meter."""
+        if self.speed != (0.0, 0.0) and self.meter is None:
+            raise ConfigError("speed: needs the shutter time of a meter; give one or use motion")
 
 
 @dataclass(frozen=True)
