@@ -78,7 +78,7 @@ def export_glb(
             "container.absent to 0"
         )
     cameras = scene.cameras if cameras is None else cameras
-    chosen = [check_camera(camera, scene.container) for camera in cameras]
+    chosen = [check_camera(camera, scene) for camera in cameras]
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: no folder {path.parent}; make it first")

@@ -256,8 +256,7 @@ class Generator:
         """Return the factor on linear radiance that a camera applies before the tone curve."""
         with self.gpu.drawing() as renderer:
             checked = self._prepared(scene).scene
-            camera = check_camera(camera, checked.container)
-            return renderer.exposure(checked, camera, self.size).factor
+            return renderer.exposure(checked, check_camera(camera, checked), self.size).factor
 
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
         """Prepare every light, shape and program that scenes may need.
@@ -297,7 +296,7 @@ class Generator:
         prepared = self._prepared(scene)
         if camera is None or isinstance(camera, str):
             return prepared, find_camera(scene, camera)
-        return prepared, check_camera(camera, scene.container)
+        return prepared, check_camera(camera, scene)
 
     def _prepared(self, scene: Scene) -> PreparedScene:
         """Return the geometry of a scene; check and prepare it once for all its cameras."""

@@ -16,7 +16,7 @@ from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.sampling.markers import rhombus_offsets
-from fastgen.sampling.scene import sheet_sizes
+from fastgen.sampling.contents import sheet_sizes
 from fastgen.srgb import DECODED
 
 

@@ -9,7 +9,7 @@ from fastgen.config.config import Config
 from fastgen.decals.artwork import stickers
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.sampling.scene import sheet_sizes
+from fastgen.sampling.contents import sheet_sizes
 
 COUNT = 250
 FAMILIES = {

@@ -20,7 +20,8 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.light.sky_visibility import open_sky
 from fastgen.render.sky_visibility_probe import LitMesh, SkyVisibilityProbe
 from fastgen.sample import Object, Sample
-from fastgen.sampling.scene import sheet_sizes, stream
+from fastgen.sampling.contents import sheet_sizes
+from fastgen.sampling.scene import stream
 from fastgen.scene import Decal, Scene, Spreader
 
 CAMERAS = ("Cl", "Cr")

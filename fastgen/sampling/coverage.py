@@ -32,7 +32,8 @@ def possible_shapes(config: Config) -> Iterator[tuple[Container, Spreader]]:
         for gap in sorted(gaps)
     ]
     bare = replace(spreaders[0], present=False)
-    held = spreaders * (c.probability > 0) + [bare] * (c.probability < 1)
+    sometimes_bare = c.probability < 1 or config.placement.has_neighbours
+    held = spreaders * (c.probability > 0) + [bare] * sometimes_bare
     for single in single_container_configs(config.container):
         (kind,), (scale,) = single.kinds, single.depth_scale
         container = Container(kind, config.container.profiles.deepened(scale))

@@ -16,34 +16,19 @@ from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
 from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
-from fastgen.geometry.mesh import Mesh
-from fastgen.geometry.shape_library import SHAPES
 from fastgen.light.hdri import hours_of, illuminance_of
-from fastgen.sampling.damage import sample_damages
-from fastgen.sampling.markings import sample_decals
-from fastgen.sampling.runs import sample_runs
-from fastgen.sampling.seals import sample_seals
+from fastgen.sampling.contents import sample_contents
+from fastgen.sampling.neighbours import sample_ground, sample_neighbours, sample_surroundings
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
-from fastgen.sampling.sheet import Sheet
 from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import (
-    Ageing,
     Camera,
-    Container,
-    Dirt,
     EnvironmentView,
-    Paint,
-    Rust,
     Scene,
-    Scratches,
     Spreader,
-    Surface,
     Vec3,
-    Wear,
 )
-from fastgen.scene.container_kinds import KINDS
-from fastgen.scene.faces import SHEET_FACES
-from fastgen.validation import Range, nearest
+from fastgen.validation import nearest
 
 SPLITS = ("train", "val", "test")
 
@@ -84,40 +69,36 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         return stream(seed, index, name)
 
     kind = weighted_choice(streams("kind"), config.container.kinds)
-    scale = float(streams("corrugation").choice(config.container.depth_scale))
-    container = Container(kind, config.container.profiles.deepened(scale))
-    surface = _surface(config, streams)
-    damages = sample_damages(config.damage, KINDS[kind].size_mm, streams)
-    decals = sample_decals(
-        config.markings, kind, _empty_sheets(container), surface.paint.albedo, streams
-    )
-    mesh = SHAPES.container(kind, container.profiles)
-    runs = sample_runs(config.markings.runs, mesh, decals, damages, surface, streams)
+    first = sample_contents(config, kind, streams)
+    spreader = _spreader(config.spreader, streams)
+    weather = sample_weather(config.weather, lambda part: streams(f"weather.{part}"))
     environment = _environment(config, streams, environments)
-    hours = hours_of(environment.name)
-    moment = sample_moment(config.sensor.stamp.years, hours, streams("moment"))
+    moment = sample_moment(config.sensor.stamp.years, hours_of(environment.name), streams("moment"))
+    cameras = [_camera(name, rig, kind, streams) for name, rig in config.cameras.items()]
+    around = sample_surroundings(config, kind, spreader.present, cameras, streams)
+    # a spreader of this kind holds one container
+    spreader = replace(spreader, present=spreader.present and not around.twins)
+    ground = None
+    if around.ground_mm is not None:
+        ground = sample_ground(config.ground, around.ground_mm, weather.wetness, streams)
     scene = Scene(
         seed=seed,
         index=index,
-        container=container,
-        surface=surface,
+        **first._asdict(),
         environment=environment,
-        cameras=tuple(
-            _with_sensor(_camera(name, rig, kind, streams), config, moment, streams)
-            for name, rig in config.cameras.items()
-        ),
-        decals=(*decals, *runs),
-        damages=damages,
-        seals=sample_seals(config.seals, streams),
-        spreader=_spreader(config.spreader, streams),
-        weather=sample_weather(config.weather, lambda part: streams(f"weather.{part}")),
+        cameras=tuple(_with_sensor(camera, config, moment, streams) for camera in around.cameras),
+        spreader=spreader,
+        neighbours=sample_neighbours(config, around.sites, first, streams),
+        ground=ground,
+        props=around.props,
+        weather=weather,
     )
     absent = streams("absent").random() < config.container.absent
     return without_container(scene) if absent else scene
 
 
 def without_container(scene: Scene) -> Scene:
-    """Return a scene that shows only the surroundings of `scene`."""
+    """Return a scene that shows only the surroundings of `scene`: the HDRI and the ground."""
     return replace(
         scene,
         container=replace(scene.container, present=False),
@@ -125,6 +106,8 @@ def without_container(scene: Scene) -> Scene:
         damages=(),
         seals=(),
         spreader=replace(scene.spreader, present=False),
+        neighbours=(),
+        props=(),
     )
 
 
@@ -142,81 +125,6 @@ def split_of(config: Config, seed: int, index: int) -> str:
     shares = np.array([config.split.train, config.split.val, config.split.test])
     edges = np.cumsum(shares / shares.sum())
     return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
-
-
-def _empty_sheets(container: Container) -> dict[str, Sheet]:
-    """Return the sheets of a container without decals."""
-    kind, profiles = container.kind, container.profiles
-    mesh = SHAPES.container(kind, profiles)
-    clearance = SHAPES.door_clearance(kind, profiles)
-    return {
-        face: Sheet(face, size, clearance=clearance)
-        if face == "door"
-        else Sheet(face, size, mesh.flats.get(face, ()))
-        for face, size in sheet_sizes(mesh).items()
-    }
-
-
-def sheet_sizes(mesh: Mesh) -> dict[str, tuple[float, float]]:
-    """Return the size of the unfolded sheet of each face that carries decals.
-
-    Args:
-        mesh: Container mesh.
-
-    Returns:
-        Width and height in mm by face.
-    """
-    rects = {face: mesh.charts[mesh.chart_index(face)].rect_mm for face in SHEET_FACES}
-    return {face: (rect[2], rect[3]) for face, rect in rects.items()}
-
-
-def _surface(config: Config, streams: Streams) -> Surface:
-    c = config.surface
-    weights = np.array(c.weights)
-    # equal weights would give other results than no weights
-    shares = weights / weights.sum() if c.color_weights else None
-    name = str(streams("paint.color").choice(list(c.colors), p=shares))
-    rust = streams("rust")
-    rust_color = str(streams("rust.color").choice(c.rust_colors))
-    # The square makes heavily rusted containers rare.
-    low, high = c.rust_coverage
-    coverage = low + (high - low) * float(rust.random()) ** 2
-    return Surface(
-        paint=Paint(
-            name,
-            linear_color(c.colors[name]),
-            c.roughness.draw(streams("paint.roughness")),
-            c.tone_variation.draw(streams("paint.tone")),
-            c.bleach.draw(streams("paint.bleach")),
-        ),
-        ageing=Ageing(
-            c.ageing_strength.draw(streams("ageing.strength")),
-            c.ageing_reach_mm.draw(streams("ageing.reach")),
-        ),
-        dirt=Dirt(
-            c.dirt_strength.draw(streams("dirt.strength")),
-            c.dirt_reach_mm.draw(streams("dirt.reach")),
-            linear_color(c.dirt_color),
-            c.dirt_streaks.draw(streams("dirt.streaks")),
-        ),
-        rust=Rust(
-            coverage,
-            c.rust_scale_mm.draw(streams("rust.scale")),
-            linear_color(rust_color),
-            c.rust_roughness.draw(streams("rust.roughness")),
-        ),
-        scratches=Scratches(
-            c.scratch_coverage.draw(streams("scratches")), c.scrapes.draw(streams("scrapes"))
-        ),
-        wear=Wear(
-            c.wear_strength.draw(streams("wear")),
-            c.wear_scale_mm.draw(streams("wear.scale")),
-        ),
-        noise_offset_mm=(
-            Range(0, 50000).draw(streams("noise.x")),
-            Range(0, 50000).draw(streams("noise.y")),
-        ),
-    )
 
 
 def _environment(
@@ -262,6 +170,11 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
     azimuth_deg, elevation_deg = rig.azimuth_deg.draw(rng), rig.elevation_deg.draw(rng)
     direction = direction_from(frame, azimuth_deg, elevation_deg)
     shift = rig.target_shift_mm.draw(rng) * frame.right + rig.target_shift_mm.draw(rng) * frame.up
+    aim = streams(f"camera.{name}.aim")
+    across, along = frame.half_mm
+    shift += (
+        rig.aim_right.draw(aim) * across * frame.right + rig.aim_up.draw(aim) * along * frame.up
+    )
     target = frame.middle_mm + shift
     position = _rounded(target + direction * rig.distance_mm.draw(rng))
     roll = rig.roll_deg.draw(rng)

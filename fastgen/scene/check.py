@@ -8,11 +8,11 @@ import numpy as np
 
 from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError
-from fastgen.scene import Camera, Container, Damage, Decal, Scene
-from fastgen.scene.container_kinds import mm_away
+from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
+from fastgen.scene.boxes import away_mm
 from fastgen.scene.limits import (
+    CAMERA_REACH_MM,
     COMPUTED_ART,
-    FAR_M,
     GLYPH_RANGE,
     LOBE_LIMIT,
     LOBES,
@@ -20,6 +20,7 @@ from fastgen.scene.limits import (
     MM,
     NEAR_M,
 )
+from fastgen.scene.places import check_places, container_boxes, container_names
 from fastgen.validation import check_fields, check_known
 
 _SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
@@ -27,9 +28,6 @@ _SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
 
 _DIVISORS = {"dented": (0, 3, 5), "perforation": (0,)}
 """Indices into Damage.shape of the values that the displacement field divides by."""
-
-_FARTHEST_MM = (FAR_M - 20.0) / MM
-"""Largest distance of a camera from the container: the whole container is before the far plane."""
 
 _ART_KINDS = ("marker", "sticker", "triangle", "emblem")
 
@@ -55,28 +53,24 @@ def check_scene(scene: Any) -> Scene:
             "scene.container.present: false, but the scene has decals, damages, seals or a "
             "spreader; remove them"
         )
-    for hasp, count in Counter(seal.hasp for seal in scene.seals).items():
-        if count > 1:
-            raise ConfigError(
-                f"scene.seals: {count} are at hasp {hasp}, and a hasp holds one; remove some"
-            )
-    for i, camera in enumerate(scene.cameras):
-        _check_camera(camera, f"scene.cameras[{i}]", scene.container)
-    for i, decal in enumerate(scene.decals):
-        _check_decal(decal, f"scene.decals[{i}]")
-    for i, damage in enumerate(scene.damages):
-        _check_damage(damage, f"scene.damages[{i}]")
-    for kind, count in Counter(damage.kind for damage in scene.damages).items():
+    _check_contents(scene, "scene")
+    for i, neighbour in enumerate(scene.neighbours):
+        _check_contents(neighbour, f"scene.neighbours[{i}]")
+    damages = [*scene.damages, *(damage for each in scene.neighbours for damage in each.damages)]
+    for kind, count in Counter(damage.kind for damage in damages).items():
         if count > MAX_INSTANCES:
             raise ConfigError(
-                f"scene.damages: {count} of kind {kind}; mask values distinguish only "
-                f"{MAX_INSTANCES}, remove some"
+                f"scene.damages: {count} of kind {kind} with those of neighbours; mask values "
+                f"distinguish only {MAX_INSTANCES}, remove some"
             )
+    check_places(scene)
+    for i, camera in enumerate(scene.cameras):
+        _check_camera(camera, f"scene.cameras[{i}]", scene)
     return scene
 
 
-def check_camera(camera: Any, container: Container) -> Camera:
-    """Return `camera` itself if it can see `container` from outside.
+def check_camera(camera: Any, scene: Scene) -> Camera:
+    """Return `camera` itself if it sees the containers of a scene from outside.
 
     Raises:
         ConfigError: if not; the message starts with 'camera'.
@@ -84,28 +78,48 @@ def check_camera(camera: Any, container: Container) -> Camera:
     if not isinstance(camera, Camera):
         raise ConfigError(f"camera: {camera!r} is neither a Camera nor the name of one")
     check_fields(camera, Camera, "camera")
-    _check_camera(camera, "camera", container)
+    _check_camera(camera, "camera", scene)
     return camera
 
 
-def _check_camera(camera: Camera, path: str, container: Container) -> None:
+def _check_contents(carrier: Scene | Neighbour, path: str) -> None:
+    """Check what one container carries."""
+    for hasp, count in Counter(seal.hasp for seal in carrier.seals).items():
+        if count > 1:
+            raise ConfigError(
+                f"{path}.seals: {count} are at hasp {hasp}, and a hasp holds one; remove some"
+            )
+    for i, decal in enumerate(carrier.decals):
+        _check_decal(decal, f"{path}.decals[{i}]")
+    for i, damage in enumerate(carrier.damages):
+        _check_damage(damage, f"{path}.damages[{i}]")
+
+
+def _check_camera(camera: Camera, path: str, scene: Scene) -> None:
     if math.dist(camera.position_mm, camera.target_mm) < 1e-3:
         raise ConfigError(f"{path}.target_mm: {camera.target_mm} is the camera's own position")
-    away_mm = float(mm_away(np.array(camera.position_mm), container.kind))
-    if away_mm < 0:
+    place = f"{path}.position_mm: {camera.position_mm}"
+    eye = np.array(camera.position_mm)
+    for box, name in zip(container_boxes(scene), container_names(scene), strict=True):
+        distance_mm = away_mm(box, eye)
+        if distance_mm < 0:
+            raise ConfigError(
+                f"{place} is inside {name}; only its outside is drawn, move the camera out"
+            )
+        if distance_mm < NEAR_M / MM:
+            raise ConfigError(
+                f"{place} is nearer to {name} than {NEAR_M / MM:g} mm, where nothing is drawn; "
+                "move it away"
+            )
+        if distance_mm > CAMERA_REACH_MM:
+            raise ConfigError(
+                f"{place} is {distance_mm * MM:.0f} m from {name}; sight ends at "
+                f"{CAMERA_REACH_MM * MM:.0f} m, move it nearer"
+            )
+    if scene.ground is not None and eye[2] < scene.ground.height_mm + NEAR_M / MM:
         raise ConfigError(
-            f"{path}.position_mm: {camera.position_mm} is inside the container; only its outside "
-            "is drawn, move the camera out"
-        )
-    if away_mm < NEAR_M / MM:
-        raise ConfigError(
-            f"{path}.position_mm: {camera.position_mm} is nearer to the container than "
-            f"{NEAR_M / MM:g} mm, where nothing is drawn; move it away"
-        )
-    if away_mm > _FARTHEST_MM:
-        raise ConfigError(
-            f"{path}.position_mm: {camera.position_mm} is {away_mm * MM:.0f} m from the container; "
-            f"sight ends at {_FARTHEST_MM * MM:.0f} m, move it nearer"
+            f"{place} is not {NEAR_M / MM:g} mm above the ground, whose height_mm is "
+            f"{scene.ground.height_mm:g}; raise it"
         )
 
 
