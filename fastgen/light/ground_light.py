@@ -63,7 +63,7 @@ def form_factors(corners: NDArray[np.floating]) -> NDArray[np.floating]:
 
     Args:
         corners: [3, K, P], K corners of P polygons relative to the receiving points, in
-            counter-clockwise order as seen from there.
+            clockwise order as seen from there.
 
     Returns:
         [3, P]; vectors from the receiving points toward the polygons.
@@ -201,7 +201,7 @@ class _Placed:
         beyond = np.abs(at[axis]) - np.float32(self.half[axis])
         face = np.empty((3, 4, at.shape[1]), np.float32)
         face[axis] = -sign * np.maximum(beyond, 1e-4)
-        # counter-clockwise as seen from outside
+        # clockwise as seen from outside
         reach = (sign if axis == 0 else -sign) * np.float32(self.half[other])
         face[other] = np.stack([-reach, -reach, reach, reach]) - at[other]
         face[2] = np.array([self.bottom, self.top, self.top, self.bottom])[:, None]

@@ -168,7 +168,7 @@ def surrounding_light(
 
 
 class _Faces(NamedTuple):
-    """The faces of a box: corners [6, 4, 3] counter-clockwise from outside, normals, middles."""
+    """The faces of a box: corners [6, 4, 3] clockwise from outside, normals and middles [6, 3]."""
 
     corners: Array
     normals: Array
@@ -179,7 +179,7 @@ class _Faces(NamedTuple):
         corners, normals = [], []
         for axis, sign in _FACES:
             a, b = (axis + 1) % 3, (axis + 2) % 3
-            if sign < 0:
+            if sign > 0:
                 a, b = b, a
             face = np.zeros((4, 3))
             face[:, axis] = sign

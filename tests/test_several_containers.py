@@ -1,0 +1,277 @@
+"""Several containers in a scene: images and labels against rays, order, and light."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen import Config, Generator
+from fastgen.camera.projection import view_of
+from fastgen.geometry.container import build_container
+from fastgen.light.environment import load_environment
+from fastgen.light.hdri import bundled_hdris
+from fastgen.light.sky_visibility import sky_directions
+from fastgen.light.surrounding_light import _lattice, surrounding_light
+from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
+from fastgen.scene.boxes import back_to_front, container_box, overlap
+from tests import oracle
+
+SIZE = (320, 240)
+THRESHOLD_MM = 5.0
+CONFIG = Config.from_values(
+    {
+        "container": {"kinds": {"20": 1}},
+        "damage": {"probability": 1, "count": [2, 4]},
+        "seals": {"probability": 0},
+    }
+)
+POSES = (
+    Pose((0.0, 3000.0, 0.0), 180.0),
+    Pose((6300.0, 100.0, 0.0), 2.5),
+    Pose((0.0, 0.0, 2616.0), 0.0),
+)
+CAMERAS = (
+    Camera("left", (-6000.0, -8000.0, 4500.0), (500.0, 0.0, 1500.0), 24.0),
+    Camera("right", (9000.0, 9000.0, 6000.0), (500.0, 1000.0, 1500.0), 24.0),
+    Camera("end", (-9000.0, 1500.0, 2500.0), (0.0, 1500.0, 2000.0), 30.0),
+    Camera("gap", (3100.0, -2500.0, 900.0), (3300.0, 2500.0, 1500.0), 18.0),
+    Camera("above", (2000.0, -2500.0, 14000.0), (2100.0, 1500.0, 0.0), 30.0),
+)
+
+
+@pytest.fixture(scope="module")
+def generator():
+    with Generator(CONFIG, seed=6, size=SIZE, quality="draft") as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def scene(generator):
+    """Four containers, each sampled like the first container of another scene."""
+    first, *others = (generator.scene(i) for i in range(4))
+    neighbours = tuple(
+        Neighbour(pose, s.container, s.surface, s.decals, s.damages, s.seals)
+        for s, pose in zip(others, POSES, strict=True)
+    )
+    return replace(first, spreader=Spreader(), neighbours=neighbours)
+
+
+def alone(scene):
+    """Return each container as a scene of its own in its own frame, with its pose."""
+    found = [(replace(scene, neighbours=()), Pose())]
+    for each in scene.neighbours:
+        own = replace(
+            scene,
+            container=each.container,
+            decals=each.decals,
+            damages=each.damages,
+            seals=each.seals,
+            neighbours=(),
+        )
+        found.append((own, each.pose))
+    return found
+
+
+def turned(camera, pose):
+    """Return a camera in the frame of a pose."""
+    angle = np.deg2rad(-pose.yaw_deg)
+    c, s = np.cos(angle), np.sin(angle)
+
+    def moved(point):
+        x, y, z = np.subtract(point, pose.position_mm)
+        return (float(c * x - s * y), float(s * x + c * y), float(z))
+
+    return replace(camera, position_mm=moved(camera.position_mm), target_mm=moved(camera.target_mm))
+
+
+def expected(scene, camera):
+    """Return ids, damage, depth and owner of each pixel from rays at each container alone."""
+    ids = np.zeros(SIZE[::-1], np.uint16)
+    damage = np.zeros_like(ids)
+    owner = np.full(ids.shape, -1)
+    depth = np.full(ids.shape, np.inf)
+    following, instances = 1, {}
+    for number, (own, pose) in enumerate(alone(scene)):
+        mesh = build_container(own.container.kind, own.container.profiles)
+        hits = oracle.cast(mesh, view_of(turned(camera, pose), SIZE), own)
+        nearer = (hits.depth_m < depth) | ((hits.hole >= 0) & ~hits.hit & (owner < 0))
+        numbers = {0: 0}
+        for k in range(1 + sum(bool(decal.class_name) for decal in own.decals)):
+            numbers[k + 1] = following
+            following = 600 if following == 199 else following + 1
+        values, counts = {0: 0, 101: 101 + number}, {}
+        for item in own.damages:
+            category = ("axis", "concave", "dented", "perforation").index(item.kind) + 2
+            counts[category] = counts.get(category, 0) + 1
+            before = instances.get(category, 0)
+            values[100 * category + counts[category]] = 100 * category + before + counts[category]
+        for category, count in counts.items():
+            instances[category] = instances.get(category, 0) + count
+        found = oracle.damage_values(own, hits, THRESHOLD_MM)
+        ids[nearer] = np.vectorize(numbers.get)(oracle.object_ids(own, mesh, hits))[nearer]
+        damage[nearer] = np.vectorize(values.get)(found)[nearer]
+        owner[nearer], depth[nearer] = number, hits.depth_m[nearer]
+    return ids, damage, depth, owner
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.name)
+def test_pixels_equal_the_nearest_hit_of_rays_at_each_container(generator, scene, camera):
+    sample = generator.render(scene=scene, camera=camera)
+    ids, damage, depth, owner = expected(scene, camera)
+    for drawn, wanted in ((sample.ids, ids), (sample.damage, damage)):
+        wrong = drawn != wanted
+        assert wrong.mean() < 4e-4
+        assert not (wrong & ~oracle.near_edge(wanted) & ~oracle.near_edge(owner)).any()
+    both = np.isfinite(depth) & (sample.ids > 0)
+    assert both.mean() > 0.1
+    assert np.quantile(np.abs(sample.depth[both] / depth[both] - 1), 0.995) < 1e-5
+
+
+def own_values(objects, container):
+    """Return the values in the damage target of a container and its damages."""
+    yield 100 + container.instance
+    for item in objects:
+        if item.container == container.container and 200 <= item.id < 600:
+            yield item.id
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.name)
+def test_labels_follow_from_the_pixels_and_from_each_container_alone(generator, scene, camera):
+    sample = generator.render(scene=scene, camera=camera)
+    objects = [item for item in sample.objects if not item.background]
+    assert len({item.id for item in objects}) == len(objects)
+    classes = {}
+    for item in objects:
+        classes.setdefault(item.class_name, []).append(item.instance)
+        shown = (sample.damage if 200 <= item.id < 600 else sample.ids) == item.id
+        if item.class_name == "container":
+            shown = np.isin(sample.damage, list(own_values(objects, item)))
+        assert item.bbox == oracle.box_of(shown)
+        assert item.area == shown.sum()
+    for found in classes.values():
+        assert sorted(found) == list(range(1, len(found) + 1))
+    for number, (own, pose) in enumerate(alone(scene)):
+        single = generator.render(scene=own, camera=turned(camera, pose)).objects
+        single = [item for item in single if not item.background]
+        mine = [item for item in objects if item.container == number]
+        assert [i.class_name for i in mine] == [i.class_name for i in single]
+        for item, other in zip(mine, single, strict=True):
+            assert item.text == other.text
+            np.testing.assert_allclose(item.polygon, other.polygon, atol=0.02)
+            assert item.area <= other.area + 2
+            if item.class_name == "container" and other.area:
+                whole = other.area / other.visible_fraction
+                assert item.visible_fraction == pytest.approx(item.area / whole, abs=0.03)
+
+
+@pytest.mark.parametrize("camera", CAMERAS[:3], ids=lambda camera: camera.name)
+def test_castings_behind_another_container_are_hidden(generator, scene, camera):
+    sample = generator.render(scene=scene, camera=camera)
+    objects = [item for item in sample.objects if item.class_name == "container"]
+    objects = [item for item in objects if not item.background]
+    flags = []
+    for item in objects:
+        for x, y, flag in item.keypoints:
+            # a visible corner lies beside pixels of its container
+            rows, columns = (slice(max(int(v) - 3, 0), int(v) + 4) for v in (y, x))
+            own = list(own_values(sample.objects, item))
+            assert flag != 2 or np.isin(sample.damage[rows, columns], own).any()
+            flags.append(flag)
+    assert {1, 2} <= set(flags)
+
+
+@pytest.mark.parametrize("quality", ["draft", "balanced", "fine"])
+def test_labels_do_not_depend_on_the_quality_and_edges_between_containers_are_opaque(
+    generators, scene, quality
+):
+    generator = generators(CONFIG, seed=6, size=SIZE, quality=quality)
+    drawn = generator.render(scene=scene, camera=CAMERAS[1])
+    assert (drawn.ids != expected(scene, CAMERAS[1])[0]).mean() < 4e-4
+    seen = np.isfinite(drawn.depth)
+    assert (drawn.cover[seen & ~oracle.near_edge(seen)] == 255).mean() > 0.995
+
+
+def test_order_of_boxes_agrees_with_rays():
+    rng = np.random.default_rng(4)
+    tried = 0
+    while tried < 60:
+        boxes = [
+            container_box("20", Pose((float(x), float(y), 2600.0 * level), float(yaw)))
+            for x, y, level, yaw in zip(
+                rng.uniform(-9e3, 9e3, 4),
+                rng.uniform(-9e3, 9e3, 4),
+                rng.integers(0, 2, 4),
+                rng.uniform(0, 360, 4),
+                strict=True,
+            )
+        ]
+        eye = rng.uniform((-2e4, -2e4, 500), (2e4, 2e4, 9e3))
+        if any(overlap(a, b) for i, a in enumerate(boxes) for b in boxes[:i]):
+            continue
+        if any(entered(eye, np.array([[0.0, 0.0, 1.0]]), box)[0] <= 0 for box in boxes):
+            continue
+        tried += 1
+        rays = np.concatenate([box.corners_mm for box in boxes]) - eye
+        rays = np.concatenate([rays, rays + rng.normal(0, 400, rays.shape)])
+        away = np.array([entered(eye, rays, box) for box in boxes])
+        order = back_to_front(boxes, eye)
+        assert sorted(order) == [0, 1, 2, 3]
+        for place, number in enumerate(order):
+            for later in order[place + 1 :]:
+                both = np.isfinite(away[number]) & np.isfinite(away[later])
+                assert (away[later][both] <= away[number][both] + 1e-6).all()
+
+
+def entered(eye, rays, box):
+    """Return the distance [N] at which rays from an eye enter a box, inf if they miss it."""
+    start, along = (eye - box.center_mm) @ box.rotation, rays @ box.rotation
+    with np.errstate(divide="ignore"):
+        ends = np.sort([(-box.half_mm - start) / along, (box.half_mm - start) / along], axis=0)
+    near, far = ends[0].max(axis=1), ends[1].min(axis=1)
+    return np.where((near < far) & (far > 0), near, np.inf)
+
+
+def test_a_neighbour_takes_light_where_it_stands_and_nowhere_else(generators, scene):
+    generator = generators(CONFIG, seed=6, size=SIZE, quality="draft")
+    overcast = EnvironmentView("port_overcast", 0.0)
+    bare = replace(scene, environment=overcast, neighbours=(), damages=(), decals=(), seals=())
+    beside = Neighbour(Pose((0.0, -4200.0, 0.0)), bare.container, bare.surface)
+    cameras = {
+        "near": Camera("near", (-1500.0, -2600.0, 1300.0), (1500.0, -1219.0, 1300.0), 24.0),
+        "far": Camera("far", (0.0, 9000.0, 1300.0), (0.0, 0.0, 1300.0), 24.0),
+    }
+    ratio = {}
+    for name, camera in cameras.items():
+        scenes = (bare, replace(bare, neighbours=(beside,)))
+        before, after = (generator.render(scene=each, camera=camera) for each in scenes)
+        first, second = (generator.exposure(each, camera) for each in scenes)
+        assert first == second
+        same = (before.ids == 1) & (after.ids == 1)
+        wall = same & ~oracle.near_edge(same)
+        dark, bright = (np.median(each.image[wall]) for each in (after, before))
+        ratio[name] = dark / bright
+    assert ratio["near"] < 0.85
+    assert ratio["far"] == pytest.approx(1.0, abs=0.02)
+
+
+def test_light_between_boxes_equals_a_monte_carlo_integral():
+    light = load_environment(bundled_hdris()["port_overcast"])
+    boxes = [
+        container_box("20", pose)
+        for pose in (Pose(), Pose((300.0, 3400.0, 0.0), 3.0), Pose((0.0, 100.0, 2620.0)))
+    ]
+    low, high = boxes[0].corners_mm.min(axis=0), boxes[0].corners_mm.max(axis=0)
+    black = 3 * [(0.0, 0.0, 0.0)]
+    (found, *_) = surrounding_light(boxes, black, 3 * [(low, high)], light, 40.0, None)
+    points, normals = _lattice(boxes[0].half_mm)
+    rng = np.random.default_rng(1)
+    for number in rng.choice(len(points), 25, replace=False):
+        # directions with a density proportional to the cosine
+        around = rng.normal(size=(40_000, 3))
+        toward = normals[number] + around / np.linalg.norm(around, axis=1, keepdims=True)
+        start = points[number] + boxes[0].center_mm
+        met = [np.isfinite(entered(start, toward, box)) for box in boxes[1:]]
+        np.testing.assert_allclose(found.factor[number], 1 - np.any(met, axis=0).mean(), atol=0.06)
+        met = [np.isfinite(entered(start, sky_directions(), box)) for box in boxes[1:]]
+        bits = np.unpackbits(found.open_bits[number]).astype(bool)
+        np.testing.assert_array_equal(bits, ~np.any(met, axis=0))
