@@ -1,5 +1,6 @@
 // Fragment stage of the ground and of the props on it, found by casting the pixel's view ray.
-// Writes display colour, the share that is not the panorama, no labels, and depth.
+// Writes display colour, the share that is not the panorama, no labels, and depth. With GROUND_COARSE
+// the image has half the resolution, and the colour is exposed radiance for ground_spread.frag.
 #version 430 core
 #include "ground.constants"
 #include "samples.constants"
@@ -14,16 +15,20 @@
 #include "ground_material.glsl"
 #include "ground_mirror.glsl"
 #include "ground_props.glsl"
-#include "view_ray.glsl"
+#include "ground_ray.glsl"
 
 layout(location = 0) out vec4 out_color;
+#if !GROUND_COARSE
 layout(location = 1) out uint out_labels;
 layout(location = 2) out float out_depth;
+#endif
+
+const float PIXEL_WIDTH = 1.0 + GROUND_COARSE;
 
 // Exposed radiance of the plane at a world position, which the ray meets at a depth.
 vec3 ground_color(vec3 at, vec3 ray, float depth) {
     float stretch = dot(ray, ray) / (ray.z * ray.z);
-    float least = depth * pixel_angle;
+    float least = depth * pixel_angle * PIXEL_WIDTH;
     float blur_m = 0.35 * least * sqrt(sqrt(stretch));
     vec2 along = ray.xy * inversesqrt(max(dot(ray.xy, ray.xy), 1e-12));
     float longest = 1e3 * least * sqrt(stretch);
@@ -47,20 +52,19 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
 // Exposed radiance along a ray, and the share of it that is not the panorama. depth is that of the
 // plane or a prop; infinite where the panorama replaces both.
 vec4 seen_color(vec3 ray, out float depth) {
-    float down = (ground_height_m - eye_m.z) / ray.z;
-    vec3 at = fma(vec3(down), ray, eye_m);
-    float away = down > 0.0 ? length(at.xy) : 1e9;
-    depth = away < ground_reach_m ? down : NO_DEPTH;
+    vec3 at;
+    depth = plane_depth(ray, at);
 #if LAYER != LAYER_ALL
     vec3 color = vec3(LAYER == LAYER_NORMALS ? 0.5 : 1.0);
 #else
-    vec3 color = ground_color(at, ray, down);
+    vec3 color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
 #endif
     float share = 1.0;
 #if GROUND_FADES && LAYER == LAYER_ALL
-    share = 1.0 - smoothstep(GROUND_FADE_START, 1.0, away / ground_reach_m);
-    color = mix(exposure * background(ray), color, share);
-    if (share == 0.0) color = exposure * background(ray);
+    float away = isinf(depth) ? 1.0 : length(at.xy) / ground_reach_m;
+    share = 1.0 - smoothstep(GROUND_FADE_START, 1.0, away);
+    vec3 behind = exposure * background(ray);
+    color = share > 0.0 ? mix(behind, color, share) : behind;
 #endif
 #if GROUND_PROPS
     PropHit hit = first_prop(ray, depth);
@@ -77,21 +81,23 @@ vec4 seen_color(vec3 ray, out float depth) {
 
 void main() {
     float depth;
+#if GROUND_COARSE
+    out_color = seen_color(ground_ray(PIXEL_WIDTH * gl_FragCoord.xy), depth);
+#else
 #if GROUND_PROPS && SAMPLES_PER_AXIS > 1
     vec4 color = vec4(0.0);
     for (int i = 0; i < 4; ++i) {
         vec2 offset = vec2(i & 1, i >> 1) * 0.5 - 0.25;
-        color += 0.25 * seen_color(view_ray(gl_FragCoord.xy + offset), depth);
+        color += 0.25 * seen_color(ground_ray(gl_FragCoord.xy + offset), depth);
     }
-    vec3 ray = view_ray(gl_FragCoord.xy);
-    float down = (ground_height_m - eye_m.z) / ray.z;
-    depth = down > 0.0 && length(fma(vec3(down), ray, eye_m).xy) < ground_reach_m ? down : NO_DEPTH;
-    depth = min(depth, first_prop(ray, depth).depth);
+    vec3 at, ray = ground_ray(gl_FragCoord.xy);
+    depth = first_prop(ray, plane_depth(ray, at)).depth;
 #else
-    vec4 color = seen_color(view_ray(gl_FragCoord.xy), depth);
-    if (isinf(depth)) discard;
+    vec4 color = seen_color(ground_ray(gl_FragCoord.xy), depth);
 #endif
+    if (isinf(depth)) discard;
     out_color = vec4(display_color(color.rgb), color.a);
     out_labels = 0u;
     out_depth = depth;
+#endif
 }

@@ -1,4 +1,5 @@
-// Boxes of the containers and props on the ground, turned about z; first BOXES containers, then props.
+// Boxes of the containers and props on the ground, turned about z. Containers are bodies 0 to
+// GROUND_BOXES - 1; EACH_BOX(f) expands to f(i) for each. Props follow from MAX_BOXES.
 // vec3 in_body(vec3 v, int i): a world vector in the axes of body i.
 // float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m): share of a distant disc
 // that body i hides.
@@ -23,25 +24,34 @@ vec3 reciprocal(vec3 v) {
 }
 
 // The silhouette counts as one straight edge, along which a ray enters and leaves the body at once.
-// from: World position in m. toward: Unit vector to the middle of the disc.
+// offset: Position in the axes of the body, from its centre in m. half_size: Half of its size.
+// inverse: Reciprocal of the unit vector to the middle of the disc, in the axes of the body.
 // spread: Angular radius of the disc. blur_m: Further radius, which filters the edge.
-float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m, out int face) {
-    vec3 turned = in_body(toward, i);
-    vec3 inverse = reciprocal(turned);
-    vec3 middle = -in_body(from - body_center[i].xyz, i) * inverse;
-    vec3 width = body_half[i].xyz * abs(inverse);
-    vec3 enter = middle - width, leave = middle + width, squared = inverse * inverse;
+// enter: Distances at which the ray passes the near plane of each axis.
+float hidden_share(vec3 offset, vec3 half_size, vec3 inverse, float spread, float blur_m, out vec3 enter) {
+    vec3 middle = -offset * inverse, width = half_size * abs(inverse), squared = inverse * inverse;
+    vec3 leave = middle + width;
+    enter = middle - width;
     float near = max(enter.x, max(enter.y, enter.z)), far = min(leave.x, min(leave.y, leave.z));
-    float slopes = (near == enter.x ? squared.x : near == enter.y ? squared.y : squared.z) +
-                   (far == leave.x ? squared.x : far == leave.y ? squared.y : squared.z);
-    float along_x = step(enter.y, enter.x);
-    face = along_x > 0.5 ? (turned.x > 0.0 ? 0 : 1) : (turned.y > 0.0 ? 2 : 3);
+    float at_near = near == enter.x ? squared.x : near == enter.y ? squared.y : squared.z;
+    float at_far = far == leave.x ? squared.x : far == leave.y ? squared.y : squared.z;
     near = max(near, 0.0);
-    float inside = (far - near) * inversesqrt(slopes);
-    float radius = fma(0.5 * (near + max(far, 0.0)), spread, blur_m);
+    float slopes = at_near + at_far, inside = (far - near) * inversesqrt(slopes);
+    // Distance to the point of the ray that is nearest to the edge.
+    float distance_m = max(fma(near, at_far, far * at_near) / slopes, 0.0);
+    float radius = fma(distance_m, spread, blur_m);
     float x = clamp(inside / radius, -1.0, 1.0), q = x * x;
     // Share of a disc behind a line, fitted within 0.01.
     return fma(x, fma(q, fma(q, -0.1134, -0.0232), 0.6366), 0.5);
+}
+
+// from: World position in m. toward: Unit vector to the middle of the disc.
+float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m, out int face) {
+    vec3 turned = in_body(toward, i), enter;
+    float cover = hidden_share(in_body(from - body_center[i].xyz, i), body_half[i].xyz, reciprocal(turned),
+                               spread, blur_m, enter);
+    face = enter.x > enter.y ? (turned.x > 0.0 ? 0 : 1) : (turned.y > 0.0 ? 2 : 3);
+    return cover;
 }
 
 float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m) {

@@ -19,11 +19,11 @@ vec4 ground_ambient(vec2 at_m) {
 // share 1 - d / sqrt(d^2 + h^2) of what is seen at the edge.
 float below_boxes(vec3 at) {
     float open = 1.0;
-    for (int i = 0; i < box_count; ++i) {
-        vec2 inside = body_half[i].xy - abs(in_body(at - body_center[i].xyz, i).xy);
-        float depth = max(min(inside.x, inside.y), 0.0), gap = body_paint[i].w;
-        open *= 1.0 - depth * inversesqrt(fma(depth, depth, gap * gap));
-    }
+#define BELOW(i) { \
+    vec2 inside = body_half[i].xy - abs(in_body(at - body_center[i].xyz, i).xy); \
+    float depth = max(min(inside.x, inside.y), 0.0), gap = body_paint[i].w; \
+    open *= 1.0 - depth * inversesqrt(fma(depth, depth, gap * gap)); }
+    EACH_BOX(BELOW)
     return open;
 }
 
@@ -31,18 +31,25 @@ float below_boxes(vec3 at) {
 vec3 ground_lights(vec3 at, vec3 normal, float blur_m) {
     vec3 sum = vec3(0.0);
 #if LIGHTS > 0
-    for (int i = 0; i < min(LIGHTS, light_count); ++i) {
-        vec4 light = light_direction[i];
-        float hidden = 0.0;
-        for (int k = 0; k < box_count; ++k)
-            hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+    float hidden = 0.0;
+#define FIRST_LIGHT(i) { \
+    vec3 enter; \
+    hidden += hidden_share(in_body(at - body_center[i].xyz, i), body_half[i].xyz, body_light[i].xyz, \
+                           light_direction[0].w, blur_m, enter); }
+    EACH_BOX(FIRST_LIGHT)
 #if GROUND_PROPS
-        if (i == 0)   // The other lights are too faint for the shadows of props.
-            for (int k = MAX_BOXES; k < MAX_BOXES + prop_count; ++k)
-                hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+    for (int k = MAX_BOXES; k < MAX_BOXES + prop_count; ++k)
+        hidden += body_cover(at, light_direction[0].xyz, k, light_direction[0].w, blur_m);
 #endif
-        float facing = max(dot(normal, light.xyz), 0.0) * max(1.0 - hidden, 0.0);
-        sum += light_irradiance[i].rgb * facing;
+    float facing = max(dot(normal, light_direction[0].xyz), 0.0);
+    sum = light_irradiance[0].rgb * (facing * max(1.0 - hidden, 0.0));
+    // The other lights are too faint for the shadows of props.
+    for (int i = 1; i < LIGHTS; ++i) {
+        vec4 light = light_direction[i];
+        hidden = 0.0;
+#define OTHER_LIGHT(k) hidden += body_cover(at, light.xyz, k, light.w, blur_m);
+        EACH_BOX(OTHER_LIGHT)
+        sum += light_irradiance[i].rgb * (max(dot(normal, light.xyz), 0.0) * max(1.0 - hidden, 0.0));
     }
 #endif
     return sum;

@@ -22,7 +22,7 @@ float cracks(float value, float lost) {
 float patch_tone(vec2 at, vec2 filter_width) {
     const vec2 cell_mm = vec2(5200.0, 7300.0);
     vec2 cell = floor(at / cell_mm);
-    vec4 random = cell_noise(ivec2(cell));
+    vec4 random = cell_noise(cell);
     vec2 half_size = mix(vec2(300.0, 400.0), vec2(1400.0, 2600.0), random.xy * random.yx);
     vec2 from_center = at - (cell + 0.5) * cell_mm - (random.zw - 0.5) * (cell_mm - 2.0 * half_size);
     float patched = band_cover(from_center.x, half_size.x, filter_width.x) *
@@ -43,7 +43,7 @@ vec3 paving(vec2 at, Footprint f, vec2 filter_width) {
     vec2 size = across ? vec2(200.0, 100.0) : vec2(100.0, 200.0);
     vec2 to_edge = 0.5 * size - abs(at - origin * 100.0 - 0.5 * size);
     vec2 block = clamp((to_edge - 3.0) / filter_width + 0.5, 0.0, 1.0);
-    vec4 random = cell_noise(ivec2(origin));
+    vec4 random = cell_noise(origin);
     float near = 1.0 - smoothstep(45.0, 110.0, f.noise);
     vec3 tone = 0.86 + 0.28 * random.x + vec3(0.05, 0.0, -0.05) * (random.y - 0.4) * 2.0;
     tone *= mix(0.5, 1.0, block.x * block.y);
@@ -56,48 +56,48 @@ GroundMaterial ground_material(vec2 at_mm, Footprint f) {
     vec2 filter_width = vec2(width_along(f, side), width_along(f, along));
     vec2 shifted = at_mm + ground_noise_mm;
     // Turned against each other, so that their periods do not coincide.
-    NoiseSample grain = read_noise(0, shifted, 800.0, f.noise);
-    NoiseSample broad = read_noise(0, mat2(0.8, 0.6, -0.6, 0.8) * shifted, 11000.0, f.noise);
-    NoiseSample worn = read_noise(1, on_lines + ground_noise_mm.yx, 5300.0, f.noise);
+    NoiseSample broad = read_noise(0, mat2(0.8, 0.6, -0.6, 0.8) * shifted, 9000.0, f.noise);
+    NoiseSample fine = read_noise(1, on_lines + ground_noise_mm.yx, 2700.0, f.noise);
+    float grain = fine.value.w - 0.5, mottle = broad.value.w - 0.5;
 
-    float tone = 1.0 + ground_wear * (0.55 * (broad.value.x - 0.5) + 0.3 * (worn.value.y - 0.5));
+    float tone = 1.0 + ground_wear * (0.55 * (broad.value.x - 0.5) + 0.3 * (fine.value.y - 0.5));
     float oil = normal_covered(broad.value.y, stain_threshold, broad.lost.y, 0.3);
     tone *= 1.0 - 0.5 * ground_wear * oil;
     // Wheels keep to tracks between the lines and leave streaks of rubber.
     float in_lane = on_lines.x - line_spacing_mm * round(on_lines.x / line_spacing_mm);
     float track = 1.0 - smoothstep(0.0, 420.0 + filter_width.x, abs(abs(in_lane) - 950.0));
-    float rubber = covered(worn.value.z, 0.8, worn.lost.z, 0.2);
+    float rubber = covered(fine.value.z, 0.8, fine.lost.z, 0.2);
     tone *= 1.0 - ground_wear * (0.14 * track + rubber * fma(0.22, track, 0.1));
     vec3 albedo = ground_albedo;
-    float crack = cracks(worn.value.y, worn.lost.y) * smoothstep(0.45, 0.75, broad.value.x);
+    float crack = cracks(fine.value.y, fine.lost.y) * smoothstep(0.45, 0.75, broad.value.x);
 #if GROUND_ASPHALT
     tone *= patch_tone(on_lines + ground_noise_mm, filter_width);
-    tone *= fma(0.85, grain.value.w - 0.5, 1.0) * fma(0.3, grain.value.x - 0.5, 1.0);
+    tone *= fma(0.85, grain, 1.0) * fma(0.3, mottle, 1.0);
     tone *= 1.0 - 0.7 * min(2.0 * ground_wear, 1.0) * crack;
 #elif GROUND_CONCRETE
     vec2 on_slabs = on_lines + ground_noise_mm;
-    vec4 slab = cell_noise(ivec2(floor(on_slabs / slab_mm)));
+    vec4 slab = cell_noise(floor(on_slabs / slab_mm));
     vec2 joints = vec2(bands_cover(on_slabs.x, slab_mm, 14.0, filter_width.x),
                        bands_cover(on_slabs.y, slab_mm, 14.0, filter_width.y));
     vec2 edges = vec2(bands_cover(on_slabs.x, slab_mm, 160.0, filter_width.x + 150.0),
                       bands_cover(on_slabs.y, slab_mm, 160.0, filter_width.y + 150.0));
-    tone *= fma(0.16, slab.x - 0.5, 1.0) * fma(0.22, grain.value.w - 0.5, 1.0);
-    tone *= fma(0.22, grain.value.x - 0.5, 1.0);
+    tone *= fma(0.16, slab.x - 0.5, 1.0) * fma(0.22, grain, 1.0);
+    tone *= fma(0.22, mottle, 1.0);
     tone *= (1.0 - 0.16 * ground_wear * max(edges.x, edges.y)) * (1.0 - 0.6 * max(joints.x, joints.y));
     tone *= 1.0 - 0.5 * ground_wear * crack;
     albedo *= mix(vec3(1.0), vec3(1.04, 1.0, 0.94), slab.y);
 #else
     albedo *= paving(on_lines + ground_noise_mm, f, filter_width);
-    tone *= fma(0.4, grain.value.w - 0.5, 1.0) * fma(0.3, grain.value.x - 0.5, 1.0);
+    tone *= fma(0.4, grain, 1.0) * fma(0.3, mottle, 1.0);
 #endif
     albedo *= max(tone, 0.05);
 
     float line = bands_cover(on_lines.x + 0.5 * line_spacing_mm, line_spacing_mm, 130.0, filter_width.x);
     // Paint stays longest on high places and goes first under wheels.
-    float paint = covered(worn.value.y, line_threshold, worn.lost.y, 0.2);
+    float paint = covered(fma(0.6, broad.value.x - 0.5, fine.value.y), line_threshold, fine.lost.y, 0.2);
     vec3 line_tone = line_albedo * (1.0 - 0.35 * ground_wear * (1.0 - broad.value.x)) *
-                     fma(0.25, grain.value.w - 0.5, 1.0);
-    albedo = mix(albedo, line_tone, line * paint * fma(0.3, grain.value.w, 0.7));
+                     fma(0.25, grain, 1.0);
+    albedo = mix(albedo, line_tone, line * paint * fma(0.3, grain, 0.85));
 
     float roughness = 0.9, puddle = 0.0;
 #if GROUND_WET

@@ -10,12 +10,13 @@ vec3 ground_mirror(vec3 at, vec3 ray, GroundMaterial m) {
     vec3 mirror = vec3(ray.xy, abs(ray.z));
     float alpha = m.roughness * m.roughness, hidden = 0.0;
     vec3 sides = vec3(0.0);
-    for (int i = 0; i < box_count; ++i) {
-        int face;
-        float cover = body_cover(at, mirror, i, alpha, 0.01, face);
-        hidden += cover;
-        sides += cover * face_radiance[4 * i + face].rgb;
-    }
+#define MIRRORED(i) { \
+    int face; \
+    float cover = body_cover(at, mirror, i, alpha, 0.01, face); \
+    hidden += cover; \
+    sides += cover * (face < 2 ? face < 1 ? face_radiance[4 * i] : face_radiance[4 * i + 1] \
+                               : face < 3 ? face_radiance[4 * i + 2] : face_radiance[4 * i + 3]).rgb; }
+    EACH_BOX(MIRRORED)
     // Boxes that hide one another count for what they hide together.
     vec3 seen = prefiltered(mirror, m.roughness) * max(1.0 - hidden, 0.0) + sides / max(hidden, 1.0);
     // Water has a refractive index of 1.33. Rough lobes climb less: Lagarde and de Rousiers 2014, Moving

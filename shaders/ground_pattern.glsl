@@ -4,7 +4,7 @@
 // float band_cover(float x, float half_width, float filter_width): share of a filter on a band about 0.
 // float bands_cover(float x, float spacing, float width, float filter_width): the same for bands about
 // all multiples of `spacing`.
-// vec4 cell_noise(ivec2 cell): four independent numbers in 0..1, equal on all machines.
+// vec4 cell_noise(vec2 cell): four independent numbers in 0..1 for a cell with whole coordinates.
 
 struct Footprint {
     vec2 along;      // Unit vector along its longer axis.
@@ -36,14 +36,9 @@ float bands_cover(float x, float spacing, float width, float filter_width) {
     return (high - bands_integral(x - 0.5 * filter_width, spacing, width)) / filter_width;
 }
 
-// Jarzynski and Olano 2020, Hash Functions for GPU Rendering, JCGT 9(3): pcg2d.
-vec4 cell_noise(ivec2 cell) {
-    uvec2 v = uvec2(cell) * 1664525u + 1013904223u;
-    v.x += v.y * 1664525u;
-    v.y += v.x * 1664525u;
-    v ^= v >> 16u;
-    v.x += v.y * 1664525u;
-    v.y += v.x * 1664525u;
-    v ^= v >> 16u;
-    return vec4(v & 0xffffu, v >> 16u) / 65535.0;
+// Hoskins 2014, Hash without Sine (MIT licence): hash42.
+vec4 cell_noise(vec2 cell) {
+    vec4 p = fract(cell.xyxy * vec4(0.1031, 0.1030, 0.0973, 0.1099));
+    p += dot(p, p.wzxy + 33.33);
+    return fract((p.xxyz + p.yzzw) * p.zywx);
 }

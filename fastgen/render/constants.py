@@ -24,7 +24,6 @@ from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_tiles
 from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattice
 from fastgen.render.variant import (
-    GROUND_TRAITS,
     LAYERS,
     PIXEL_TRAITS,
     ShaderVariant,
@@ -39,7 +38,7 @@ from fastgen.render.zone_codes import (
     ZONE_SMALL,
     ZONE_TURN,
 )
-from fastgen.scene.limits import DECAL_KINDS, MIN_ROUGHNESS
+from fastgen.scene.limits import DECAL_KINDS, GROUNDS, MIN_ROUGHNESS
 
 LIST_GROUP = 64
 """Pixels that one compute work group shades."""
@@ -179,8 +178,17 @@ def _environment(_: ShaderVariant) -> Defines:
 
 
 def _ground(v: ShaderVariant) -> Defines:
+    ground = v.ground
     return {
-        **{f"GROUND_{name.upper()}": int(name in v.ground) for name in GROUND_TRAITS},
+        **{f"GROUND_{kind.upper()}": int(kind == ground.kind) for kind in GROUNDS},
+        "GROUND_BOXES": ground.boxes,
+        "GROUND_LENS": int(ground.lens),
+        "GROUND_WET": int(ground.wet),
+        "GROUND_FADES": int(ground.fades),
+        "GROUND_PROPS": int(ground.props),
+        "GROUND_COARSE": int(ground.coarse),
+        # constant indices, because llvmpipe reads blocks slowly by computed ones
+        "EACH_BOX(f)": " ".join(f"f({i})" for i in range(ground.boxes)),
         "GROUND_FADE_START": GROUND_FADE_START,
         "MAX_BOXES": MAX_BOXES,
     }

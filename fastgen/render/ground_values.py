@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.geometry.prepared_scene import Member
 from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
@@ -20,6 +20,9 @@ _NO_GAP_M = 1e6
 
 _LEAST_GAP_M = 1e-3
 
+_FAR_BELOW_M = -1e4
+"""Height of boxes that a program has but the scene has not."""
+
 
 def prop_box(prop: Prop) -> OrientedBox:
     """Return the box around a prop."""
@@ -28,7 +31,11 @@ def prop_box(prop: Prop) -> OrientedBox:
 
 
 def ground_values(
-    ground: Ground, members: Sequence[Member], props: Sequence[Prop], light: GroundLight
+    ground: Ground,
+    members: Sequence[Member],
+    props: Sequence[Prop],
+    light: GroundLight,
+    toward: NDArray[np.float64],
 ) -> Mapping[str, ArrayLike]:
     """Return the members of GROUND_BLOCK.
 
@@ -37,9 +44,11 @@ def ground_values(
         members: Containers of the scene that are present.
         props: Props of the scene.
         light: Light on the plane around `members`.
+        toward: Unit vector [3] to the first directional light.
     """
     bodies = [member.box for member in members] + [prop_box(prop) for prop in props]
     rows = np.zeros((3, MAX_BOXES + len(props), 4))
+    rows[0, len(members) : MAX_BOXES, 2] = _FAR_BELOW_M
     places = [*range(len(members)), *range(MAX_BOXES, MAX_BOXES + len(props))]
     for place, body in zip(places, bodies, strict=True):
         rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
@@ -51,6 +60,8 @@ def ground_values(
         rows[2, place, 3] = max(gap, _LEAST_GAP_M) if gap < LOW_GAP_M else _NO_GAP_M
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
+    turned = np.array([body.axes @ toward for body in bodies[: len(members)]]).reshape(-1, 3)
+    inverse = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
     scale = 1 / (light.step_m * GRID)
     yaw = np.deg2rad(ground.line_yaw_deg)
     wet = ground.wetness
@@ -58,6 +69,7 @@ def ground_values(
         "body_center": rows[0],
         "body_half": rows[1],
         "body_paint": rows[2],
+        "body_light": np.insert(inverse, 3, 0.0, axis=1),
         "face_radiance": np.insert(light.face_radiance.reshape(-1, 3), 3, 0.0, axis=1),
         "grid_transform": (*scale, *(0.5 / np.array(GRID) - light.low_m * scale)),
         "ground_albedo": ground.albedo,
@@ -74,7 +86,6 @@ def ground_values(
         "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
-        "box_count": len(members),
         "prop_count": len(props),
     }
 

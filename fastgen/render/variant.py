@@ -25,11 +25,30 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
 surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block.
 Each class has its list, see classify.comp."""
 
-GROUND_TRAITS = ("asphalt", "concrete", "paving", "wet", "fades", "props")
-"""Traits of the ground's programs: the kind of ground, and whether a program draws wet ground, the
-fade into the panorama, and props."""
-
 PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
+
+
+@dataclass(frozen=True)
+class GroundVariant:
+    """What a program of the ground is compiled for.
+
+    Attributes:
+        kind: One of GROUNDS.
+        boxes: Most containers whose shadows and mirror images it draws.
+        lens: Undo lens distortion.
+        wet: Draw wet ground.
+        fades: Blend into the panorama.
+        props: Draw props.
+        coarse: Shade once per 2x2 pixels.
+    """
+
+    kind: str = "asphalt"
+    boxes: int = 0
+    lens: bool = False
+    wet: bool = False
+    fades: bool = False
+    props: bool = False
+    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,7 +67,7 @@ class ShaderVariant:
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
         over: Draw over an image that already shows what lies behind, not over the sky.
-        ground: Those of GROUND_TRAITS that a program of the ground has.
+        ground: What the ground pass needs besides.
     """
 
     samples_per_axis: int = 1
@@ -62,7 +81,7 @@ class ShaderVariant:
     radiance: bool = False
     without: tuple[str, ...] = ()
     over: bool = False
-    ground: tuple[str, ...] = ()
+    ground: GroundVariant = GroundVariant()
 
     @property
     def traits(self) -> tuple[str, ...]:

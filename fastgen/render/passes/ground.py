@@ -1,34 +1,26 @@
 """Ground pass: the plane below the containers and the props on it, drawn over the background."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
-from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ground_light import GroundLight, ground_light
 from fastgen.render.blocks import GROUND_BLOCK
-from fastgen.render.constants import GROUND_FADE_START
 from fastgen.render.draw_inputs import DrawInputs
-from fastgen.render.ground_values import ground_values, prop_box
-from fastgen.render.program import Programs
+from fastgen.render.ground_regions import ground_regions
+from fastgen.render.ground_values import ground_values
+from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
-from fastgen.render.regions import Region, outside, region_of
-from fastgen.scene import Ground, Scene
+from fastgen.render.regions import Region
+from fastgen.render.variant import GroundVariant, ShaderVariant
+from fastgen.scene import Scene
 
-_BLOCK_PX = 16
-"""Height of the blocks of rows in which it is decided what to draw."""
-
-_COLUMNS = 17
-"""Columns of an image whose rays are followed to find what its rows see."""
-
-_SHADED_MM = 600.0
-"""Distance from a prop within which it shades the ground, see ground_props.glsl."""
-
-_LONGEST_SHADOW_MM = 10000.0
+Array = NDArray[np.float64]
 
 
 class GroundPass:
@@ -54,6 +46,7 @@ class GroundPass:
         self._ambient = ambient
         self._block = ctx.buffer(reserve=GROUND_BLOCK.size)
         self._scenes: ReleasingCache[_SceneLight] = ReleasingCache(2)
+        self._coarse: ReleasingCache[_CoarseTarget] = ReleasingCache(2)
 
     def run(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Draw the ground of a scene, if it has one.
@@ -81,39 +74,106 @@ class GroundPass:
                 ),
             ),
         )
-        self._block.write(
-            GROUND_BLOCK.pack(ground_values(ground, present, scene.props, kept.light))
-        )
+        toward = _first_light(scene, ambient)
+        values = ground_values(ground, present, scene.props, kept.light, toward)
+        self._block.write(GROUND_BLOCK.pack(values))
         self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
         self._ctx.memory_barrier()  # compute shaders may have written the background
-        inputs.targets.image.use()
         self._ctx.enable_only(moderngl.NOTHING)
+        boxes = [member.box for member in present]
+        regions = ground_regions(scene, ground, inputs.view, boxes, toward)
+        variant = ShaderVariant(
+            layer=inputs.variant.layer,
+            lights=inputs.variant.lights,
+            radiance=inputs.variant.radiance,
+        )
         textures = {**inputs.textures, "ground_grid": kept.texture}
-        for traits, regions in _regions(scene, ground, inputs.view, ambient).items():
-            program = self._programs.get(
-                ("fullscreen.vert", "ground.frag"),
-                replace(
-                    inputs.variant,
-                    samples_per_axis=inputs.variant.samples_per_axis if "props" in traits else 1,
-                    lookups=1,
-                    damage="undamaged",
-                    traced=False,
-                    coarse=False,
-                    without=(),
-                    over=False,
-                    ground=(ground.kind, *(("wet",) if ground.wetness else ()), *traits),
-                ),
-            )
-            program.bind(textures)
-            for region in regions:
+        coarse = inputs.variant.coarse and variant.layer == "all"
+        if coarse:
+            fine = {drawn: parts for drawn, parts in regions.items() if drawn.props}
+            self._draw_coarse(inputs, variant, textures, regions)
+        else:
+            fine = regions
+        inputs.targets.image.use()
+        if coarse:
+            self._spread(inputs, variant, regions)
+        for drawn, parts in fine.items():
+            per_axis = inputs.variant.samples_per_axis if drawn.props else 1
+            self._draw(replace(variant, ground=drawn, samples_per_axis=per_axis), textures, parts)
+        self._ctx.scissor = None
+
+    def _draw(self, variant: ShaderVariant, textures: Textures, regions: Sequence[Region]) -> None:
+        """Draw regions of the bound framebuffer with the program of a variant."""
+        if not regions:
+            return
+        program = self._programs.get(("fullscreen.vert", "ground.frag"), variant)
+        program.bind(textures)
+        for region in regions:
+            self._ctx.scissor = region
+            program.draw_vertices(3)
+
+    def _draw_coarse(
+        self,
+        inputs: DrawInputs,
+        variant: ShaderVariant,
+        textures: Textures,
+        regions: Mapping[GroundVariant, Sequence[Region]],
+    ) -> None:
+        """Draw what is not near props at half the resolution."""
+        width, height = ((side + 1) // 2 for side in inputs.targets.size)
+        target = self._coarse.get((width, height), lambda: _CoarseTarget(self._ctx, width, height))
+        target.framebuffer.use()
+        for drawn, parts in regions.items():
+            if drawn.props:
+                continue
+            halved = []
+            for x, y, across, down in parts:
+                # one texel more, because spreading interpolates
+                left, top = max(x // 2 - 1, 0), max(y // 2 - 1, 0)
+                right, bottom = (x + across + 3) // 2, (y + down + 3) // 2
+                halved.append((left, top, right - left, bottom - top))
+            self._draw(replace(variant, ground=replace(drawn, coarse=True)), textures, halved)
+
+    def _spread(
+        self,
+        inputs: DrawInputs,
+        variant: ShaderVariant,
+        regions: Mapping[GroundVariant, Sequence[Region]],
+    ) -> None:
+        """Spread the coarse image over the bound framebuffer."""
+        width, height = ((side + 1) // 2 for side in inputs.targets.size)
+        target = self._coarse.get((width, height), lambda: _CoarseTarget(self._ctx, width, height))
+        lens = inputs.view.distortion is not None
+        program = self._programs.get(
+            ("fullscreen.vert", "ground_spread.frag"),
+            replace(variant, lights=0, ground=GroundVariant(lens=lens)),
+        )
+        program.bind({"ground_coarse": target.texture})
+        for drawn, parts in regions.items():
+            for region in () if drawn.props else parts:
                 self._ctx.scissor = region
                 program.draw_vertices(3)
-        self._ctx.scissor = None
 
     def release(self) -> None:
         """Free all GL objects."""
         self._scenes.release()
+        self._coarse.release()
         self._block.release()
+
+
+class _CoarseTarget:
+    """Image of half the resolution: exposed radiance, and the share that is not the panorama."""
+
+    def __init__(self, ctx: moderngl.Context, width: int, height: int) -> None:
+        self.texture = ctx.texture((width, height), 4, dtype="f2")
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.framebuffer = ctx.framebuffer([self.texture])
+
+    def release(self) -> None:
+        """Free the GL objects."""
+        self.framebuffer.release()
+        self.texture.release()
 
 
 class _SceneLight:
@@ -131,67 +191,8 @@ class _SceneLight:
         self.texture.release()
 
 
-def _regions(
-    scene: Scene, ground: Ground, view: View, ambient: Ambient
-) -> dict[tuple[str, ...], list[Region]]:
-    """Return disjoint regions of the image by the traits of the program that draws each."""
-    near, far = _bands(ground, view)
-    if not scene.props:
-        return {(): near, ("fades",): far}
-    width, height = view.size
-    around = region_of(view, _props_reach(scene, ground, ambient)) or (0, 0, width, height)
-    return {
-        (): outside(near, [around]),
-        ("fades",): outside(far, [around]),
-        ("fades", "props"): [around],
-    }
-
-
-def _bands(ground: Ground, view: View) -> tuple[list[Region], list[Region]]:
-    """Return the rows that see only the near ground, and the others that may see ground.
-
-    Near ground is not faded at all. It is the inside of a circle, and so is what an image sees of
-    it convex without lens distortion; the border columns decide.
-    """
-    width, height = view.size
-    rows = np.append(np.arange(0, height, _BLOCK_PX), height)
-    x, y = np.meshgrid(np.linspace(0, width, _COLUMNS), rows)
-    eye_mm, rays = view.rays(np.stack([x, y], axis=-1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = (ground.height_mm - eye_mm[2]) / rays[..., 2]
-        at = eye_mm[:2] + distance[..., None] * rays[..., :2]
-    away = np.where(distance > 0, np.hypot(at[..., 0], at[..., 1]), np.inf)
-    all_near = away.max(axis=1) < 0.97 * GROUND_FADE_START * ground.reach_mm
-    some = away.min(axis=1) < ground.reach_mm
-    blocks_near = all_near[1:] & all_near[:-1]
-    # a block beside one that sees ground may see some between the columns
-    seen = some[1:] | some[:-1]
-    blocks_seen = seen | np.append(seen[1:], False) | np.append(False, seen[:-1])
-    found: tuple[list[Region], list[Region]] = ([], [])
-    for regions, blocks in zip(found, (blocks_near, blocks_seen & ~blocks_near), strict=True):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], blocks.astype(int), [0]])))
-        for first, end in edges.reshape(-1, 2):
-            top, bottom = int(rows[first]), int(rows[end])
-            regions.append((0, top, width, bottom - top))
-    return found
-
-
-def _props_reach(scene: Scene, ground: Ground, ambient: Ambient) -> np.ndarray:
-    """Return points [N, 3] in mm whose hull contains the props and what they shade."""
-    corners = np.concatenate([prop_box(prop).corners_mm for prop in scene.props])
-    low, high = corners.min(axis=0) - _SHADED_MM, corners.max(axis=0)
-    low[2], high[:2] = ground.height_mm, high[:2] + _SHADED_MM
-    hull = [
-        np.array([x, y, z])
-        for x in (low[0], high[0])
-        for y in (low[1], high[1])
-        for z in (low[2], high[2])
-    ]
-    if ambient.lights:
-        light = to_map_frame(ambient.lights[0].direction, -scene.environment.yaw_deg)
-        above = corners[:, 2:] - ground.height_mm
-        thrown = -light[:2] * above / max(light[2], 1e-3)
-        thrown *= np.minimum(1, _LONGEST_SHADOW_MM / np.maximum(np.hypot(*thrown.T), 1))[:, None]
-        shadows = np.column_stack([corners[:, :2] + thrown, np.full(len(corners), low[2])])
-        hull.extend(shadows)
-    return np.array(hull)
+def _first_light(scene: Scene, ambient: Ambient) -> Array:
+    """Return the unit vector [3] to the brightest directional light; up if there is none."""
+    if not ambient.lights:
+        return np.array([0.0, 0.0, 1.0])
+    return to_map_frame(ambient.lights[0].direction, -scene.environment.yaw_deg)
