@@ -13,7 +13,19 @@ from fastgen import Config, Generator
 from fastgen.camera.electronics import stamped
 from fastgen.files.images import jpeg, write
 from fastgen.scene import Camera, Scene
-from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from fastgen.scene.optics import (
+    ChromaNoise,
+    Defocus,
+    Lens,
+    Meter,
+    Noise,
+    Rain,
+    Response,
+    Sensor,
+    Sharpening,
+    Stamp,
+    Weather,
+)
 
 SIZE = (320, 240)
 INDEX = 3
@@ -25,9 +37,20 @@ SENSORS = {
     "exposure +1.5 EV": Sensor(exposure_error_ev=1.5),
     "white balance": Sensor(gains=(1.25, 1.0, 0.75)),
     "noise": Sensor(noise=Noise(400, 6, 1)),
+    "response": Sensor(response=Response(1.2, 1.1, 1.2)),
+    "contrast 1.6": Sensor(response=Response(1.2, 1.6, 1.0)),
+    "chroma noise": Sensor(chroma_noise=ChromaNoise(0.025, 5.0, 1)),
+    "sharpening": Sensor(sharpening=Sharpening(1.5, 1.2)),
     "JPEG 15": Sensor(jpeg_quality=15),
     "stamp": Sensor(stamp=Stamp("2024-11-21 06:41:08", "top left", 0.04)),
 }
+
+DIM = Sensor(
+    meter=Meter(f_number=2.0, longest_s=0.03, largest_iso=3200, dim_target=0.06),
+    noise=Noise(6000, 4, 1),
+    response=Response(1.2, 1.1, 1.2),
+)
+"""A camera at the limits of its meter."""
 
 LENSES = {
     "no lens": (None, 16.0),
@@ -51,6 +74,8 @@ def tiles(generator: Generator, scene: Scene, camera: Camera) -> list[np.ndarray
         found.append((name, scene, replace(camera, sensor=sensor)))
     for name, weather in WEATHERS.items():
         found.append((name, replace(scene, weather=weather), camera))
+    dim = replace(scene, environment=replace(scene.environment, illuminance_lx=10.0))
+    found.append(("meter, 10 lx", dim, replace(camera, sensor=DIM)))
     crane = Generator(Config.preset("crane"), seed=1, size=SIZE).scene(3)
     found.append(("preset crane", crane, crane.camera("A")))
     images = []
