@@ -42,3 +42,6 @@ SPREADER_ID = 60000
 
 SEAL_ID = 60001
 """Id of a seal on the first hasp; those on the other hasps follow."""
+
+BACKGROUND_ID = 100000
+"""Ids of containers in the surroundings start above it. They are not in the id target."""

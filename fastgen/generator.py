@@ -12,8 +12,10 @@ from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
 from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import ConfigError
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.labels.background import background_objects
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
+from fastgen.light.container_map import ContainerMap, container_map_path, load_container_map
 from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.preload import preload
@@ -123,9 +125,22 @@ class Generator:
 
     @property
     def environment_record(self) -> dict[str, dict[str, Any]]:
-        """SHA-256 and weight of each available HDRI, by name: what decides the light of scenes."""
-        sha256 = {n: hashlib.sha256(p.read_bytes()).hexdigest() for n, p in self._hdris.items()}
-        return {n: {"sha256": sha256[n], "weight": w} for n, w in self._weights.items()}
+        """What decides the light and the background of scenes, by name of each available HDRI.
+
+        Its SHA-256, its weight and, if it has a container map, the SHA-256 of that as `containers`.
+        """
+        record: dict[str, dict[str, Any]] = {}
+        for name, weight in self._weights.items():
+            path = self._hdris[name]
+            record[name] = {"sha256": _sha256(path), "weight": weight}
+            if container_map_path(path).is_file():
+                record[name]["containers"] = _sha256(container_map_path(path))
+        return record
+
+    def container_map(self, environment: str) -> ContainerMap | None:
+        """Return the containers that an environment shows; None if they are unknown."""
+        path = self._hdris.get(environment)
+        return None if path is None else load_container_map(path)
 
     @property
     def renderer_name(self) -> str:
@@ -186,7 +201,12 @@ class Generator:
                 image = apply_camera_model(frame, view, camera, scene.weather, airlight, exposure)
                 frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)
-        objects = label(Shot(frame, prepared, view, config))
+        shot = Shot(frame, prepared, view, config)
+        objects, background = label(shot), None
+        containers = self.container_map(scene.environment.name)
+        if containers is not None and config.labels.background != "none":
+            more, background = background_objects(shot, containers)
+            objects += more
         return Sample(
             image=frame.image,
             cover=frame.cover,
@@ -198,6 +218,7 @@ class Generator:
             view=view,
             objects=objects,
             normals=frame.normals,
+            background=background,
         )
 
     def _airlight(self, renderer: Renderer, scene: Scene, exposure: float) -> Color:
@@ -306,6 +327,10 @@ class Generator:
         if given is None or scene is not given.scene:
             self._given = given = PreparedScene(check_scene(scene))
         return given
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:

@@ -24,6 +24,9 @@ class SceneRenderer(Protocol):
     def environments(self) -> dict[str, float]:
         """Weight of each HDRI by name."""
 
+    def container_map(self, environment: str) -> object:
+        """Return the containers that an environment shows."""
+
     def scene(self, index: int) -> Scene:
         """Return a sampled scene."""
 
@@ -49,6 +52,7 @@ def preload(generator: SceneRenderer, on_step: Callable[[], None]) -> None:
         for name in environments:
             on_step()
             renderer.preload_environment(name)
+            generator.container_map(name)
         for container, spreader in possible_shapes(config):
             on_step()
             shape = replace(scene, container=container, spreader=spreader, damages=())

@@ -64,7 +64,7 @@ class Object:
         keypoints: Casting corners of the container in the order of labels.objects.CASTINGS. Of a
             seal, the middle of its barrel or body; of a bolt without a barrel, that of its head.
         container: Number of the container that the object is or belongs to: 0, or k for
-            Scene.neighbours[k - 1].
+            Scene.neighbours[k - 1]; -1 for containers of the panorama.
         background: Whether the object is a container of the panorama around the scene. It has no
             amodal box, polygon or keypoints, and no pixels in the id target; see Sample.background.
     """
@@ -98,8 +98,8 @@ class Sample(Frame):
         camera: The camera.
         view: Projection of the camera.
         objects: The labels.
-        background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container that a pixel shows,
-            0 elsewhere. None if these containers are not labelled: they are unknown in photographs,
+        background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container at each pixel, 0
+            elsewhere. None if these containers are not labelled: they are unknown in photographs,
             and LabelConfig.background may switch them off.
     """
 

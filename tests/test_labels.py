@@ -13,7 +13,7 @@ from tests import oracle
 
 @pytest.fixture(scope="module")
 def samples():
-    config = Config.from_values({"spreader": {"probability": 0}})
+    config = Config.from_values({"spreader": {"probability": 0}, "labels": {"background": "none"}})
     with Generator(config, seed=11, size=(480, 360)) as generator:
         return [
             generator.render(index=i, camera=c) for i in range(4) for c in ("A", "B", "Cl", "Cr")

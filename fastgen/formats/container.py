@@ -20,8 +20,13 @@ class _Container(Format):
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample = item.sample
         thing = item.container
+        # without keypoints, a container is a region to ignore, even if other tasks label it
+        surroundings = [
+            {**each, "iscrowd": 1, "keypoints": [0] * (3 * len(CASTINGS)), "num_keypoints": 0}
+            for each in item.background_annotations
+        ]
         if thing is None or item.container_annotation is None:
-            return {}, []
+            return {}, surroundings
         pose = view_values(sample.view)
         found = {
             **item.container_annotation,
@@ -34,7 +39,7 @@ class _Container(Format):
             "distortion_model": pose["distortion_model"],
             "distortion": pose["distortion"],
         }
-        return {}, [found]
+        return {}, [found, *surroundings]
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Corner castings of synthetic shipping containers, and the containers' poses"

@@ -12,6 +12,7 @@ from fastgen.files.images import decode, png
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
 from fastgen.formats.item import Item
+from fastgen.labels.background import background_masks
 from fastgen.labels.overlay import draw_outline
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Sample
@@ -47,22 +48,30 @@ class _Damage(Format):
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         found = list(instances(item.sample))
         height, width = item.sample.damage.shape
+        outlined = [
+            (category, box, window(mask, box))
+            for category, box, mask, ignored in found
+            if not ignored
+        ]
+        surroundings = background_masks(item.sample)
+        outlined += [(1, box, part) for thing, box, part in surroundings if not thing.ignored]
         lines = []
-        for category, box, mask, ignored in found:
-            polygon = yolo.outline(window(mask, box))
-            if len(polygon) > 2 and not ignored:
+        for category, box, part in outlined:
+            polygon = yolo.outline(part)
+            if len(polygon) > 2:
                 points = (polygon + box[:2]) / (width, height)
                 lines.append(yolo.line(category - 1, points.ravel().tolist()))
         files: Files = {
             f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),
             f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
         }
-        return files, [
+        facts = [
             item.container_annotation
             if category == 1
             else coco.annotation(category, box, window(mask, box), (width, height), ignored)
             for category, box, mask, ignored in found
         ]
+        return files, facts + item.background_annotations
 
     def labels(self, facts: Any) -> Iterable[Label]:
         return coco.labels(facts, self.classes)
@@ -109,7 +118,10 @@ def _outline_faults(found: list[tuple[int, list[float]]]) -> Iterator[str]:
 
 
 def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str, Any]]) -> str:
-    """Compare a mask file with annotations; '' if it has the same parts."""
+    """Compare a mask file with annotations; '' if it has the same parts.
+
+    Containers of the panorama are not in the mask.
+    """
     width, height = size
     try:
         mask = decode(png_file)
@@ -130,6 +142,7 @@ def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str
     listed = [
         (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
         for item in annotations
+        if not item.get("background")
     ]
     same = sorted(from_mask, key=repr) == sorted(listed, key=repr)
     return "" if same else "differs from the COCO annotations"

@@ -32,6 +32,8 @@ class _Imdg(Format):
         }
         found: list[dict[str, Any] | None] = []
         for thing, box in item.detections:
+            if thing.background:
+                continue
             if thing.id == CONTAINER_ID:
                 found.append(item.container_annotation)
                 continue
@@ -44,7 +46,7 @@ class _Imdg(Format):
                     **more,
                 }
             )
-        return files, found
+        return files, found + item.background_annotations
 
     def labels(self, facts: Any) -> Iterable[Label]:
         return coco.labels(facts, self.classes)

@@ -9,6 +9,7 @@ from fastgen.classes import ALL_DETECTION_CLASSES, CONTAINER_ID
 from fastgen.config.config import LabelConfig
 from fastgen.files.images import jpeg
 from fastgen.formats import coco
+from fastgen.labels.background import background_masks
 from fastgen.labels.visibility import window
 from fastgen.sample import Box, Object, Sample
 
@@ -59,6 +60,18 @@ class Item:
             return None
         part = window(sample.damage, thing.bbox) > 0
         return coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored)
+
+    @cached_property
+    def background_annotations(self) -> list[dict[str, Any]]:
+        """COCO annotations of the visible containers of the panorama, category 1 of each task.
+
+        Each has the additional key `background`, which is true.
+        """
+        size = self.sample.view.size
+        return [
+            {**coco.annotation(1, box, part, size, thing.ignored), "background": True}
+            for thing, box, part in background_masks(self.sample)
+        ]
 
     @cached_property
     def jpeg(self) -> bytes:

@@ -19,6 +19,7 @@ def scene_file(item: Item) -> bytes:
         "camera": sample.camera.name,
         "size": list(sample.view.size),
         "view": view_values(sample.view),
+        "background_known": sample.background is not None,
         "objects": [vars(thing) for thing in sample.objects],
     }
     return orjson.dumps(head)[:-1] + b',"scene":' + _scene_json(sample.scene) + b"}"

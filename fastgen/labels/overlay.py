@@ -21,6 +21,7 @@ from fastgen.sample import Sample
 
 Image = NDArray[np.uint8]
 
+_SURROUNDINGS = (150, 150, 150)
 _LINE_PX = 1000
 """Image side in pixels for each pixel of line width."""
 
@@ -125,14 +126,21 @@ def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
 
 
 def overlay(sample: Sample, image: Image | None = None) -> Image:
-    """Return the sample's image, or `image`, with tinted damages and boxes of visible objects."""
+    """Return the sample's image, or `image`, with tinted damages and boxes of visible objects.
+
+    Containers of the panorama have thin grey boxes without captions.
+    """
     drawn = (sample.image if image is None else image).copy()
     damaged = sample.damage >= DAMAGE_VALUES.start
     if damaged.any():
         tint = label_colors(sample.damage, DAMAGE_GREYS)[damaged]
         drawn[damaged] = (0.55 * drawn[damaged] + 0.45 * tint).astype(np.uint8)
     for item in sample.objects:
-        if item.bbox is not None:
+        if item.bbox is not None and item.background:
+            x0, y0, x1, y1 = item.bbox
+            cv2.rectangle(drawn, (x0, y0), (x1 - 1, y1 - 1), _SURROUNDINGS, 1)
+    for item in sample.objects:
+        if item.bbox is not None and not item.background:
             caption = f"{item.class_name} {item.instance}"
             draw_box(drawn, item.bbox, item.class_name, caption)
     return drawn

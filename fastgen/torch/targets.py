@@ -19,8 +19,10 @@ from fastgen.formats import yolo
 from fastgen.formats.damage import instances
 from fastgen.formats.door import DOOR_CLASSES, door_number
 from fastgen.formats.seal import SEAL_CLASSES
+from fastgen.labels.background import background_masks
 from fastgen.labels.crops import crop_box, text_crops
 from fastgen.labels.hasp_crops import hasp_crops
+from fastgen.labels.visibility import window
 from fastgen.sample import Box, Object, Sample
 from fastgen.validation import check_known
 
@@ -204,12 +206,18 @@ _Found = tuple[int, Box, int, NDArray[np.bool_] | None]
 
 
 def _damages(sample: Sample) -> list[_Found]:
-    """Return class from 0, box, visible pixels and mask of the container and each damage."""
-    return [
+    """Return class from 0, box, visible pixels and mask of each container and damage."""
+    found: list[_Found] = [
         (category - 1, box, int(np.count_nonzero(mask)), mask)
         for category, box, mask, ignored in instances(sample)
         if not ignored
     ]
+    for thing, box, part in background_masks(sample):
+        if not thing.ignored:
+            mask = np.zeros(sample.damage.shape, bool)
+            window(mask, box)[:] = part
+            found.append((0, box, thing.area, mask))
+    return found
 
 
 def _markers(sample: Sample) -> list[_Found]:
