@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.frame import Frame
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Container, Damage, Scene
+from fastgen.scene.object_ids import scene_numbers
 
 Box = tuple[int, int, int, int]
 """(x0, y0, x1, y1) in pixels, x1 and y1 exclusive."""
@@ -90,6 +91,23 @@ class Object:
 
 
 @dataclass(frozen=True, eq=False)
+class ContainerView:
+    """One container in an image.
+
+    Attributes:
+        container: The container.
+        damages: Its damages, in its own frame.
+        view: Projection of the camera, in the frame of the container.
+        damage_values: Values of the container and its damages in the damage target.
+    """
+
+    container: Container
+    damages: tuple[Damage, ...]
+    view: View
+    damage_values: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Sample(Frame):
     """Frame with its labels, and the scene and camera that it shows.
 
@@ -98,7 +116,7 @@ class Sample(Frame):
         camera: The camera.
         view: Projection of the camera.
         objects: The labels.
-        background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container at each pixel, 0
+        background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container at a pixel, 0
             elsewhere. None if these containers are not labelled: they are unknown in photographs,
             and LabelConfig.background may switch them off.
     """
@@ -108,6 +126,25 @@ class Sample(Frame):
     view: View
     objects: list[Object]
     background: NDArray[np.uint16] | None = field(default=None, kw_only=True)
+
+    def container_at(self, number: int) -> ContainerView:
+        """Return a container of the scene, as the camera sees it in the container's own frame.
+
+        Args:
+            number: Object.container of the container or of what it carries.
+        """
+        scene, numbers = self.scene, scene_numbers(self.scene)[number]
+        values = (numbers.undamaged, *numbers.damages)
+        if number == 0:
+            return ContainerView(scene.container, scene.damages, self.view, values)
+        each = scene.neighbours[number - 1]
+        return ContainerView(each.container, each.damages, self.view.in_frame(each.pose), values)
+
+    def container_mask(self, number: int) -> NDArray[np.bool_]:
+        """Return the pixels [H, W] that show a container with its decals and damages."""
+        if not self.scene.neighbours:
+            return np.asarray(self.damage > 0)
+        return np.isin(self.damage, self.container_at(number).damage_values)
 
     def __repr__(self) -> str:
         """Return one line, because notebooks print samples and arrays would fill pages."""

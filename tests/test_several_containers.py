@@ -49,11 +49,14 @@ def generator():
 def scene(generator):
     """Four containers, each sampled like the first container of another scene."""
     first, *others = (generator.scene(i) for i in range(4))
-    neighbours = tuple(
+    return replace(first, spreader=Spreader(), neighbours=neighbours_of(others, POSES))
+
+
+def neighbours_of(scenes, poses):
+    return tuple(
         Neighbour(pose, s.container, s.surface, s.decals, s.damages, s.seals)
-        for s, pose in zip(others, POSES, strict=True)
+        for s, pose in zip(scenes, poses, strict=True)
     )
-    return replace(first, spreader=Spreader(), neighbours=neighbours)
 
 
 def alone(scene):

@@ -1,4 +1,4 @@
-"""BOP format for the pose of the container: bop_toolkit, docs/bop_datasets_format.md.
+"""BOP format for the poses of containers: bop_toolkit, docs/bop_datasets_format.md.
 
 Lengths are in millimetres, matrices are row-major and pixel centres are at whole numbers. Each
 split is one BOP scene. Image ids count the images of the whole dataset.
@@ -42,30 +42,38 @@ class _Bop(Format):
             f"{folder}/rgb/{name}.jpg": Same(item.image_path),
             f"{folder}/depth/{name}.png": png(depth_mm(sample.depth)),
         }
-        thing = item.container
         intrinsics = sample.view.intrinsics.copy()
         intrinsics[:2, 2] -= 0.5
         camera = {"cam_K": intrinsics.ravel().tolist(), "depth_scale": 1.0}
         if sample.view.distortion:  # an addition of ours: BOP has no lens distortion
             camera |= {key: view_values(sample.view)[key] for key in _LENS_KEYS}
-        if thing is None or thing.bbox is None or thing.amodal_bbox is None:
-            return files, {"id": item.number, "camera": camera, "gt": [], "info": []}
-        visible = np.asarray(sample.damage > 0, np.uint8) * np.uint8(255)
-        files[f"{folder}/mask_visib/{name}_000000.png"] = png(visible)
-        gt = {
-            "cam_R_m2c": sample.view.rotation.ravel().tolist(),
-            "cam_t_m2c": sample.view.translation_mm.tolist(),
-            "obj_id": OBJECT_IDS[sample.scene.container.kind],
-        }
-        info = {
-            "bbox_obj": _corner_and_size(thing.amodal_bbox),
-            "bbox_visib": _corner_and_size(thing.bbox),
-            "px_count_all": round(thing.area / thing.visible_fraction),
-            "px_count_valid": int(np.count_nonzero(visible[np.isfinite(sample.depth)])),
-            "px_count_visib": thing.area,
-            "visib_fract": thing.visible_fraction,
-        }
-        return files, {"id": item.number, "camera": camera, "gt": [gt], "info": [info]}
+        poses: list[dict[str, Any]] = []
+        infos: list[dict[str, Any]] = []
+        for thing in item.containers:
+            if thing.bbox is None or thing.amodal_bbox is None:
+                continue
+            mask = sample.container_mask(thing.container)
+            path = f"{folder}/mask_visib/{name}_{len(poses):06d}.png"
+            files[path] = png(np.asarray(mask, np.uint8) * np.uint8(255))
+            seen = sample.container_at(thing.container)
+            poses.append(
+                {
+                    "cam_R_m2c": seen.view.rotation.ravel().tolist(),
+                    "cam_t_m2c": seen.view.translation_mm.tolist(),
+                    "obj_id": OBJECT_IDS[seen.container.kind],
+                }
+            )
+            infos.append(
+                {
+                    "bbox_obj": _corner_and_size(thing.amodal_bbox),
+                    "bbox_visib": _corner_and_size(thing.bbox),
+                    "px_count_all": round(thing.area / thing.visible_fraction),
+                    "px_count_valid": int(np.count_nonzero(mask & np.isfinite(sample.depth))),
+                    "px_count_visib": thing.area,
+                    "visib_fract": thing.visible_fraction,
+                }
+            )
+        return files, {"id": item.number, "camera": camera, "gt": poses, "info": infos}
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):

@@ -1,4 +1,4 @@
-"""COCO keypoints at the eight corner castings of the container, with its pose and the camera."""
+"""COCO keypoints at the eight corner castings of each container, with its pose and the camera."""
 
 from typing import Any
 
@@ -18,28 +18,29 @@ class _Container(Format):
     name = "container"
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
-        sample = item.sample
-        thing = item.container
+        found = []
+        for thing in item.containers:
+            if thing.id not in item.container_annotations:
+                continue
+            seen = item.sample.container_at(thing.container)
+            pose = view_values(seen.view)
+            found.append(
+                {
+                    **item.container_annotations[thing.id],
+                    "keypoints": [value for point in thing.keypoints for value in point],
+                    "num_keypoints": sum(flag > 0 for *_, flag in thing.keypoints),
+                    "kind": seen.container.kind,
+                    "rotation": pose["rotation"],
+                    "translation_mm": pose["translation_mm"],
+                    "intrinsics": pose["intrinsics"],
+                    "distortion_model": pose["distortion_model"],
+                    "distortion": pose["distortion"],
+                }
+            )
         # without keypoints, a container is a region to ignore, even if other tasks label it
-        surroundings = [
-            {**each, "iscrowd": 1, "keypoints": [0] * (3 * len(CASTINGS)), "num_keypoints": 0}
-            for each in item.background_annotations
-        ]
-        if thing is None or item.container_annotation is None:
-            return {}, surroundings
-        pose = view_values(sample.view)
-        found = {
-            **item.container_annotation,
-            "keypoints": [value for point in thing.keypoints for value in point],
-            "num_keypoints": sum(flag > 0 for *_, flag in thing.keypoints),
-            "kind": sample.scene.container.kind,
-            "rotation": pose["rotation"],
-            "translation_mm": pose["translation_mm"],
-            "intrinsics": pose["intrinsics"],
-            "distortion_model": pose["distortion_model"],
-            "distortion": pose["distortion"],
-        }
-        return {}, [found, *surroundings]
+        none = {"iscrowd": 1, "keypoints": [0] * (3 * len(CASTINGS)), "num_keypoints": 0}
+        found += [{**each, **none} for each in item.background_annotations]
+        return {}, found
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Corner castings of synthetic shipping containers, and the containers' poses"

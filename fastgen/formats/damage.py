@@ -6,7 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, SEGMENTATION_CLASSES
+from fastgen.classes import (
+    DAMAGE_CLASSES,
+    DAMAGE_VALUES,
+    SEGMENTATION_CLASSES,
+    UNDAMAGED_CONTAINER,
+)
 from fastgen.config.config import Config
 from fastgen.files.images import decode, png
 from fastgen.formats import coco, yolo
@@ -14,7 +19,7 @@ from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Rec
 from fastgen.formats.item import Item
 from fastgen.labels.background import background_masks
 from fastgen.labels.overlay import draw_outline
-from fastgen.labels.visibility import mask_box, window
+from fastgen.labels.visibility import window
 from fastgen.sample import Box, Sample
 
 CATEGORIES = [
@@ -25,20 +30,23 @@ CATEGORIES = [
 
 
 def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], bool]]:
-    """Yield the visible container and each visible damage.
+    """Yield the visible containers and each visible damage.
 
     Yields:
-        Category id, tight box, mask bool [H, W], and whether the instance is ignored. The mask of
-        the container includes its damages.
+        Value in the damage target, tight box, mask bool [H, W], and whether the instance is
+        ignored. The mask of a container includes its damages.
     """
-    own = [thing for thing in sample.objects if thing.class_name in SEGMENTATION_CLASSES]
-    ignored = {thing.id: thing.ignored for thing in own}
-    damaged = sample.damage.ravel()[np.flatnonzero(sample.damage >= DAMAGE_VALUES.start)]
-    for value in (0, *np.unique(damaged).tolist()):
-        mask = sample.damage == value if value else sample.damage > 0
-        box = mask_box(mask)
-        if box is not None:
-            yield int(value) // 100 if value else 1, box, mask, ignored.get(value or 1, False)
+    found = []
+    for thing in sample.objects:
+        if thing.bbox is None or thing.background or thing.class_name not in SEGMENTATION_CLASSES:
+            continue
+        if thing.class_name == "container":
+            mask = sample.container_mask(thing.container)
+            found.append((UNDAMAGED_CONTAINER + thing.container, thing.bbox, mask, thing.ignored))
+        else:
+            mask = np.asarray(sample.damage == thing.id)
+            found.append((thing.id, thing.bbox, mask, thing.ignored))
+    yield from sorted(found, key=lambda each: each[0])
 
 
 class _Damage(Format):
@@ -49,8 +57,8 @@ class _Damage(Format):
         found = list(instances(item.sample))
         height, width = item.sample.damage.shape
         outlined = [
-            (category, box, window(mask, box))
-            for category, box, mask, ignored in found
+            (value // 100, box, window(mask, box))
+            for value, box, mask, ignored in found
             if not ignored
         ]
         surroundings = background_masks(item.sample)
@@ -66,10 +74,8 @@ class _Damage(Format):
             f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
         }
         facts = [
-            item.container_annotation
-            if category == 1
-            else coco.annotation(category, box, window(mask, box), (width, height), ignored)
-            for category, box, mask, ignored in found
+            coco.annotation(value // 100, box, window(mask, box), (width, height), ignored)
+            for value, box, mask, ignored in found
         ]
         return files, facts + item.background_annotations
 
@@ -130,7 +136,10 @@ def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str
         complete = False
     if not complete:
         return f"not a complete 16-bit PNG of {width}x{height}"
-    parts = [(1, mask > 0)] if mask.any() else []
+    annotations = [item for item in annotations if not item.get("background")]
+    # the mask does not tell which of several containers a damage is on
+    several = sum(item["category_id"] == 1 for item in annotations) > 1
+    parts = [(1, mask > 0)] if mask.any() and not several else []
     parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
     from_mask = []
     for category, part in parts:
@@ -142,7 +151,7 @@ def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str
     listed = [
         (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
         for item in annotations
-        if not item.get("background")
+        if not (several and item["category_id"] == 1)
     ]
     same = sorted(from_mask, key=repr) == sorted(listed, key=repr)
     return "" if same else "differs from the COCO annotations"

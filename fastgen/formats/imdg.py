@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DETECTION_CLASSES, CONTAINER_ID
+from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records, Same
@@ -30,12 +30,12 @@ class _Imdg(Format):
             f"imdg/images/{split}/{stem}.jpg": Same(item.image_path),
             f"imdg/labels/{split}/{stem}.txt": labels.encode(),
         }
-        found: list[dict[str, Any] | None] = []
+        found: list[dict[str, Any]] = []
         for thing, box in item.detections:
             if thing.background:
                 continue
-            if thing.id == CONTAINER_ID:
-                found.append(item.container_annotation)
+            if thing.id in item.container_annotations:
+                found.append(item.container_annotations[thing.id])
                 continue
             part = window(sample.ids, box) == thing.id
             category = ALL_DETECTION_CLASSES.index(thing.class_name) + 1

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from fastgen.classes import ALL_DETECTION_CLASSES, CONTAINER_ID
+from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.config.config import LabelConfig
 from fastgen.files.images import jpeg
 from fastgen.formats import coco
@@ -41,25 +41,35 @@ class Item:
 
     @property
     def container(self) -> Object | None:
-        """The container, visible or not; None if the scene has none."""
-        return next((thing for thing in self.sample.objects if thing.id == CONTAINER_ID), None)
+        """The first container, visible or not; None if the scene has none."""
+        return next(iter(self.containers), None)
+
+    @property
+    def containers(self) -> list[Object]:
+        """The containers of the scene, visible or not, without those of the background."""
+        return [
+            thing
+            for thing in self.sample.objects
+            if thing.class_name == "container" and not thing.background
+        ]
 
     @property
     def detections(self) -> Iterator[tuple[Object, Box]]:
-        """The container, texts and markers that have visible pixels.
+        """Containers, texts and markers that have visible pixels.
 
         Each comes with the box (x0, y0, x1, y1) of these pixels; x1 and y1 are exclusive.
         """
         return detections(self.sample.objects)
 
     @cached_property
-    def container_annotation(self) -> dict[str, Any] | None:
-        """COCO annotation of the container, category 1 of each task; None if it is not visible."""
-        thing, sample = self.container, self.sample
-        if thing is None or thing.bbox is None:
-            return None
-        part = window(sample.damage, thing.bbox) > 0
-        return coco.annotation(1, thing.bbox, part, sample.view.size, thing.ignored)
+    def container_annotations(self) -> dict[int, dict[str, Any]]:
+        """COCO annotation of each visible container by its id, category 1 of each task."""
+        found, size = {}, self.sample.view.size
+        for thing in self.containers:
+            if thing.bbox is not None:
+                part = window(self.sample.container_mask(thing.container), thing.bbox)
+                found[thing.id] = coco.annotation(1, thing.bbox, part, size, thing.ignored)
+        return found
 
     @cached_property
     def background_annotations(self) -> list[dict[str, Any]]:
@@ -80,7 +90,7 @@ class Item:
 
 
 def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
-    """Yield the container, texts and markers that have visible pixels.
+    """Yield containers, texts and markers that have visible pixels.
 
     Each comes with the box (x0, y0, x1, y1) of these pixels; x1 and y1 are exclusive. Ignored
     objects are included.

@@ -122,10 +122,10 @@ def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
         center = np.array([(glyph.x0 + glyph.x1) / 2, base + decal.cap_mm / 2]) - middle
         letters.append(center + grid * decal.cap_mm * (ink.ink_right - ink.ink_left, 1.0))
     sheet = np.concatenate(letters) @ decal.turn.T + np.array(decal.center_mm)
-    container = sample.scene.container
-    mesh = SHAPES.container(container.kind, container.profiles)
+    seen = sample.container_at(item.container)
+    mesh = SHAPES.container(seen.container.kind, seen.container.profiles)
     rest, _ = mesh.sheet_to_surface(decal.face, sheet)
-    pixels, _ = sample.view.project(deform(sample.scene.damages, rest))
+    pixels, _ = seen.view.project(deform(seen.damages, rest))
     columns, rows = np.clip(np.floor(pixels).astype(int), 0, np.array(sample.view.size) - 1).T
-    seen = sample.ids[rows, columns] == item.id
-    return float(seen.reshape(len(letters), -1).mean(axis=1).min())
+    shown = sample.ids[rows, columns] == item.id
+    return float(shown.reshape(len(letters), -1).mean(axis=1).min())

@@ -18,6 +18,7 @@ from fastgen.classes import (
     UNDAMAGED_CONTAINER,
 )
 from fastgen.sample import Sample
+from fastgen.scene.limits import MAX_NEIGHBOURS
 
 Image = NDArray[np.uint8]
 
@@ -26,7 +27,9 @@ _LINE_PX = 1000
 """Image side in pixels for each pixel of line width."""
 
 ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
-DAMAGE_GREYS = MappingProxyType({UNDAMAGED_CONTAINER: 200})
+DAMAGE_GREYS = MappingProxyType(
+    {UNDAMAGED_CONTAINER + k: 200 - 8 * k for k in range(1 + MAX_NEIGHBOURS)}
+)
 
 _GOLDEN = (5**0.5 - 1) / 2
 

@@ -206,10 +206,10 @@ _Found = tuple[int, Box, int, NDArray[np.bool_] | None]
 
 
 def _damages(sample: Sample) -> list[_Found]:
-    """Return class from 0, box, visible pixels and mask of each container and damage."""
+    """Return class from 0, box, visible pixels and mask of each container and each damage."""
     found: list[_Found] = [
-        (category - 1, box, int(np.count_nonzero(mask)), mask)
-        for category, box, mask, ignored in instances(sample)
+        (value // 100 - 1, box, int(np.count_nonzero(mask)), mask)
+        for value, box, mask, ignored in instances(sample)
         if not ignored
     ]
     for thing, box, part in background_masks(sample):
