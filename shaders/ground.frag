@@ -5,7 +5,6 @@
 #include "ground.constants"
 #include "samples.constants"
 #include "variant.constants"
-#include "units.constants"
 #include "ground.block"
 #include "view.block"
 #include "display_color.glsl"

@@ -7,6 +7,7 @@
 // BodyHit body_hit(vec3 from, vec3 ray, int i): where a ray enters a body.
 
 #include "ground.constants"
+#include "units.constants"
 #include "ground.block"
 
 struct BodyHit {

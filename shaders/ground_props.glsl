@@ -42,10 +42,10 @@ vec3 prop_color(PropHit hit, vec3 at) {
     vec3 n = hit.normal;
     // The ground beside the face stands for what is around it.
     vec4 ambient = ground_ambient(at.xy + 0.3 * n.xy);
-    float up = 0.5 + 0.5 * n.z, above = clamp((at.z - ground_height_m) / 0.4, 0.0, 1.0);
+    float up = 0.5 + 0.5 * n.z, raised = clamp((at.z - ground_height_m) / 0.4, 0.0, 1.0);
     vec3 light = up * ambient.a * diffuse_radiance(n + vec3(0.0, 0.0, 0.5)) +
                  (1.0 - up) * ground_albedo * ambient.rgb;
-    light *= mix(0.55, 1.0, above);
+    light *= mix(0.55, 1.0, raised);
     light += ground_lights(fma(vec3(PROP_OFFSET_M), n, at), n, 0.25 * PROP_OFFSET_M);
     return exposure * body_paint[hit.body].rgb * light;
 }

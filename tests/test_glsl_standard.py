@@ -17,8 +17,15 @@ from fastgen.render import settings
 from fastgen.render.blocks import BLOCKS
 from fastgen.render.constants import CONSTANTS
 from fastgen.render.program import expand, shader_text
-from fastgen.render.variant import DAMAGE_VARIANTS, LAYERS, ShaderVariant, listed_classes
+from fastgen.render.variant import (
+    DAMAGE_VARIANTS,
+    LAYERS,
+    GroundVariant,
+    ShaderVariant,
+    listed_classes,
+)
 from fastgen.resources import shader_path
+from fastgen.scene.limits import GROUNDS
 
 COMPILER = "glslangValidator"
 LIGHTS = (0, 1, MAX_LIGHTS)
@@ -108,6 +115,14 @@ def test_all_other_shaders_are_standard_glsl(programs):
         if damage != "holed":
             programs.add(("bake.vert", "bake.frag"), of_points)
     programs.add(("occluder.vert", "occluder.frag"), ShaderVariant())
+    for kind, wet, coarse in zip(GROUNDS, (False, True, True), (True, False, True), strict=True):
+        ground = GroundVariant(kind, boxes=2, wet=wet, fades=wet, props=not coarse, coarse=coarse)
+        variant = ShaderVariant(
+            samples_per_axis=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground
+        )
+        programs.add(("fullscreen.vert", "ground.frag"), variant)
+    lens = ShaderVariant(ground=GroundVariant(lens=True))
+    programs.add(("fullscreen.vert", "ground_spread.frag"), lens)
     assert refused(programs.folder) == ""
 
 

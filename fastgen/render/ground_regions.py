@@ -68,7 +68,8 @@ def ground_regions(
     for fades, bands in zip((False, True), rest, strict=True):
         open_ = outside(bands, shaded)
         found[replace(plain, fades=fades)] = open_
-        found[replace(plain, fades=fades, boxes=count)] = outside(bands, open_)
+        if boxes:
+            found[replace(plain, fades=fades, boxes=count)] = outside(bands, open_)
     return found
 
 
