@@ -18,7 +18,7 @@ from fastgen.errors import AssetError
 from fastgen.light.environment import to_map_frame
 from fastgen.light.hdri import MAX_WIDTH, MIN_WIDTH
 
-POINTS = 256
+POINTS = 64
 """Directions per container in ContainerMap.points."""
 
 
