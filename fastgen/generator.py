@@ -223,7 +223,7 @@ class Generator:
 
     def _airlight(self, renderer: Renderer, scene: Scene, exposure: float) -> Color:
         """Return the exposed radiance of fog and rain: the mean of the light from all around."""
-        light = renderer.ambient(scene.environment.name)
+        light = renderer.ambient(scene.environment)
         around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
         mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
         mean = mean * exposure

@@ -5,12 +5,14 @@ from dataclasses import replace
 from typing import Protocol
 
 from fastgen.config.config import Config
+from fastgen.config.lamps import LampsConfig
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.renderer import Renderer
 from fastgen.render.session import GpuSession
 from fastgen.sampling.coverage import damage_variant_configs, possible_shapes
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Camera, EnvironmentView, Scene
+from fastgen.scene.optics import Lamp
 
 
 class SceneRenderer(Protocol):
@@ -68,7 +70,14 @@ def _typical_scenes(generator: SceneRenderer, environments: Collection[str]) -> 
     for config in damage_variant_configs(generator.config):
         scene = sample_scene(config, generator.seed, 0, generator.environments)
         for name in environments:
-            yield replace(scene, environment=EnvironmentView(name, 0.0))
+            for count in _lamp_counts(config.environment.lamps):
+                lamps = (Lamp(0.0, 45.0, 100.0),) * count
+                yield replace(scene, environment=EnvironmentView(name, 0.0, lamps=lamps))
+
+
+def _lamp_counts(config: LampsConfig) -> range:
+    """Return the possible numbers of lamps; they decide the number of lights of a program."""
+    return range(config.count[1] + 1 if config.probability > 0 else 1)
 
 
 def _distinct_draws(renderer: Renderer, scenes: Iterable[Scene]) -> list[tuple[Scene, Camera]]:

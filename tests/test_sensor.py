@@ -182,6 +182,7 @@ def test_presets_of_real_cameras_share_all_other_draws_and_survive_json(preset):
     same = {"surface": {"color_weights": {}}, "markings": {"marked_containers": 1.0}}
     same["spreader"] = {"probability": Config.preset().spreader.probability}
     same["seals"] = {"probability": 0.0}
+    same["environment"] = {"lamps": {"probability": 0.0}}
     crane = Generator(Config.from_values(same, Config.preset(preset)), seed=4)
     plain = Generator(seed=4)
     kinds = set()

@@ -17,6 +17,7 @@ from annotated_types import MinLen
 from fastgen import srgb
 from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
+from fastgen.config.lamps import LampsConfig
 from fastgen.config.markings import MarkingsConfig
 from fastgen.config.presets import PRESETS
 from fastgen.config.sensor import SensorConfig, WeatherConfig
@@ -179,6 +180,7 @@ class EnvironmentConfig:
         illuminance_lx: Light on level ground under the sky of an HDRI, by its name, for cameras
             with a meter (sensor.meter). Bundled HDRIs that are not listed have the estimates of
             assets/hdri/index.json, and other HDRIs 10,000 lx, which is an overcast day.
+        lamps: Floodlights in dark scenes.
     """
 
     names: tuple[str, ...] = ()
@@ -186,6 +188,7 @@ class EnvironmentConfig:
     illuminance_lx: dict[str, Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")]] = field(
         default_factory=dict
     )
+    lamps: LampsConfig = field(default_factory=LampsConfig)
 
 
 @dataclass(frozen=True)

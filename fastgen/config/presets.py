@@ -51,6 +51,7 @@ _OUTDOORS: dict[str, Any] = {
         "stamp": {"probability": 0.3},
         "jpeg_quality": [45, 92],
     },
+    "environment": {"lamps": {"probability": 0.6}},
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }

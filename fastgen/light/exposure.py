@@ -5,14 +5,14 @@ import numpy as np
 from fastgen.camera.exposure import MIDDLE_GREY, Exposure, limited_exposure
 from fastgen.camera.projection import View
 from fastgen.light.environment import Ambient, irradiance_at, metered_luminance
-from fastgen.scene import REC_709, Camera, Color, EnvironmentView
+from fastgen.scene import REC_709, Camera, Color
 
 _CENTER_WEIGHT = 0.65
 _MIN_LUMINANCE = 1e-6
 
 
 def metered_exposure(
-    light: Ambient, environment: EnvironmentView, view: View, camera: Camera, paint: Color
+    light: Ambient, cd_m2: float, yaw_deg: float, view: View, camera: Camera, paint: Color
 ) -> Exposure:
     """Return the exposure that brings the metered mean to MIDDLE_GREY, or to a meter's target.
 
@@ -22,13 +22,13 @@ def metered_exposure(
     MIDDLE_GREY, because a metering pattern averages over other surfaces as well.
 
     Args:
-        light: Light of the environment.
-        environment: Rotation of the light, and its illuminance for cameras with a meter.
+        light: Light of the environment and of lamps.
+        cd_m2: Luminance of a unit of radiance, see lamps.unit_luminance.
+        yaw_deg: Counter-clockwise rotation of the environment about the vertical, seen from above.
         view: Projection of the camera.
         camera: Its `exposure_ev` is added in stops. The meter of its sensor limits the exposure.
         paint: Linear albedo of the container.
     """
-    yaw_deg = environment.yaw_deg
     forward = view.rotation[2]
     level, upright = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     steep = abs(forward[2]) > np.linalg.norm(forward * level)
@@ -43,6 +43,4 @@ def metered_exposure(
     meter = camera.sensor.meter if camera.sensor else None
     if meter is None:
         return Exposure(float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev))
-    up = float(irradiance_at(light, [[0, 0, 1]])[0] @ REC_709)
-    cd_m2 = environment.illuminance_lx / (np.pi * max(up, _MIN_LUMINANCE))
     return limited_exposure(float(metered), cd_m2, meter, camera.exposure_ev)

@@ -21,28 +21,27 @@ from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
-from fastgen.light.exposure import metered_exposure
 from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.reflectance import dfg_table
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
-from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.passes.background import BackgroundPass
 from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
+from fastgen.render.passes.ground import GroundPass
 from fastgen.render.passes.normals import NormalsPass
 from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sample_lattice import fitting
+from fastgen.render.scene_lights import Around, SceneLights
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
-from fastgen.render.shadows import Shadows
 from fastgen.render.shapes import Shapes, ray_bodies
 from fastgen.render.surface_values import damage_values, scene_values
 from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
@@ -50,7 +49,7 @@ from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.boxes import back_to_front
 from fastgen.scene.limits import MAX_NEIGHBOURS, MM
 
@@ -89,23 +88,21 @@ class Renderer:
         """
         self._gl = gl
         self.ctx = gl.ctx
-        self._light_of = light
         self._quality = quality
         self._mask_threshold_mm = mask_threshold_mm
         self._without = without
         self._programs = programs = Programs(self.ctx, read)
         self._geometry = GeometryPass(self.ctx, programs)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
+        self._ground = GroundPass(self.ctx, programs, self.ambient)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
         self._rays: ReleasingCache[RayPass] = ReleasingCache(2)
         self._targets: ReleasingCache[ImageTargets] = ReleasingCache(2)
         self._bodies: RecentCache[RayBodies] = RecentCache(_CONTAINERS)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
-        self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
-        self._backgrounds = BackgroundTextures(gl)
+        self._lights = SceneLights(gl, light, quality)
         self._scenes: ReleasingCache[SceneResources] = ReleasingCache(_CONTAINERS)
-        self._shadows = Shadows(self.ctx, quality.shadow_detail)
         self._blocks = {
             block.name: self.ctx.buffer(reserve=block.size)
             for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
@@ -174,10 +171,11 @@ class Renderer:
         Containers do not overlap. Several are drawn over one another from back to front.
         """
         scene = prepared.scene
-        exposure = self._exposure(scene, camera, view).factor
+        exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)
-        inputs = self._inputs(prepared, view, options)
+        around = self._lights.around(prepared, self._resources) if several else None
+        inputs = self._inputs(prepared, view, options, around)
         self._light(inputs, prepared.members[0], prepared, exposure)
         if not several:
             self._geometry.run(inputs)
@@ -186,10 +184,11 @@ class Renderer:
             self._shade(inputs, normals)
             return inputs.targets
         self._background.run(inputs)
+        self._ground.run(inputs, prepared)
         present = [m for m in prepared.members if m.prepared.scene.container.present]
         for number in back_to_front([each.box for each in present], view.position_m / MM):
             member = present[number]
-            inputs = self._inputs(member.prepared, view.in_frame(member.pose), options)
+            inputs = self._inputs(member.prepared, view.in_frame(member.pose), options, around)
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)
@@ -206,7 +205,13 @@ class Renderer:
             found = self._normals.run(inputs)
             np.copyto(normals, found, where=found.any(axis=-1, keepdims=True))
 
-    def _inputs(self, prepared: PreparedScene, view: View, options: DrawOptions) -> DrawInputs:
+    def _inputs(
+        self,
+        prepared: PreparedScene,
+        view: View,
+        options: DrawOptions,
+        around: Around | None = None,
+    ) -> DrawInputs:
         """Collect what the passes share, and fill the uniform blocks of scene and damages."""
         scene, size, lens = prepared.scene, view.size, view.distortion is not None
         damages = seen_damages(scene.damages, tuple((view.position_m / MM).tolist()))
@@ -217,10 +222,15 @@ class Renderer:
             (size, per_axis, options.radiance),
             lambda: ImageTargets(self._gl, size, per_axis, options.radiance),
         )
-        light = self._gpu_light(scene.environment.name)
+        environment = scene.environment
+        light, ambient = self._lights.of(environment.name), self.ambient(environment)
         resources = self._resources(prepared)
         container, spreader, lit = self._shapes.of(
-            prepared, resources.materials, lens, light.ambient
+            prepared,
+            resources.materials,
+            lens,
+            ambient,
+            None if around is None else around[prepared],
         )
         seals = self._shapes.seals(prepared, lit[0])
         self._set(SCENE_BLOCK, scene_values(prepared, len(light.background)))
@@ -241,7 +251,7 @@ class Renderer:
                 lookups=self._quality.lookups,
                 layer=options.layer,
                 damage=damage,
-                lights=shader_lights(light.ambient.lights),
+                lights=shader_lights(ambient.lights),
                 traced=light.sky_rays is not None and options.layer == "all",
                 coarse=self._quality.coarse and per_axis == 1,
                 radiance=options.radiance,
@@ -252,7 +262,7 @@ class Renderer:
                 **self._material_textures(resources, container, spreader),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
-                "environment_map": self._backgrounds.get(light),
+                "environment_map": self._lights.background(scene.environment.name),
             },
         )
 
@@ -268,8 +278,8 @@ class Renderer:
             exposure: Factor on radiance.
         """
         scene, view = member.prepared.scene, inputs.view
-        lights = self.ambient(scene.environment.name).lights
-        shadow = self._shadows.cast(member, whole, lights)
+        lights = self.ambient(scene.environment).lights
+        shadow = self._lights.shadows.cast(member, whole, lights)
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
         values = {
@@ -281,7 +291,7 @@ class Renderer:
     def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
         environment = prepared.scene.environment
-        light = self._gpu_light(environment.name)
+        light = self._lights.of(environment.name)
         if not inputs.variant.traced or light.sky_rays is None or not inputs.regions.surfaces:
             return
         size, lens = inputs.view.size, inputs.view.distortion is not None
@@ -289,7 +299,7 @@ class Renderer:
         materials = self._resources(prepared).materials
         bodies = self._bodies.get(
             (prepared, lens),
-            lambda: ray_bodies(prepared, materials, lens, inputs.lit, light.ambient),
+            lambda: ray_bodies(prepared, materials, lens, inputs.lit, self.ambient(environment)),
         )
         rays.run(inputs, bodies, light.sky_rays, environment.yaw_deg)
 
@@ -306,7 +316,7 @@ class Renderer:
 
     def preload_environment(self, name: str) -> None:
         """Prepare the light and the background of an environment."""
-        self._backgrounds.get(self._gpu_light(name))
+        self._lights.background(name)
 
     def programs_key(self, prepared: PreparedScene, camera: Camera) -> Hashable:
         """Return a key that is equal for all draws at one image size that use the same programs.
@@ -316,24 +326,18 @@ class Renderer:
             camera: The camera.
         """
         damages = seen_damages(prepared.scene.damages, camera.position_mm)
-        lights = shader_lights(self.ambient(prepared.scene.environment.name).lights)
+        lights = shader_lights(self.ambient(prepared.scene.environment).lights)
         spreader = prepared.scene.spreader.present
         return variant(damages), lights, camera.lens is not None, spreader
-
-    def _gpu_light(self, environment: str) -> GpuLight:
-        return self._lights.get(
-            environment,
-            lambda: GpuLight(self._gl, self._light_of(environment), self._quality.traced),
-        )
 
     @property
     def shadow_map(self) -> ShadowMap:
         """Shadows of the directional lights on the first container of the last scene."""
-        return self._shadows.of(0)
+        return self._lights.shadows.of(0)
 
-    def ambient(self, environment: str) -> Ambient:
-        """Return the light of an environment as the CPU uses it."""
-        return self._gpu_light(environment).ambient
+    def ambient(self, environment: EnvironmentView) -> Ambient:
+        """Return the light of an environment and its lamps, as the CPU uses it."""
+        return self._lights.ambient(environment)
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""
@@ -362,12 +366,7 @@ class Renderer:
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
         """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
-        return self._exposure(scene, camera, view_of(camera, size))
-
-    def _exposure(self, scene: Scene, camera: Camera, view: View) -> Exposure:
-        light = self.ambient(scene.environment.name)
-        paint = scene.surface.paint.albedo
-        return metered_exposure(light, scene.environment, view, camera, paint)
+        return self._lights.exposure(scene, camera, view_of(camera, size))
 
     def _resources(self, prepared: PreparedScene) -> SceneResources:
         return self._scenes.get(
@@ -390,13 +389,7 @@ class Renderer:
     def release(self) -> None:
         """Free every GL object of this renderer."""
         owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
-        owners += [
-            self._backgrounds,
-            self._shadows,
-            self._geometry,
-            self._programs,
-            *self._blocks.values(),
-        ]
+        owners += [self._geometry, self._ground, self._programs, *self._blocks.values()]
         for item in [*owners, *self._tables.values()]:
             item.release()
 

@@ -9,6 +9,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.exposure import metered_exposure
+from fastgen.light.lamps import unit_luminance, with_lamps
 from fastgen.light.surrounding_light import Paving, SurroundingLight, surrounding_light
 from fastgen.render.environment_textures import BackgroundTextures, GpuLight
 from fastgen.render.gl import GLContext
@@ -16,7 +17,7 @@ from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.scene_resources import SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadows import Shadows
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, EnvironmentView, Scene
 
 Around = Mapping[PreparedScene, SurroundingLight]
 """Change of the light on each container of a scene."""
@@ -42,6 +43,7 @@ class SceneLights:
         self._traced = quality.traced
         self._lights: ReleasingCache[GpuLight] = ReleasingCache(24)
         self._backgrounds = BackgroundTextures(gl)
+        self._lit: RecentCache[Ambient] = RecentCache(4)
         self._around: RecentCache[Around] = RecentCache(2)
         self.shadows = Shadows(gl.ctx, quality.shadow_detail)
 
@@ -51,9 +53,12 @@ class SceneLights:
             environment, lambda: GpuLight(self._gl, self._light_of(environment), self._traced)
         )
 
-    def ambient(self, environment: str) -> Ambient:
-        """Return the light of an environment as the CPU uses it."""
-        return self.of(environment).ambient
+    def ambient(self, environment: EnvironmentView) -> Ambient:
+        """Return the light of an environment and its lamps, as the CPU uses it."""
+        light = self.of(environment.name).ambient
+        if not environment.lamps:
+            return light
+        return self._lit.get(environment, lambda: with_lamps(light, environment))
 
     def background(self, environment: str) -> moderngl.Texture:
         """Return the background map of an environment."""
@@ -61,8 +66,11 @@ class SceneLights:
 
     def exposure(self, scene: Scene, camera: Camera, view: View) -> Exposure:
         """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
-        light, paint = self.ambient(scene.environment.name), scene.surface.paint.albedo
-        return metered_exposure(light, scene.environment, view, camera, paint)
+        environment, paint = scene.environment, scene.surface.paint.albedo
+        unlit = self.of(environment.name).ambient
+        cd_m2 = unit_luminance(unlit, environment.illuminance_lx)
+        light = self.ambient(environment)
+        return metered_exposure(light, cd_m2, environment.yaw_deg, view, camera, paint)
 
     def around(
         self, prepared: PreparedScene, resources: Callable[[PreparedScene], SceneResources]
@@ -80,7 +88,7 @@ class SceneLights:
                 [each.box for each in members],
                 [resources(each.prepared).materials.sheet for each in members],
                 [each.prepared.container.bounds_mm for each in members],
-                self.ambient(scene.environment.name),
+                self.ambient(scene.environment),
                 scene.environment.yaw_deg,
                 Paving(ground.height_mm, ground.albedo) if ground else None,
             )

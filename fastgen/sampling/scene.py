@@ -18,6 +18,7 @@ from fastgen.config.config import Config, SpreaderConfig, linear_color
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import hours_of, illuminance_of
 from fastgen.sampling.contents import sample_contents
+from fastgen.sampling.lamps import sample_lamps
 from fastgen.sampling.neighbours import sample_ground, sample_neighbours, sample_surroundings
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.streams import Streams, weighted_choice
@@ -140,7 +141,8 @@ def _environment(
     name = weighted_choice(streams("environment"), weights)
     yaw_deg = config.environment.yaw_deg.draw(streams("environment.yaw"))
     lx = config.environment.illuminance_lx.get(name, illuminance_of(name))
-    return EnvironmentView(name, yaw_deg, lx)
+    lamps = sample_lamps(config.environment.lamps, lx, streams("environment.lamps"))
+    return EnvironmentView(name, yaw_deg, lx, lamps)
 
 
 def _spreader(c: SpreaderConfig, streams: Streams) -> Spreader:

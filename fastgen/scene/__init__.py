@@ -19,6 +19,7 @@ from fastgen.scene.data import (
 from fastgen.scene.optics import (
     ChromaNoise,
     Defocus,
+    Lamp,
     Lens,
     Meter,
     Noise,
@@ -44,6 +45,7 @@ __all__ = [
     "Dirt",
     "EnvironmentView",
     "Ground",
+    "Lamp",
     "Lens",
     "Meter",
     "Neighbour",

@@ -31,6 +31,7 @@ from fastgen.scene.limits import (
     LOWEST_GROUND_MM,
     MAX_DAMAGES,
     MAX_DECALS,
+    MAX_LAMPS,
     MAX_NEIGHBOURS,
     MAX_PROPS,
     OVERCAST_LX,
@@ -39,7 +40,7 @@ from fastgen.scene.limits import (
     Millimetres,
     Number,
 )
-from fastgen.scene.optics import Lens, Sensor, Weather
+from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
 from fastgen.validation import Bounds, Flag, OneOf, Share, from_plain, to_plain
 
@@ -280,12 +281,15 @@ class EnvironmentView:
     Attributes:
         name: Name of its file without extension.
         yaw_deg: Counter-clockwise rotation about the vertical.
-        illuminance_lx: Light on level ground under an open sky; only cameras with a meter use it.
+        illuminance_lx: Light on level ground under an open sky; cameras with a meter and
+            lamps use it.
+        lamps: Floodlights beside the environment.
     """
 
     name: str
     yaw_deg: Degrees
     illuminance_lx: Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")] = OVERCAST_LX
+    lamps: Annotated[tuple[Lamp, ...], MaxLen(MAX_LAMPS)] = ()
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,9 @@ OVERCAST_LX = 1e4
 ILLUMINANCE_LIMITS_LX = (1e-3, 2e5)
 """Illuminance of level ground: from starlight to more than the sun in the zenith, in lux."""
 
+MAX_LAMPS = 2
+"""Lamps of a scene; more would leave no directional lights of the environment."""
+
 WHOLE = Bounds(0, 2**63 - 1)
 """Bounds of seeds and indices."""
 

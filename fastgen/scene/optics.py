@@ -1,10 +1,10 @@
-"""Lens, sensor and weather of a Scene, as plain frozen data."""
+"""Lens, sensor, lamps and weather of a Scene, as plain frozen data."""
 
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastgen.errors import ConfigError
-from fastgen.scene.limits import CORNERS, WHOLE, Number
+from fastgen.scene.limits import CORNERS, WHOLE, Degrees, Number
 from fastgen.validation import Bounds, OneOf, Share, check_known
 
 LENS_MODELS = {"brown_conrady": 5, "fisheye": 4}
@@ -27,6 +27,10 @@ SPEED_LIMIT = 2.0
 """Fastest movement of an image in widths per second; at the longest shutter time it blurs over the
 whole width."""
 
+LAMP_LIMITS_LX = (0.001, 1e5)
+"""Illuminance of a lamp; it may not be 0."""
+
+_Part = Annotated[float, Bounds(0.001, 1000.0)]
 _Speed = Annotated[float, Bounds(-SPEED_LIMIT, SPEED_LIMIT)]
 _Move = Annotated[float, Bounds(-1.0, 1.0)]
 _Gain = Annotated[float, Bounds(0.0, 1000.0)]
@@ -202,6 +206,23 @@ class Sensor:
         """Refuse a speed without the shutter time of a meter."""
         if self.speed != (0.0, 0.0) and self.meter is None:
             raise ConfigError("speed: needs the shutter time of a meter; give one or use motion")
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """A floodlight, far enough from the container that its light is parallel.
+
+    Attributes:
+        azimuth_deg: Direction toward the lamp, counter-clockwise from +x.
+        elevation_deg: Elevation above the horizon.
+        illuminance_lx: Light on a surface that faces the lamp.
+        color: Linear Rec. 709 of the light; only the ratios matter.
+    """
+
+    azimuth_deg: Degrees
+    elevation_deg: Annotated[float, Bounds(-90.0, 90.0, "degrees")]
+    illuminance_lx: Annotated[float, Bounds(*LAMP_LIMITS_LX, "lx")]
+    color: tuple[_Part, _Part, _Part] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)

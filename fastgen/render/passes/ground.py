@@ -18,7 +18,7 @@ from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
 from fastgen.render.regions import Region
 from fastgen.render.variant import GroundVariant, ShaderVariant
-from fastgen.scene import Scene
+from fastgen.scene import EnvironmentView, Scene
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,10 @@ class GroundPass:
     """
 
     def __init__(
-        self, ctx: moderngl.Context, programs: Programs, ambient: Callable[[str], Ambient]
+        self,
+        ctx: moderngl.Context,
+        programs: Programs,
+        ambient: Callable[[EnvironmentView], Ambient],
     ) -> None:
         """Prepare the pass.
 
@@ -60,7 +63,7 @@ class GroundPass:
         if ground is None:
             return
         present = [m for m in prepared.members if m.prepared.scene.container.present]
-        ambient = self._ambient(scene.environment.name)
+        ambient = self._ambient(scene.environment)
         kept = self._scenes.get(
             prepared,
             lambda: _SceneLight(
