@@ -1,24 +1,30 @@
-"""Shares that presets set: containers with markers, and colours of the fleet."""
+"""Shares that presets set: markers, colours, arrangements; and the files in examples/ports."""
 
 import colorsys
 import math
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
 from fastgen.config.config import Config
-from fastgen.config.presets import PRESETS
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
+from fastgen.scene.check import check_scene
+from fastgen.scene.container_kinds import KINDS
 
 COUNT = 300
 REAL = ("crane", "gate")
-"""Presets of real cameras."""
+PORTS = ("gate", "yard", "quay")
+"""Presets that have a file in examples/ports."""
 
 
 @pytest.fixture(scope="module")
 def scenes():
-    generators = {name: Generator(Config.preset(name), seed=6) for name in PRESETS}
+    """Scenes without neighbours, whose contents take most of the time."""
+    fewer = {"placement": {"neighbours": 0}}
+    configs = {name: Config.from_values(fewer, Config.preset(name)) for name in ("seafront", *REAL)}
+    generators = {name: Generator(config, seed=6) for name, config in configs.items()}
     return {name: [g.scene(index) for index in range(COUNT)] for name, g in generators.items()}
 
 
@@ -35,8 +41,8 @@ def hue_of(name):
     return "blue" if 195 < degrees < 260 else "other"
 
 
-def near(share, expected):
-    return abs(share - expected) < 4 * math.sqrt(expected * (1 - expected) / COUNT)
+def near(share, expected, count=COUNT):
+    return abs(share - expected) < 4 * math.sqrt(expected * (1 - expected) / count)
 
 
 @pytest.mark.parametrize("preset", REAL)
@@ -88,3 +94,44 @@ def test_own_colors_replace_those_of_a_preset_alone():
         Config.from_values(
             {"surface": {"colors": colors, "color_weights": dict.fromkeys(colors, 0)}}
         )
+
+
+@pytest.mark.parametrize("preset", PORTS)
+def test_the_file_of_a_port_has_the_values_of_its_preset(preset):
+    path = Path("examples/ports") / f"{preset}.yaml"
+    assert Config.load(path, Config.preset("crane")) == Config.preset(preset)
+
+
+@pytest.mark.parametrize("preset", PORTS)
+def test_scenes_of_ports_can_be_drawn(preset):
+    generator = Generator(Config.preset(preset), seed=9)
+    scenes = [generator.scene(index) for index in range(12)]
+    assert all(check_scene(scene) and scene.ground for scene in scenes)
+    assert any(scene.neighbours for scene in scenes)
+
+
+def visible_width(camera):
+    """Return the width in mm of what an undistorted camera sees at its target."""
+    return (
+        camera.sensor_width_mm / camera.focal_mm * math.dist(camera.position_mm, camera.target_mm)
+    )
+
+
+def test_a_gate_sees_parts_of_containers_from_above(scenes):
+    cut = 0
+    for scene in scenes["gate"]:
+        for camera in scene.cameras:
+            height = camera.position_mm[2] - scene.ground.height_mm
+            assert height < (9500 if camera.name == "roof" else 7000)
+            assert camera.position_mm[2] > camera.target_mm[2]
+            if camera.name in ("left", "right"):
+                cut += visible_width(camera) < KINDS[scene.container.kind].length_mm
+    assert cut > 0.7 * 2 * COUNT
+
+
+def test_twins_of_a_gate_are_on_trailers():
+    values = {"container": {"kinds": {"20": 1}}, "placement": {"neighbours": 0}}
+    generator = Generator(Config.from_values(values, Config.preset("gate")), seed=6)
+    scenes = [generator.scene(index) for index in range(60)]
+    assert near(sum(bool(scene.neighbours) for scene in scenes) / 60, 1 / 3, 60)
+    assert all(scene.props for scene in scenes)

@@ -24,19 +24,20 @@ _FLEET_PAINT = {
 }
 """Frequency of paints in fleets, in percent: half are red, maroon or brown, a fifth blue."""
 
+_FISHEYE = {"model": "fisheye", "k1": [-0.035, -0.005], "k2": [0.0, 0.006]}
+_BARREL = {"k1": [-0.24, -0.16], "k2": [0.03, 0.07], "p1": [-1e-3, 1e-3]}
+_SLIGHT = {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}
+"""Distortions, from short to long lenses."""
+
 _LENSES = {
-    "A": {
-        "focal_mm": 22.0,
-        "lens": {"model": "fisheye", "k1": [-0.035, -0.005], "k2": [0.0, 0.006]},
-    },
-    "B": {"lens": {"k1": [-0.24, -0.16], "k2": [0.03, 0.07], "p1": [-1e-3, 1e-3]}},
-    "Cl": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
-    "Cr": {"lens": {"k1": [-0.14, -0.06], "p2": [-1e-3, 1e-3]}},
+    "A": {"focal_mm": 22.0, "lens": _FISHEYE},
+    "B": {"lens": _BARREL},
+    "Cl": {"lens": _SLIGHT},
+    "Cr": {"lens": _SLIGHT},
 }
 
 _OUTDOORS: dict[str, Any] = {
     "surface": {"color_weights": _FLEET_PAINT},
-    "cameras": _LENSES,
     "sensor": {
         "defocus": {"probability": 0.15},
         "motion": {"probability": 0.5},
@@ -55,17 +56,140 @@ _OUTDOORS: dict[str, Any] = {
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Fleets, seals, wide lenses, weather and sensor effects that all presets of real cameras share."""
+"""Fleets, seals, weather and sensor effects that all presets of real cameras share."""
+
+_GATE_END = {
+    "focal_mm": 30.0,
+    "distance_mm": [1900, 3800],
+    "azimuth_deg": [-15, 15],
+    "elevation_deg": [15, 42],
+    "aim_up": [0.2, 1.0],
+    "lens": _BARREL,
+}
+_GATE_SIDE = {
+    "focal_mm": 28.0,
+    "distance_mm": [2000, 4800],
+    "azimuth_deg": [-60, 60],
+    "elevation_deg": [5, 32],
+    "aim_right": [-0.95, 0.95],
+    "aim_up": [-0.4, 0.6],
+    "lens": _BARREL,
+}
+_YARD_POLE = {
+    "focal_mm": 28.0,
+    "azimuth_deg": [-50, 50],
+    "elevation_deg": [15, 45],
+    "target_shift_mm": [-1500, 1500],
+    "lens": _SLIGHT,
+}
+_QUAY_SIDE = {
+    "focal_mm": 22.0,
+    "distance_mm": [5500, 14000],
+    "azimuth_deg": [-40, 40],
+    "elevation_deg": [10, 45],
+    "aim_right": [-0.6, 0.6],
+    "lens": _FISHEYE,
+}
+_QUAY_END = {
+    "focal_mm": 32.0,
+    "distance_mm": [4500, 9500],
+    "azimuth_deg": [-30, 30],
+    "elevation_deg": [8, 38],
+    "lens": _SLIGHT,
+}
 
 PRESETS: dict[str, dict[str, Any]] = {
     "seafront": {},
     # images of real crane cameras
-    "crane": {**_OUTDOORS, "markings": {"marked_containers": 0.35}},
-    # containers that pass a gate: most without markers, none on a spreader
+    "crane": {**_OUTDOORS, "cameras": _LENSES, "markings": {"marked_containers": 0.35}},
+    # trucks that pass a gate in lanes; cameras on portals see parts of containers from near by
     "gate": {
         **_OUTDOORS,
         "markings": {"marked_containers": 0.15},
         "spreader": {"probability": 0.0},
+        "placement": {
+            "arrangements": {"trailer": 1.0, "twin": 0.5},
+            "neighbours": [0, 3],
+            "lifted_twins": 0.0,
+        },
+        "ground": {
+            "kinds": {"asphalt": 0.4, "concrete": 0.2, "paving": 0.4},
+            "line_probability": 0.6,
+            "line_spacing_mm": [3500, 4500],
+        },
+        "cameras": {
+            "rear": {"face": "door", **_GATE_END},
+            "front": {"face": "no_door", **_GATE_END},
+            "left": {"face": "front", **_GATE_SIDE},
+            "right": {"face": "back", **_GATE_SIDE},
+            "roof": {
+                "face": "roof",
+                "focal_mm": 20.0,
+                "distance_mm": [2200, 4500],
+                "azimuth_deg": [-25, 25],
+                "elevation_deg": [-20, 20],
+                "aim_right": [-0.9, 0.9],
+                "lens": _FISHEYE,
+            },
+        },
+    },
+    # piles and rows, seen from a reach stacker and from poles
+    "yard": {
+        **_OUTDOORS,
+        "markings": {"marked_containers": 0.1},
+        "spreader": {"probability": 0.0},
+        "placement": {
+            "arrangements": {"stack": 0.75, "row": 0.25},
+            "neighbours": [3, 11],
+            "tiers": [2, 4],
+        },
+        "ground": {"line_probability": 0.7, "line_spacing_mm": [2700, 3300]},
+        "cameras": {
+            "stacker": {
+                "face": "front",
+                "focal_mm": 22.0,
+                "distance_mm": [4000, 9000],
+                "azimuth_deg": [-35, 35],
+                "elevation_deg": [-5, 25],
+                "aim_right": [-0.5, 0.5],
+                "lens": _FISHEYE,
+            },
+            "pole_door": {"face": "door", "distance_mm": [7000, 18000], **_YARD_POLE},
+            "pole_end": {"face": "no_door", "distance_mm": [7000, 18000], **_YARD_POLE},
+            "mast": {
+                "face": "front",
+                "focal_mm": 35.0,
+                "distance_mm": [12000, 30000],
+                "azimuth_deg": [-50, 50],
+                "elevation_deg": [20, 45],
+                "target_shift_mm": [-3000, 3000],
+            },
+        },
+    },
+    # containers under a ship-to-shore crane: in the air, on trailers and on the quay
+    "quay": {
+        **_OUTDOORS,
+        "markings": {"marked_containers": 0.35},
+        "spreader": {"probability": 0.6},
+        "placement": {
+            "arrangements": {
+                "lifted": 0.4,
+                "trailer": 0.3,
+                "stack": 0.1,
+                "standing": 0.1,
+                "twin": 0.5,
+            },
+            "neighbours": [0, 4],
+            "tiers": [1, 2],
+            "lifted_twins": 0.5,
+        },
+        "ground": {"kinds": {"asphalt": 0.3, "concrete": 0.5, "paving": 0.2}},
+        "cameras": {
+            "waterside": {"face": "front", **_QUAY_SIDE},
+            "landside": {"face": "back", **_QUAY_SIDE},
+            "end_left": {"face": "no_door", **_QUAY_END},
+            "end_right": {"face": "door", **_QUAY_END},
+        },
     },
 }
-"""Values of each preset, nested as in a file."""
+"""Values of each preset, nested as in a file. `examples/ports/` explains those of ports."""

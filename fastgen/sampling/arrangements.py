@@ -200,14 +200,18 @@ class _Place:
         piles = ([self.bottom(cell, -height, "trailer")] for cell in cells)
         return Plan(-height, props=props, twin=twin, wanted=count, piles=piles)
 
-    def bottom(self, cell: Cell, ground_mm: float, vehicle: str = "") -> Site:
-        """Return a site on the ground or on a vehicle."""
+    def bottom(
+        self, cell: Cell, ground_mm: float, vehicle: str = "", in_lanes: bool = False
+    ) -> Site:
+        """Return a site on the ground or on a vehicle; vehicles are in lanes in any case."""
         placement, name = self.config.placement, _name(cell, 0)
         kind = self._kind(name)
-        x, y = self._middle_mm(cell, kind, in_lanes=bool(vehicle))
+        x, y = self._middle_mm(cell, kind, in_lanes or bool(vehicle))
         turn = 0.0
         rng = self.streams(f"{name}.pose")
-        along = placement.lane_offset_mm if vehicle == "trailer" else placement.offset_mm
+        along = (
+            placement.lane_offset_mm if in_lanes or vehicle == "trailer" else placement.offset_mm
+        )
         x += along.draw(rng)
         aside, yaw = placement.offset_mm.draw(rng), placement.yaw_deg.draw(rng)
         if vehicle != "wagon":  # rails are straight
@@ -229,7 +233,7 @@ class _Place:
         """Yield sites on the ground and on trailers below a lifted container."""
         for cell in cells:
             standing = self.streams(f"{_name(cell, 0)}.standing").random() < _ON_GROUND
-            yield [self.bottom(cell, ground_mm, "" if standing else "trailer")]
+            yield [self.bottom(cell, ground_mm, "" if standing else "trailer", in_lanes=True)]
 
     def _pile(self, cell: Cell, ground_mm: float, gap_mm: float) -> list[Site]:
         """Return the sites of a pile, from the bottom."""
