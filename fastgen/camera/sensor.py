@@ -77,7 +77,8 @@ def apply_camera_model(
         light = _through_weather(frame.radiance, frame, view, weather, sky)
         if sensor.meter:
             times = _for_highlights(light, sensor)
-            light, exposure = light * np.float32(times), exposure.lowered(times)
+            if times < 1:
+                light, exposure = light * np.float32(times), exposure.lowered(times)
         light = _recorded(light, frame, view, camera, exposure)
         curve = sensor.response
         image = respond(light, curve) if curve else tone_map_and_encode(light)
