@@ -16,7 +16,8 @@ from fastgen.labels.background import background_objects
 from fastgen.labels.objects import label
 from fastgen.labels.visibility import Shot
 from fastgen.light.container_map import ContainerMap, container_map_path, load_container_map
-from fastgen.light.environment import EnvironmentLight, irradiance_at, load_environment
+from fastgen.light.environment import EnvironmentLight, load_environment
+from fastgen.light.exposure import airlight
 from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
 from fastgen.preload import preload
 from fastgen.render.cuda import CudaFrame, cuda_reason
@@ -29,12 +30,9 @@ from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
 from fastgen.sampling.coverage import extreme_lenses
 from fastgen.sampling.scene import sample_scene
-from fastgen.scene import Camera, Color, Scene
+from fastgen.scene import Camera, Scene
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
-
-_BRIGHTEST_AIR = 0.65
-"""Largest exposed radiance of fog: a light meter keeps fog below the tone curve's shoulder."""
 
 
 def find_camera(scene: Scene, name: str | None = None) -> Camera:
@@ -197,8 +195,9 @@ class Generator:
             frame = renderer.render(prepared, camera, self.size, layer, radiance, normals)
             if modelled:
                 exposure = renderer.exposure(scene, camera, self.size)
-                airlight = self._airlight(renderer, scene, exposure.factor)
-                image = apply_camera_model(frame, view, camera, scene.weather, airlight, exposure)
+                light = renderer.ambient(scene.environment)
+                air = airlight(light, scene.environment.yaw_deg, exposure.factor)
+                image = apply_camera_model(frame, view, camera, scene.weather, air, exposure)
                 frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)
         shot = Shot(frame, prepared, view, config)
@@ -220,15 +219,6 @@ class Generator:
             normals=frame.normals,
             background=background,
         )
-
-    def _airlight(self, renderer: Renderer, scene: Scene, exposure: float) -> Color:
-        """Return the exposed radiance of fog and rain: the mean of the light from all around."""
-        light = renderer.ambient(scene.environment)
-        around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
-        mean = irradiance_at(light, around, scene.environment.yaw_deg).mean(axis=0)
-        mean = mean * exposure
-        red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
-        return red, green, blue
 
     def render_cuda(
         self,
@@ -272,6 +262,14 @@ class Generator:
         """Bake the material layers of a scene's spreader; None if it has none. See `bake`."""
         with self.gpu.drawing() as renderer:
             return renderer.bake_spreader(self._prepared(scene), texel_mm)
+
+    def bake_ground(self, scene: Scene, texel_mm: float = 4.0) -> Atlas | None:
+        """Bake the ground of a scene within its reach; None if it has none.
+
+        The texels are wider than `texel_mm` if the texture would have more than 4096 along a side.
+        """
+        with self.gpu.drawing() as renderer:
+            return renderer.bake_ground(self._prepared(scene), texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera) -> float:
         """Return the factor on linear radiance that a camera applies before the tone curve."""

@@ -10,7 +10,7 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.renderer import Renderer
 from fastgen.render.session import GpuSession
 from fastgen.sampling.coverage import damage_variant_configs, possible_shapes
-from fastgen.sampling.scene import sample_scene
+from fastgen.sampling.scene import environment_weights, sample_scene
 from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.optics import Lamp
 
@@ -46,8 +46,8 @@ def preload(generator: SceneRenderer, on_step: Callable[[], None]) -> None:
         on_step: Called before each step; a step takes seconds if the disk cache is empty.
     """
     config = generator.config
-    weighted = [name for name, weight in generator.environments.items() if weight > 0]
-    environments = config.environment.names or weighted
+    weights = environment_weights(config, generator.environments)
+    environments = [name for name, weight in weights.items() if weight > 0]
     scene = generator.scene(0)
     lens = any(camera.lens is not None for camera in scene.cameras)
     with generator.gpu.drawing() as renderer:

@@ -13,7 +13,7 @@ from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import deform
 from fastgen.sampling.coverage import possible_shapes
-from fastgen.sampling.scene import sample_scene
+from fastgen.sampling.scene import environment_weights, sample_scene
 from fastgen.validation import Bounds, annotation
 
 NASTY: tuple[typing.Any, ...] = (
@@ -185,6 +185,16 @@ def test_possible_shapes_are_exactly_those_of_sampled_scenes():
     possible = {shape(*pair) for pair in possible_shapes(config)}
     scenes = [sample_scene(config, 5, index, environments) for index in range(800)]
     assert {shape(scene.container, scene.spreader) for scene in scenes} == possible
+
+
+def test_weights_of_hdris_replace_those_that_are_usual():
+    environments = {"park": 1.0, "sky": 2.5, "workshop": 0.0}
+    config = Config.from_values({"environment": {"weights": {"workshop": 3, "sky": 0, "far": 9}}})
+    names = [sample_scene(config, 5, index, environments).environment.name for index in range(400)]
+    assert set(names) == {"park", "workshop"}
+    assert 0.68 < names.count("workshop") / len(names) < 0.82
+    named = Config.from_values({"environment": {"names": ["park", "sky"], "weights": {"sky": 3}}})
+    assert environment_weights(named, environments) == {"park": 1.0, "sky": 3}
 
 
 @pytest.mark.parametrize("number", ["1e-05", "1E-3", "2.5e-4", "1.0e-05", ".5e-3", "+1e-4"])

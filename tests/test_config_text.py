@@ -56,6 +56,10 @@ def test_the_command_prints_a_preset_changed_by_a_file(tmp_path, capsys):
             "cameras.x.lens: the image's corners look",
         ),
         ("environment: {names: [quay]}", "environment.names: HDRI 'quay' is not available"),
+        (
+            "environment: {names: [park], weights: {park: 0}}",
+            "environment.weights: all weights are 0",
+        ),
     ],
 )
 def test_the_command_refuses_a_file_that_a_run_would_refuse(tmp_path, capsys, text, words):

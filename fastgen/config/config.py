@@ -176,6 +176,8 @@ class EnvironmentConfig:
         names: HDRIs to draw from, all equally likely, by file name without extension; assets/hdri
             has the bundled ones. If the list is empty, all HDRIs of --hdri are used. Without
             --hdri these are the bundled ones except interiors, ports more often than others.
+        weights: Relative frequency of HDRIs, by name. HDRIs that are not listed keep theirs. Names
+            of HDRIs that are not available have no effect.
         yaw_deg: Rotation of the environment about the vertical.
         illuminance_lx: Light on level ground under the sky of an HDRI, by its name, for cameras
             with a meter (sensor.meter). Bundled HDRIs that are not listed have the estimates of
@@ -184,6 +186,7 @@ class EnvironmentConfig:
     """
 
     names: tuple[str, ...] = ()
+    weights: dict[str, _Weight] = field(default_factory=dict)
     yaw_deg: Annotated[Range, Bounds(-360.0, 360.0, "degrees")] = Range(0, 360)
     illuminance_lx: dict[str, Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")]] = field(
         default_factory=dict

@@ -1,4 +1,4 @@
-"""Exposure metering of a camera, weighted to the container in the centre of the image."""
+"""Exposure metering weighted to the container in the centre of the image, and light of fog."""
 
 import numpy as np
 
@@ -9,6 +9,9 @@ from fastgen.scene import REC_709, Camera, Color
 
 _CENTER_WEIGHT = 0.65
 _MIN_LUMINANCE = 1e-6
+
+_BRIGHTEST_AIR = 0.65
+"""Largest exposed radiance of fog: a light meter keeps fog below the tone curve's shoulder."""
 
 
 def metered_exposure(
@@ -44,3 +47,18 @@ def metered_exposure(
     if meter is None:
         return Exposure(float(MIDDLE_GREY / metered * 2.0**camera.exposure_ev))
     return limited_exposure(float(metered), cd_m2, meter, camera.exposure_ev)
+
+
+def airlight(light: Ambient, yaw_deg: float, exposure: float) -> Color:
+    """Return the exposed radiance of fog and rain: the mean of the light from all around.
+
+    Args:
+        light: Light of the environment.
+        yaw_deg: Rotation of the environment.
+        exposure: Factor on radiance.
+    """
+    around = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]
+    mean = irradiance_at(light, around, yaw_deg).mean(axis=0)
+    mean = mean * exposure
+    red, green, blue = (mean * min(1.0, _BRIGHTEST_AIR / float(mean.max()))).tolist()
+    return red, green, blue

@@ -29,7 +29,7 @@ from fastgen.scene import (
     Spreader,
     Vec3,
 )
-from fastgen.validation import nearest
+from fastgen.validation import check_weights, nearest
 
 SPLITS = ("train", "val", "test")
 
@@ -56,14 +56,13 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         config: Distribution of scenes.
         seed: Seed of the dataset.
         index: Index of the scene.
-        environments: Weight of each available HDRI by name. If `config.environment.names` is not
-            empty, the HDRIs listed there are equally likely and the weights are ignored.
+        environments: Weight of each available HDRI by name; see `environment_weights`.
 
     Returns:
         The sampled scene.
 
     Raises:
-        ConfigError: `config.environment.names` lists an HDRI that is not available.
+        ConfigError: `config.environment` leaves no HDRI, or lists one that is not available.
     """
 
     def streams(name: str) -> np.random.Generator:
@@ -128,17 +127,32 @@ def split_of(config: Config, seed: int, index: int) -> str:
     return SPLITS[int(np.searchsorted(edges[:2], stream(seed, index, "split").random(), "right"))]
 
 
+def environment_weights(config: Config, available: Mapping[str, float]) -> dict[str, float]:
+    """Return the weight of each HDRI that a configuration draws from, sorted by name.
+
+    Args:
+        config: Distribution of scenes.
+        available: Weight of each available HDRI by name, for a configuration without its own.
+
+    Raises:
+        ConfigError: A listed HDRI is not available, or no HDRI has a weight above 0.
+    """
+    wanted = config.environment.names
+    for name in wanted:
+        if name not in available:
+            raise ConfigError(
+                f"environment.names: HDRI {name!r} is not available{nearest(name, available)}"
+            )
+    usual = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(available.items()))
+    weights = {name: config.environment.weights.get(name, own) for name, own in usual.items()}
+    check_weights("environment.weights", weights.values())
+    return weights
+
+
 def _environment(
     config: Config, streams: Streams, environments: Mapping[str, float]
 ) -> EnvironmentView:
-    wanted = config.environment.names
-    for name in wanted:
-        if name not in environments:
-            raise ConfigError(
-                f"environment.names: HDRI {name!r} is not available{nearest(name, environments)}"
-            )
-    weights = dict.fromkeys(sorted(wanted), 1.0) or dict(sorted(environments.items()))
-    name = weighted_choice(streams("environment"), weights)
+    name = weighted_choice(streams("environment"), environment_weights(config, environments))
     yaw_deg = config.environment.yaw_deg.draw(streams("environment.yaw"))
     lx = config.environment.illuminance_lx.get(name, illuminance_of(name))
     lamps = sample_lamps(config.environment.lamps, lx, streams("environment.lamps"))
