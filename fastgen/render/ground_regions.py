@@ -30,7 +30,7 @@ _BLURRED_MM = 150.0
 
 _LONGEST_SHADOW_MM = 60000.0
 
-_BOX_COUNTS = (0, 1, 2, 3, 4, 6, 8, 12, MAX_BOXES)
+_BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
 """Numbers of containers that programs are compiled for."""
 
 Array = NDArray[np.float64]
@@ -65,11 +65,12 @@ def ground_regions(
         if plain.wet
         else [region_of(view, _reach([box], ground, toward, _BLURRED_MM)) or whole for box in boxes]
     )
-    for fades, bands in zip((False, True), rest, strict=True):
-        open_ = outside(bands, shaded)
-        found[replace(plain, fades=fades)] = open_
-        if boxes:
-            found[replace(plain, fades=fades, boxes=count)] = outside(bands, open_)
+    open_ = [outside(bands, shaded) for bands in rest]
+    found[plain], found[replace(plain, fades=True)] = open_
+    if boxes:  # one program for near and far, because each takes a while to compile
+        near, far = rest
+        closed = [*outside(near, open_[0]), *outside(far, open_[1])]
+        found[replace(plain, fades=True, boxes=count)] = closed
     return found
 
 
