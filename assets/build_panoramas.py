@@ -2,12 +2,15 @@
 
     python assets/build_panoramas.py                  # all that are missing, in hdri/
     python assets/build_panoramas.py --width 512 --out /tmp/look port_noon
-    python assets/build_panoramas.py --maps-only      # the container maps of all panoramas
+    python assets/build_panoramas.py --maps-only      # the container maps of those that exist
 
 Run by hand. Needs Python 3.11, `bpy` 4.5, `OpenEXR` and OpenCV. The package panoramas/ contains the
 port: shapes, materials, models, layout and sky. Cycles traces the objects on the ground. Haze, sky
 and the sun's disc are added from exact maps afterwards, so that the disc keeps its energy and the
 sky has no noise. Beside each panorama, NAME.containers.png numbers the containers that it shows.
+
+The variants with a `place` (gate, aisle and rail, by day, night, rain and fog) are not part of the
+package. Render them with `--out` into a folder for `--hdri`.
 """
 
 import argparse
@@ -172,8 +175,8 @@ def main() -> None:
     chosen.out.mkdir(parents=True, exist_ok=True)
     for v in VARIANTS:
         path = chosen.out / f"{v.name}.exr"
-        missing = chosen.maps_only or not path.exists()
-        if v.name not in chosen.names and (chosen.names or not missing):
+        by_default = path.exists() == chosen.maps_only
+        if v.name not in chosen.names and (chosen.names or not by_default):
             continue
         if not chosen.maps_only:
             write(bake(v, chosen.width, chosen.samples), path)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from panoramas import models
+from panoramas import models, places
 from panoramas.shapes import Shape, place
 from panoramas.sky import Clouds
 
@@ -45,6 +45,7 @@ class Variant:
         cranes: x and raised boom of each quay crane.
         ship_m: x of the middle of the ship at the quay, or None.
         end_m: x of the end of the quay.
+        place: Place inside the port that is built around the eye, one of places.BUILDERS, or "".
         wide_deck: The ship's load and railing stand as if its deck were equally wide everywhere.
             Panoramas that were rendered so keep this geometry for their container maps.
     """
@@ -66,6 +67,7 @@ class Variant:
     cranes: tuple[tuple[float, bool], ...] = ((-75.0, False), (62.0, False), (150.0, True))
     ship_m: float | None = 40.0
     end_m: float = 2500.0
+    place: str = ""
     wide_deck: bool = False
 
 
@@ -76,6 +78,7 @@ class Builder:
         self.v = variant
         self.rng = np.random.default_rng(variant.seed)
         self.containers = 0
+        self.truck = models.truck()
         painter = np.random.default_rng(1)  # separate, so that liveries do not affect the layout
         self.boxes = {
             feet: [models.container(feet, painted, painter) for painted in (0, 0, 1, 1, 1, 1)]
@@ -94,12 +97,20 @@ class Builder:
         self._masts()
         self._traffic()
         self._far()
+        if self.v.place:
+            places.BUILDERS[self.v.place](self)
 
     def _free(self, x: float, y: float, radius: float) -> bool:
         ex, ey, _ = self.v.eye
-        return x < self.v.end_m - 8 and np.hypot(x - ex, y - ey) > radius
+        x0, y0, x1, y1 = places.CLEAR.get(self.v.place, (0.0, 0.0, 0.0, 0.0))
+        inside = x0 < x < x1 and y0 < y < y1
+        return x < self.v.end_m - 8 and not inside and np.hypot(x - ex, y - ey) > radius
 
-    def _box(
+    def color(self) -> int:
+        """Draw a container's colour, as an index into PALETTE."""
+        return int(self.rng.integers(len(PALETTE)))
+
+    def box(
         self,
         feet: int,
         position: tuple[float, float, float],
@@ -159,7 +170,7 @@ class Builder:
             place(models.quay_crane(up, trolley, hoist), (x, QUAY_RAIL_M, 0), 0, color)
             for lx in (-9, 9):
                 for ly in (-2.0, 32.0):
-                    self._light((x + lx, QUAY_RAIL_M + ly, 14.3), 0.25)
+                    self.light((x + lx, QUAY_RAIL_M + ly, 14.3), 0.25)
         for k in range(12):
             block, row = self.rng.integers(-3, 3), self.rng.integers(0, 6)
             x, y = block * 172 + self.rng.uniform(20, 130), 56.0 + row * 30
@@ -167,7 +178,7 @@ class Builder:
                 color = CRANE_COLORS[(self.v.seed + 1 + k % 2) % 4]
                 mesh = models.yard_crane(self.rng.uniform(4, 19))
                 place(mesh, (x, y, 0), 0, color)
-                self._light((x, y + 3, 19), 0.12)
+                self.light((x, y + 3, 19), 0.12)
 
     def _ship(self, x: float, y: float, turn: float = 0.0) -> None:
         length, beam = 290.0, 40.0
@@ -187,15 +198,15 @@ class Builder:
             for row in range(rows):
                 aside = (row - (rows - 1) / 2) * 2.5
                 ry = y - beam / 2 + aside
-                color_run = int(self.rng.integers(len(PALETTE)))
+                color_run = self.color()
                 levels = max(tall - int(self.rng.integers(0, 3)), 1)
                 for level in range(levels):
                     if self.rng.random() < 0.4:
-                        color_run = int(self.rng.integers(len(PALETTE)))
+                        color_run = self.color()
                     z = SEA_M + 14.6 + level * models.HEIGHT
-                    self._box(40, (bx, ry, z), color_run, 0.0, abs(aside) + 1.25 < deck)
+                    self.box(40, (bx, ry, z), color_run, 0.0, abs(aside) + 1.25 < deck)
         for bay in range(8):
-            self._light((first + 34 * bay, y - 4, SEA_M + 34), 0.12)
+            self.light((first + 34 * bay, y - 4, SEA_M + 34), 0.12)
 
     def _yard(self) -> None:
         for line in range(6):
@@ -210,18 +221,18 @@ class Builder:
                         if not self._free(x, y, 9.0):
                             continue
                         levels = int(np.clip(round(self.rng.normal(fill, 1.1)), 0, 5))
-                        color = 14 if reefer else int(self.rng.integers(len(PALETTE)))
+                        color = 14 if reefer else self.color()
                         for level in range(levels):
                             if self.rng.random() < 0.5 and not reefer:
-                                color = int(self.rng.integers(len(PALETTE)))
+                                color = self.color()
                             turn = 180.0 * int(self.rng.random() < 0.5)
                             z = level * models.HEIGHT
                             slide = self.rng.normal(0, 0.03)
                             if twenty:
-                                self._box(20, (x - 3.1, y + slide, z), color, turn)
-                                self._box(20, (x + 3.1, y + slide, z), color, turn)
+                                self.box(20, (x - 3.1, y + slide, z), color, turn)
+                                self.box(20, (x + 3.1, y + slide, z), color, turn)
                             else:
-                                self._box(40, (x, y + slide, z), color, turn)
+                                self.box(40, (x, y + slide, z), color, turn)
 
     def _halls(self) -> None:
         for k in range(5):
@@ -241,9 +252,10 @@ class Builder:
                 x, y = 86.0 * k + 4, 52.0 + 60 * line
                 if self._free(x, y, 12):
                     place(mesh, (x, y, 0))
-                    self._light((x, y, 30.5), 1.0)
+                    self.light((x, y, 30.5), 1.0)
 
-    def _light(self, where: tuple[float, float, float], share: float) -> None:
+    def light(self, where: tuple[float, float, float], share: float) -> None:
+        """Add a spot lamp that shines down, by night; share is relative to a mast's lamps."""
         if not self.v.lamps:
             return
         lamp = bpy.data.lights.new("lamp", "SPOT")
@@ -257,7 +269,6 @@ class Builder:
         bpy.context.scene.collection.objects.link(thing)
 
     def _traffic(self) -> None:
-        truck = models.truck()
         for _ in range(16):
             x = self.rng.uniform(-220, min(220, self.v.end_m - 30))
             y = float(self.rng.choice((10.5, 14.5, 18.5, 22.5, 26.5, 44.5, 79.5, 109.5)))
@@ -265,13 +276,13 @@ class Builder:
             if not self._free(x, y, 17):
                 continue
             tint = ((0.6, 0.6, 0.58), (0.55, 0.28, 0.03), (0.4, 0.05, 0.03))[self.rng.integers(3)]
-            place(truck, (x, y, 0), turn, tint)
+            place(self.truck, (x, y, 0), turn, tint)
             if self.rng.random() < 0.65:
-                self._box(40, (x, y, 1.45), int(self.rng.integers(len(PALETTE))), turn)
+                self.box(40, (x, y, 1.45), self.color(), turn)
         for _ in range(14):  # containers on the apron
             x, y = self.rng.uniform(-200, min(200, self.v.end_m - 20)), self.rng.uniform(36.5, 40)
             if self._free(x, y, 14):
-                self._box(40, (x, y, 0), int(self.rng.integers(len(PALETTE))), 0.0)
+                self.box(40, (x, y, 0), self.color(), 0.0)
 
     def _far(self) -> None:
         s = Shape()
@@ -319,4 +330,4 @@ class Builder:
             x, y = self.rng.uniform(-1900, -820), -1000 - self.rng.uniform(60, 160)
             for level in range(int(self.rng.integers(1, 5))):
                 z = 0.5 + level * models.HEIGHT
-                self._box(40, (x, y, z), int(self.rng.integers(len(PALETTE))), 0.0)
+                self.box(40, (x, y, z), self.color(), 0.0)
