@@ -172,6 +172,21 @@ def test_scenes_without_ground_and_repeated_scenes_are_bit_identical(generator, 
     np.testing.assert_array_equal(alone.image, first[0].image)
 
 
+@pytest.mark.parametrize("count", [2, 4])
+def test_containers_behind_the_camera_hardly_change_the_ground(generator, scene, count):
+    """Programs are compiled for more containers than these scenes have."""
+    far = tuple(
+        Neighbour(Pose((0.0, -20000.0 - 3000.0 * i, -1200.0)), scene.container, scene.surface)
+        for i in range(count)
+    )
+    alone, among = (
+        generator.render(camera="side", scene=replace(scene, neighbours=each)) for each in ((), far)
+    )
+    plane = (alone.ids == 0) & np.isfinite(alone.depth)
+    apart = np.abs(alone.image.astype(float) - among.image)[plane]
+    assert apart.mean() < 3
+
+
 def test_sunlight_on_the_plane_equals_ray_casts(generator, scene, ambient):
     camera = CAMERAS[2]
     box = container_box(scene.container.kind, Pose())

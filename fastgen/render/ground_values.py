@@ -49,6 +49,7 @@ def ground_values(
     bodies = [member.box for member in members] + [prop_box(prop) for prop in props]
     rows = np.zeros((3, MAX_BOXES + len(props), 4))
     rows[0, len(members) : MAX_BOXES, 2] = _FAR_BELOW_M
+    rows[2, len(members) : MAX_BOXES, 3] = _NO_GAP_M
     places = [*range(len(members)), *range(MAX_BOXES, MAX_BOXES + len(props))]
     for place, body in zip(places, bodies, strict=True):
         rows[0, place] = *body.center_mm * MM, body.rotation[0, 0]
@@ -61,7 +62,8 @@ def ground_values(
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
     turned = np.array([body.axes @ toward for body in bodies[: len(members)]]).reshape(-1, 3)
-    inverse = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
+    inverse = np.ones((MAX_BOXES, 4))  # zeros would make boxes that are not there NaN
+    inverse[: len(members), :3] = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
     scale = 1 / (light.step_m * GRID)
     yaw = np.deg2rad(ground.line_yaw_deg)
     wet = ground.wetness
@@ -69,7 +71,7 @@ def ground_values(
         "body_center": rows[0],
         "body_half": rows[1],
         "body_paint": rows[2],
-        "body_light": np.insert(inverse, 3, 0.0, axis=1),
+        "body_light": inverse,
         "face_radiance": np.insert(light.face_radiance.reshape(-1, 3), 3, 0.0, axis=1),
         "grid_transform": (*scale, *(0.5 / np.array(GRID) - light.low_m * scale)),
         "ground_albedo": ground.albedo,
