@@ -141,7 +141,7 @@ def test_sampled_scenes_pass_the_check_and_read_back(mixed):
 
 
 def arrangement_of(scene):
-    """Return the arrangement as the scene shows it; '' where neighbours were left out."""
+    """Return the arrangement as the scene shows it."""
     if scene.ground is None:
         return "alone"
     kinds = Counter(prop.shape for prop in scene.props)

@@ -111,7 +111,7 @@ def test_scenes_of_ports_can_be_drawn(preset):
 
 
 def visible_width(camera):
-    """Return the width in mm of what an undistorted camera sees at its target."""
+    """Return the width in mm of an undistorted image at the distance of its target."""
     return (
         camera.sensor_width_mm / camera.focal_mm * math.dist(camera.position_mm, camera.target_mm)
     )

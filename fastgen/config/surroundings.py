@@ -1,4 +1,4 @@
-"""What is around the container: further containers, vehicles below them, and the ground."""
+"""Surroundings of the container: further containers, vehicles below them, and the ground."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -19,21 +19,21 @@ _Color = Annotated[str, Matching("#?[0-9a-fA-F]{6}", "is not a color; write it a
 
 @dataclass(frozen=True)
 class PlacementConfig:
-    """What the container stands on or hangs above, and the containers around it.
+    """Arrangement of the container, its neighbours and the ground.
 
-    The cameras follow the container, wherever it is. A neighbour is left out, with those on top of
-    it, if it would overlap something, come within 300 mm of a camera, or if more than 60 % of what
-    a camera sees of the container would be hidden. A camera that would be less than 300 mm above
-    the ground is raised to that height; under a lifted container, the ground is lowered instead.
+    The cameras follow the container. A neighbour is not placed if it would overlap something or be
+    within 300 mm of a camera. Neighbours may hide at most 60 % of the container's visible box from
+    a camera. A camera less than 300 mm above the ground is raised to that height; below a lifted
+    container, the ground is lowered instead.
 
     Attributes:
-        arrangements: Relative frequency of each arrangement. alone: nothing but the container and
-            the HDRI. lifted: in the air above the ground and its neighbours. standing: on the
-            ground, without neighbours. row: on the ground, among neighbours side by side and end to
-            end. stack: in a pile, among other piles. trailer: on a trailer, with trailers in the
-            lanes beside it. wagon: on a rail wagon, with wagons before, behind and beside it. twin:
-            two 20-foot containers end to end, on a trailer or lifted; other kinds draw among the
-            other arrangements.
+        arrangements: Relative frequency of each arrangement. In alone, there is only the container
+            and the HDRI. In lifted, it is in the air above its neighbours. In standing, it is on
+            the ground without neighbours. In row, neighbours are beside it and at its ends. In
+            stack, it is in a pile among other piles. In trailer, it is on a trailer, with trailers
+            in other lanes. In wagon, it is on a rail wagon, with other wagons around. In twin, two
+            20-foot containers are end to end, on a trailer or lifted; containers of other kinds
+            draw one of the other arrangements.
         neighbours: Number of further containers; all numbers are equally likely. A twin has one
             more, its second container.
         lift_mm: Height of a lifted container above the ground.
@@ -91,7 +91,7 @@ class PlacementConfig:
 
     @property
     def has_neighbours(self) -> bool:
-        """Whether a scene may have neighbours."""
+        """True if a scene may have neighbours."""
         several = self.chosen - {"alone", "standing"}
         return "twin" in several or bool(several and self.neighbours[1] > 0)
 

@@ -1,4 +1,4 @@
-"""Sampling of arrangements: what the container stands on, and where its neighbours could be."""
+"""Sampling of arrangements: the support of the container, and possible sites of its neighbours."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,7 +34,7 @@ _ON_GROUND = 0.5
 _VEHICLES = {"trailer": trailer_props, "wagon": wagon_props}
 
 _PARTS = 12
-"""Parts of a neighbour's vehicle. Smaller ones are left out, since a scene has room for few."""
+"""Largest number of parts of a neighbour's vehicle; its smaller parts are not drawn."""
 
 Cell = tuple[int, int]
 """Row and column of a pile; the container's own is (0, 0). Rows follow y and columns x."""
@@ -91,10 +91,10 @@ def sample_plan(
     Args:
         config: Distribution of scenes.
         kind: Kind of the container.
-        held: Whether a spreader holds it, so that nothing can be on top of it.
+        held: True if a spreader is on it, so that nothing else can be.
         floor_mm: Greatest height of the ground below a lifted container.
         streams: Function from the name of a property to its independent random generator.
-        at_bottom: Whether to put the container at the bottom of its pile.
+        at_bottom: Put the container at the bottom of its pile.
     """
     weights = config.placement.arrangements
     if kind != "20":

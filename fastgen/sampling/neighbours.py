@@ -29,11 +29,11 @@ LEAST_DISTANCE_MM = 300.0
 """Least distance of a camera from neighbours and from the ground."""
 
 MOST_HIDDEN = 0.6
-"""Largest share of what a camera sees of the container that neighbours may hide."""
+"""Largest share of the container's visible box that neighbours may hide from a camera."""
 
 
 class Surroundings(NamedTuple):
-    """What is around a container, and the cameras that were moved for it.
+    """Surroundings of a container, and the cameras, which may have been moved.
 
     Attributes:
         cameras: All cameras.
@@ -58,7 +58,7 @@ def sample_surroundings(
     Args:
         config: Distribution of scenes; its rig has the cameras.
         kind: Kind of the container.
-        held: Whether a spreader holds it.
+        held: True if a spreader is on it.
         cameras: Cameras as if there was only the container.
         streams: Function from the name of a property to its independent random generator.
     """
@@ -153,7 +153,7 @@ class _Taken:
 
     Args:
         kind: Kind of the container.
-        held: Whether a spreader holds it.
+        held: True if a spreader is on it.
         plan: Arrangement with a ground.
         rig: Each camera, and the face that it looks at.
     """

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Sight:
-    """Points on a container's outer box that a camera sees, and which of them are hidden.
+    """Visible points on a container's outer box, each marked as hidden or not.
 
     Only points within the image count. The image is taken as square and without distortion.
 

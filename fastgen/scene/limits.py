@@ -12,7 +12,7 @@ FAR_M = 200.0
 """Near and far plane of every camera, in metres along its optical axis."""
 
 CAMERA_REACH_MM = (FAR_M - 20.0) / MM
-"""Largest distance of a camera from a container, all of which is then before the far plane."""
+"""Largest distance of a camera from a container; a whole container then fits before FAR_M."""
 
 MAX_DAMAGES = 128
 """Damages per scene; they fit the 16 KiB that every driver grants a uniform block."""
