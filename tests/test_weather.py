@@ -11,6 +11,7 @@ from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.camera.weather import _streaks, add_fog, add_rain
 from fastgen.config.config import Config
 from fastgen.generator import Generator
+from fastgen.light.exposure import airlight
 from fastgen.scene import Camera
 from fastgen.scene.optics import Lens, Rain, Weather
 from tests.test_environment import write_exr
@@ -168,7 +169,8 @@ def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     sample = generator.render(scene=scene, camera=camera)
     clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
     with generator.gpu.drawing() as renderer:
-        air = np.array(generator._airlight(renderer, scene, generator.exposure(scene, camera)))
+        light, yaw_deg = renderer.ambient(scene.environment.name), scene.environment.yaw_deg
+        air = np.array(airlight(light, yaw_deg, generator.exposure(scene, camera)))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
     away = np.minimum(sample.depth / (rays @ forward), 300)
