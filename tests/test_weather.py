@@ -169,7 +169,7 @@ def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     sample = generator.render(scene=scene, camera=camera)
     clear = generator.render(scene=replace(scene, weather=Weather()), camera=camera)
     with generator.gpu.drawing() as renderer:
-        light, yaw_deg = renderer.ambient(scene.environment.name), scene.environment.yaw_deg
+        light, yaw_deg = renderer.ambient(scene.environment), scene.environment.yaw_deg
         air = np.array(airlight(light, yaw_deg, generator.exposure(scene, camera)))
     _, rays = sample.view.rays()
     forward = sample.view.rotation[2]
