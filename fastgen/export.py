@@ -1,16 +1,19 @@
 """Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools.
 
-The file contains the damaged container, the spreader, their baked textures, the seals and the
-cameras. If the damage tears holes, it also contains the inside of the container.
+The file contains all damaged containers, the spreader, the ground and the props on it, their baked
+textures, the seals and the cameras. A container with holes also has its inside. The ground is a square whose alpha falls to 0 where the
+environment replaces it.
 
 Data that glTF has no place for is stored as `extras`. The extras of the glTF scene are the
 environment and the Scene; those of a camera's node are its exposure and lens distortion. Viewers
 show each camera as a pinhole.
 """
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import trimesh
@@ -28,11 +31,12 @@ from fastgen.generator import Generator
 from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
 from fastgen.geometry.mesh import MATERIALS, Mesh
-from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.render.constants import INSIDE_ALBEDO
+from fastgen.geometry.prepared_scene import Member, PreparedScene
+from fastgen.render.constants import GROUND_FADE_START, INSIDE_ALBEDO
 from fastgen.render.passes.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.render.surface_values import SEAL_STEEL_ALBEDO
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Color, Ground, Pose, Prop, Scene
+from fastgen.scene.boxes import rotation_of
 from fastgen.scene.check import check_camera, check_scene
 from fastgen.scene.limits import MM
 from fastgen.validation import to_plain
@@ -48,6 +52,12 @@ _IMAGE_NAMES = {"baseColorTexture": "base_color", "metallicRoughnessTexture": "s
 _FLOOR_SLOPE = 0.7
 """Inside faces whose normal has a larger z than this are the wooden floor."""
 
+_ROUND_SIDES = 64
+"""Sides of an exported cylinder."""
+
+_WATER_SPECULAR = 0.5
+"""Reflectance of water (2 %) as a share of the 4 % of other materials; KHR_materials_specular."""
+
 
 def export_glb(
     generator: Generator,
@@ -61,18 +71,19 @@ def export_glb(
     Args:
         generator: Bakes the textures. Its image size sets the aspect ratio of the cameras.
         scene: The scene. If its damage tears holes, the file also has the inside, in one color for
-            the floor and one for the rest.
+            the floor and one for the rest. Neighbours are nodes that begin with "neighbour_1",
+            "neighbour_2" and so on, and props are "prop_0" and so on.
         path: The GLB file.
         cameras: Cameras to write; by default all cameras of the scene.
-        texel_mm: Width of a texel of the container's textures, in millimetres. The spreader's
-            texels are wider if its atlas would be too large otherwise.
+        texel_mm: Width of a texel of the containers' textures, in millimetres. The texels of
+            spreader and ground are wider if their textures would be too large otherwise.
 
     Raises:
         ConfigError: The texel is too small, the scene cannot be drawn, or it has no container.
         OutputError: The file cannot be written.
     """
     check_scene(scene)
-    if not scene.container.present:
+    if not (scene.container.present or scene.neighbours or scene.ground):
         raise ConfigError(
             f"scene {scene.index}: has no container to export; take another, or set "
             "container.absent to 0"
@@ -83,30 +94,43 @@ def export_glb(
     if not path.parent.is_dir():
         raise OutputError(f"{path}: no folder {path.parent}; make it first")
     prepared = PreparedScene(scene)
-    mesh = prepared.container
-    atlas_size(mesh, texel_mm)  # raises ConfigError before the slow steps
-    body = damaged_mesh(mesh, scene.damages)
-    atlas = generator.bake(scene, texel_mm)
-    parts = {"container": _baked_part(body, atlas, scene.surface.paint.name)}
-    if variant(scene.damages) == "holed":
-        parts |= _inside(body)
+    present = [each for each in prepared.members if each.prepared.scene.container.present]
+    for member in present:
+        atlas_size(member.prepared.container, texel_mm)  # raises ConfigError before the slow steps
+    exported = trimesh.Scene(metadata=_scene_extras(scene))
+    colors = {f"inside_{name}": albedo for name, albedo in INSIDE_ALBEDO.items()}
+    colors["seal_steel"] = SEAL_STEEL_ALBEDO
+
+    def add(parts: dict[str, trimesh.Trimesh], pose: Pose) -> None:
+        for name, part in parts.items():
+            exported.add_geometry(part, name, name, transform=_transform(pose))
+
+    for member in present:
+        add(_member(generator, member, texel_mm), member.pose)
+        seals = member.prepared.scene.seals
+        colors |= {_named(f"seal_{seal.hasp}", member.number): seal.albedo for seal in seals}
     if prepared.spreader is not None:
         spreader = prepared.spreader.mesh
         baked = generator.bake_spreader(scene, max(texel_mm, least_texel_mm(spreader)))
         assert baked is not None
-        parts["spreader"] = _baked_part(spreader, baked, "spreader")
-    if prepared.seals is not None:
-        parts |= _seals(prepared.seals.mesh)
+        add({"spreader": _baked_part(spreader, baked, "spreader")}, Pose())
+    for number, prop in enumerate(scene.props):
+        add({f"prop_{number}": _prop(prop, f"prop_{number}")}, prop.pose)
+        colors[f"prop_{number}"] = prop.albedo
+    ground = scene.ground
+    if ground is not None:
+        baked = generator.bake_ground(scene, texel_mm)
+        assert baked is not None
+        add({"ground": _ground_part(ground, baked)}, Pose((0.0, 0.0, ground.height_mm)))
 
     def complete(tree: dict[str, Any]) -> None:
         tree["asset"]["generator"] = f"fastgen {fastgen.__version__}"
-        _complete_materials(tree, scene)
+        _complete_materials(tree, colors)
+        if ground is not None:
+            _set_specular(tree, "ground", _WATER_SPECULAR if ground.wetness else 0.0)
         for camera in chosen:
             _append_camera(tree, generator, scene, camera)
 
-    exported = trimesh.Scene(metadata=_scene_extras(scene))
-    for name, part in parts.items():
-        exported.add_geometry(part, node_name=name, geom_name=name)
     write(path, gltf.export_glb(exported, include_normals=True, tree_postprocessor=complete))
 
 
@@ -120,6 +144,26 @@ class _Texture:
 
     def save(self, stream: BinaryIO, format: str) -> None:
         stream.write(self._data)
+
+
+def _member(generator: Generator, member: Member, texel_mm: float) -> dict[str, trimesh.Trimesh]:
+    """Return the parts of a container by their names in the file, in its own frame."""
+    scene, number = member.prepared.scene, member.number
+    body = damaged_mesh(member.prepared.container, scene.damages)
+    paint = _named(scene.surface.paint.name, number)
+    # cameras are in the frame of the first container, where they need not be outside of this one
+    atlas = generator.bake(replace(scene, cameras=()) if number else scene, texel_mm)
+    parts = {"container": _baked_part(body, atlas, paint)}
+    if variant(scene.damages) == "holed":
+        parts |= _inside(body)
+    if member.prepared.seals is not None:
+        parts |= _seals(member.prepared.seals.mesh, number)
+    return {_named(name, number): part for name, part in parts.items()}
+
+
+def _named(name: str, number: int) -> str:
+    """Return the name in the file of something that container `number` has."""
+    return f"neighbour_{number}_{name}" if number else name
 
 
 def _baked_part(mesh: Mesh | DamagedMesh, atlas: Atlas, material: str) -> trimesh.Trimesh:
@@ -150,25 +194,101 @@ def _inside(body: DamagedMesh) -> dict[str, trimesh.Trimesh]:
     return parts
 
 
-def _seals(mesh: Mesh) -> dict[str, trimesh.Trimesh]:
-    """Return the triangles of each material of seals. The materials have one color each."""
+def _seals(mesh: Mesh, number: int) -> dict[str, trimesh.Trimesh]:
+    """Return the triangles of each material of a container's seals, which have one color each."""
     parts = {}
     of_vertices = np.array([chart.material_index for chart in mesh.charts])[mesh.chart]
     of_triangles = of_vertices[mesh.triangles[:, 0]]
-    for number in np.unique(of_triangles).tolist():
-        used, triangles = np.unique(mesh.triangles[of_triangles == number], return_inverse=True)
+    for index in np.unique(of_triangles).tolist():
+        used, triangles = np.unique(mesh.triangles[of_triangles == index], return_inverse=True)
+        steel = MATERIALS[index] == "seal_steel"
         plain = PBRMaterial(
-            MATERIALS[number],
-            metallicFactor=0.8 if MATERIALS[number] == "seal_steel" else 0.0,
+            MATERIALS[index] if steel else _named(MATERIALS[index], number),
+            metallicFactor=0.8 if steel else 0.0,
             roughnessFactor=0.4,
         )
-        parts[plain.name] = _part(
+        parts[MATERIALS[index]] = _part(
             mesh.positions_mm[used],
             mesh.normals[used],
             triangles.reshape(-1, 3),
             TextureVisuals(material=plain),
         )
     return parts
+
+
+def _prop(prop: Prop, name: str) -> trimesh.Trimesh:
+    """Return a prop in its own frame."""
+    solid = _unit_box() if prop.shape == "box" else _unit_cylinder()
+    half_mm = np.array(prop.size_mm) / 2
+    plain = PBRMaterial(name, metallicFactor=0.0, roughnessFactor=float(prop.roughness))
+    visual = TextureVisuals(material=plain)
+    return _part(solid.corners * half_mm, solid.normals, solid.triangles, visual)
+
+
+class _UnitSolid(NamedTuple):
+    """A solid from -1 to 1 along each axis: corners [V, 3], normals [V, 3], triangles [T, 3]."""
+
+    corners: NDArray[np.floating]
+    normals: NDArray[np.floating]
+    triangles: NDArray[np.integer]
+
+
+def _unit_box() -> _UnitSolid:
+    """Return a box with flat faces."""
+    corners, normals = [], []
+    for axis, sign in itertools.product(range(3), (-1, 1)):
+        out, across, up = np.roll(np.eye(3), axis, axis=1)
+        turn = [(-1, -sign), (1, -sign), (1, sign), (-1, sign)]
+        corners += [sign * out + u * across + v * up for u, v in turn]
+        normals += 4 * [sign * out]
+    quad = np.array([[0, 1, 2], [0, 2, 3]])
+    triangles = np.concatenate([quad + 4 * face for face in range(6)])
+    return _UnitSolid(np.array(corners), np.array(normals), triangles)
+
+
+def _unit_cylinder() -> _UnitSolid:
+    """Return a cylinder along y with a smooth side."""
+    angle = np.linspace(0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
+    out = np.stack([np.cos(angle), np.zeros(_ROUND_SIDES), -np.sin(angle)], axis=-1)
+    end = np.array([0.0, 1.0, 0.0])
+    rings = [out - end, out + end]
+    corners = np.concatenate([*rings, *rings])
+    normals = np.concatenate([out, out, np.tile(-end, (len(out), 1)), np.tile(end, (len(out), 1))])
+    i = np.arange(_ROUND_SIDES)
+    j, count = (i + 1) % _ROUND_SIDES, _ROUND_SIDES
+    side = [np.stack([i, j, j + count], axis=-1), np.stack([i, j + count, i + count], axis=-1)]
+    fan = np.stack([np.zeros_like(i[1:-1]), i[1:-1], j[1:-1]], axis=-1)
+    caps = [2 * count + fan[:, ::-1], 3 * count + fan]
+    return _UnitSolid(corners, normals, np.concatenate([*side, *caps]))
+
+
+def _ground_part(ground: Ground, atlas: Atlas) -> trimesh.Trimesh:
+    """Return the ground as a square around the origin, with alpha where it fades."""
+    rows, columns = atlas.base_color.shape[:2]
+    away = np.abs(np.arange(columns) + 0.5 - ground.reach_mm / atlas.texel_mm)
+    away = np.hypot(away, away[:rows, None]) * (atlas.texel_mm / ground.reach_mm)
+    x = np.clip((away - GROUND_FADE_START) / (1 - GROUND_FADE_START), 0, 1)
+    alpha = 255 * (1 - x * x * (3 - 2 * x))  # smoothstep, as ground.frag does
+    color = np.dstack([atlas.base_color, np.rint(alpha)[::-1].astype(np.uint8)])
+    square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * ground.reach_mm
+    uv = atlas.uv(square[:, :2] + ground.reach_mm)
+    uv[:, 1] = 1 - uv[:, 1]
+    material = PBRMaterial(
+        name="ground",
+        alphaMode="BLEND",
+        baseColorTexture=_Texture(color),
+        metallicRoughnessTexture=_Texture(atlas.surface),
+    )
+    up = np.tile([0.0, 0.0, 1.0], (4, 1))
+    return _part(square, up, np.array([[0, 1, 2], [0, 2, 3]]), TextureVisuals(uv, material))
+
+
+def _transform(pose: Pose) -> NDArray[np.float64]:
+    """Return the matrix [4, 4] of a node at a pose, in metres with y up."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = _Y_UP @ rotation_of(pose) @ _Y_UP.T
+    matrix[:3, 3] = _Y_UP @ pose.position_mm * MM
+    return matrix
 
 
 def _part(
@@ -198,11 +318,8 @@ def _scene_extras(scene: Scene) -> dict[str, Any]:
     }
 
 
-def _complete_materials(tree: dict[str, Any], scene: Scene) -> None:
+def _complete_materials(tree: dict[str, Any], colors: Mapping[str, Color]) -> None:
     """Name the images, and set the exact colors that trimesh has rounded to 8 bits."""
-    colors = {f"inside_{name}": albedo for name, albedo in INSIDE_ALBEDO.items()}
-    colors["seal_steel"] = SEAL_STEEL_ALBEDO
-    colors |= {f"seal_{seal.hasp}": seal.albedo for seal in scene.seals}
     for material in tree["materials"]:
         values = material["pbrMetallicRoughness"]
         if "baseColorTexture" not in values:
@@ -211,6 +328,14 @@ def _complete_materials(tree: dict[str, Any], scene: Scene) -> None:
         for key, image in _IMAGE_NAMES.items():
             texture = tree["textures"][values[key]["index"]]
             tree["images"][texture["source"]]["name"] = f"{material['name']}_{image}"
+
+
+def _set_specular(tree: dict[str, Any], name: str, share: float) -> None:
+    """Scale the reflectance of a material, which is 4 % otherwise; glTF KHR_materials_specular."""
+    extension = "KHR_materials_specular"
+    tree.setdefault("extensionsUsed", []).append(extension)
+    material = next(each for each in tree["materials"] if each["name"] == name)
+    material["extensions"] = {extension: {"specularFactor": share}}
 
 
 def _append_camera(

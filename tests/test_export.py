@@ -18,10 +18,11 @@ from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
 from fastgen.geometry.damage_law import in_hole
 from fastgen.geometry.damaged_mesh import damaged_mesh
-from fastgen.scene import Camera, Scene, Spreader
+from fastgen.scene import Camera, Ground, Neighbour, Pose, Prop, Scene, Spreader
 from fastgen.scene.optics import Lens
 
 SIZE = (320, 240)
+GREY = (0.2, 0.2, 0.2)
 TO_Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], float)
 
 TORN = Config.from_values(
@@ -284,6 +285,70 @@ def test_the_file_stores_scene_light_and_exposure(generator, torn):
     for camera in scene.cameras:
         expected = generator.exposure(scene, camera)
         assert nodes[camera.name]["extras"]["exposure"] == expected
+
+
+@pytest.fixture(scope="module")
+def surrounded(generator, tmp_path_factory):
+    """A scene with a turned neighbour, ground and props, and its file."""
+    scene = replace(generator.scene(0), spreader=Spreader(), damages=())
+    other = generator.scene(1)
+    neighbour = Neighbour(
+        Pose((500.0, 4200.0, -300.0), 170.0), other.container, other.surface, other.decals
+    )
+    camera = Camera("around", (9000.0, -5000.0, 5000.0), (1000.0, 1000.0, 0.0), 20.0)
+    scene = replace(
+        scene,
+        cameras=(camera,),
+        neighbours=(neighbour,),
+        ground=Ground("concrete", -800.0, wear=0.0, reach_mm=8000.0),
+        props=(
+            Prop("box", Pose((3500.0, -2500.0, -500.0), 20.0), (700.0, 300.0, 600.0), (0.1,) * 3),
+            Prop(
+                "cylinder", Pose((500.0, -2400.0, -500.0), 40.0), (600.0, 900.0, 600.0), (0.2,) * 3
+            ),
+        ),
+    )
+    path = tmp_path_factory.mktemp("surrounded") / "scene.glb"
+    export_glb(generator, scene, path, texel_mm=32.0)
+    return scene, path
+
+
+def test_neighbours_ground_and_props_are_where_the_renderer_draws_them(generator, surrounded):
+    scene, path = surrounded
+    sample = generator.render(scene=scene)
+    loaded = trimesh.load(path, process=False)
+    body = trimesh.util.concatenate(list(loaded.dump()))
+    body.vertices = body.vertices @ TO_Z_UP.T
+    view = sample.view
+    eye_mm, rays = view.rays()
+    rays = rays.reshape(-1, 3)
+    origins = np.tile(eye_mm / 1e3, (len(rays), 1))
+    hits, which, _ = RayMeshIntersector(body).intersects_location(origins, rays, False)
+    depth = np.full(len(rays), np.inf)
+    depth[which] = (hits - eye_mm / 1e3) @ view.rotation[2]
+    shown = sample.depth.ravel()
+    both = np.isfinite(depth) & np.isfinite(shown)
+    assert both.mean() > 0.4
+    # a cylinder of 64 sides, and corners of the square beyond the ground's reach
+    assert np.quantile(np.abs(depth[both] - shown[both]), 0.98) < 2e-3
+    assert (np.isfinite(depth) | ~np.isfinite(shown)).mean() > 0.999
+
+
+def test_the_dry_ground_reflects_no_highlights_and_fades(surrounded):
+    scene, path = surrounded
+    tree = tree_of(path)
+    (material,) = (m for m in tree["materials"] if m["name"] == "ground")
+    assert material["extensions"]["KHR_materials_specular"]["specularFactor"] == 0.0
+    assert "KHR_materials_specular" in tree["extensionsUsed"]
+    image = trimesh.load(path, process=False).geometry["ground"].visual.material.baseColorTexture
+    alpha = np.array(image)[..., 3]
+    rows, columns = alpha.shape
+    assert alpha[rows // 2, columns // 2] == 255
+    assert alpha[0, 0] == 0
+    assert abs(int(alpha[rows // 2, columns * 7 // 8]) - 128) < 4  # three quarters of the reach
+    color = np.array(image)[..., :3].reshape(-1, 3).mean(axis=0) / 255
+    linear = ((color + 0.055) / 1.055) ** 2.4
+    assert linear == pytest.approx(np.array(scene.ground.albedo), rel=0.15)
 
 
 def test_lens_distortion_is_stored_in_the_extras_of_its_camera(generator, tmp_path):

@@ -116,11 +116,14 @@ def test_all_other_shaders_are_standard_glsl(programs):
             programs.add(("bake.vert", "bake.frag"), of_points)
     programs.add(("occluder.vert", "occluder.frag"), ShaderVariant())
     for kind, wet, coarse in zip(GROUNDS, (False, True, True), (True, False, True), strict=True):
-        ground = GroundVariant(kind, boxes=2, wet=wet, fades=wet, props=not coarse, coarse=coarse)
+        ground = GroundVariant(
+            kind, boxes=2, wet=wet, fades=wet, props=not coarse, shadows=coarse, coarse=coarse
+        )
         variant = ShaderVariant(
             samples_per_axis=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground
         )
         programs.add(("fullscreen.vert", "ground.frag"), variant)
+        programs.add(("fullscreen.vert", "ground_bake.frag"), variant)
     lens = ShaderVariant(ground=GroundVariant(lens=True))
     programs.add(("fullscreen.vert", "ground_spread.frag"), lens)
     assert refused(programs.folder) == ""

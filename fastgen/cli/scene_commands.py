@@ -60,8 +60,9 @@ def add_export(commands: Any) -> None:
     command = commands.add_parser(
         "export",
         help="write one scene as a GLB file for Blender and other programs",
-        description="Write one scene as a GLB file for Blender and other programs: container and "
-        "spreader with baked textures, cameras, and the name of the environment.",
+        description="Write one scene as a GLB file for Blender and other programs: containers, "
+        "spreader and ground with baked textures, what stands on the ground, cameras, and the name "
+        "of the environment.",
     )
     add_index(command)
     add_seed(command)

@@ -51,10 +51,16 @@ def jpeg(image: NDArray[np.uint8]) -> bytes:
 
 
 def png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """Return an sRGB image, uint8 [H, W, 3], or a mask, uint8 or uint16 [H, W], as PNG."""
+    """Return an image as PNG.
+
+    Args:
+        pixels: sRGB uint8 [H, W, 3], the same with alpha [H, W, 4], or a mask uint8 or uint16
+            [H, W].
+    """
     if pixels.ndim == 2:
         return _mask_png(pixels)
-    done, data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., ::-1]), _PNG_FAST)
+    channels = [2, 1, 0, 3][: pixels.shape[2]]
+    done, data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., channels]), _PNG_FAST)
     assert done
     return data.tobytes()
 

@@ -364,6 +364,11 @@ class Renderer:
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )
 
+    def bake_ground(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
+        """Bake the material of a scene's ground within its reach; None where it has none."""
+        self._set(SCENE_BLOCK, scene_values(prepared, 0))
+        return self._ground.bake(prepared.scene, self._tables, texel_mm)
+
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
         """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
         return self._lights.exposure(scene, camera, view_of(camera, size))

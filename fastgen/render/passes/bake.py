@@ -1,4 +1,4 @@
-"""Bake pass: the material layers of a mesh as textures, evaluated by the shading GLSL."""
+"""Bake pass: the material layers of meshes and of the ground as textures, by the shading GLSL."""
 
 import numbers
 from dataclasses import dataclass
@@ -18,13 +18,19 @@ from fastgen.render.variant import ShaderVariant
 MAX_ATLAS = 8192
 """Texels along a side that viewers accept reliably."""
 
+GROUND_TEXELS = 4096
+"""Most texels along a side of the ground."""
+
 _TILE = 1024
 _COARSEST_MM = 1000.0
 
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Baked textures of one mesh. Row 0 holds the highest atlas y, so lettering is upright.
+    """Baked textures of one mesh or of the ground.
+
+    Row 0 holds the highest atlas y, so lettering is upright. The ground's atlas is centred on the
+    world's origin.
 
     Attributes:
         base_color: uint8 [H, W, 3], sRGB-encoded albedo.
@@ -120,11 +126,7 @@ def bake_atlas(
             tile.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
             program["atlas_to_clip"] = (scale, scale, -1 - 2 * x / _TILE, -1 - 2 * y / _TILE)
             array.render(moderngl.TRIANGLES, instances=GUTTER_STEPS)
-            for i, image in enumerate(images):
-                data = tile.read(components=4, attachment=i, alignment=1)
-                texels = np.frombuffer(data, np.uint8).reshape(_TILE, _TILE, 4)
-                part = image[y : y + _TILE, x : x + _TILE]
-                part[:] = texels[: part.shape[0], : part.shape[1]]
+            _read_tile(tile, images, x, y)
     items: list[Any] = [tile, *targets, depth, array, vertex_buffer, index_buffer]
     for item in items:
         item.release()
@@ -133,6 +135,57 @@ def bake_atlas(
     empty = images[0][..., 3] == 0
     for image in images:
         image[empty] = np.median(image[~empty], axis=0)
+    return _atlas(images, texel_mm)
+
+
+def bake_ground(
+    ctx: moderngl.Context,
+    program: ShaderProgram,
+    textures: Textures,
+    reach_mm: float,
+    texel_mm: float,
+) -> Atlas:
+    """Bake the ground around the world's origin. Its uniform blocks are filled already.
+
+    Args:
+        ctx: Current context.
+        program: Program of ground_bake.frag.
+        textures: Textures that the program reads.
+        reach_mm: Half of the side of the baked square.
+        texel_mm: Width of a texel; a wider one is taken if the square has more than GROUND_TEXELS.
+    """
+    texel_mm = max(texel_mm, 2 * reach_mm / GROUND_TEXELS)
+    side = int(np.ceil(2 * reach_mm / texel_mm))
+    targets = [ctx.renderbuffer((_TILE, _TILE), 4) for _ in range(2)]
+    tile = ctx.framebuffer(targets)
+    images = [np.zeros((side, side, 4), np.uint8) for _ in targets]
+    program.bind(textures)
+    program["texel_mm"] = texel_mm
+    tile.use()
+    ctx.enable_only(moderngl.NOTHING)
+    ctx.scissor = None
+    for y in range(0, side, _TILE):
+        for x in range(0, side, _TILE):
+            program["low_mm"] = (x * texel_mm - reach_mm, y * texel_mm - reach_mm)
+            program.draw_vertices(3)
+            _read_tile(tile, images, x, y)
+    tile.release()
+    for target in targets:
+        target.release()
+    return _atlas(images, texel_mm)
+
+
+def _read_tile(tile: moderngl.Framebuffer, images: list[NDArray[np.uint8]], x: int, y: int) -> None:
+    """Copy the attachments of a tile to its place in images of the whole."""
+    for i, image in enumerate(images):
+        data = tile.read(components=4, attachment=i, alignment=1)
+        texels = np.frombuffer(data, np.uint8).reshape(_TILE, _TILE, 4)
+        part = image[y : y + _TILE, x : x + _TILE]
+        part[:] = texels[: part.shape[0], : part.shape[1]]
+
+
+def _atlas(images: list[NDArray[np.uint8]], texel_mm: float) -> Atlas:
+    """Return the atlas of an albedo and a surface image with row 0 at the bottom."""
     base_color, surface = (np.ascontiguousarray(image[::-1, :, :3]) for image in images)
     return Atlas(base_color, surface, texel_mm)
 

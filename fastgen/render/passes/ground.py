@@ -14,6 +14,7 @@ from fastgen.render.blocks import GROUND_BLOCK
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.ground_regions import ground_regions
 from fastgen.render.ground_values import ground_values
+from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
 from fastgen.render.regions import Region
@@ -156,6 +157,26 @@ class GroundPass:
             for region in () if drawn.props else parts:
                 self._ctx.scissor = region
                 program.draw_vertices(3)
+
+    def bake(self, scene: Scene, textures: Textures, texel_mm: float) -> Atlas | None:
+        """Bake the material of a scene's ground within its reach; None if it has none.
+
+        Args:
+            scene: The scene, whose SCENE_BLOCK is filled already.
+            textures: Textures that the material reads.
+            texel_mm: Least width of a texel.
+        """
+        ground = scene.ground
+        if ground is None:
+            return None
+        ambient = self._ambient(scene.environment)
+        unlit = ground_light([], [], ambient, 0.0, ground.height_mm)
+        values = ground_values(ground, [], [], unlit, np.array([0.0, 0.0, 1.0]))
+        self._block.write(GROUND_BLOCK.pack(values))
+        self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
+        variant = ShaderVariant(ground=GroundVariant(ground.kind, wet=ground.wetness > 0))
+        program = self._programs.get(("fullscreen.vert", "ground_bake.frag"), variant)
+        return bake_ground(self._ctx, program, textures, ground.reach_mm, texel_mm)
 
     def release(self) -> None:
         """Free all GL objects."""
