@@ -1,11 +1,15 @@
 """Compare the images with those of a path tracer.
 
-    python bench/accuracy.py [--cases 32] [--qualities draft,balanced,fine,high]
+    python bench/accuracy.py [--cases 32] [--only 32,33] [--qualities draft,balanced,fine,high]
 
-Renders the 32 cases of bench/references at every quality. The references are Cycles renders of the
+Renders the cases of bench/references at every quality. The references are Cycles renders of the
 same exported scenes at 1,024 samples, with the same light, exposure, tone curve and pixel filter.
-Reports FLIP, SSIM and PSNR over the whole image and over the pixels of the container and its
+Reports FLIP, SSIM and PSNR over the whole image and over the pixels of the containers and the
 spreader. First checks that silhouettes and depths through the pixel centres agree.
+
+The first 32 cases show one container without surroundings. The cases of surrounded_cases.py have a
+ground and neighbours; they get a table of their own, also with FLIP over the pixels of the ground
+and the props on it.
 
 Two figures put the errors in perspective. Cycles' own noise is the same measure between two of its
 renders with different seeds. For each quality, the table also shows at how many samples Cycles has
@@ -35,8 +39,9 @@ from cycles_figures import Figures, equal_samples
 from error_pictures import contact_picture, picture, write_picture
 from image_error import Comparison, displayed, divided, stops_over
 from numpy.typing import NDArray
-from reference_set import DEPTH_STEP, FILTERS, SEED, SIZE, Case, Reference, cases, load, traced
+from reference_set import DEPTH_STEP, FILTERS, FOLDER, SEED, SIZE, Case, Reference, cases, load
 from reporting import ROOT, machine, origin, save, write_section
+from surrounded_cases import SurroundedCase, every_case, surrounded_cases
 
 from fastgen import Config, Generator
 from fastgen.sample import Sample
@@ -62,6 +67,7 @@ class Result:
     Attributes:
         measures: Measures from Comparison.both.
         rounding: The same measures of the reference rounded to 8 bits per channel, like our images.
+        ground: Mean FLIP over the pixels of ground and props; nan if there are none.
         parts: By part of the image: number of pixels, sum of their FLIP, and median stops by which
             our image is brighter.
         seconds: CPU time of a labelled image.
@@ -71,6 +77,7 @@ class Result:
     case: Case
     measures: tuple[float, ...]
     rounding: tuple[float, ...]
+    ground: float
     parts: dict[str, tuple[int, float, float]]
     seconds: float
     panels: tuple[Array, Array, Array]
@@ -86,6 +93,7 @@ def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[fl
         SystemExit: The silhouettes differ in more than 1 - MIN_COINCIDENCE of the pixels.
     """
     inside = sample.ids > 0
+    solid = np.isfinite(sample.depth)
     same = float((inside == reference.inside).mean())
     if same < MIN_COINCIDENCE:
         raise SystemExit(
@@ -94,7 +102,7 @@ def check_geometry(case: Case, reference: Reference, sample: Sample) -> tuple[fl
             "and trace it again with --blender-python"
         )
     step = (slice(None, None, DEPTH_STEP),) * 2
-    both = inside[step] & np.isfinite(reference.depth_m)
+    both = solid[step] & np.isfinite(reference.depth_m)
     apart_m = np.abs(sample.depth[step][both] - reference.depth_m[both])
     return same, float(np.quantile(apart_m, 0.99)) * 1e3
 
@@ -124,7 +132,9 @@ def compared(
         spent.append(time.process_time() - began)
     measures, rounding = (c.both(reference.inside) for c in (error, rounded))
     panels = (ours, expected, error.flip_map)
-    return Result(case, measures, rounding, parts, min(spent), panels)
+    plane = (sample.ids == 0) & np.isfinite(sample.depth)
+    ground = float(error.flip_map[plane].mean()) if plane.any() else float("nan")
+    return Result(case, measures, rounding, ground, parts, min(spent), panels)
 
 
 def all_results(quality: str, chosen: Iterable[Case]) -> tuple[list[Result], str]:
@@ -203,12 +213,29 @@ def by_part(quality: str, listed: list[Result]) -> list[str]:
     lines.append("| --- | --- | --- | --- | --- |")
     for part, of_images in shares.items():
         pixels, error, stops = np.array(of_images).T
+        if not pixels.any():
+            continue
         lines.append(
             f"| {part} | {pixels.sum() / totals[0]:.1%} | {error.sum() / totals[1]:.1%} | "
             f"{error.sum() / max(pixels.sum(), 1):.3f} | {np.nanmean(stops):+.2f} "
             f"({np.nanmin(stops):+.2f} to {np.nanmax(stops):+.2f}) |"
         )
     return lines
+
+
+def by_surroundings(results: dict[str, list[Result]]) -> list[str]:
+    """Return a table of the FLIP of each surrounded case, with two columns per quality."""
+    columns = [f"{where}, {quality}" for quality in results for where in ("objects", "ground")]
+    lines = ["| case | " + " | ".join(columns) + " |", "| --- |" + " --- |" * len(columns)]
+    rows = []
+    for same in zip(*results.values(), strict=True):
+        case = same[0].case
+        assert isinstance(case, SurroundedCase)
+        rows.append([value for r in same for value in (r.measures[3], r.ground)])
+        cells = " | ".join(f"{value:.3f}" for value in rows[-1])
+        lines.append(f"| {case.number}: {case.name}, {case.light} | {cells} |")
+    means = " | ".join(f"{value:.3f}" for value in np.mean(rows, axis=0))
+    return [*lines, f"| mean | {means} |"]
 
 
 def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
@@ -233,58 +260,102 @@ def as_samples(results: dict[str, list[Result]], figures: Figures) -> list[str]:
     return lines
 
 
-def main() -> None:
-    """Print the tables and write the pictures."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cases", type=int, default=len(cases()))
-    parser.add_argument("--qualities", default="draft,balanced,fine,high")
-    parser.add_argument("--blender-python", type=Path)
-    parser.add_argument("--picture", type=Path, default=ROOT / "docs" / "accuracy.jpg")
-    parser.add_argument("--out", type=Path, help="folder for a picture per case and quality")
-    options = parser.parse_args()
-    if options.blender_python:
-        command = [sys.executable, str(Path(__file__).with_name("trace_references.py"))]
-        command += ["--blender-python", str(options.blender_python), "--cases", str(options.cases)]
-        subprocess.run(command, check=True)
-        packer = str(Path(__file__).with_name("pack_references.py"))
-        subprocess.run([sys.executable, packer], check=True)
-    chosen = traced(options.cases)
-    if len(chosen) < options.cases:
-        print(f"{options.cases - len(chosen)} references are missing: give --blender-python PYTHON")
-    if not chosen:
-        raise SystemExit(2)
+def heading(count: int) -> str:
+    """Return a line that says what was measured on which machine."""
+    return f"{count} cases, {SIZE[0]}x{SIZE[1]}, {machine()}, no GPU."
+
+
+def main_section(results: dict[str, list[Result]], coincidence: list[str]) -> list[str]:
+    """Return the tables about the cases without surroundings."""
     figures = Figures.load()
-    results, lines = {}, []
-    for quality in options.qualities.split(","):
-        results[quality], coincidence = all_results(quality, chosen)
-        lines.append(f"- {coincidence}")
-    about = machine()
-    title = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}, no GPU."
-    lines = [title, "", *overall(results, figures), "", *lines, ""]
-    if figures.series:
+    lines = [heading(len(next(iter(results.values())))), "", *overall(results, figures), ""]
+    lines += [*(f"- {line}" for line in coincidence), ""]
+    if any(r.case.number in figures.series for r in next(iter(results.values()))):
         lines += [f"Over the {len(figures.series)} cases with a Cycles series:", ""]
         lines += [*as_samples(results, figures), ""]
     lines += [*by_group(results), ""]
     for quality, listed in results.items():
         if quality != "draft":
             lines += [*by_part(quality, listed), ""]
-    write_section("accuracy", lines[:-1])
+    return lines[:-1]
 
+
+def surroundings_section(results: dict[str, list[Result]]) -> list[str]:
+    """Return the tables about the cases with ground and neighbours."""
+    lines = [heading(len(next(iter(results.values())))), "", *by_surroundings(results), ""]
+    quality = "balanced" if "balanced" in results else next(iter(results))
+    return [*lines, *by_part(quality, results[quality])]
+
+
+def trace(python: Path, chosen_by: list[str]) -> None:
+    """Path-trace and pack missing references.
+
+    Args:
+        python: A Python with bpy.
+        chosen_by: Arguments of trace_references.py that choose the cases.
+    """
+    command = [sys.executable, str(Path(__file__).with_name("trace_references.py"))]
+    command += ["--blender-python", str(python), *chosen_by]
+    subprocess.run(command, check=True)
+    packer = str(Path(__file__).with_name("pack_references.py"))
+    subprocess.run([sys.executable, packer], check=True)
+
+
+def write_pictures(folder: Path, results: dict[str, list[Result]]) -> None:
+    """Write a picture per case and quality."""
+    for quality, listed in results.items():
+        for r in listed:
+            name = f"{quality}_{r.case.number:02d}_{r.case.camera}_{r.case.light}.png"
+            write_picture(folder / name, picture(*r.panels))
+
+
+def main() -> None:
+    """Print the tables and write the pictures."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cases", type=int, default=len(cases()))
+    parser.add_argument("--only", help="numbers of cases, such as 3,32; results are only printed")
+    parser.add_argument("--qualities", default="draft,balanced,fine,high")
+    parser.add_argument("--blender-python", type=Path)
+    parser.add_argument("--picture", type=Path, default=ROOT / "docs" / "accuracy.jpg")
+    parser.add_argument("--out", type=Path, help="folder for a picture per case and quality")
+    options = parser.parse_args()
+    wanted = [*cases()[: options.cases], *surrounded_cases()]
+    if options.only:
+        wanted = [every_case()[int(number)] for number in options.only.split(",")]
+    if options.blender_python:
+        chosen_by = ["--only", options.only] if options.only else ["--cases", str(options.cases)]
+        trace(options.blender_python, chosen_by)
+    chosen = [case for case in wanted if (FOLDER / f"{case.number:02d}.npz").exists()]
+    if len(chosen) < len(wanted):
+        missing = len(wanted) - len(chosen)
+        print(f"{missing} references are missing: give --blender-python PYTHON")
+    if not chosen:
+        raise SystemExit(2)
+    results, coincidence = {}, {}
+    for quality in options.qualities.split(","):
+        results[quality], coincidence[quality] = all_results(quality, chosen)
+    alone = {q: [r for r in rows if r.case.number < len(cases())] for q, rows in results.items()}
+    among = {q: [r for r in rows if r.case.number >= len(cases())] for q, rows in results.items()}
+    sections = {}
+    if any(alone.values()):
+        sections["accuracy"] = main_section(alone, list(coincidence.values()))
+    if any(among.values()):
+        sections["surroundings"] = surroundings_section(among)
+    if options.out:
+        write_pictures(options.out, results)
+    if options.only:
+        print("\n\n".join("\n".join(lines) for lines in sections.values()))
+        return
+    for name, lines in sections.items():
+        write_section(name, lines)
     measures = {
-        quality: {f"{r.case.number:02d}": [*r.measures, r.seconds] for r in listed}
+        quality: {f"{r.case.number:02d}": [*r.measures, r.seconds, r.ground] for r in listed}
         for quality, listed in results.items()
     }
     save("accuracy", {**origin(), "measures": measures})
     shown = results.get("balanced") or next(iter(results.values()))
-    write_picture(
-        options.picture, contact_picture([(r.case, r.panels) for r in shown[:CONTACT_CASES]])
-    )
-    if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
-        for quality, listed in results.items():
-            for r in listed:
-                name = f"{quality}_{r.case.number:02d}_{r.case.camera}_{r.case.light}.png"
-                write_picture(options.out / name, picture(*r.panels))
+    first = [(r.case, r.panels) for r in shown[:CONTACT_CASES]]
+    write_picture(options.picture, contact_picture(first))
 
 
 if __name__ == "__main__":

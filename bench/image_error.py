@@ -136,10 +136,12 @@ def divided(sample: Sample, openness: Array) -> dict[str, NDArray[np.bool_]]:
         openness: Sky visibility [H, W] from the reference's ambient occlusion, 1 in the open.
     """
     inside = sample.ids > 0
-    edges = borders(sample.ids, sample.depth)
+    plane = ~inside & np.isfinite(sample.depth)
+    edges = borders(sample.ids, np.where(inside, sample.depth, np.inf))
     plain = inside & ~edges & (sample.ids == 1)
     return {
-        "background": ~inside & ~edges,
+        "background": ~inside & ~plane & ~edges,
+        "ground and props": plane & ~edges,
         "edges": edges,
         "markers and text": ~edges & (sample.ids > 1) & (sample.ids < SPREADER_ID),
         "spreader": ~edges & (sample.ids == SPREADER_ID),

@@ -24,11 +24,11 @@ from reference_set import (
     SIZE,
     Case,
     Reference,
-    cases,
     filtered,
     load,
     save,
 )
+from surrounded_cases import every_case
 
 from fastgen import Generator
 from fastgen.scene import Scene
@@ -49,9 +49,12 @@ def radiance(path: Path) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def whole_radiance(raw: Path, number: int, seed: int) -> Array:
-    """Return the whole image, with the finer render pasted in around the objects."""
-    whole, _ = radiance(raw / f"{number:02d}_{seed}_whole.exr")
+    """Return the whole image; the finer render may cover only the rectangle around the objects."""
     finer, there = radiance(raw / f"{number:02d}_{seed}.exr")
+    background = raw / f"{number:02d}_{seed}_whole.exr"
+    if not background.exists():
+        return finer
+    whole, _ = radiance(background)
     return np.where(there[..., None], finer, whole)
 
 
@@ -59,11 +62,11 @@ def traced(raw: Path, case: Case) -> Reference:
     """Return the reference of a traced case before compression."""
     number = case.number
     centers = channels(raw / f"{number:02d}_centers.exr")
-    inside = centers["IndexOB.X"] > 0.5
-    depth_m = np.where(inside, centers["Depth.Z"], np.inf)[::DEPTH_STEP, ::DEPTH_STEP]
+    index = np.rint(centers["IndexOB.X"])
+    depth_m = np.where(index > 0, centers["Depth.Z"], np.inf)[::DEPTH_STEP, ::DEPTH_STEP]
     scene = Scene.from_json((raw / f"{number:02d}.json").read_text(encoding="utf-8"))
     images = filtered(whole_radiance(raw, number, 1))
-    return Reference(scene, exposure_of(case, scene), images, inside, depth_m, centers["AO.R"])
+    return Reference(scene, exposure_of(case, scene), images, index == 1, depth_m, centers["AO.R"])
 
 
 def exposure_of(case: Case, scene: Scene) -> float:
@@ -125,7 +128,7 @@ def main() -> None:
     if listing.exists():
         known = json.loads(listing.read_text(encoding="utf-8"))
     last = listing.stat().st_mtime if listing.exists() else 0.0
-    for case in cases():
+    for case in every_case():
         name = f"{case.number:02d}"
         files = list(options.raw.glob(f"{name}_*.*"))
         traced_already = (options.raw / f"{name}_1.exr").exists()

@@ -12,10 +12,10 @@ is the plain mean over its square.
 `{samples}` in the name of the output. The CPU seconds of each number are printed as JSON.
 
 --background N renders the whole image with N samples into --whole. The image of -o then covers only
-the rectangle around all objects and is empty outside it.
+the rectangle around all objects and is empty outside it. Not for cameras with objects behind them.
 
 --centers FILE also writes depth, object index and ambient occlusion at the point that the ray
-through each pixel centre hits.
+through each pixel centre hits. The index is 1 for containers and spreader, 2 for ground and props.
 """
 
 import argparse
@@ -33,6 +33,7 @@ from bpy_extras.object_utils import world_to_camera_view
 _CENTER_SAMPLES = 16  # for ambient occlusion; depth and index use the first sample
 _MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # Cycles' narrowest filter: rays go through the pixel centre
+_SURROUNDINGS = ("ground", "prop_")
 
 
 def read_tree(path: Path) -> dict[str, Any]:
@@ -62,7 +63,8 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     scene.render.resolution_x, scene.render.resolution_y = node["extras"]["size"]
     scene.render.resolution_percentage = 100
     for item in bpy.data.objects:
-        item.pass_index = int(item.type == "MESH")
+        if item.type == "MESH":
+            item.pass_index = 2 if item.name.startswith(_SURROUNDINGS) else 1
 
     world = bpy.data.worlds.new("environment")
     world.use_nodes = True

@@ -92,9 +92,9 @@ class Reference:
         scene: The scene that was traced.
         exposure: Exposure of its camera at that time.
         radiance: Linear float32 [H, W, 3] before exposure, by filter (see FILTERS).
-        inside: Mask [H, W] of the pixel centres whose ray hits something.
+        inside: Mask [H, W] of the pixel centres whose ray hits a container or a spreader.
         depth_m: Distance along the optical axis in metres, for every DEPTH_STEP-th row and column.
-            inf where nothing is hit.
+            inf where nothing is hit. Ground and props are included.
         openness: Sky visibility [H, W] (Cycles' ambient occlusion), 1 in the open.
     """
 

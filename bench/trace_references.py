@@ -1,10 +1,14 @@
 """Path-trace the references that `bench/accuracy.py` compares with.
 
     python bench/trace_references.py --blender-python PYTHON [--cases 32] [--twice 8] [--series 8]
+    python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36
 
-Run it once, in the background: with these defaults it takes 45 minutes on two cores. PYTHON is a
+Run it once, in the background: with these defaults it takes an hour on two cores. PYTHON is a
 Python 3.11 with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be
 continued. Cases that are already in bench/references keep the scene stored there.
+
+--only traces the cases with these numbers, once each. From 32 on they are the cases of
+surrounded_cases.py, which have a ground.
 
 Cycles writes into --raw; `bench/pack_references.py` then makes bench/references from it. The first
 --twice cases are traced a second time with another seed, to measure Cycles' own noise. The first
@@ -20,11 +24,13 @@ from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
 
-from reference_set import SAMPLES, SCALE, SEED, SIZE, Case, cases, load, traced
+from reference_set import FOLDER, SAMPLES, SCALE, SEED, SIZE, Case, cases, load
+from surrounded_cases import every_case, surrounded_cases
 
 from fastgen import Generator
 from fastgen.export import export_glb
 from fastgen.light.hdri import bundled_hdris
+from fastgen.scene import Scene
 
 SERIES = {"spp": (1, 2, 4, 8, 16, 32, 64, 128, 256), "denoised": (1, 2, 4, 8, 16, 32, 64)}
 BACKGROUND_SAMPLES = 16
@@ -47,14 +53,22 @@ class Tracer:
         folder.mkdir(parents=True, exist_ok=True)
 
     def reference(self, case: Case, seed: int) -> None:
-        """Write NN_seed.exr and NN_seed_whole.exr, and for seed 1 also NN_centers.exr."""
+        """Write NN_seed.exr, and for seed 1 also NN_centers.exr.
+
+        Of a scene with nothing around the container, NN_seed.exr shows the objects only, and
+        NN_seed_whole.exr the whole image.
+        """
         name = f"{case.number:02d}"
         done = self._folder / f"{name}_{seed}.exr"
         if done.exists():
             return
         part = self._folder / f"part_{name}_{seed}.exr"
-        more = ["--scale", SCALE, "--background", BACKGROUND_SAMPLES]
-        more += ["--whole", self._folder / f"{name}_{seed}_whole.exr"]
+        self._exported(case)
+        scene = Scene.from_json((self._folder / f"{name}.json").read_text(encoding="utf-8"))
+        more: list[object] = ["--scale", SCALE]
+        if not (scene.ground or scene.neighbours):
+            more += ["--background", BACKGROUND_SAMPLES]
+            more += ["--whole", self._folder / f"{name}_{seed}_whole.exr"]
         if seed == 1:
             more += ["--centers", self._folder / f"{name}_centers.exr"]
         self._run(case, part, seed, str(SAMPLES // SCALE**2), more)
@@ -94,7 +108,8 @@ class Tracer:
         """Return the GLB file of a case; its scene is stored next to it."""
         glb = self._folder / f"{case.number:02d}.glb"
         if not glb.exists():
-            scene = load(case.number).scene if case in traced(len(cases())) else case.drawn()
+            stored = (FOLDER / f"{case.number:02d}.npz").exists()
+            scene = load(case.number).scene if stored else case.drawn()
             aside = glb.with_suffix(".part")
             with Generator(case.config, SEED, SIZE) as generator:
                 export_glb(generator, scene, aside, [scene.camera(case.camera)], TEXEL_MM)
@@ -111,12 +126,17 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=32)
     parser.add_argument("--twice", type=int, default=8)
     parser.add_argument("--series", type=int, default=8)
+    parser.add_argument("--only", help="numbers of the cases to trace, such as 32,33")
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--raw", type=Path, default=Path(__file__).parent / ".raw_references")
     options = parser.parse_args()
     os.nice(19)
     tracer = Tracer(options.blender_python, options.raw, options.threads)
-    for case in cases()[: options.cases]:
+    if options.only:
+        for number in options.only.split(","):
+            tracer.reference(every_case()[int(number)], 1)
+        return
+    for case in [*cases()[: options.cases], *surrounded_cases()]:
         tracer.reference(case, 1)
     for case in cases()[: options.series]:
         for way in SERIES:
