@@ -4,6 +4,7 @@
 #version 430 core
 #include "ground.constants"
 #include "samples.constants"
+#include "units.constants"
 #include "variant.constants"
 #include "ground.block"
 #include "view.block"
@@ -36,11 +37,12 @@ vec3 ground_color(vec3 at, vec3 ray, float depth) {
     Footprint f = Footprint(along, 1e3 * least, stretch - 1.0, noise);
     GroundMaterial m = ground_material(1e3 * at.xy, f);
 
-    float open = below_boxes(at);
-#if GROUND_PROPS
-    open *= beside_props(at);
+    float open = below_boxes(at), hidden = hidden_by_boxes(at, blur_m);
+#if GROUND_SHADOWS
+    prop_shade(at, blur_m, open, hidden);
 #endif
-    vec3 light = ground_ambient(at.xy).rgb * open + ground_lights(at, vec3(0.0, 0.0, 1.0), blur_m);
+    vec3 light = ground_ambient(at.xy).rgb * open +
+                 ground_lights(at, vec3(0.0, 0.0, 1.0), hidden, blur_m);
     vec3 color = m.albedo * light;
 #if GROUND_WET
     color += ground_mirror(at, normalize(ray), m) * open;
@@ -56,10 +58,13 @@ vec4 seen_color(vec3 ray, out float depth) {
 #if LAYER != LAYER_ALL
     vec3 color = vec3(LAYER == LAYER_NORMALS ? 0.5 : 1.0);
 #else
-    vec3 color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
+    vec3 color = vec3(0.0);
+#if GROUND_PLANE
+    color = ground_color(at, ray, isinf(depth) ? 1.0 : depth);
+#endif
 #endif
     float share = 1.0;
-#if GROUND_FADES && LAYER == LAYER_ALL
+#if GROUND_FADES && GROUND_PLANE && LAYER == LAYER_ALL
     float away = isinf(depth) ? 1.0 : length(at.xy) / ground_reach_m;
     share = 1.0 - smoothstep(GROUND_FADE_START, 1.0, away);
     vec3 behind = exposure * background(ray);
@@ -73,6 +78,8 @@ vec4 seen_color(vec3 ray, out float depth) {
 #if LAYER == LAYER_ALL
         color = prop_color(hit, fma(vec3(depth), ray, eye_m));
 #endif
+    } else {
+        depth = GROUND_PLANE == 1 ? depth : NO_DEPTH;
     }
 #endif
     return vec4(color, share);

@@ -1,7 +1,9 @@
 // vec4 ground_ambient(vec2 at_m): irradiance / pi of sky and containers on the ground, and the share of
 // an even sky that is seen there. See fastgen/light/ground_light.py.
 // float below_boxes(vec3 at): share of that light which reaches below containers with a low gap.
-// vec3 ground_lights(vec3 at, vec3 normal, float blur_m): irradiance / pi of the directional lights.
+// float hidden_by_boxes(vec3 at, float blur_m): share of the first directional light that they hide.
+// vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m): irradiance / pi of the
+// directional lights.
 
 #include "ground.constants"
 #include "ground.block"
@@ -27,23 +29,23 @@ float below_boxes(vec3 at) {
     return open;
 }
 
-// blur_m: Radius over which the shadows of containers are filtered.
-vec3 ground_lights(vec3 at, vec3 normal, float blur_m) {
-    vec3 sum = vec3(0.0);
-#if LIGHTS > 0
+// Share of the first light that boxes hide, or more where they hide one another.
+float hidden_by_boxes(vec3 at, float blur_m) {
     float hidden = 0.0;
 #define FIRST_LIGHT(i) { \
     vec3 enter; \
     hidden += hidden_share(in_body(at - body_center[i].xyz, i), body_half[i].xyz, body_light[i].xyz, \
                            light_direction[0].w, blur_m, enter); }
     EACH_BOX(FIRST_LIGHT)
-#if GROUND_PROPS
-    for (int k = MAX_BOXES; k < MAX_BOXES + prop_count; ++k)
-        hidden += body_cover(at, light_direction[0].xyz, k, light_direction[0].w, blur_m);
-#endif
+    return hidden;
+}
+
+// hidden: Share of the first light that is hidden. blur_m: Radius over which shadows are filtered.
+vec3 ground_lights(vec3 at, vec3 normal, float hidden, float blur_m) {
+    vec3 sum = vec3(0.0);
+#if LIGHTS > 0
     float facing = max(dot(normal, light_direction[0].xyz), 0.0);
     sum = light_irradiance[0].rgb * (facing * max(1.0 - hidden, 0.0));
-    // The other lights are too faint for the shadows of props.
     for (int i = 1; i < LIGHTS; ++i) {
         vec4 light = light_direction[i];
         hidden = 0.0;

@@ -1,6 +1,7 @@
 // PropHit first_prop(vec3 ray, float depth): nearest prop along a view ray before a depth; body is -1 for
-// none. vec3 prop_color(PropHit hit, vec3 at): its exposed radiance.
-// float beside_props(vec3 at): share of the sky's light on the ground next to props and below them.
+// none. vec3 prop_color(PropHit hit, vec3 at): its exposed radiance, without shadows of other props.
+// void prop_shade(vec3 at, float blur_m, inout float open, inout float hidden): dims the sky's light on
+// the ground beside and below props, and adds what they hide of the first light.
 
 #include "ground.constants"
 #include "ground.block"
@@ -8,6 +9,19 @@
 #include "environment_map.glsl"
 #include "ground_bodies.glsl"
 #include "ground_light.glsl"
+
+#if GROUND_SHADOWS
+// A body shades the ground around it over about its height.
+void prop_shade(vec3 at, float blur_m, inout float open, inout float hidden) {
+    for (int i = prop_range.x; i < prop_range.y; ++i) {
+        vec3 offset = in_body(at - body_center[i].xyz, i), size = body_half[i].xyz;
+        vec3 apart = max(abs(offset) - size, 0.0), enter;
+        float near = clamp(1.0 - length(apart) / min(2.0 * size.z, 0.6), 0.0, 1.0);
+        open *= 1.0 - 0.6 * near * near;
+        hidden += hidden_share(offset, size, body_light[i].xyz, light_direction[0].w, blur_m, enter);
+    }
+}
+#endif
 
 #if GROUND_PROPS
 struct PropHit {
@@ -18,25 +32,14 @@ struct PropHit {
 
 PropHit first_prop(vec3 ray, float depth) {
     PropHit first = PropHit(depth, vec3(0.0, 0.0, 1.0), -1);
-    for (int i = MAX_BOXES; i < MAX_BOXES + prop_count; ++i) {
+    for (int i = prop_range.x; i < prop_range.y; ++i) {
         BodyHit hit = body_hit(eye_m, ray, i);
         if (hit.depth < first.depth) first = PropHit(hit.depth, hit.normal, i);
     }
     return first;
 }
 
-// A body shades the ground around it over about its height.
-float beside_props(vec3 at) {
-    float open = 1.0;
-    for (int i = MAX_BOXES; i < MAX_BOXES + prop_count; ++i) {
-        vec3 apart = max(abs(in_body(at - body_center[i].xyz, i)) - body_half[i].xyz, 0.0);
-        float near = clamp(1.0 - length(apart) / min(2.0 * body_half[i].z, 0.6), 0.0, 1.0);
-        open *= 1.0 - 0.6 * near * near;
-    }
-    return open;
-}
-
-const float PROP_OFFSET_M = 0.004;   // Keeps a prop out of its own shadow.
+const float PROP_OFFSET_M = 0.004;
 
 vec3 prop_color(PropHit hit, vec3 at) {
     vec3 n = hit.normal;
@@ -46,7 +49,8 @@ vec3 prop_color(PropHit hit, vec3 at) {
     vec3 light = up * ambient.a * diffuse_radiance(n + vec3(0.0, 0.0, 0.5)) +
                  (1.0 - up) * ground_albedo * ambient.rgb;
     light *= mix(0.55, 1.0, raised);
-    light += ground_lights(fma(vec3(PROP_OFFSET_M), n, at), n, 0.25 * PROP_OFFSET_M);
+    vec3 outside = fma(vec3(PROP_OFFSET_M), n, at);
+    light += ground_lights(outside, n, hidden_by_boxes(outside, PROP_OFFSET_M), PROP_OFFSET_M);
     return exposure * body_paint[hit.body].rgb * light;
 }
 #endif

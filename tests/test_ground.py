@@ -374,10 +374,10 @@ def test_regions_are_disjoint_and_cover_the_ground(scene, camera, props):
     )
     count = np.zeros(SIZE[::-1], int)
     fading = np.zeros(SIZE[::-1], bool)
-    for drawn, parts in regions.items():
-        for x, y, width, height in parts:
-            count[y : y + height, x : x + width] += 1
-            fading[y : y + height, x : x + width] |= drawn.fades
+    for each in regions:
+        x, y, width, height = each.region
+        count[y : y + height, x : x + width] += 1
+        fading[y : y + height, x : x + width] |= each.variant.fades
     depth = plane_depth_mm(camera, GROUND)
     seen = np.isfinite(depth)
     assert count.max() == 1

@@ -108,8 +108,8 @@ GROUND_BLOCK = Block(
         ("vec4", "body_half", MAX_BOXES + MAX_PROPS),  # half of its size in m; sine of its turn
         # albedo; for boxes the height in m of the gap below it, for cylinders a number above 1
         ("vec4", "body_paint", MAX_BOXES + MAX_PROPS),
-        # reciprocal of the unit vector to the first light, in the axes of each box
-        ("vec4", "body_light", MAX_BOXES),
+        # reciprocal of the unit vector to the first light, in the axes of each body
+        ("vec4", "body_light", MAX_BOXES + MAX_PROPS),
         ("vec4", "face_radiance", 4 * MAX_BOXES),  # of the -x, +x, -y and +y side of each box
         ("vec4", "grid_transform"),  # scale and offset from world m to the grid's coordinates
         ("vec3", "ground_albedo"),
@@ -126,7 +126,6 @@ GROUND_BLOCK = Block(
         ("float", "damp_threshold"),
         ("float", "puddle_threshold"),
         ("float", "slab_mm"),
-        ("int", "prop_count"),
     ),
 )
 

@@ -197,6 +197,8 @@ def _ground(v: ShaderVariant) -> Defines:
         "GROUND_LENS": int(ground.lens),
         "GROUND_WET": int(ground.wet),
         "GROUND_FADES": int(ground.fades),
+        "GROUND_PLANE": int(ground.plane),
+        "GROUND_SHADOWS": int(ground.shadows),
         "GROUND_PROPS": int(ground.props),
         "GROUND_COARSE": int(ground.coarse),
         "EACH_BOX(f)": _each("f", ground.boxes),

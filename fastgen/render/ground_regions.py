@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,9 @@ from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
 from fastgen.render.ground_values import prop_box
-from fastgen.render.regions import Region, outside, region_of
+from fastgen.render.regions import Region, merged, outside, region_of, within
 from fastgen.render.variant import GroundVariant
-from fastgen.scene import Ground, Scene
+from fastgen.scene import Ground, Prop, Scene
 from fastgen.scene.boxes import OrientedBox
 
 _BLOCK_PX = 16
@@ -28,6 +29,9 @@ _SHADED_MM = 600.0
 _BLURRED_MM = 150.0
 """Distance beyond a container's shadow to which its edge may be blurred."""
 
+_APART_MM = 400.0
+"""Least distance between the props of two vehicles."""
+
 _LONGEST_SHADOW_MM = 60000.0
 
 _BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
@@ -36,10 +40,24 @@ _BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
 Array = NDArray[np.float64]
 
 
+class GroundDraw(NamedTuple):
+    """A region of the image, and the program that draws it.
+
+    Attributes:
+        variant: What the program is compiled for.
+        region: The region.
+        props: First prop that the region or a shadow in it may show, and the one after the last.
+    """
+
+    variant: GroundVariant
+    region: Region
+    props: tuple[int, int] = (0, 0)
+
+
 def ground_regions(
     scene: Scene, ground: Ground, view: View, boxes: Sequence[OrientedBox], toward: Array
-) -> dict[GroundVariant, list[Region]]:
-    """Return disjoint regions of the image by the program that draws each.
+) -> list[GroundDraw]:
+    """Return disjoint regions of the image with the program that draws each.
 
     Args:
         scene: The scene, for its props.
@@ -49,28 +67,65 @@ def ground_regions(
         toward: Unit vector [3] to the first directional light.
     """
     whole = (0, 0, *view.size)
-    near, far = _bands(ground, view)
     count = next(most for most in _BOX_COUNTS if most >= len(boxes))
     plain = GroundVariant(ground.kind, 0, view.distortion is not None, ground.wetness > 0)
-    found: dict[GroundVariant, list[Region]] = {}
-    rest = [near, far]
+    near = replace(plain, boxes=count, fades=True, shadows=True)
+    draws: list[GroundDraw] = []
+    rest = [*_bands(ground, view)]
     if scene.props:
-        props = [prop_box(prop) for prop in scene.props]
-        around = [region_of(view, _reach(props, ground, toward, _SHADED_MM)) or whole]
-        found[replace(plain, boxes=count, fades=True, props=True)] = around
-        rest = [outside(bands, around) for bands in rest]
+        vehicles = _clusters(scene.props)
+        bodies, shaded = [], []
+        for first, end in vehicles:
+            parts = [prop_box(prop) for prop in scene.props[first:end]]
+            corners = np.concatenate([part.corners_mm for part in parts])
+            bodies.append(region_of(view, corners) or whole)
+            shaded.append(region_of(view, _reach(parts, ground, toward, _SHADED_MM)) or whole)
+        shown = [region for region in merged(bodies) if region is not None]
+        around = [region for region in merged(shaded) if region is not None]
+        for variant, regions in (
+            (replace(near, props=True), shown),
+            (
+                near,
+                outside(
+                    [part for bands in rest for band in bands for part in within(around, band)],
+                    shown,
+                ),
+            ),
+        ):
+            for region in regions:
+                found = [v for v, s in zip(vehicles, shaded, strict=True) if within([s], region)]
+                if region[2] > 0 < region[3]:
+                    ends = (found[0][0], found[-1][1]) if found else (0, 0)
+                    draws.append(GroundDraw(variant, region, ends))
+        rest = [outside(outside(bands, around), shown) for bands in rest]
     # a wet plane mirrors boxes from everywhere
-    shaded = (
+    dark = (
         [whole]
         if plain.wet
         else [region_of(view, _reach([box], ground, toward, _BLURRED_MM)) or whole for box in boxes]
     )
-    open_ = [outside(bands, shaded) for bands in rest]
-    found[plain], found[replace(plain, fades=True)] = open_
-    if boxes:  # one program for near and far, because each takes a while to compile
-        near, far = rest
-        closed = [*outside(near, open_[0]), *outside(far, open_[1])]
-        found[replace(plain, fades=True, boxes=count)] = closed
+    for bands, fades in zip(rest, (False, True), strict=True):
+        lit = outside(bands, dark) if boxes else bands
+        draws += [GroundDraw(replace(plain, fades=fades), region) for region in lit]
+        # one program for near and far, because each takes a while to compile
+        by_boxes = replace(plain, boxes=count, fades=True)
+        draws += [GroundDraw(by_boxes, region) for region in outside(bands, lit)]
+    return draws
+
+
+def _clusters(props: Sequence[Prop]) -> list[tuple[int, int]]:
+    """Return the ranges of consecutive props that are close to one another, such as a vehicle."""
+    found: list[tuple[int, int]] = []
+    low = high = np.zeros(2)
+    for number, prop in enumerate(props):
+        corners = prop_box(prop).corners_mm[:, :2]
+        least, most = corners.min(axis=0), corners.max(axis=0)
+        if found and (least < high + _APART_MM).all() and (most > low - _APART_MM).all():
+            found[-1] = (found[-1][0], number + 1)
+            low, high = np.minimum(low, least), np.maximum(high, most)
+        else:
+            found.append((number, number + 1))
+            low, high = least, most
     return found
 
 

@@ -61,9 +61,9 @@ def ground_values(
         rows[2, place, 3] = max(gap, _LEAST_GAP_M) if gap < LOW_GAP_M else _NO_GAP_M
     for place, prop in enumerate(props, MAX_BOXES):
         rows[2, place] = *prop.albedo, 2.0 if prop.shape == "cylinder" else 0.0
-    turned = np.array([body.axes @ toward for body in bodies[: len(members)]]).reshape(-1, 3)
-    inverse = np.ones((MAX_BOXES, 4))  # zeros would make boxes that are not there NaN
-    inverse[: len(members), :3] = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
+    turned = np.array([body.axes @ toward for body in bodies]).reshape(-1, 3)
+    inverse = np.ones((len(rows[0]), 4))  # zeros would make boxes that are not there NaN
+    inverse[places, :3] = 1 / np.where(np.abs(turned) < 1e-6, 1e-6, turned)
     scale = 1 / (light.step_m * GRID)
     yaw = np.deg2rad(ground.line_yaw_deg)
     wet = ground.wetness
@@ -88,7 +88,6 @@ def ground_values(
         "damp_threshold": 1.35 - 2.1 * wet if wet else 9.0,
         "puddle_threshold": 1.1 - 0.65 * wet**1.5 if wet else 9.0,
         "slab_mm": 4000 + np.mod(abs(ground.noise_offset_mm[0]), 2000.0),
-        "prop_count": len(props),
     }
 
 

@@ -38,6 +38,8 @@ class GroundVariant:
         lens: Undo lens distortion.
         wet: Draw wet ground.
         fades: Blend into the panorama.
+        plane: Draw the plane.
+        shadows: Draw the shadows of props on the plane.
         props: Draw props.
         coarse: Shade once per 2x2 pixels.
     """
@@ -47,6 +49,8 @@ class GroundVariant:
     lens: bool = False
     wet: bool = False
     fades: bool = False
+    plane: bool = True
+    shadows: bool = False
     props: bool = False
     coarse: bool = False
 

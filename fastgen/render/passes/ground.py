@@ -1,6 +1,6 @@
 """Ground pass: the plane below the containers and the props on it, drawn over the background."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import moderngl
@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ground_light import GroundLight, ground_light
-from fastgen.render.blocks import GROUND_BLOCK
+from fastgen.render.blocks import GROUND_BLOCK, MAX_BOXES
 from fastgen.render.draw_inputs import DrawInputs
-from fastgen.render.ground_regions import ground_regions
+from fastgen.render.ground_regions import GroundDraw, ground_regions
 from fastgen.render.ground_values import ground_values
 from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
-from fastgen.render.regions import Region
 from fastgen.render.variant import GroundVariant, ShaderVariant
 from fastgen.scene import EnvironmentView, Scene
 
@@ -85,78 +84,67 @@ class GroundPass:
         self._ctx.memory_barrier()  # compute shaders may have written the background
         self._ctx.enable_only(moderngl.NOTHING)
         boxes = [member.box for member in present]
-        regions = ground_regions(scene, ground, inputs.view, boxes, toward)
+        draws = ground_regions(scene, ground, inputs.view, boxes, toward)
         variant = ShaderVariant(
             layer=inputs.variant.layer,
             lights=inputs.variant.lights,
             radiance=inputs.variant.radiance,
         )
         textures = {**inputs.textures, "ground_grid": kept.texture}
-        coarse = inputs.variant.coarse and variant.layer == "all"
-        if coarse:
-            fine = {drawn: parts for drawn, parts in regions.items() if drawn.props}
-            self._draw_coarse(inputs, variant, textures, regions)
-        else:
-            fine = regions
+        if inputs.variant.coarse and variant.layer == "all":
+            self._draw_coarse(inputs, variant, textures, draws)
+            draws = [
+                each._replace(
+                    variant=replace(each.variant, plane=False, shadows=False, fades=False)
+                )
+                for each in draws
+                if each.variant.props
+            ]
         inputs.targets.image.use()
-        if coarse:
-            self._spread(inputs, variant, regions)
-        for drawn, parts in fine.items():
-            per_axis = inputs.variant.samples_per_axis if drawn.props else 1
-            self._draw(replace(variant, ground=drawn, samples_per_axis=per_axis), textures, parts)
+        for each in draws:
+            per_axis = inputs.variant.samples_per_axis if each.variant.props else 1
+            self._draw(replace(variant, samples_per_axis=per_axis), textures, each)
         self._ctx.scissor = None
 
-    def _draw(self, variant: ShaderVariant, textures: Textures, regions: Sequence[Region]) -> None:
-        """Draw regions of the bound framebuffer with the program of a variant."""
-        if not regions:
-            return
-        program = self._programs.get(("fullscreen.vert", "ground.frag"), variant)
+    def _draw(self, variant: ShaderVariant, textures: Textures, draw: GroundDraw) -> None:
+        """Draw one region of the bound framebuffer."""
+        own = replace(variant, ground=draw.variant)
+        program = self._programs.get(("fullscreen.vert", "ground.frag"), own)
+        first, end = draw.props
+        program["prop_range"] = (MAX_BOXES + first, MAX_BOXES + end)
         program.bind(textures)
-        for region in regions:
-            self._ctx.scissor = region
-            program.draw_vertices(3)
+        self._ctx.scissor = draw.region
+        program.draw_vertices(3)
 
     def _draw_coarse(
         self,
         inputs: DrawInputs,
         variant: ShaderVariant,
         textures: Textures,
-        regions: Mapping[GroundVariant, Sequence[Region]],
+        draws: Sequence[GroundDraw],
     ) -> None:
-        """Draw what is not near props at half the resolution."""
+        """Shade the plane at half the resolution, and spread it over the image."""
         width, height = ((side + 1) // 2 for side in inputs.targets.size)
         target = self._coarse.get((width, height), lambda: _CoarseTarget(self._ctx, width, height))
         target.framebuffer.use()
-        for drawn, parts in regions.items():
-            if drawn.props:
-                continue
-            halved = []
-            for x, y, across, down in parts:
-                # one texel more, because spreading interpolates
-                left, top = max(x // 2 - 1, 0), max(y // 2 - 1, 0)
-                right, bottom = (x + across + 3) // 2, (y + down + 3) // 2
-                halved.append((left, top, right - left, bottom - top))
-            self._draw(replace(variant, ground=replace(drawn, coarse=True)), textures, halved)
-
-    def _spread(
-        self,
-        inputs: DrawInputs,
-        variant: ShaderVariant,
-        regions: Mapping[GroundVariant, Sequence[Region]],
-    ) -> None:
-        """Spread the coarse image over the bound framebuffer."""
-        width, height = ((side + 1) // 2 for side in inputs.targets.size)
-        target = self._coarse.get((width, height), lambda: _CoarseTarget(self._ctx, width, height))
+        for each in draws:
+            x, y, across, down = each.region
+            # one texel more, because spreading interpolates
+            left, top = max(x // 2 - 1, 0), max(y // 2 - 1, 0)
+            right, bottom = (x + across + 3) // 2, (y + down + 3) // 2
+            own = replace(each.variant, props=False, coarse=True)
+            part = GroundDraw(own, (left, top, right - left, bottom - top), each.props)
+            self._draw(variant, textures, part)
+        inputs.targets.image.use()
         lens = inputs.view.distortion is not None
         program = self._programs.get(
             ("fullscreen.vert", "ground_spread.frag"),
             replace(variant, lights=0, ground=GroundVariant(lens=lens)),
         )
         program.bind({"ground_coarse": target.texture})
-        for drawn, parts in regions.items():
-            for region in () if drawn.props else parts:
-                self._ctx.scissor = region
-                program.draw_vertices(3)
+        for each in draws:
+            self._ctx.scissor = each.region
+            program.draw_vertices(3)
 
     def bake(self, scene: Scene, textures: Textures, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None if it has none.
