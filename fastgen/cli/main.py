@@ -8,6 +8,7 @@ from typing import NoReturn
 import fastgen
 from fastgen.cli.config_command import add_config_command
 from fastgen.cli.dataset_commands import add_generate, add_stats, add_verify
+from fastgen.cli.fit_command import add_fit
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
 from fastgen.dataset.console import drop_unprinted, mend_streams, say, tell
@@ -69,7 +70,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"fastgen {fastgen.__version__}")
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
-    for add in (add_generate, add_config_command, add_show, add_export, add_stats, add_verify):
+    adders = (
+        *(add_generate, add_config_command, add_fit, add_show, add_export, add_stats),
+        add_verify,
+    )
+    for add in adders:
         add(commands)
     words = "test the OpenGL backends and devices of this machine"
     command = commands.add_parser("doctor", help=words, description=f"{words.capitalize()}.")

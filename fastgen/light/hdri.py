@@ -118,6 +118,13 @@ def hours_of(name: str) -> tuple[int, int]:
 
 
 @lru_cache
+def kind_of(name: str) -> str:
+    """Return the kind of light of a bundled environment, a key of `_KIND_LX`; "" for others."""
+    kinds = _index()[name]["kind"] if name in _index() else ()
+    return next((kind for kind in _KIND_LX if kind in kinds), "")
+
+
+@lru_cache
 def illuminance_of(name: str) -> float:
     """Return the estimated light on level ground under an environment's open sky, in lux.
 

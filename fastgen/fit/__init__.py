@@ -1,0 +1,1 @@
+"""Configurations that make rendered pictures resemble a user's photographs."""

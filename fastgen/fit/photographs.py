@@ -1,0 +1,82 @@
+"""Reading of a folder of photographs, and of the boxes beside them."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.errors import AssetError
+from fastgen.files.images import decode
+from fastgen.fit.statistics import Pixels, scaled
+
+_TYPES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
+_SMALLEST = 64
+
+
+class Photograph(NamedTuple):
+    """One photograph.
+
+    Attributes:
+        path: Its file.
+        size: (width, height) of the file in pixels.
+        pixels: uint8 [H, W, 3], sRGB, scaled down to `longest` if the file is larger.
+    """
+
+    path: Path
+    size: tuple[int, int]
+    pixels: Pixels
+
+
+def read_photographs(folder: Path, longest: int) -> list[Photograph]:
+    """Return the photographs directly in a folder, sorted by name.
+
+    Args:
+        folder: Folder with files of type JPEG, PNG, WebP, BMP or TIFF. Hidden files are ignored.
+        longest: Longer side in pixels that larger photographs are scaled down to.
+
+    Raises:
+        AssetError: The folder is missing or has no photograph, or one cannot be read or is smaller
+            than 64 pixels.
+    """
+    if not folder.is_dir():
+        raise AssetError(f"{folder}: no such folder; give one that contains photographs")
+    found = sorted(
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in _TYPES and not path.name.startswith(".")
+    )
+    if not found:
+        raise AssetError(
+            f"{folder}: no photograph in this folder; give one with {', '.join(_TYPES)}"
+        )
+    return [_read(path, longest) for path in found]
+
+
+def _read(path: Path, longest: int) -> Photograph:
+    try:
+        pixels = _as_rgb(decode(path.read_bytes()))
+    except (OSError, ValueError) as error:
+        raise AssetError(f"{path}: cannot be read as a picture ({error}); remove it") from None
+    height, width = pixels.shape[:2]
+    if min(height, width) < _SMALLEST:
+        raise AssetError(
+            f"{path}: {width}x{height} pixels are too few to measure; give photographs of at least "
+            f"{_SMALLEST} pixels on each side"
+        )
+    if max(height, width) > longest:
+        pixels = scaled(pixels, longest)
+    return Photograph(path, (width, height), pixels)
+
+
+def _as_rgb(pixels: NDArray[np.generic]) -> Pixels:
+    """Return a decoded picture as uint8 [H, W, 3] without alpha."""
+    if pixels.dtype == np.uint16:
+        pixels = (pixels // 257).astype(np.uint8)
+    if pixels.dtype != np.uint8 or pixels.ndim not in (2, 3):
+        raise ValueError(f"pixels of type {pixels.dtype} with {pixels.ndim} axes")
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.shape[2] < 3:  # grey, maybe with alpha
+        pixels = np.repeat(pixels[..., :1], 3, axis=2)
+    return np.ascontiguousarray(pixels[..., :3], np.uint8)

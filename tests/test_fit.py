@@ -1,0 +1,296 @@
+"""Fits to photographs: statistics by independent formulas, and recovery of known cameras."""
+
+from concurrent.futures import ThreadPoolExecutor
+from math import erf, sqrt
+
+import cv2
+import numpy as np
+import pytest
+
+from fastgen.camera.electronics import compress_jpeg, sharpened, vignette
+from fastgen.cli.main import main
+from fastgen.config.config import Config
+from fastgen.config.sensor import SensorConfig
+from fastgen.config.yaml_values import loaded
+from fastgen.errors import AssetError
+from fastgen.files.images import encode_picture
+from fastgen.fit.boxes import camera_distances, read_box_heights
+from fastgen.fit.edges import edge_blur_and_overshoot
+from fastgen.fit.frames import linear_frames, statistics_of_frames
+from fastgen.fit.gap import Gap, gap
+from fastgen.fit.paints import paint_weights
+from fastgen.fit.photographs import read_photographs
+from fastgen.fit.proposal import Proposal
+from fastgen.fit.search import mixed_shares, search
+from fastgen.fit.space import VARIABLES, changes_at, point_of, sensor_at
+from fastgen.fit.statistics import NAMES, STATISTICS, measured
+from fastgen.scene.optics import Sharpening
+from fastgen.validation import from_plain
+
+
+def statistic(pixels, name):
+    return float(measured(pixels)[NAMES.index(name)])
+
+
+def grey_picture(values):
+    """Return a grey picture of values 0..255 [H, W]."""
+    codes = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return np.repeat(codes[..., None], 3, axis=2)
+
+
+def blurred_bars(sigma, size=240, bar=40):
+    """Return bars between codes 70 and 180 with edges that a Gaussian blurs."""
+    x = np.arange(size) + 0.5
+    row = np.full(size, 70.0)
+    for number, edge in enumerate(range(bar, size, bar)):
+        rise = np.array([0.5 * (1 + erf((v - edge) / (sigma * sqrt(2)))) for v in x])
+        row += (110 if number % 2 == 0 else -110) * rise
+    return np.tile(row, (size, 1))
+
+
+def test_quantiles_of_a_ramp_are_its_values():
+    ramp = grey_picture(np.tile(np.linspace(0, 255, 512), (64, 1)))
+    for share in (5, 25, 50, 75, 95):
+        assert statistic(ramp, f"luminance, {share} %") == pytest.approx(share / 100, abs=0.005)
+    assert statistic(ramp, "contrast") == pytest.approx(sqrt(1 / 12), abs=0.002)
+    assert statistic(ramp, "clipped share") == pytest.approx(13 / 256, abs=0.004)
+    assert statistic(ramp, "black share") == pytest.approx(12.5 / 256, abs=0.004)
+
+
+@pytest.mark.parametrize("sigma", [1.0, 3.0, 8.0])
+def test_noise_is_that_which_was_added(sigma):
+    # the flattest quarter of pure noise has up to a tenth less
+    rng = np.random.default_rng(1)
+    picture = grey_picture(128 + rng.normal(0, sigma, (240, 320)))
+    assert 2 ** statistic(picture, "noise") - 0.25 == pytest.approx(0.95 * sigma, rel=0.12)
+
+
+def test_chroma_noise_does_not_count_fine_noise():
+    rng = np.random.default_rng(1)
+    flat = np.full((240, 320, 3), 128.0)
+    fine = flat + rng.normal(0, 4, flat.shape)
+    blotches = cv2.resize(rng.normal(0, 6, (60, 80)).astype(np.float32), (320, 240))
+    coarse = flat + blotches[..., None] * [1.402, -0.714, 0]
+    fine, coarse = (np.clip(np.rint(each), 0, 255).astype(np.uint8) for each in (fine, coarse))
+    assert statistic(coarse, "chroma noise") > statistic(fine, "chroma noise") + 0.7
+    assert statistic(fine, "noise") > statistic(coarse, "noise") + 1
+
+
+@pytest.mark.parametrize("sigma", [0.8, 1.2, 1.8])
+def test_blur_of_an_edge_is_that_of_its_gaussian(sigma):
+    picture = grey_picture(blurred_bars(sigma))
+    assert statistic(picture, "edge blur") == pytest.approx(sigma, rel=0.12)
+    assert abs(statistic(picture, "overshoot of edges")) < 0.02
+
+
+def test_overshoot_is_that_of_an_unsharp_mask():
+    amount, blur, radius = 1.0, 1.0, 1.5
+    picture = sharpened(grey_picture(blurred_bars(blur)), Sharpening(amount, radius))
+    x = np.linspace(0, 4, 401)
+    step = [
+        (1 + amount) * 0.5 * (1 + erf(v / (blur * sqrt(2))))
+        - amount * 0.5 * (1 + erf(v / sqrt(2 * (blur**2 + radius**2))))
+        for v in x
+    ]
+    _, overshoot = edge_blur_and_overshoot((picture[..., 0] / 255).astype(np.float32))
+    assert overshoot == pytest.approx(max(step) - 1, abs=0.015)
+
+
+def test_white_balance_is_in_stops_of_light():
+    codes = np.array([128, 128, 128], float)
+    light = ((codes / 255 + 0.055) / 1.055) ** 2.4 * [2**0.3, 1, 2**-0.2]
+    encoded = 255 * (1.055 * light ** (1 / 2.4) - 0.055)
+    picture = np.tile(np.rint(encoded).astype(np.uint8), (80, 80, 1))
+    assert statistic(picture, "red over green") == pytest.approx(0.3, abs=0.03)
+    assert statistic(picture, "blue over green") == pytest.approx(-0.2, abs=0.03)
+
+
+def test_blockiness_falls_with_jpeg_quality():
+    rng = np.random.default_rng(2)
+    picture = grey_picture(cv2.GaussianBlur(rng.normal(128, 300, (240, 320)), (0, 0), 3))
+    found = [statistic(compress_jpeg(picture, quality), "blockiness") for quality in (15, 50, 95)]
+    assert found[0] > found[1] + 0.1 > found[2] + 0.1
+    assert statistic(picture, "blockiness") == pytest.approx(0, abs=0.1)
+
+
+def test_corner_light_follows_vignetting():
+    light = 0.4 * vignette((320, 240), 0.5)[..., 0]
+    picture = grey_picture(255 * (1.055 * light ** (1 / 2.4) - 0.055))
+    assert -1 < statistic(picture, "corner light") < -0.6
+
+
+def test_the_gap_is_the_shift_in_spreads_of_the_photographs():
+    rng = np.random.default_rng(3)
+    real = rng.normal(0, 1, (40, len(NAMES)))
+    assert gap(real, real).total == pytest.approx(0, abs=1e-12)
+    moved = gap(real, real + 2 * real.std(axis=0))
+    np.testing.assert_allclose(moved.of_statistic, 2, rtol=1e-9)
+    weights = np.array([1.0] * 40 + [0.0] * 40)
+    assert gap(real, np.concatenate([real, real + 9]), weights).total == pytest.approx(0, abs=1e-9)
+    one_dark = real.copy()
+    one_dark[0] = np.nan
+    assert np.isfinite(gap(one_dark, real).of_statistic).all()
+
+
+@pytest.mark.parametrize("preset", ["seafront", "gate"])
+def test_every_point_is_a_valid_sensor_and_the_preset_needs_no_change(preset):
+    sensor = Config.preset(preset).sensor
+    assert changes_at(point_of(sensor), sensor) == {}
+    rng = np.random.default_rng(4)
+    for point in (*rng.random((20, len(VARIABLES))), np.zeros(13), np.ones(13)):
+        made = sensor_at(point, sensor)
+        assert isinstance(made, SensorConfig)
+        Config.from_values({"sensor": changes_at(point, sensor)}, Config.preset(preset))
+
+
+def test_shares_of_light_are_a_mixture():
+    shares = {"night": 0.2, "sun": 0.8}
+    assert mixed_shares(shares, [0.5, 0.5]) == pytest.approx(shares)
+    mixed = mixed_shares(shares, [1.0, 0.5])
+    assert sum(mixed.values()) == pytest.approx(1)
+    assert mixed["night"] > 0.8
+
+
+def test_paints_of_photographs_gain_weight():
+    surface = Config.preset().surface
+
+    def picture(name):
+        code = bytes.fromhex(surface.colors[name].removeprefix("#"))
+        return np.tile(np.array(list(code), np.uint8), (80, 80, 1))
+
+    both = [picture("signal blue"), picture("leaf green")]
+    weights = paint_weights(surface, [picture("signal blue")], both)
+    assert weights["signal blue"] > 1.5 * weights["oxide red"]
+    assert weights["leaf green"] < 0.2 * weights["oxide red"]
+    assert weights["white"] == 1
+    colored = [name for name in weights if name not in ("white", "light grey", "mid grey")]
+    assert sum(weights[name] for name in colored) == pytest.approx(len(colored), rel=0.02)
+
+
+STRONG = {
+    "exposure_error_ev": [0.6, 0.8],
+    "white_balance_ev": [0.3, 0.3],
+    "noise": {"probability": 1.0, "full_well_e": [300, 300]},
+    "response": {"probability": 1.0, "clip": 1.2, "contrast": 1.5, "saturation": 1.5},
+}
+"""Camera whose photographs the closed loop fits: bright, magenta, noisy and hard."""
+
+
+def test_a_fit_recovers_the_camera_of_photographs(generators):
+    response = {"probability": 1.0, "clip": 1.2, "contrast": 1.0, "saturation": 1.0}
+    sensor = {"response": response, "noise": {"probability": 1.0, "full_well_e": 8000}}
+    config = Config.from_values({"environment": {"names": ["park", "city"]}, "sensor": sensor})
+    generator = generators(config, seed=3, size=(160, 120), quality="draft")
+    frames = linear_frames(generator, 8)
+    others = linear_frames(generator, 8, first=100)
+    with ThreadPoolExecutor(2) as workers:
+        taken = from_plain(SensorConfig, STRONG, base=SensorConfig())
+        real = statistics_of_frames([*frames, *others], taken, workers)
+        found = search(real, frames, config.sensor, {}, 240, seed=1)
+        sensor = sensor_at(found.point, config.sensor)
+        before, after = (
+            [
+                gap(real, statistics_of_frames(each, camera, workers)).total
+                for each in (frames, others)
+            ]
+            for camera in (config.sensor, sensor)
+        )
+    assert after[0] < 0.5 * before[0]
+    assert after[1] < 0.8 * before[1]  # scenes that the search did not see
+    # a camera that clips later and exposes longer takes much the same picture
+    exposure = sum(sensor.exposure_error_ev) / 2 - np.log2(np.mean(sensor.response.clip))
+    assert exposure == pytest.approx(0.7 - np.log2(1.2), abs=0.35)
+    assert sum(sensor.white_balance_ev) / 2 == pytest.approx(0.3, abs=0.15)
+    assert 120 < sensor.noise.full_well_e.lo <= sensor.noise.full_well_e.hi < 800
+    assert sensor.response.contrast.lo > 1.25
+    assert sensor.response.saturation.lo > 1.2
+
+
+def photographs_in(folder, count, size=(96, 80)):
+    folder.mkdir()
+    rng = np.random.default_rng(5)
+    for k in range(count):
+        pixels = rng.integers(0, 255, (size[1], size[0], 3), np.uint8)
+        (folder / f"{k}.png").write_bytes(encode_picture(pixels, ".png"))
+    return folder
+
+
+def test_large_photographs_are_scaled_down(tmp_path):
+    (photograph,) = read_photographs(photographs_in(tmp_path / "a", 1, (300, 100)), 150)
+    assert photograph.pixels.shape == (50, 150, 3)
+    assert photograph.size == (300, 100)
+
+
+def test_bad_photographs_are_named(tmp_path):
+    with pytest.raises(AssetError, match="no such folder"):
+        read_photographs(tmp_path / "none", 640)
+    with pytest.raises(AssetError, match="no photograph in this folder"):
+        read_photographs(tmp_path, 640)
+    small = photographs_in(tmp_path / "small", 1, (96, 20))
+    with pytest.raises(AssetError, match=r"0\.png: 96x20 pixels are too few"):
+        read_photographs(small, 640)
+    (tmp_path / "small/0.png").write_bytes(b"no picture")
+    with pytest.raises(AssetError, match=r"0\.png: cannot be read as a picture"):
+        read_photographs(small, 640)
+
+
+def test_the_command_refuses_before_it_renders(tmp_path, capsys):
+    folder = photographs_in(tmp_path / "photos", 1)
+    (tmp_path / "port.yaml").write_text("mine")
+    for arguments, words in (
+        ([], "port.yaml: exists; give another name with -o, or --force"),
+        (["--force", "--budget", "0"], "budget: 0 is out of range"),
+        (["--force", "--longest", "9"], "longest: 9 is out of range"),
+        (["--force", "--preset", "gaet"], "did you mean gate"),
+    ):
+        assert main(["fit", str(folder), "-o", str(tmp_path / "port.yaml"), *arguments]) == 2
+        assert words in capsys.readouterr().err
+    assert (tmp_path / "port.yaml").read_text() == "mine"
+
+
+def test_a_proposal_is_a_file_that_a_config_reads(tmp_path):
+    values = {
+        "surface": {"color_weights": {"oxide red": 2.0, "navy": 0.5}},
+        "cameras": {"rear": {"distance_mm": [2500.0, 3000.0]}, "roof": {}},
+        "sensor": {"response": {"clip": [1.1, 1.4]}, "jpeg_quality": [30, 60]},
+        "environment": {"weights": {"park": 0.25}},
+    }
+    nothing = Gap(np.zeros(len(NAMES)), {}, 0.0)
+    reasons = {"sensor.response": "photographs: contrast 0.2"}
+    proposal = Proposal(values, reasons, nothing, nothing, ["few"])
+    path = tmp_path / "port.yaml"
+    path.write_text(proposal.as_yaml("two\nlines"))
+    assert path.read_text().startswith("# two\n# lines\n# few\nsurface:\n")
+    assert "  # photographs: contrast 0.2\n  response:\n" in path.read_text()
+    assert loaded(path.read_text()) == values
+    config = Config.load(path, Config.preset("gate"))
+    assert config.cameras["rear"].distance_mm == (2500, 3000)
+    assert config.cameras["roof"] == Config.preset("gate").cameras["roof"]
+
+
+def test_heights_of_boxes_give_distances(tmp_path):
+    folder = photographs_in(tmp_path / "photos", 3)
+    photographs = read_photographs(folder, 640)
+    (folder / "0.txt").write_text("0 0.5 0.5 0.9 0.5\n1 0.5 0.5 0.1 0.1\n")
+    (folder / "1.txt").write_text("0 0.5 0.25 0.9 0.5\n")  # cut off by the upper border
+    (folder / "boxes.json").write_text(
+        '{"images": [{"id": 7, "file_name": "2.png", "height": 80}], "annotations": ['
+        '{"image_id": 7, "category_id": 1, "bbox": [3, 10, 50, 40]}]}'
+    )
+    assert read_box_heights(folder, photographs) == pytest.approx([0.5, 0.5])
+    preset = Config.from_values({"container": {"kinds": {"20": 1}}}, Config.preset("gate"))
+    rig, words = camera_distances(preset, [0.5, 0.5])
+    rear = preset.cameras["rear"]
+    # a wall of 2591 mm has an image of half the sensor's height
+    expected = rear.focal_mm * 2591 / (0.5 * 27)
+    assert rig["rear"]["distance_mm"] == pytest.approx([expected, expected], abs=6)
+    assert rig["roof"] == {}
+    assert words == "boxes of 2 photographs are 50% to 50% of the image high"
+    (folder / "0.txt").write_text("container 0.5\n")
+    with pytest.raises(AssetError, match=r"0\.txt: line 1 is not a YOLO box"):
+        read_box_heights(folder, photographs)
+
+
+def test_every_statistic_has_a_cue_and_a_floor():
+    assert len(measured(grey_picture(np.full((64, 64), 99.0)))) == len(NAMES)
+    assert all(each.cue and each.floor > 0 for each in STATISTICS.values())
