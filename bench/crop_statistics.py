@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Pixels = NDArray[np.uint8]
-"""RGB picture [H, W, 3]."""
+from fastgen.fit.statistics import Pixels, planes_of, scaled
 
 Array = NDArray[np.float64]
 
@@ -20,7 +19,6 @@ _Z95 = 1.959964
 _REPLICATES = 1000
 _FOLDS = 5
 _DARK, _BRIGHT = 0.12, 0.95
-_FLAT_SHARE = 0.25
 _EDGE = 0.15
 _RIDGE = 1.0
 
@@ -68,21 +66,11 @@ def auc_interval(positive: Scores, negative: Scores, seed: int = 0) -> Interval:
 
 def statistics_of(pixels: Pixels, longest: int) -> dict[str, float]:
     """Return the named statistics of a picture, after scaling its longer side to `longest`."""
-    scale = longest / max(pixels.shape[:2])
-    size = (max(round(pixels.shape[1] * scale), 8), max(round(pixels.shape[0] * scale), 8))
-    way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    scaled = cv2.resize(pixels, size, interpolation=way)
-    rgb = (scaled / 255).astype(np.float32)
-    grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    hue, saturation, _ = np.moveaxis(cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV), 2, 0)
-    mean, square = (cv2.GaussianBlur(a, (0, 0), 4.0) for a in (grey, grey * grey))
-    local = np.sqrt(np.maximum(square - mean * mean, 0))
+    planes = planes_of(scaled(pixels, longest))
+    rgb, grey, hue, saturation = planes.rgb, planes.grey, planes.hue, planes.saturation
+    local, fine, middle, flat = planes.local, planes.fine, planes.middle, planes.flat
     across, down = (cv2.Sobel(grey, cv2.CV_32F, *way, ksize=3) / 4 for way in ((1, 0), (0, 1)))
     slope = np.hypot(across, down)
-    fine = grey - cv2.GaussianBlur(grey, (0, 0), 1.0)
-    middle = cv2.GaussianBlur(grey, (0, 0), 1.0) - mean
-    # the flattest quarter of the picture shows the noise
-    flat = local <= np.quantile(local, _FLAT_SHARE)
     red, green, blue = (float(rgb[..., k].mean()) + 1e-3 for k in range(3))
     brown = (hue < 40) & (saturation > 0.3) & (grey < 0.6)
     return {
