@@ -20,7 +20,7 @@ from fastgen.fit.frames import linear_frames, statistics_of_frames
 from fastgen.fit.gap import Gap, gap
 from fastgen.fit.paints import paint_weights
 from fastgen.fit.photographs import read_photographs
-from fastgen.fit.proposal import Proposal
+from fastgen.fit.proposal import Effort, Proposal, propose
 from fastgen.fit.search import mixed_shares, search
 from fastgen.fit.space import VARIABLES, changes_at, point_of, sensor_at
 from fastgen.fit.statistics import NAMES, STATISTICS, measured
@@ -204,6 +204,23 @@ def test_a_fit_recovers_the_camera_of_photographs(generators):
     assert 120 < sensor.noise.full_well_e.lo <= sensor.noise.full_well_e.hi < 800
     assert sensor.response.contrast.lo > 1.25
     assert sensor.response.saturation.lo > 1.2
+
+
+def test_a_proposal_changes_paints_light_and_camera(tmp_path):
+    names = ("park", "port_night")
+    preset = Config.from_values({"environment": {"names": names}, "sensor": {"vignetting": 0.1}})
+    photographs = read_photographs(photographs_in(tmp_path / "photos", 5), 640)
+    effort = Effort(trials=12, frames=4, checked=3, size=(96, 72), quality="draft")
+    proposal = propose(photographs, preset, effort, seed=2, boxes=[0.4, 0.6])
+    assert set(proposal.values) == {"surface", "cameras", "environment", "sensor"}
+    assert set(proposal.values["environment"]["weights"]) == set(names)
+    assert proposal.after.total < proposal.before.total
+    (tmp_path / "port.yaml").write_text(proposal.as_yaml("fitted"))
+    config = Config.load(tmp_path / "port.yaml", preset)
+    assert config == Config.from_values(proposal.values, preset)
+    few = propose(photographs[:3], preset, effort, seed=2)
+    assert not {"surface", "environment"} & set(few.values)
+    assert "3 photographs are too few for weights" in few.notes[0]
 
 
 def photographs_in(folder, count, size=(96, 80)):
