@@ -186,7 +186,7 @@ def test_a_fit_recovers_the_camera_of_photographs(generators):
     with ThreadPoolExecutor(2) as workers:
         taken = from_plain(SensorConfig, STRONG, base=SensorConfig())
         real = statistics_of_frames([*frames, *others], taken, workers)
-        found = search(real, frames, config.sensor, {}, 240, seed=1)
+        found = search(real, frames, config.sensor, {}, 180, seed=1)
         sensor = sensor_at(found.point, config.sensor)
         before, after = (
             [
