@@ -78,7 +78,7 @@ def ground_regions(
         for first, end in vehicles:
             parts = [prop_box(prop) for prop in scene.props[first:end]]
             corners = np.concatenate([part.corners_mm for part in parts])
-            bodies.append(region_of(view, corners) or whole)
+            bodies.append(region_of(view, _around(corners)) or whole)
             shaded.append(region_of(view, _reach(parts, ground, toward, _SHADED_MM)) or whole)
         shown = [region for region in merged(bodies) if region is not None]
         around = [region for region in merged(shaded) if region is not None]
@@ -170,4 +170,14 @@ def _reach(boxes: Sequence[OrientedBox], ground: Ground, toward: Array, margin_m
     far = np.hypot(*thrown.T)[:, None]
     thrown *= np.minimum(1, _LONGEST_SHADOW_MM / np.maximum(far, 1)) * 1.02
     shadows = np.column_stack([corners[:, :2] + thrown, np.full(len(corners), ground.height_mm)])
-    return np.concatenate([hull, shadows])
+    return np.concatenate([hull, _around(shadows)])
+
+
+def _around(points: Array) -> Array:
+    """Return the corners [8, 3] of the upright box around points [N, 3].
+
+    Regions of few points are found much faster if the lens distorts.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    corners: Array = low + UNIT_CUBE * (high - low)
+    return corners

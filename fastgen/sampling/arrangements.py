@@ -33,8 +33,9 @@ _ON_GROUND = 0.5
 
 _VEHICLES = {"trailer": trailer_props, "wagon": wagon_props}
 
-_PARTS = 12
-"""Largest number of parts of a neighbour's vehicle; its smaller parts are not drawn."""
+_PARTS = 13
+"""Largest number of parts of a vehicle. Smaller parts are not drawn: each pixel near a vehicle is
+tested against all its parts."""
 
 Cell = tuple[int, int]
 """Row and column of a pile; the container's own is (0, 0). Rows follow y and columns x."""
@@ -221,8 +222,7 @@ class _Place:
         if not vehicle:
             return Site(name, kind, pose)
         height, props = self._vehicle(vehicle, name, kind, pose)
-        largest = sorted(props, key=lambda prop: -math.prod(prop.size_mm))[:_PARTS]
-        lifted = (replace(prop, pose=_raised(prop.pose, height)) for prop in largest)
+        lifted = (replace(prop, pose=_raised(prop.pose, height)) for prop in props)
         return Site(name, kind, _raised(pose, height), tuple(lifted))
 
     def _ground_mm(self) -> float:
@@ -286,7 +286,8 @@ class _Place:
         self, vehicle: str, name: str, kind: str, pose: Pose
     ) -> tuple[float, tuple[Prop, ...]]:
         """Return the height of a container on a vehicle, and the vehicle's parts in the world."""
-        low_mm, props = _VEHICLES[vehicle](kind, self.streams(f"{name}.vehicle"))
+        low_mm, parts = _VEHICLES[vehicle](kind, self.streams(f"{name}.vehicle"))
+        props = sorted(parts, key=lambda prop: -math.prod(prop.size_mm))[:_PARTS]
         turn, at = rotation_of(pose), np.array(pose.position_mm)
         placed = []
         for prop in props:
