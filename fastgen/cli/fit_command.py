@@ -40,8 +40,9 @@ def add_fit(commands: Any) -> None:
         type=float,
         default=4.0,
         metavar="MINUTES",
-        help="effort in minutes of a machine with two cores; it sets the number of trials, so the "
-        "same seed gives the same file on any machine; default: %(default)g",
+        help="effort of the search in minutes of a machine with two cores, after a few minutes of "
+        "rendering; it sets the number of trials, so the same seed gives the same file on any "
+        "machine; default: %(default)g",
     )
     command.add_argument(
         "--longest",

@@ -25,7 +25,7 @@ from fastgen.sampling.scene import environment_weights
 FEWEST_FOR_WEIGHTS = 5
 """Photographs below which weights of paints and environments stay as in the preset."""
 
-TRIALS_PER_MINUTE = 90
+TRIALS_PER_MINUTE = 60
 """Trials of 32 frames that two cores make in a minute. A constant, so that the result of a seed
 does not depend on the machine."""
 
