@@ -1,8 +1,8 @@
 """Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools.
 
 The file contains all damaged containers, the spreader, the ground and the props on it, their baked
-textures, the seals and the cameras. A container with holes also has its inside. The ground is a square whose alpha falls to 0 where the
-environment replaces it.
+textures, the seals and the cameras. A container with holes also has its inside. The ground is a
+square whose alpha falls to 0 where the environment replaces it.
 
 Data that glTF has no place for is stored as `extras`. The extras of the glTF scene are the
 environment and the Scene; those of a camera's node are its exposure and lens distortion. Viewers

@@ -30,6 +30,7 @@ from fastgen.scene import Camera, EnvironmentView
 from fastgen.scene.optics import Lens
 
 SIZE = (320, 240)
+IGNORING = Config.from_values({"labels": {"background": "ignore"}})
 PORTS = sorted(name for name in bundled_hdris() if name.startswith("port_"))
 
 CAMERAS = (
@@ -70,7 +71,7 @@ def looked_up(numbers, column, row):
 
 @pytest.fixture(scope="module")
 def generator():
-    with Generator(size=SIZE, quality="draft") as generator:
+    with Generator(IGNORING, size=SIZE, quality="draft") as generator:
         yield generator
 
 
@@ -323,7 +324,7 @@ def test_containers_of_the_background_are_labelled_if_the_config_says_so(generat
 def test_a_panorama_of_the_user_may_have_a_map(tmp_path):
     for name in ("port_noon.exr", "port_noon.containers.png"):
         (tmp_path / name).write_bytes(asset_path("hdri", name).read_bytes())
-    with Generator(size=SIZE, quality="draft", hdri_dir=tmp_path) as own:
+    with Generator(IGNORING, size=SIZE, quality="draft", hdri_dir=tmp_path) as own:
         assert set(own.environment_record) == {"port_noon"}
         assert "containers" in own.environment_record["port_noon"]
         assert own.container_map("port_noon").count == whole_map("port_noon").max()

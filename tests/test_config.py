@@ -74,9 +74,10 @@ def test_any_value_is_either_sampled_or_refused_by_its_key(path):
 def limits(cls, path=()):
     """Yield path and bounds of the numbers in a dataclass and its parts, except in mappings."""
     for name, hint in typing.get_type_hints(cls, include_extras=True).items():
+        plain = typing.get_args(hint)[0] if typing.get_origin(hint) is typing.Annotated else hint
         if dataclasses.is_dataclass(hint):
             yield from limits(hint, (*path, name))
-        elif typing.get_origin(hint) is not dict and (bounds := annotation(Bounds, hint)):
+        elif typing.get_origin(plain) is not dict and (bounds := annotation(Bounds, hint)):
             yield (*path, name), bounds
 
 

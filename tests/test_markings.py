@@ -15,8 +15,8 @@ from fastgen.decals.weights import weight_lines
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry.container import build_container
-from fastgen.sampling.markers import rhombus_offsets
 from fastgen.sampling.contents import sheet_sizes
+from fastgen.sampling.markers import rhombus_offsets
 from fastgen.srgb import DECODED
 
 

@@ -262,13 +262,14 @@ class LabelConfig:
             fraction is relative to their pixels if nothing hid them.
         min_text_px: Height below which a text is not a legible crop.
         background: Containers of the panorama, which are known in the bundled ports. "ignore" marks
-            them as ignored, "label" labels them as containers, "none" leaves them out.
+            them as ignored, "label" labels them as containers, "none" leaves them out, as the paper
+            does.
     """
 
     min_visible_px: Annotated[int, Bounds(1, 1e6, "pixels")] = 12
     min_visible_fraction: Share = 0.05
     min_text_px: Annotated[float, Bounds(1.0, 1e4, "pixels")] = 10.0
-    background: Annotated[str, OneOf(("ignore", "label", "none"))] = "ignore"
+    background: Annotated[str, OneOf(("ignore", "label", "none"))] = "none"
 
 
 @dataclass(frozen=True)

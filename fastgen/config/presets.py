@@ -53,10 +53,11 @@ _OUTDOORS: dict[str, Any] = {
         "jpeg_quality": [45, 92],
     },
     "environment": {"lamps": {"probability": 0.6}},
+    "labels": {"background": "ignore"},
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Fleets, seals, weather and sensor effects that all presets of real cameras share."""
+"""Fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
 
 _GATE_END = {
     "focal_mm": 30.0,
