@@ -87,7 +87,7 @@ __all__ = [
     "export_glb",
     "generate",
 ]
-__version__ = "0.25.0"
+__version__ = "0.26.0"
 
 _HOMES = {
     "Config": "config.config",

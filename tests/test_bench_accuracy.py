@@ -15,6 +15,7 @@ import pareto_chart
 import pytest
 import reference_set
 from reference_set import FILTERS
+from surrounded_cases import every_case, surrounded_cases
 
 from fastgen import Config, Generator
 from fastgen.geometry.container import build_container
@@ -22,6 +23,7 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.render.program import shader_text
 from fastgen.render.variant import LAYERS
+from fastgen.scene.check import check_scene
 
 
 @pytest.mark.parametrize("count", [8, 16, 24, 32])
@@ -42,6 +44,15 @@ def test_the_scene_of_a_case_has_its_light_damage_and_rust():
         assert scene.environment.name == case.light
         assert bool(scene.damages) == case.damaged
         assert scene.surface.rust.coverage == (reference_set.RUSTY if case.rusty else 0.0)
+
+
+def test_surrounded_cases_can_be_drawn_and_are_numbered_on():
+    assert [case.number for case in surrounded_cases()] == [32, 33, 34, 35, 36]
+    for case in surrounded_cases():
+        scene = check_scene(case.drawn())
+        assert scene.ground is not None
+        assert len(scene.neighbours) == len(case.poses)
+        assert bool(scene.props) == case.on_trailer
 
 
 def test_filters_are_the_integrals_of_a_box_and_a_tent():
@@ -94,14 +105,15 @@ STORED = sorted(reference_set.FOLDER.glob("*.npz"))
 
 
 def test_every_case_has_a_stored_reference():
-    assert [int(path.stem) for path in STORED] == [case.number for case in reference_set.cases()]
+    assert [int(path.stem) for path in STORED] == [case.number for case in every_case()]
 
 
 @pytest.mark.parametrize("path", STORED, ids=lambda p: p.stem)
 def test_a_stored_reference_loads_and_matches_its_case(path):
-    case = reference_set.cases()[int(path.stem)]
+    case = every_case()[int(path.stem)]
     reference = reference_set.load(case.number)
     assert reference.scene.environment.name == case.light
+    assert (reference.scene.ground is not None) == (case in surrounded_cases())
     assert 0.02 < reference.inside.mean() < 0.98
     for image in reference.radiance.values():
         assert np.isfinite(image).all()
