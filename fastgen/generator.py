@@ -123,9 +123,9 @@ class Generator:
 
     @property
     def environment_record(self) -> dict[str, dict[str, Any]]:
-        """What decides the light and the background of scenes, by name of each available HDRI.
+        """SHA-256 and weight of each available HDRI by name, which decide the light of scenes.
 
-        Its SHA-256, its weight and, if it has a container map, the SHA-256 of that as `containers`.
+        For an HDRI with a container map, `containers` is the SHA-256 of the map.
         """
         record: dict[str, dict[str, Any]] = {}
         for name, weight in self._weights.items():

@@ -1,4 +1,4 @@
-"""What the surroundings of a container change in its light: other containers and the ground.
+"""Change of the light on a container by its surroundings: other containers and the ground.
 
 The light of a container in the open is known at its vertices (sky_visibility.py). Boxes around it
 and the ground change it smoothly, so factors on that light are computed at few points of its outer

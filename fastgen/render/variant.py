@@ -30,7 +30,7 @@ PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
 
 @dataclass(frozen=True)
 class GroundVariant:
-    """What a program of the ground is compiled for.
+    """Choices that a program of the ground is compiled for.
 
     Attributes:
         kind: One of GROUNDS.
