@@ -8,10 +8,10 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.geometry.container import build_container
-from fastgen.light.environment import load_environment
+from fastgen.light.environment import load_environment, sky_irradiance, to_map_frame
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.sky_visibility import sky_directions
-from fastgen.light.surrounding_light import _lattice, surrounding_light
+from fastgen.light.surrounding_light import Paving, _lattice, surrounding_light
 from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
 from fastgen.scene.boxes import back_to_front, container_box, overlap
 from tests import oracle
@@ -278,3 +278,52 @@ def test_light_between_boxes_equals_a_monte_carlo_integral():
         met = [np.isfinite(entered(start, sky_directions(), box)) for box in boxes[1:]]
         bits = np.unpackbits(found.open_bits[number]).astype(bool)
         np.testing.assert_array_equal(bits, ~np.any(met, axis=0))
+
+
+@pytest.mark.parametrize("gap_mm", [None, 900.0], ids=["alone", "row"])
+def test_light_off_the_ground_equals_a_monte_carlo_integral(gap_mm):
+    light = load_environment(bundled_hdris()["port_noon"])
+    albedo, yaw_deg = np.array([0.3, 0.25, 0.2]), 70.0
+    poses = [Pose()] if gap_mm is None else [Pose(), Pose((0.0, 2438.0 + gap_mm, 0.0))]
+    boxes = [container_box("20", pose) for pose in poses]
+    black = len(boxes) * [(0.0, 0.0, 0.0)]
+    low, high = boxes[0].corners_mm.min(axis=0), boxes[0].corners_mm.max(axis=0)
+    paving = Paving(0.0, tuple(albedo))
+    (found, *_) = surrounding_light(
+        boxes, black, len(boxes) * [(low, high)], light, yaw_deg, paving
+    )
+    points, normals = _lattice(boxes[0].half_mm)
+    points = points + boxes[0].center_mm
+    walls = np.flatnonzero((normals[:, 2] == 0) & (points[:, 2] > 20))
+    sun = to_map_frame(light.lights[0].direction, -yaw_deg)
+    of_sky, of_nadir = sky_irradiance(light, [[0, 0, 1.0], [0, 0, -1.0]], yaw_deg)
+    rng = np.random.default_rng(1)
+    around = rng.normal(size=(3000, 3))
+    around /= np.linalg.norm(around, axis=1, keepdims=True)
+    apart = []
+    for number in walls[::3]:
+        toward, start = normals[number] + around, points[number]
+        met = np.min([entered(start, toward, box) for box in boxes], axis=0)
+        down = np.where(toward[:, 2] < 0, -start[2] / toward[:, 2], np.inf)
+        ground = down < met
+        at = start + down[ground, None] * toward[ground]
+        # rays up from the ground, with a density proportional to the cosine
+        up = np.array([0.0, 0.0, 1.0]) + around[rng.permutation(len(around))[: len(at)]]
+        shut = np.any([each_enters(at, up, box) for box in boxes], axis=0)
+        shade = np.any([each_enters(at, np.tile(sun, (len(at), 1)), box) for box in boxes], axis=0)
+        lit = of_sky * ~shut[:, None] + np.array(light.lights[0].light) * sun[2] * ~shade[:, None]
+        whole = sky_irradiance(light, normals[number : number + 1], yaw_deg)[0]
+        above = (np.isinf(met) & (toward[:, 2] >= 0)).mean() * (2 * whole - of_nadir)
+        expected = (above + albedo * lit.sum(axis=0) / len(around)) / whole
+        apart.append(found.factor[number] - expected)
+    assert np.abs(apart).mean() < 0.03
+    assert np.abs(apart).max() < 0.2
+
+
+def each_enters(points, rays, box):
+    """Return whether the ray [N, 3] from each point [N, 3] meets a box."""
+    start, along = (points - box.center_mm) @ box.rotation, rays @ box.rotation
+    with np.errstate(divide="ignore"):
+        ends = np.sort([(-box.half_mm - start) / along, (box.half_mm - start) / along], axis=0)
+    near, far = ends[0].max(axis=1), ends[1].min(axis=1)
+    return (near < far) & (far > 1e-3)

@@ -25,8 +25,11 @@ _STEP_MM = 1000.0
 
 _LIFT_MM = 5.0
 _MOST_HIDDEN = 0.97
-_GROUND_MM = (300.0, 900.0, 2700.0)
-"""Distances in front of a wall at which the ground is lit to represent what the wall sees."""
+_GROUND_POINTS = 4
+"""Points of the ground in front of a wall whose light represents all that the wall sees."""
+
+_RAYS_PER_POINT = 4
+"""Rays that find how much of the ground around such a point the wall sees."""
 
 _FACES = [(axis, sign) for axis in range(3) for sign in (-1, 1)]
 """Axis and direction of the faces of a box, in the order of all arrays here."""
@@ -159,9 +162,12 @@ def surrounding_light(
             points, toward, [faces[j] for j in others], [radiance[j] for j in others]
         )
         whole = np.maximum(sky_irradiance(light, toward, yaw_deg), 1e-9)
-        factor = 1 - hidden[:, None] + bounced / whole
-        if paving is not None:
-            factor += _from_ground(points, toward, boxes, faces, light, yaw_deg, paving) / whole
+        if paving is None:
+            factor = 1 - hidden[:, None] + bounced / whole
+        else:
+            share, ground = _from_ground(points, toward, i, boxes, faces, light, yaw_deg, paving)
+            above = _from_above(toward, whole, hidden, share, light, yaw_deg)
+            factor = (above + ground + bounced) / whole
         bits = _open_bits(points, box, [boxes[j] for j in others])
         found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits))
     return found
@@ -237,34 +243,72 @@ def _from_lights(
     return found
 
 
+def _from_above(
+    toward: Array, whole: Array, hidden: Array, ground: Array, light: Ambient, yaw_deg: float
+) -> Array:
+    """Return the irradiance / pi [P, 3] from above the horizon that no box hides.
+
+    Args:
+        toward: Normals [P, 3].
+        whole: Irradiance / pi [P, 3] in the open, also from below the horizon.
+        hidden: Share [P] of the hemispheres that boxes cover.
+        ground: Share [P] of the hemispheres in which the ground is seen.
+        light: The environment.
+        yaw_deg: Its rotation.
+    """
+    lower = (1 - toward[:, 2]) / 2
+    below = sky_irradiance(light, [[0.0, 0.0, -1.0]], yaw_deg)
+    upper = np.maximum(whole - lower[:, None] * below, 0.0)
+    # boxes cover what is below the horizon and not ground
+    seen = 1 - (hidden - (lower - ground)) / np.maximum(1 - lower, 1e-6)
+    return np.clip(seen, 0.0, 1.0)[:, None] * upper
+
+
 def _from_ground(
     points: Array,
     toward: Array,
+    number: int,
     boxes: Sequence[OrientedBox],
     faces: Sequence[_Faces],
     light: Ambient,
     yaw_deg: float,
     paving: Paving,
-) -> Array:
-    """Return the change of irradiance / pi [P, 3] as the ground replaces the HDRI's lower half."""
-    share = (1 - toward[:, 2]) / 2
+) -> tuple[Array, Array]:
+    """Return the share [P] of the hemispheres in which box `number` sees ground, and its light.
+
+    The light is irradiance / pi [P, 3]. A wall at height h sees the share 1 - h / sqrt(h^2 + d^2)
+    of all level ground within the distance d. So rays to the quantiles of that share, straight
+    ahead, have equal weights.
+    """
     up = np.array([0.0, 0.0, 1.0])
-    found = np.zeros((len(points), 3))
-    steps = np.array(_GROUND_MM)
+    lower = (1 - toward[:, 2]) / 2
     height = np.maximum(points[:, 2] - paving.height_mm, 1.0)
-    # a wall sees the ground at about its own height away most
-    near = 1 / (1 + (np.log(height[:, None] / steps)) ** 2)
-    near /= near.sum(axis=1, keepdims=True)
-    for weight, step in zip(near.T, steps, strict=True):
-        at = points + step * toward * (1, 1, 0)
+    count = _GROUND_POINTS * _RAYS_PER_POINT
+    quantile = (np.arange(count).reshape(_GROUND_POINTS, -1, 1) + 0.5) / count
+    away = height * np.sqrt((1 - quantile) ** -2 - 1)
+    level = toward * (1, 1, 0)
+    ends = points + away[..., None] * level
+    ends[..., 2] = paving.height_mm + _LIFT_MM
+    seen = np.broadcast_to(lower > 0, away.shape)
+    for other, box in enumerate(boxes):
+        if other != number:
+            seen = seen & ~_between(points, ends, box)
+    share, found = np.zeros(len(points)), np.zeros((len(points), 3))
+    dark = [np.zeros((6, 3))] * len(faces)
+    for reached, shown in zip(away, seen, strict=True):
+        part = shown.mean(axis=0)
+        some = np.flatnonzero(part)
+        middle = (reached * shown).sum(axis=0)[some] / shown.sum(axis=0)[some]
+        at = points[some] + middle[:, None] * level[some]
         at[:, 2] = paving.height_mm + _LIFT_MM
         normals = np.broadcast_to(up, at.shape)
-        hidden, _ = _seen(at, normals, faces, [np.zeros((6, 3))] * len(faces))
+        hidden, _ = _seen(at, normals, faces, dark)
         lit = sky_irradiance(light, normals, yaw_deg) * (1 - hidden[:, None])
         lit = lit + _from_lights(at, normals, boxes, light, yaw_deg)
-        found += weight[:, None] * lit
-    below = sky_irradiance(light, -up[None], yaw_deg)
-    return share[:, None] * (np.array(paving.albedo) * found - below)
+        weight = part[some] * lower[some] / _GROUND_POINTS
+        share[some] += weight
+        found[some] += weight[:, None] * lit
+    return share, found * np.array(paving.albedo)
 
 
 def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -> NDArray[np.uint8]:
@@ -274,6 +318,17 @@ def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -
     for other in others:
         hidden |= _meets(points, directions @ box.rotation.T, other)
     return np.packbits(~hidden, axis=1)
+
+
+def _between(points: Array, ends: Array, box: OrientedBox) -> NDArray[np.bool_]:
+    """Return whether a box is on the straight way from points [P, 3] to ends [..., P, 3]."""
+    start = (points - box.center_mm) @ box.rotation
+    way = (ends - points) @ box.rotation
+    way = np.where(np.abs(way) < 1e-9, 1e-9, way)
+    middle, reach = -start / way, box.half_mm / np.abs(way)
+    near, far = (middle - reach).max(axis=-1), (middle + reach).min(axis=-1)
+    found: NDArray[np.bool_] = (near < far) & (far > 0) & (near < 1)
+    return found
 
 
 def _meets(points: Array, toward: Array, box: OrientedBox) -> NDArray[np.bool_]:
