@@ -26,7 +26,7 @@ _STEP_MM = 1000.0
 _LIFT_MM = 5.0
 _MOST_HIDDEN = 0.97
 _GROUND_POINTS = 4
-"""Points of the ground in front of a wall whose light represents all that the wall sees."""
+"""Points in front of a wall at which the light on the ground is computed."""
 
 _RAYS_PER_POINT = 4
 """Rays that find how much of the ground around such a point the wall sees."""
@@ -277,8 +277,8 @@ def _from_ground(
     """Return the share [P] of the hemispheres in which box `number` sees ground, and its light.
 
     The light is irradiance / pi [P, 3]. A wall at height h sees the share 1 - h / sqrt(h^2 + d^2)
-    of all level ground within the distance d. So rays to the quantiles of that share, straight
-    ahead, have equal weights.
+    of all level ground within the distance d. Rays straight ahead to the quantiles of this share
+    have equal weights.
     """
     up = np.array([0.0, 0.0, 1.0])
     lower = (1 - toward[:, 2]) / 2
