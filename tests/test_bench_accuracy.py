@@ -261,7 +261,7 @@ def test_an_image_matches_its_path_traced_reference(renderer, number, apart):
     case, reference = reference_set.cases()[number], reference_set.load(number)
     scene = reference.scene
     ours = renderer.render(scene=scene, camera=case.camera).image
-    exposure = renderer.exposure(scene, scene.camera(case.camera)).factor
+    exposure = renderer.exposure(scene, scene.camera(case.camera))
     expected = 255 * image_error.displayed(reference.radiance[FILTERS["high"]], exposure)
     difference = (expected - ours)[reference.inside]
     assert np.abs(difference).mean() < apart

@@ -200,7 +200,7 @@ def test_after_preload_no_scene_builds_a_shape_or_loads_a_light(monkeypatch):
         def never(*_: object, **__: object) -> None:
             raise AssertionError("made after preload")
 
-        for made in ("shapes.GpuMesh", "shapes.zone_table", "renderer.GpuLight"):
+        for made in ("shapes.GpuMesh", "shapes.zone_table", "scene_lights.GpuLight"):
             monkeypatch.setattr(f"fastgen.render.{made}", never)
         monkeypatch.setattr("fastgen.render.sky_visibility_probe.encoded_cones", never)
         monkeypatch.setattr("fastgen.files.disk_cache.cached", never)

@@ -26,10 +26,12 @@ def digest(state):
 def with_floats(value):
     """Turn all numbers into floats, as one state may have 12 and the other 12.0.
 
-    The configuration and the digests of a curriculum's configurations are dropped.
+    The configuration, the digests of a curriculum's configurations and those of container maps,
+    which version 0.23 had not, are dropped.
     """
     if isinstance(value, dict):
-        kept = {key: item for key, item in value.items() if key not in ("config", "curriculum")}
+        dropped = ("config", "curriculum", "containers")
+        kept = {key: item for key, item in value.items() if key not in dropped}
         return {key: with_floats(item) for key, item in kept.items()}
     if isinstance(value, list | tuple):
         return [with_floats(item) for item in value]

@@ -170,7 +170,9 @@ def test_bleached_paint_is_lighter_and_greyer_and_uneven(bare):
 def test_patches_are_paint_beside_all_other_decals():
     scenes = []
     for number in (0, 2):
-        values = {"markings": {"patches_per_face": [number, number]}}
+        # runs and old codes depend on the other decals of their face
+        others = {"runs": 0, "identifiers": {"painted_over": 0}}
+        values = {"markings": {"patches_per_face": [number, number], **others}}
         scenes.append(Config.from_values(values))
     without, with_patches = ([sample(config, index) for index in range(6)] for config in scenes)
     patches = 0

@@ -46,6 +46,8 @@ CONFIG = Config.from_values(
         },  # smallest textures; the ends are the same for all sizes
         "environment": {"names": list(LIGHTS)},
         "cameras": {name: {"focal_mm": 62.0} for name in CAMERAS},
+        # these may lie over or under other decals
+        "markings": {"runs": 0.0, "identifiers": {"painted_over": 0.0}},
     }
 )
 

@@ -59,9 +59,10 @@ def check_scene(scene: Any) -> Scene:
     damages = [*scene.damages, *(damage for each in scene.neighbours for damage in each.damages)]
     for kind, count in Counter(damage.kind for damage in damages).items():
         if count > MAX_INSTANCES:
+            whose = " with those of neighbours" if scene.neighbours else ""
             raise ConfigError(
-                f"scene.damages: {count} of kind {kind} with those of neighbours; mask values "
-                f"distinguish only {MAX_INSTANCES}, remove some"
+                f"scene.damages: {count} of kind {kind}{whose}; mask values distinguish only "
+                f"{MAX_INSTANCES}, remove some"
             )
     check_places(scene)
     for i, camera in enumerate(scene.cameras):
