@@ -327,3 +327,14 @@ def each_enters(points, rays, box):
         ends = np.sort([(-box.half_mm - start) / along, (box.half_mm - start) / along], axis=0)
     near, far = ends[0].max(axis=1), ends[1].min(axis=1)
     return (near < far) & (far > 1e-3)
+
+
+def test_a_container_that_passes_the_camera_is_not_ignored(generator, scene):
+    """Beside the camera its projection has no end, so nearly all of it is outside the image."""
+    camera = Camera("beside", (0.0, -2600.0, 1500.0), (2000.0, -1219.0, 1200.0), 24.0)
+    sample = generator.render(scene=scene, camera=camera)
+    first = sample.objects[0]
+    assert first.class_name == "container"
+    assert first.area > 0.3 * SIZE[0] * SIZE[1]
+    assert first.visible_fraction < 0.05
+    assert not first.ignored

@@ -259,7 +259,8 @@ class LabelConfig:
         min_visible_px: Objects with fewer visible pixels are marked as ignored. Formats with ignore
             regions list them as such; other formats leave them out.
         min_visible_fraction: Objects with a smaller visible fraction are ignored as well. The
-            fraction is relative to their pixels if nothing hid them.
+            fraction is relative to their pixels if nothing hid them, or to the pixels of the image
+            if these are fewer.
         min_text_px: Height below which a text is not a legible crop.
         background: Containers of the panorama, which are known in the bundled ports. "ignore" marks
             them as ignored, "label" labels them as containers, "none" leaves them out, as the paper

@@ -62,9 +62,8 @@ def background_objects(
             continue
         area = int(areas[number - 1])
         group = number > containers.count
-        facts = visibility(
-            shot.config, area, 0 if group else int(whole[number]) - area, beyond.get(number, 0)
-        )
+        hidden = 0 if group else int(whole[number]) - area
+        facts = visibility(shot.config, shot.view.size, area, hidden, beyond.get(number, 0))
         facts["ignored"] |= group or shot.config.labels.background == "ignore"
         objects.append(
             Object(

@@ -42,7 +42,7 @@ def damage_objects(shot: Shot) -> list[Object]:
                 bbox=bbox,
                 amodal_bbox=amodal_bbox,
                 area=int(area),
-                **visibility(shot.config, int(area), hidden, beyond),
+                **visibility(shot.config, shot.view.size, int(area), hidden, beyond),
             )
         )
     return objects

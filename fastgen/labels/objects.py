@@ -137,7 +137,9 @@ def _decals(shot: Shot) -> list[Object]:
                 quad=tuple(quads[row]) if before[row] else (),
                 reading=("vertical" if decal.vertical else "horizontal") if decal.text else "",
                 parts=tuple(parts.get(row, ())) if before[row] else (),
-                **visibility(shot.config, area, hidden[row], int(alone.beyond[row])),
+                **visibility(
+                    shot.config, shot.view.size, area, hidden[row], int(alone.beyond[row])
+                ),
             )
         )
     return objects
@@ -182,7 +184,7 @@ def _container(shot: Shot) -> Object:
     hidden = 0 if shot.hiding is None or asked is None else int(alone.shown(shot.hiding)[0])
     castings, polygon = _castings(shot, corners)
     (amodal_bbox,) = float_boxes(bounds[None])
-    told = visibility(shot.config, area, hidden, int(alone.beyond[0]))
+    told = visibility(shot.config, shot.view.size, area, hidden, int(alone.beyond[0]))
     if area and ((bounds[:2] < 0).any() or (bounds[2:] > view.size).any()):
         told["truncated"] = True  # damage bulges out of the box
     return Object(
@@ -218,7 +220,7 @@ def _spreader(shot: Shot) -> list[Object]:
             bbox=shot.spreader_box,
             amodal_bbox=bounds[0],
             area=area,
-            **visibility(shot.config, area, hidden, int(alone.beyond[0])),
+            **visibility(shot.config, shot.view.size, area, hidden, int(alone.beyond[0])),
         )
     ]
 

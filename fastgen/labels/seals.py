@@ -40,7 +40,9 @@ def seal_objects(shot: Shot) -> list[Object]:
             amodal_bbox=bounds[i],
             area=int(areas[i]),
             keypoints=(middles[i],),
-            **visibility(shot.config, int(areas[i]), int(hidden[i]), int(beyond[i])),
+            **visibility(
+                shot.config, shot.view.size, int(areas[i]), int(hidden[i]), int(beyond[i])
+            ),
         )
         for i in range(count)
     ]

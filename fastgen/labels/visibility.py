@@ -112,23 +112,30 @@ class Visibility(TypedDict):
     ignored: bool
 
 
-def visibility(config: Config, area: int, hidden: int, beyond: int) -> Visibility:
+def visibility(
+    config: Config, size: tuple[int, int], area: int, hidden: int, beyond: int
+) -> Visibility:
     """Return the visibility members of an object.
+
+    An object with more pixels than the image counts as large as the image where its fraction
+    decides whether it is ignored. Beside a camera, a container may have thousands of times as many.
 
     Args:
         config: Configuration with the label rules.
+        size: (width, height) of the image in pixels.
         area: Visible pixels of the object.
         hidden: Other pixels of the image that the object would cover alone.
         beyond: Pixels outside the image that the object would cover alone.
     """
     whole = area + hidden + beyond
     fraction = area / whole if whole else 0.0
-    rules = config.labels
+    rules, image = config.labels, size[0] * size[1]
+    shown = area / min(whole, image) if whole else 0.0
     return {
         "visible_fraction": fraction,
         "truncated": bool(area) and beyond > 0,
         "occluded": bool(area) and hidden > max(_EDGE_PX, _EDGE_SHARE * (area + hidden)),
-        "ignored": area < rules.min_visible_px or fraction < rules.min_visible_fraction,
+        "ignored": area < rules.min_visible_px or shown < rules.min_visible_fraction,
     }
 
 
