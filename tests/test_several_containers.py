@@ -8,7 +8,12 @@ import pytest
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.geometry.container import build_container
-from fastgen.light.environment import load_environment, sky_irradiance, to_map_frame
+from fastgen.light.environment import (
+    load_environment,
+    lower_irradiance,
+    sky_irradiance,
+    to_map_frame,
+)
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.sky_visibility import sky_directions
 from fastgen.light.surrounding_light import Paving, _lattice, surrounding_light
@@ -296,7 +301,8 @@ def test_light_off_the_ground_equals_a_monte_carlo_integral(gap_mm):
     points = points + boxes[0].center_mm
     walls = np.flatnonzero((normals[:, 2] == 0) & (points[:, 2] > 20))
     sun = to_map_frame(light.lights[0].direction, -yaw_deg)
-    of_sky, of_nadir = sky_irradiance(light, [[0, 0, 1.0], [0, 0, -1.0]], yaw_deg)
+    (of_sky,) = sky_irradiance(light, [[0, 0, 1.0]], yaw_deg)
+    below = lower_irradiance(light, normals, yaw_deg)
     rng = np.random.default_rng(1)
     around = rng.normal(size=(3000, 3))
     around /= np.linalg.norm(around, axis=1, keepdims=True)
@@ -313,7 +319,7 @@ def test_light_off_the_ground_equals_a_monte_carlo_integral(gap_mm):
         shade = np.any([each_enters(at, np.tile(sun, (len(at), 1)), box) for box in boxes], axis=0)
         lit = of_sky * ~shut[:, None] + np.array(light.lights[0].light) * sun[2] * ~shade[:, None]
         whole = sky_irradiance(light, normals[number : number + 1], yaw_deg)[0]
-        above = (np.isinf(met) & (toward[:, 2] >= 0)).mean() * (2 * whole - of_nadir)
+        above = (np.isinf(met) & (toward[:, 2] >= 0)).mean() * 2 * (whole - below[number])
         expected = (above + albedo * lit.sum(axis=0) / len(around)) / whole
         apart.append(found.factor[number] - expected)
     assert np.abs(apart).mean() < 0.03

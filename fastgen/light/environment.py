@@ -277,6 +277,15 @@ def sky_radiance(env: Ambient, directions: ArrayLike, yaw_deg: float) -> NDArray
     return (total / np.bincount(nearest, solid_angle, count)[:, None]).astype(np.float32)
 
 
+def lower_irradiance(env: Ambient, normals: ArrayLike, yaw_deg: float) -> NDArray[np.float32]:
+    """Return the part of `sky_irradiance` that comes from below the horizon, float32 [K, 3]."""
+    cells, solid_angle = _sky_geometry(env.sky.shape[0])
+    facing = np.maximum(to_map_frame(normals, yaw_deg) @ cells.T, 0.0) * solid_angle
+    radiance = env.sky.reshape(-1, 3)
+    part = (facing * (cells[:, 2] < 0)) @ radiance / np.maximum(facing @ radiance, 1e-9)
+    return np.asarray(sky_irradiance(env, normals, yaw_deg) * part, np.float32)
+
+
 @functools.cache
 def _sky_geometry(size: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return octahedral_texels as float32."""

@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.geometry.mesh import Mesh
-from fastgen.light.environment import Ambient, sky_irradiance, to_map_frame
+from fastgen.light.environment import (
+    Ambient,
+    lower_irradiance,
+    sky_irradiance,
+    to_map_frame,
+)
 from fastgen.light.ground_light import form_factors
 from fastgen.light.sky_visibility import sky_directions
 from fastgen.scene.boxes import OrientedBox
@@ -166,7 +171,11 @@ def surrounding_light(
             factor = 1 - hidden[:, None] + bounced / whole
         else:
             share, ground = _from_ground(points, toward, i, boxes, faces, light, yaw_deg, paving)
-            above = _from_above(toward, whole, hidden, share, light, yaw_deg)
+            lower = (1 - toward[:, 2]) / 2
+            # boxes cover what is below the horizon and not ground
+            open_ = 1 - (hidden - (lower - share)) / np.maximum(1 - lower, 1e-6)
+            upper = whole - _lower_by_face(light, box, normals, yaw_deg)
+            above = np.clip(open_, 0.0, 1.0)[:, None] * np.maximum(upper, 0.0)
             factor = (above + ground + bounced) / whole
         bits = _open_bits(points, box, [boxes[j] for j in others])
         found.append(SurroundingLight(np.maximum(factor, 0.02).astype(np.float32), bits))
@@ -243,25 +252,11 @@ def _from_lights(
     return found
 
 
-def _from_above(
-    toward: Array, whole: Array, hidden: Array, ground: Array, light: Ambient, yaw_deg: float
-) -> Array:
-    """Return the irradiance / pi [P, 3] from above the horizon that no box hides.
-
-    Args:
-        toward: Normals [P, 3].
-        whole: Irradiance / pi [P, 3] in the open, also from below the horizon.
-        hidden: Share [P] of the hemispheres that boxes cover.
-        ground: Share [P] of the hemispheres in which the ground is seen.
-        light: The environment.
-        yaw_deg: Its rotation.
-    """
-    lower = (1 - toward[:, 2]) / 2
-    below = sky_irradiance(light, [[0.0, 0.0, -1.0]], yaw_deg)
-    upper = np.maximum(whole - lower[:, None] * below, 0.0)
-    # boxes cover what is below the horizon and not ground
-    seen = 1 - (hidden - (lower - ground)) / np.maximum(1 - lower, 1e-6)
-    return np.clip(seen, 0.0, 1.0)[:, None] * upper
+def _lower_by_face(light: Ambient, box: OrientedBox, normals: Array, yaw_deg: float) -> Array:
+    """Return the irradiance / pi [P, 3] from below the horizon, for normals [P, 3] of a box."""
+    of_axes = np.concatenate([-np.eye(3), np.eye(3)])
+    found = lower_irradiance(light, of_axes @ box.rotation.T, yaw_deg)
+    return np.asarray(found[(of_axes @ normals.T).argmax(axis=0)], np.float64)
 
 
 def _from_ground(
