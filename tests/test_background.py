@@ -335,3 +335,17 @@ def test_a_map_of_another_kind_is_refused(tmp_path, numbers):
     Image.fromarray(numbers).save(tmp_path / "a.containers.png")
     with pytest.raises(AssetError, match=r"a\.containers\.png"):
         load_container_map(tmp_path / "a.exr")
+
+
+def test_cameras_of_all_pitches_and_sizes_see_what_the_map_has_along_their_rays():
+    path = bundled_hdris()["port_noon"]
+    containers, numbers = load_container_map(path), whole_map("port_noon")
+    assert containers is not None
+    for size in ((97, 61), (64, 200), (320, 240)):
+        for pitch in np.arange(-87.0, 88.0, 3.5):
+            rise = 10000.0 * np.tan(np.deg2rad(pitch))
+            camera = Camera("c", (0, -9000, 1500), (3000, 1000, 1500 + float(rise)), 24.0)
+            view = view_of(camera, size)
+            found = around(view, containers, 25.0)[1:-1, 1:-1]
+            wanted = looked_up(numbers, *texels(numbers, view, 25.0))
+            assert (found != wanted).mean() < 0.02

@@ -118,6 +118,8 @@ def around(view: View, containers: ContainerMap, yaw_deg: float) -> NDArray[np.u
         return found
     first, limit = max(box[1] - 1, 0), min(box[3] + 1, len(y))
     top, bottom = first * step, min((limit - 2) * step, height)
+    if top >= bottom:  # only nodes below the image are near
+        return found
     inner = slice(step, step + bottom - top), slice(step, step + width)
     middle, _ = containers.texels(view.rotation[2], yaw_deg)
     least = middle - containers.width / 2
