@@ -22,7 +22,7 @@ from fastgen.light.environment import (
     to_map_frame,
 )
 from fastgen.light.ground_light import form_factors
-from fastgen.light.sky_visibility import sky_directions
+from fastgen.light.sky_visibility import Sky, sky_directions
 from fastgen.scene.boxes import OrientedBox
 
 _STEP_MM = 1000.0
@@ -170,7 +170,9 @@ def surrounding_light(
         if paving is None:
             factor = 1 - hidden[:, None] + bounced / whole
         else:
-            share, ground = _from_ground(points, toward, i, boxes, faces, light, yaw_deg, paving)
+            share, ground = _from_ground(
+                points, toward, i, boxes, faces, Sky(light, yaw_deg), paving
+            )
             lower = (1 - toward[:, 2]) / 2
             # boxes cover what is below the horizon and not ground
             open_ = 1 - (hidden - (lower - share)) / np.maximum(1 - lower, 1e-6)
@@ -265,8 +267,7 @@ def _from_ground(
     number: int,
     boxes: Sequence[OrientedBox],
     faces: Sequence[_Faces],
-    light: Ambient,
-    yaw_deg: float,
+    sky: Sky,
     paving: Paving,
 ) -> tuple[Array, Array]:
     """Return the share [P] of the hemispheres in which box `number` sees ground, and its light.
@@ -275,6 +276,7 @@ def _from_ground(
     of all level ground within the distance d. Rays straight ahead to the quantiles of this share
     have equal weights.
     """
+    light, yaw_deg = sky.light, sky.yaw_deg
     up = np.array([0.0, 0.0, 1.0])
     lower = (1 - toward[:, 2]) / 2
     height = np.maximum(points[:, 2] - paving.height_mm, 1.0)
