@@ -113,7 +113,7 @@ def loss(whole: Reference, stored: Reference) -> float:
     """Return the largest mean FLIP over object pixels between the traced and the stored images."""
     pairs = (
         [displayed(reference.radiance[name], whole.exposure) for reference in (whole, stored)]
-        for name in whole.radiance
+        for name in stored.radiance
     )
     return max(Comparison.of(*pair).both(whole.inside)[3] for pair in pairs)
 
