@@ -14,7 +14,6 @@ from fastgen.light.ground_light import LOW_GAP_M, form_factors, ground_light
 from fastgen.light.hdri import bundled_hdris
 from fastgen.render.gl import open_context
 from fastgen.render.ground_regions import ground_regions
-from fastgen.render.ground_values import prop_box
 from fastgen.sampling.ground import trailer_props, wagon_props
 from fastgen.scene import (
     Camera,
@@ -26,7 +25,7 @@ from fastgen.scene import (
     Prop,
     Spreader,
 )
-from fastgen.scene.boxes import container_box
+from fastgen.scene.boxes import container_box, prop_box
 from fastgen.scene.check import check_scene
 from fastgen.scene.optics import Weather
 from tests import glsl, oracle

@@ -14,20 +14,20 @@ from typing import Annotated, Any
 import yaml
 from annotated_types import MinLen
 
-from fastgen import srgb
 from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
+from fastgen.config.fields import HexColors, Weight
 from fastgen.config.lamps import LampsConfig
 from fastgen.config.markings import MarkingsConfig
 from fastgen.config.presets import PRESETS
 from fastgen.config.sensor import SensorConfig, WeatherConfig
+from fastgen.config.surface import SurfaceConfig
 from fastgen.config.surroundings import GroundConfig, PlacementConfig
 from fastgen.config.yaml_values import loaded
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
-from fastgen.scene.limits import GAP_LIMITS_MM, ILLUMINANCE_LIMITS_LX, MIN_ROUGHNESS
+from fastgen.scene.limits import GAP_LIMITS_MM, ILLUMINANCE_LIMITS_LX
 from fastgen.validation import (
-    UNIT,
     Bounds,
     Matching,
     OneOf,
@@ -39,12 +39,6 @@ from fastgen.validation import (
     to_plain,
 )
 
-_Color = Annotated[str, Matching("#?[0-9a-fA-F]{6}", "is not a color; write it as '#rrggbb'")]
-_Colors = Annotated[tuple[_Color, ...], MinLen(1)]
-_Reach = Annotated[Range, Bounds(1.0, 1e6, "mm")]
-_Roughness = Annotated[Range, Bounds(MIN_ROUGHNESS, 1.0)]
-_Size = Annotated[Range, Bounds(50, 1e5, "mm")]
-_Weight = Annotated[float, Bounds(0.0, 1e6)]
 _CameraName = Annotated[
     str,
     Matching(
@@ -52,90 +46,6 @@ _CameraName = Annotated[
         "is not a camera name; it is used in file names, so give up to 64 letters, digits, - and _",
     ),
 ]
-
-
-@dataclass(frozen=True)
-class SurfaceConfig:
-    """Paint and its ageing (SeaFront paper, section 3.2), layer by layer as in its Fig. 5.
-
-    Attributes:
-        colors: Colors of undamaged paint by name.
-        color_weights: Relative frequency of each color; 1 for a color that is not named. Names that
-            are not in `colors` have no effect, so a file may replace a preset's colors alone.
-        roughness: Perceptual GGX roughness of undamaged paint.
-        tone_variation: Variation of the paint's tone over a side.
-        bleach: Loss of colour to the sun, in uneven columns and most on the roof.
-        ageing_strength: Strength of the darkening toward the corners of each panel.
-        ageing_reach_mm: Distance from a corner up to which it is visible.
-        dirt_strength: Strength of the deposit along edges.
-        dirt_reach_mm: Distance from an edge up to which it is visible.
-        dirt_color: Color of the deposit.
-        dirt_streaks: Strength of the dark streaks that run down from upper edges.
-        rust_coverage: Share of the sheet that is rusty, not counting rust runs, scrapes and
-            damages. Most of it lies along edges, above all the lower ones, and little on open
-            panels; frame and castings are rustier. The drawn position in the range is squared, so
-            low values prevail.
-        rust_scale_mm: Size of the patches.
-        rust_colors: Colors of the rust; all are equally likely.
-        rust_roughness: Perceptual GGX roughness of rust.
-        scratch_coverage: Share of the sheet under fine bright scratches; values above 0.1 add no
-            more.
-        scrapes: Share of the steel that forks and spreaders have scraped, at their heights on walls
-            and doors, on the outer flats of the corrugation. On rusty containers scrapes rust.
-        wear_strength: Unevenness of the paint's reflection.
-        wear_scale_mm: Size of the noise of wear, scratches and dirt.
-    """
-
-    colors: Annotated[dict[str, _Color], MinLen(1)] = field(
-        default_factory=lambda: {
-            "oxide red": "#6b2a22",
-            "maroon": "#57202a",
-            "rust brown": "#6e3b26",
-            "signal blue": "#1f4e84",
-            "navy": "#1c2c48",
-            "sky blue": "#4a86ad",
-            "turquoise": "#24777a",
-            "sea green": "#2a6650",
-            "leaf green": "#3c7a45",
-            "olive": "#5a5d3c",
-            "traffic orange": "#c4561f",
-            "amber": "#d08a22",
-            "cream": "#c9bfa2",
-            "light grey": "#a3a6a6",
-            "mid grey": "#6d7276",
-            "white": "#d2d3ce",
-            "magenta": "#9a2b62",
-            "charcoal": "#3a3d40",
-        }
-    )
-    color_weights: dict[str, _Weight] = field(default_factory=dict)
-    roughness: _Roughness = Range(0.38, 0.62)
-    tone_variation: Annotated[Range, UNIT] = Range(0.02, 0.12)
-    bleach: Annotated[Range, UNIT] = Range(0.0, 0.6)
-    ageing_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
-    ageing_reach_mm: _Reach = Range(300, 1100)
-    dirt_strength: Annotated[Range, UNIT] = Range(0.05, 0.55)
-    dirt_reach_mm: _Reach = Range(60, 320)
-    dirt_color: _Color = "#a8a59c"
-    dirt_streaks: Annotated[Range, UNIT] = Range(0.0, 0.7)
-    rust_coverage: Annotated[Range, UNIT] = Range(0.0, 0.12)
-    rust_scale_mm: _Size = Range(500, 1400)
-    rust_colors: _Colors = ("#5e3823", "#6e4529", "#4d2c20", "#7a4f30")
-    rust_roughness: _Roughness = Range(0.8, 0.95)
-    scratch_coverage: Annotated[Range, UNIT] = Range(0.0, 0.003)
-    scrapes: Annotated[Range, UNIT] = Range(0.0, 0.3)
-    wear_strength: Annotated[Range, UNIT] = Range(0.1, 0.6)
-    wear_scale_mm: _Size = Range(700, 2500)
-
-    def __post_init__(self) -> None:
-        """Refuse colors without any weight."""
-        if sum(self.weights) <= 0:
-            raise ConfigError("color_weights: all colors have weight 0; give at least one above 0")
-
-    @property
-    def weights(self) -> list[float]:
-        """Relative frequency of each color, in the order of `colors`."""
-        return [self.color_weights.get(name, 1.0) for name in self.colors]
 
 
 @dataclass(frozen=True)
@@ -151,7 +61,7 @@ class ContainerConfig:
             spreader, and have no labels.
     """
 
-    kinds: dict[Annotated[str, OneOf(tuple(KINDS))], _Weight] = field(
+    kinds: dict[Annotated[str, OneOf(tuple(KINDS))], Weight] = field(
         default_factory=lambda: {"20": 0.3, "40": 0.25, "40HC": 0.35, "45HC": 0.1}
     )
     profiles: WallProfiles = field(default_factory=WallProfiles)
@@ -186,7 +96,7 @@ class EnvironmentConfig:
     """
 
     names: tuple[str, ...] = ()
-    weights: dict[str, _Weight] = field(default_factory=dict)
+    weights: dict[str, Weight] = field(default_factory=dict)
     yaw_deg: Annotated[Range, Bounds(-360.0, 360.0, "degrees")] = Range(0, 360)
     illuminance_lx: dict[str, Annotated[float, Bounds(*ILLUMINANCE_LIMITS_LX, "lx")]] = field(
         default_factory=dict
@@ -221,7 +131,7 @@ class SpreaderConfig:
     """
 
     probability: Share = 0.9
-    colors: _Colors = ("#d9a514", "#e0b428", "#c9661b", "#b8321f", "#a8541c", "#8f9396")
+    colors: HexColors = ("#d9a514", "#e0b428", "#c9661b", "#b8321f", "#a8541c", "#8f9396")
     flippers_down: Share = 0.6
     gap_mm: Annotated[Range, Bounds(*GAP_LIMITS_MM, "mm")] = Range(10, 30)
 
@@ -241,10 +151,10 @@ class SealsConfig:
     probability: Share = 0.0
     second: Share = 0.25
     hanging: Share = 0.15
-    kinds: dict[Annotated[str, OneOf(("bolt", "cable"))], _Weight] = field(
+    kinds: dict[Annotated[str, OneOf(("bolt", "cable"))], Weight] = field(
         default_factory=lambda: {"bolt": 0.7, "cable": 0.3}
     )
-    colors: _Colors = ("#e3b013", "#e9e9e4", "#1f7a3d", "#c02a22", "#1f4fa0", "#d8661c")
+    colors: HexColors = ("#e3b013", "#e9e9e4", "#1f7a3d", "#c02a22", "#1f4fa0", "#d8661c")
 
     def __post_init__(self) -> None:
         """Refuse kinds without any weight."""
@@ -409,9 +319,3 @@ def _with_room(config: Config) -> Config:
         check_room(name, rig, kinds, config.damage.bulge_mm)
         check_above_ground(name, rig, config.placement.grounded, config.damage.bulge_mm)
     return config
-
-
-def linear_color(text: str) -> tuple[float, float, float]:
-    """Return the linear Rec. 709 albedo of an sRGB hex color such as '#1f4e84'."""
-    red, green, blue = (srgb.linear(code / 255) for code in bytes.fromhex(text.removeprefix("#")))
-    return red, green, blue

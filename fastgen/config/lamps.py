@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import MinLen
-
+from fastgen.config.fields import HexColors
 from fastgen.scene.limits import MAX_LAMPS
 from fastgen.scene.optics import LAMP_LIMITS_LX
-from fastgen.validation import Bounds, Matching, Range, Share
+from fastgen.validation import Bounds, Range, Share
 
 
 @dataclass(frozen=True)
@@ -30,10 +29,4 @@ class LampsConfig:
     illuminance_lx: Annotated[Range, Bounds(*LAMP_LIMITS_LX, "lx")] = Range(30, 200)
     elevation_deg: Annotated[Range, Bounds(1.0, 90.0, "degrees")] = Range(20, 70)
     azimuth_deg: Annotated[Range, Bounds(-360.0, 360.0, "degrees")] = Range(0, 360)
-    colors: Annotated[
-        tuple[
-            Annotated[str, Matching("#?[0-9a-fA-F]{6}", "is not a color; write it as '#rrggbb'")],
-            ...,
-        ],
-        MinLen(1),
-    ] = ("#fff4e8", "#eef3ff", "#ffca8a")
+    colors: HexColors = ("#fff4e8", "#eef3ff", "#ffca8a")

@@ -5,16 +5,15 @@ from typing import Annotated
 
 from annotated_types import MinLen
 
+from fastgen.config.fields import HexColors, Weight
 from fastgen.scene.limits import GROUNDS, LOWEST_GROUND_MM, MAX_NEIGHBOURS
-from fastgen.validation import UNIT, Bounds, Matching, OneOf, Range, Share, check_weights
+from fastgen.validation import UNIT, Bounds, OneOf, Range, Share, check_weights
 
 ARRANGEMENTS = ("alone", "lifted", "standing", "row", "stack", "trailer", "wagon", "twin")
 """Arrangements of a scene's containers."""
 
-_Weight = Annotated[float, Bounds(0.0, 1e6)]
 _Gap = Annotated[Range, Bounds(0.0, 20000.0, "mm")]
 _Albedo = Annotated[Range, UNIT]
-_Color = Annotated[str, Matching("#?[0-9a-fA-F]{6}", "is not a color; write it as '#rrggbb'")]
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,7 @@ class PlacementConfig:
         same_paint: Probability that a neighbour has the color of the container.
     """
 
-    arrangements: dict[Annotated[str, OneOf(ARRANGEMENTS)], _Weight] = field(
+    arrangements: dict[Annotated[str, OneOf(ARRANGEMENTS)], Weight] = field(
         default_factory=lambda: {"alone": 1.0}
     )
     neighbours: Annotated[tuple[int, int], Bounds(0, MAX_NEIGHBOURS)] = (1, 4)
@@ -117,7 +116,7 @@ class GroundConfig:
         reach_mm: Horizontal distance at which the HDRI has replaced the ground.
     """
 
-    kinds: Annotated[dict[Annotated[str, OneOf(GROUNDS)], _Weight], MinLen(1)] = field(
+    kinds: Annotated[dict[Annotated[str, OneOf(GROUNDS)], Weight], MinLen(1)] = field(
         default_factory=lambda: {"asphalt": 0.5, "concrete": 0.25, "paving": 0.25}
     )
     asphalt: _Albedo = Range(0.05, 0.16)
@@ -128,7 +127,7 @@ class GroundConfig:
     wear: _Albedo = Range(0.2, 1.0)
     line_probability: Share = 0.5
     line_paint: _Albedo = Range(0.1, 0.9)
-    line_colors: Annotated[tuple[_Color, ...], MinLen(1)] = ("#dcdcd4", "#d8b23c")
+    line_colors: HexColors = ("#dcdcd4", "#d8b23c")
     line_spacing_mm: Annotated[Range, Bounds(200.0, 1e5, "mm")] = Range(3000, 4500)
     line_yaw_deg: Annotated[Range, Bounds(-180.0, 180.0, "degrees")] = Range(-4, 4)
     reach_mm: Annotated[Range, Bounds(2000.0, 1.5e5, "mm")] = Range(25000, 60000)

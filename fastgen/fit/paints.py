@@ -5,7 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.config.config import SurfaceConfig, linear_color
+from fastgen.config.fields import linear_color
+from fastgen.config.surface import SurfaceConfig
 from fastgen.fit.statistics import Pixels, planes_of, sky_like
 from fastgen.srgb import DECODED
 

@@ -163,8 +163,11 @@ def surrounding_light(
         points = box.center_mm + (local + middle) @ box.rotation.T
         toward = normals @ box.rotation.T
         others = [j for j in range(len(boxes)) if j != i]
-        hidden, bounced = _seen(
-            points, toward, [faces[j] for j in others], [radiance[j] for j in others]
+        covered = _covered(points, toward, [faces[j] for j in others])
+        hidden = covered.sum(axis=(0, 1))
+        bounced = sum(
+            (part.T @ radiance[j] for part, j in zip(covered, others, strict=True)),
+            np.zeros((len(points), 3)),
         )
         whole = np.maximum(sky_irradiance(light, toward, yaw_deg), 1e-9)
         if paving is None:
@@ -207,20 +210,16 @@ class _Faces(NamedTuple):
         return _Faces(every, np.array(normals), every.mean(axis=1))
 
 
-def _seen(
-    points: Array, toward: Array, faces: Sequence[_Faces], radiance: Sequence[Array]
-) -> tuple[Array, Array]:
-    """Return the share [P] of the hemispheres that boxes cover, and the light off them [P, 3]."""
-    hidden, bounced = np.zeros(len(points)), np.zeros((len(points), 3))
-    for each, shone in zip(faces, radiance, strict=True):
+def _covered(points: Array, toward: Array, faces: Sequence[_Faces]) -> Array:
+    """Return the form factors [B, 6, P] of the faces of boxes at points with normals [P, 3]."""
+    found = np.zeros((len(faces), 6, len(points)))
+    for factor, each in zip(found, faces, strict=True):
         apart = each.corners[:, :, None] - points  # [6, 4, P, 3]
         vectors = form_factors(apart.transpose(3, 1, 0, 2).reshape(3, 4, -1)).reshape(3, 6, -1)
-        factor = np.maximum(np.einsum("cfp,pc->fp", vectors, toward), 0.0)
+        factor[:] = np.maximum(np.einsum("cfp,pc->fp", vectors, toward), 0.0)
         factor[((points - each.middles[:, None]) * each.normals[:, None]).sum(axis=-1) <= 0] = 0.0
-        hidden += factor.sum(axis=0)
-        bounced += factor.T @ shone
-    scale = np.minimum(1.0, _MOST_HIDDEN / np.maximum(hidden, 1e-9))
-    return hidden * scale, bounced * scale[:, None]
+    found *= np.minimum(1.0, _MOST_HIDDEN / np.maximum(found.sum(axis=(0, 1)), 1e-9))
+    return found
 
 
 def _face_radiance(
@@ -234,9 +233,8 @@ def _face_radiance(
     own = faces[number]
     start = own.middles + _LIFT_MM * own.normals
     others = [each for j, each in enumerate(faces) if j != number]
-    dark = [np.zeros((6, 3))] * len(others)
-    hidden, _ = _seen(start, own.normals, others, dark)
-    found = sky_irradiance(light, own.normals, yaw_deg) * (1 - hidden[:, None])
+    hidden = _covered(start, own.normals, others).sum(axis=(0, 1))
+    found: Array = sky_irradiance(light, own.normals, yaw_deg) * (1 - hidden[:, None])
     return found + _from_lights(start, own.normals, boxes, light, yaw_deg)
 
 
@@ -289,9 +287,8 @@ def _from_ground(
     seen = np.broadcast_to(lower > 0, away.shape)
     for other, box in enumerate(boxes):
         if other != number:
-            seen = seen & ~_between(points, ends, box)
+            seen = seen & ~box.between(points, ends)
     share, found = np.zeros(len(points)), np.zeros((len(points), 3))
-    dark = [np.zeros((6, 3))] * len(faces)
     for reached, shown in zip(away, seen, strict=True):
         part = shown.mean(axis=0)
         some = np.flatnonzero(part)
@@ -299,7 +296,7 @@ def _from_ground(
         at = points[some] + middle[:, None] * level[some]
         at[:, 2] = paving.height_mm + _LIFT_MM
         normals = np.broadcast_to(up, at.shape)
-        hidden, _ = _seen(at, normals, faces, dark)
+        hidden = _covered(at, normals, faces).sum(axis=(0, 1))
         lit = sky_irradiance(light, normals, yaw_deg) * (1 - hidden[:, None])
         lit = lit + _from_lights(at, normals, boxes, light, yaw_deg)
         weight = part[some] * lower[some] / _GROUND_POINTS
@@ -317,27 +314,7 @@ def _open_bits(points: Array, box: OrientedBox, others: Sequence[OrientedBox]) -
     return np.packbits(~hidden, axis=1)
 
 
-def _between(points: Array, ends: Array, box: OrientedBox) -> NDArray[np.bool_]:
-    """Return whether a box is on the straight way from points [P, 3] to ends [..., P, 3]."""
-    start = (points - box.center_mm) @ box.rotation
-    way = (ends - points) @ box.rotation
-    way = np.where(np.abs(way) < 1e-9, 1e-9, way)
-    middle, reach = -start / way, box.half_mm / np.abs(way)
-    near, far = (middle - reach).max(axis=-1), (middle + reach).min(axis=-1)
-    found: NDArray[np.bool_] = (near < far) & (far > 0) & (near < 1)
-    return found
-
-
 def _meets(points: Array, toward: Array, box: OrientedBox) -> NDArray[np.bool_]:
     """Return whether rays from P points in D directions meet a box, bool [P, D]."""
-    start = (points - box.center_mm) @ box.rotation
-    along = toward @ box.rotation
-    along = np.where(np.abs(along) < 1e-9, 1e-9, along)
-    near = np.full((len(points), len(toward)), 0.0)
-    far = np.full((len(points), len(toward)), np.inf)
-    for axis in range(3):
-        middle = -start[:, axis, None] / along[:, axis]
-        reach = box.half_mm[axis] / np.abs(along[:, axis])
-        near = np.maximum(near, middle - reach)
-        far = np.minimum(far, middle + reach)
-    return near < far
+    enters, leaves = box.crossed(points[:, None], toward[None])
+    return np.asarray(np.maximum(enters, 0.0) < leaves)

@@ -11,11 +11,10 @@ from fastgen.camera.projection import View
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
-from fastgen.render.ground_values import prop_box
 from fastgen.render.regions import Region, merged, outside, region_of, within
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop, Scene
-from fastgen.scene.boxes import OrientedBox
+from fastgen.scene.boxes import OrientedBox, prop_box
 
 _BLOCK_PX = 16
 """Height of the blocks of rows in which it is decided what to draw."""

@@ -9,7 +9,7 @@ from fastgen.geometry.prepared_scene import Member
 from fastgen.light.ground_light import GRID, LOW_GAP_M, GroundLight
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.scene import Ground, Prop
-from fastgen.scene.boxes import OrientedBox, rotation_of
+from fastgen.scene.boxes import prop_box
 from fastgen.scene.limits import MM
 
 _STAINED = 0.045
@@ -22,12 +22,6 @@ _LEAST_GAP_M = 1e-3
 
 _FAR_BELOW_M = -1e4
 """Height of boxes that a program has but the scene has not."""
-
-
-def prop_box(prop: Prop) -> OrientedBox:
-    """Return the box around a prop."""
-    center, half = np.array(prop.pose.position_mm), np.array(prop.size_mm) / 2
-    return OrientedBox(center, half, rotation_of(prop.pose))
 
 
 def ground_values(

@@ -10,24 +10,23 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from typing import Any, Self
 
-import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
-from fastgen.decals.artwork import art_layers, art_levels, glyph_coverage, glyph_tiles
+from fastgen.decals.artwork import art_layers
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.ray_bodies import RayBodies
-from fastgen.light.reflectance import dfg_table
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
+from fastgen.render.material_tables import Textures, material_tables
 from fastgen.render.passes.background import BackgroundPass
 from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
@@ -44,7 +43,6 @@ from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes, ray_bodies
 from fastgen.render.surface_values import damage_values, scene_values
-from fastgen.render.textures import levelled_texture, mipmapped_array, noise_texture
 from fastgen.render.uniforms import Block
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.view_values import view_values
@@ -55,8 +53,6 @@ from fastgen.scene.limits import MAX_NEIGHBOURS, MM
 
 _CONTAINERS = 2 + MAX_NEIGHBOURS
 """Containers whose tables are cached: those of one scene, and one more."""
-
-_Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 
 
 class Renderer:
@@ -110,17 +106,7 @@ class Renderer:
         for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
             self._blocks[block.name].bind_to_uniform_block(block.binding)
         self._art_layers = art_layers()
-        tiles, _ = glyph_tiles()
-        table = dfg_table()
-        dfg = self.ctx.texture(table.shape[1::-1], 2, table.tobytes(), dtype="f4")
-        dfg.repeat_x = dfg.repeat_y = False
-        glyphs = np.stack([tiles, glyph_coverage(tiles)], axis=-1)
-        self._tables: _Textures = {
-            "noise_tiles": noise_texture(gl),
-            "art": levelled_texture(gl, art_levels()),
-            "glyph_tiles": mipmapped_array(self.ctx, glyphs),
-            "dfg_table": dfg,
-        }
+        self._tables = material_tables(gl)
 
     def render(
         self,
@@ -380,7 +366,7 @@ class Renderer:
 
     def _material_textures(
         self, resources: SceneResources, mesh: GpuMesh, spreader: GpuMesh | None
-    ) -> _Textures:
+    ) -> Textures:
         """Return the textures that the material layers read."""
         zones = self._shapes.zone_table(mesh, spreader)
         return {**self._tables, "zone_table": zones, **resources.textures}

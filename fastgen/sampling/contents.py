@@ -5,7 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastgen.config.config import Config, SurfaceConfig, linear_color
+from fastgen.config.config import Config
+from fastgen.config.fields import linear_color
+from fastgen.config.surface import SurfaceConfig
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.sampling.damage import sample_damages

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastgen.config.config import Config, ContainerConfig, linear_color
+from fastgen.config.config import Config, ContainerConfig
+from fastgen.config.fields import linear_color
 from fastgen.config.sensor import LensConfig
 from fastgen.sampling.scene import rounded_gap_mm
 from fastgen.scene import Container, Spreader

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fastgen.config.config import linear_color
+from fastgen.config.fields import linear_color
 from fastgen.config.lamps import LampsConfig
 from fastgen.scene.optics import Lamp
 

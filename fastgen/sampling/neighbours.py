@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fastgen.config.config import Config, linear_color
+from fastgen.config.config import Config
+from fastgen.config.fields import linear_color
 from fastgen.config.surroundings import GroundConfig
 from fastgen.errors import ConfigError
 from fastgen.sampling.arrangements import Plan, Site, sample_plan

@@ -8,6 +8,7 @@ import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.iso6346 import Identifier, sample_identifier
+from fastgen.sampling.colors import mixed
 from fastgen.sampling.lettering_style import Style
 from fastgen.sampling.sheet import GAP_MM, Sheet, between, has_slots, tenth
 from fastgen.sampling.streams import Streams
@@ -57,7 +58,7 @@ def sample_painted_over(
     old = sample_identifier(rng, config.identifiers.owner_codes, style.identifier.size_type)
     fresh = _fresh(paint_albedo, rng)
     shown = float(rng.uniform(0.05, 0.25)) if rng.random() < _SHOWS else 0.0
-    ink = _mixed(fresh, style.albedo, shown)
+    ink = mixed(fresh, style.albedo, shown)
     rolled = bool(rng.random() < 0.5)
     made: list[Decal] = []
     for present in decals:
@@ -80,16 +81,11 @@ def sample_painted_over(
 def _fresh(paint: Color, rng: np.random.Generator) -> Color:
     """Return paint of nearly the container's colour: mostly darker, because it has not faded."""
     tone = rng.uniform(0.6, 0.88) if rng.random() < 0.7 else rng.uniform(1.08, 1.3)
-    return _mixed(_scaled(paint, tone), (float(np.mean(paint)),) * 3, float(rng.uniform(0, 0.12)))
+    return mixed(_scaled(paint, tone), (float(np.mean(paint)),) * 3, float(rng.uniform(0, 0.12)))
 
 
 def _scaled(color: Color, factor: float) -> Color:
     red, green, blue = (min(float(factor * part), 1.0) for part in color)
-    return red, green, blue
-
-
-def _mixed(first: Color, second: Color, share: float) -> Color:
-    red, green, blue = (round(a + share * (b - a), 4) for a, b in zip(first, second, strict=True))
     return red, green, blue
 
 

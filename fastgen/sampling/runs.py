@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fastgen.geometry.mesh import Mesh
+from fastgen.sampling.colors import mixed
 from fastgen.sampling.sheet import has_slots, tenth
 from fastgen.sampling.streams import Streams
 from fastgen.scene import Color, Damage, Decal, Surface
@@ -160,10 +161,6 @@ def _run(face: str, source: _Source, surface: Surface, rng: np.random.Generator)
     art = drawings[int(rng.integers(len(drawings)))]
     strength, wear = rng.uniform(0.5, 1.0), round(float(rng.uniform(0.0, 0.4)), 3)
     color = surface.rust.albedo if source.rust else _DIRT
-    red, green, blue = (
-        round(float(a + strength * (b - a)), 4)
-        for a, b in zip(surface.paint.albedo, color, strict=True)
-    )
     if length < _SHORTEST_MM:
         return None
     return Decal(
@@ -173,6 +170,6 @@ def _run(face: str, source: _Source, surface: Surface, rng: np.random.Generator)
         center_mm=(tenth(source.x), tenth(source.y - length / 2)),
         size_mm=(tenth(source.width), tenth(length)),
         art=art,
-        albedo=(red, green, blue),
+        albedo=mixed(surface.paint.albedo, color, strength),
         wear=wear,
     )

@@ -14,7 +14,8 @@ import numpy as np
 
 from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
-from fastgen.config.config import Config, SpreaderConfig, linear_color
+from fastgen.config.config import Config, SpreaderConfig
+from fastgen.config.fields import linear_color
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import hours_of, illuminance_of
 from fastgen.sampling.contents import sample_contents

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from fastgen.config.config import SealsConfig, linear_color
+from fastgen.config.config import SealsConfig
+from fastgen.config.fields import linear_color
 from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import Seal
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera.projection import view_of
 from fastgen.scene import Camera
-from fastgen.scene.boxes import OrientedBox, stops
+from fastgen.scene.boxes import OrientedBox
 
 _STEPS = 8
 """Points along each side of a face."""
@@ -36,7 +36,7 @@ class Sight:
 
     def behind(self, box: OrientedBox) -> NDArray[np.bool_]:
         """Return the points that are hidden if there is this further box, bool [P]."""
-        return self._hidden | stops(box, self._eye, self._points)
+        return self._hidden | box.between(self._eye, self._points)
 
     def share(self, hidden: NDArray[np.bool_]) -> float:
         """Return the share of the box's visible part that is hidden, 0 to 1."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS
-from fastgen.scene.data import Pose
+from fastgen.scene.data import Pose, Prop
 
 _TOUCHING_MM = 1e-3
 """Overlap that counts as touching, because poses are rounded."""
@@ -52,6 +52,28 @@ class OrientedBox:
         """Its axes [3, 3], one per row, in the world."""
         return self.rotation.T
 
+    def crossed(self, start_mm: Array, way_mm: Array) -> tuple[Array, Array]:
+        """Return where straight lines enter and leave the box, in lengths of the way.
+
+        Args:
+            start_mm: Points [..., 3] in the world.
+            way_mm: Ways [..., 3] from them; both shapes broadcast.
+
+        Returns:
+            Two arrays [...]. A line that misses the box leaves before it enters.
+        """
+        start = (start_mm - self.center_mm) @ self.rotation
+        way = way_mm @ self.rotation
+        way = np.where(np.abs(way) < 1e-9, 1e-9, way)
+        middle, reach = -start / way, self.half_mm / np.abs(way)
+        return (middle - reach).max(axis=-1), (middle + reach).min(axis=-1)
+
+    def between(self, start_mm: Array, end_mm: Array) -> NDArray[np.bool_]:
+        """Return whether the box is on the straight way between points [..., 3]."""
+        enters, leaves = self.crossed(start_mm, end_mm - start_mm)
+        found: NDArray[np.bool_] = (enters < leaves) & (leaves > 0) & (enters < 1 - 1e-6)
+        return found
+
 
 def container_box(kind: str, pose: Pose) -> OrientedBox:
     """Return the outer box of a container of a kind."""
@@ -60,6 +82,12 @@ def container_box(kind: str, pose: Pose) -> OrientedBox:
     turn = rotation_of(pose)
     middle = np.array(pose.position_mm) + turn @ np.array([0.0, 0.0, half[2]])
     return OrientedBox(middle, half, turn)
+
+
+def prop_box(prop: Prop) -> OrientedBox:
+    """Return the box around a prop."""
+    half = np.array(prop.size_mm) / 2
+    return OrientedBox(np.array(prop.pose.position_mm), half, rotation_of(prop.pose))
 
 
 def spreader_box(kind: str) -> OrientedBox:
@@ -93,17 +121,6 @@ def away_mm(box: OrientedBox, point_mm: Array) -> float:
     return most if most < 0 else float(np.linalg.norm(np.maximum(outside, 0)))
 
 
-def stops(box: OrientedBox, eye_mm: Array, points_mm: Array) -> NDArray[np.bool_]:
-    """Return whether a box is between an eye [3] and each of the points [P, 3]."""
-    start = box.axes @ (eye_mm - box.center_mm)
-    way = (points_mm - eye_mm) @ box.rotation
-    way = np.where(way == 0, 1e-9, way)
-    ends = np.stack([-box.half_mm - start, box.half_mm - start])[:, None] / way
-    enters, leaves = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
-    found: NDArray[np.bool_] = (enters < leaves) & (leaves > 0) & (enters < 1 - 1e-6)
-    return found
-
-
 def back_to_front(boxes: Sequence[OrientedBox], eye_mm: Array) -> list[int]:
     """Return the order in which boxes can be drawn over one another.
 
@@ -125,12 +142,9 @@ def back_to_front(boxes: Sequence[OrientedBox], eye_mm: Array) -> list[int]:
             apart = gap >= -_TOUCHING_MM
             face = axes @ boxes[i].center_mm + np.abs(axes @ boxes[i].rotation) @ boxes[i].half_mm
             beyond = axes @ eye_mm - face
-            # a plane between two boxes: the one on the side of the eye is not hidden by the other
-            hides[i, j] = not (apart & (beyond >= gap)).any()
-            hides[j, i] = not (apart & (beyond <= 0)).any()
-            between = (apart & (beyond > 0) & (beyond < gap)).any()
-            if between:
-                hides[i, j] = hides[j, i] = False
+            # an eye beyond the plane of i, or on it, does not see j behind i
+            hides[i, j] = not (apart & (beyond >= np.minimum(gap, 0))).any()
+            hides[j, i] = not (apart & (beyond <= np.maximum(gap, 0))).any()
     order: list[int] = []
     left = list(range(count))
     while left:

@@ -1,13 +1,11 @@
 """Checks of the places of containers, props and the ground in a scene."""
 
-import numpy as np
-
 from fastgen.errors import ConfigError
 from fastgen.scene.boxes import (
     OrientedBox,
     container_box,
     overlap,
-    rotation_of,
+    prop_box,
     spreader_box,
 )
 from fastgen.scene.data import Pose, Prop, Scene
@@ -70,17 +68,16 @@ def _check_prop(prop: Prop, path: str, scene: Scene, boxes: list[OrientedBox]) -
             f"{path}.size_mm: x and z are the diameter of a cylinder, but {prop.size_mm[0]:g} and "
             f"{prop.size_mm[2]:g} differ; make them equal"
         )
-    half = np.array(prop.size_mm) / 2
-    box = OrientedBox(np.array(prop.pose.position_mm), half, rotation_of(prop.pose))
-    lowest = box.center_mm[2] - half[2]
+    box = prop_box(prop)
+    lowest, top = box.center_mm[2] - box.half_mm[2], box.center_mm[2] + box.half_mm[2]
     if lowest < scene.ground.height_mm - _SUNK_MM:
         raise ConfigError(
             f"{path}.pose.position_mm: the prop reaches down to {lowest:g}, below the ground, "
             f"whose height_mm is {scene.ground.height_mm:g}; raise it"
         )
     highest = max(each.center_mm[2] - each.half_mm[2] for each in boxes)
-    if box.center_mm[2] + half[2] > highest + _SUNK_MM:
+    if top > highest + _SUNK_MM:
         raise ConfigError(
-            f"{path}.pose.position_mm: the prop reaches up to {box.center_mm[2] + half[2]:g}, "
+            f"{path}.pose.position_mm: the prop reaches up to {top:g}, "
             f"above the undersides of all containers; props are below {highest:g}, lower it"
         )
