@@ -90,11 +90,17 @@ void main() {
 #if GROUND_COARSE
     out_color = seen_color(ground_ray(PIXEL_WIDTH * gl_FragCoord.xy), depth);
 #else
+#if GROUND_PROPS
+    bool shows_props = tile_props().xy != uvec2(0u);
+    if (GROUND_PLANE == 0 && !shows_props) discard;
+#endif
 #if GROUND_PROPS && SAMPLES_PER_AXIS > 1
+    // Elsewhere the pattern of the plane is filtered already.
+    int samples = shows_props ? 4 : 1;
     vec4 color = vec4(0.0);
-    for (int i = 0; i < 4; ++i) {
-        vec2 offset = vec2(i & 1, i >> 1) * 0.5 - 0.25;
-        color += 0.25 * seen_color(ground_ray(gl_FragCoord.xy + offset), depth);
+    for (int i = 0; i < samples; ++i) {
+        vec2 offset = shows_props ? vec2(i & 1, i >> 1) * 0.5 - 0.25 : vec2(0.0);
+        color += seen_color(ground_ray(gl_FragCoord.xy + offset), depth) / float(samples);
     }
     vec3 at, ray = ground_ray(gl_FragCoord.xy);
     depth = first_prop(ray, plane_depth(ray, at)).depth;

@@ -1,6 +1,5 @@
 // Boxes of the containers and props on the ground, turned about z. Containers are bodies 0 to
-// GROUND_BOXES - 1; EACH_BOX(f) expands to f(i) for each. Props follow from MAX_BOXES;
-// prop_range: the first one of a draw, and the one after the last.
+// GROUND_BOXES - 1; EACH_BOX(f) expands to f(i) for each. Props follow from MAX_BOXES.
 // vec3 in_body(vec3 v, int i): a world vector in the axes of body i.
 // float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m): share of a distant disc
 // that body i hides.
@@ -60,8 +59,6 @@ float body_cover(vec3 from, vec3 toward, int i, float spread, float blur_m) {
     int face;
     return body_cover(from, toward, i, spread, blur_m, face);
 }
-
-uniform ivec2 prop_range;
 
 #if GROUND_PROPS
 // A cylinder's axis is its y axis. body_paint.w is above 1 for cylinders.

@@ -10,10 +10,31 @@
 #include "ground_bodies.glsl"
 #include "ground_light.glsl"
 
+#if GROUND_SHADOWS || GROUND_PROPS
+uniform usampler2D prop_tiles;   // See tile_masks in fastgen/render/prop_tiles.py.
+
+// Masks of a tile: of the props that it may show, and of those that may shade it.
+uvec4 tile_props() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy) << GROUND_COARSE;
+    return texelFetch(prop_tiles, pixel / TILE_PX, 0);
+}
+
+// The next prop of a mask, which loses it.
+int next_prop(inout uvec2 left) {
+    bool low = left.x != 0u;
+    int bit = findLSB(low ? left.x : left.y);
+    if (low) left.x &= left.x - 1u;
+    else left.y &= left.y - 1u;
+    return MAX_BOXES + bit + (low ? 0 : 32);
+}
+#endif
+
 #if GROUND_SHADOWS
 // A body shades the ground around it over about its height.
 void prop_shade(vec3 at, float blur_m, inout float open, inout float hidden) {
-    for (int i = prop_range.x; i < prop_range.y; ++i) {
+    uvec2 left = tile_props().zw;
+    while ((left.x | left.y) != 0u) {
+        int i = next_prop(left);
         vec3 offset = in_body(at - body_center[i].xyz, i), size = body_half[i].xyz;
         vec3 apart = max(abs(offset) - size, 0.0), enter;
         float near = clamp(1.0 - length(apart) / min(2.0 * size.z, 0.6), 0.0, 1.0);
@@ -32,7 +53,9 @@ struct PropHit {
 
 PropHit first_prop(vec3 ray, float depth) {
     PropHit first = PropHit(depth, vec3(0.0, 0.0, 1.0), -1);
-    for (int i = prop_range.x; i < prop_range.y; ++i) {
+    uvec2 left = tile_props().xy;
+    while ((left.x | left.y) != 0u) {
+        int i = next_prop(left);
         BodyHit hit = body_hit(eye_m, ray, i);
         if (hit.depth < first.depth) first = PropHit(hit.depth, hit.normal, i);
     }

@@ -13,7 +13,7 @@ from fastgen.light.environment import Ambient, load_environment, sky_irradiance,
 from fastgen.light.ground_light import LOW_GAP_M, form_factors, ground_light
 from fastgen.light.hdri import bundled_hdris
 from fastgen.render.gl import open_context
-from fastgen.render.ground_regions import ground_regions
+from fastgen.render.ground_regions import ground_plan
 from fastgen.sampling.ground import trailer_props, wagon_props
 from fastgen.scene import (
     Camera,
@@ -368,12 +368,10 @@ def test_drafts_show_the_same_ground(scene):
 def test_regions_are_disjoint_and_cover_the_ground(scene, camera, props):
     boxes = [container_box("20", Pose()), container_box("20", Pose((0.0, 6000.0, 0.0), 30.0))]
     toward = np.array([0.4, 0.3, 0.866])
-    regions = ground_regions(
-        replace(scene, props=props), GROUND, view_of(camera, SIZE), boxes, toward
-    )
+    plan = ground_plan(replace(scene, props=props), GROUND, view_of(camera, SIZE), boxes, toward)
     count = np.zeros(SIZE[::-1], int)
     fading = np.zeros(SIZE[::-1], bool)
-    for each in regions:
+    for each in plan.draws:
         x, y, width, height = each.region
         count[y : y + height, x : x + width] += 1
         fading[y : y + height, x : x + width] |= each.variant.fades

@@ -1,8 +1,12 @@
-"""Set operations on rectangular regions of the image."""
+"""Rectangular regions of the image: set operations, and those that points project to."""
 
 import numpy as np
+import pytest
 
-from fastgen.render.regions import bands, merged, outside, within
+from fastgen.camera.projection import view_of
+from fastgen.render.regions import bands, hull_corners, merged, outside, within
+from fastgen.scene import Camera
+from fastgen.scene.optics import Lens
 
 
 def painted(regions, size=(40, 30)):
@@ -71,3 +75,40 @@ def test_within_is_the_intersection_with_one_region():
         expected = (painted(kept) > 0) & (painted([other]) > 0)
         np.testing.assert_array_equal(painted(given), expected)
     assert within([None], (3, 4, 5, 6)) == [(3, 4, 5, 6)]
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        None,
+        Lens("brown_conrady", (-0.28, 0.06, 0.002, -0.003, 0.0)),
+        Lens("brown_conrady", (0.15, 0.02, 0.0, 0.0, 0.0)),
+        Lens("fisheye", (-0.05, 0.01, 0.0, 0.0)),
+    ],
+)
+def test_hulls_project_into_their_rectangles(lens):
+    rng = np.random.default_rng(11)
+    size = (320, 200)
+    checked, spare = 0, []
+    for _ in range(60):
+        eye, target = rng.uniform(-9000, 9000, (2, 3))
+        view = view_of(Camera("a", tuple(eye), tuple(target), rng.uniform(18, 60), lens=lens), size)
+        groups = rng.uniform(-6000, 6000, (8, 1, 3)) + rng.uniform(-2500, 2500, (8, 6, 3))
+        corners, near = hull_corners(view, groups)
+        assert (corners[near] == [0, 0, *size]).all()
+        weights = rng.dirichlet(np.full(6, 0.3), (8, 400))
+        pixels, _ = view.project(weights @ groups)
+        inside = ((pixels >= 0) & (pixels < size)).all(axis=-1)
+        for seen, rectangle in zip(
+            np.where(inside[..., None], pixels, np.nan)[~near], corners[~near], strict=True
+        ):
+            seen = seen[np.isfinite(seen).all(axis=-1)]
+            if len(seen) < 100:
+                continue
+            assert (seen >= rectangle[:2]).all()
+            assert (seen <= rectangle[2:]).all()
+            least = np.prod(np.ptp(seen, axis=0))
+            spare.append(np.prod(rectangle[2:] - rectangle[:2]) / least)
+            checked += 1
+    assert checked > 60
+    assert np.median(spare) < 1.6  # random points do not reach the corners of their hull

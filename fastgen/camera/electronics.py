@@ -34,7 +34,9 @@ def vignette(size: tuple[int, int], corner_loss: float) -> Light:
     across, down = width**2 / (width**2 + height**2), height**2 / (width**2 + height**2)
     square = across * x**2 + down * y[:, None] ** 2
     steep = (1 - corner_loss) ** -0.5 - 1
-    return np.asarray(((1 + steep * square) ** -2)[..., None], np.float32)
+    fall = np.reciprocal(np.asarray(1 + steep * square, np.float32))
+    fall *= fall
+    return fall[..., None]
 
 
 def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
@@ -100,8 +102,12 @@ def stamped(image: NDArray[np.uint8], stamp: Stamp) -> NDArray[np.uint8]:
     ink = np.zeros((height, width), np.uint8)
     cv2.putText(ink, stamp.text, (x, y), _FONT, scale, (255,), stroke, cv2.LINE_AA)
     edge = cv2.dilate(ink, np.ones((2 * stroke + 1,) * 2, np.uint8))
-    white, dark = (mask[..., None].astype(np.float32) / 255 for mask in (ink, edge))
-    return np.asarray(np.rint(np.minimum(image * (1 - dark) + 255 * white, 255)), np.uint8)
+    across, down, wide, high = cv2.boundingRect(edge)
+    part = slice(down, down + high), slice(across, across + wide)
+    white, dark = (mask[part][..., None].astype(np.float32) / 255 for mask in (ink, edge))
+    result = image.copy()
+    result[part] = np.rint(np.minimum(image[part] * (1 - dark) + 255 * white, 255))
+    return result
 
 
 def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:

@@ -30,6 +30,9 @@ _WIDEST_DEG = 78.0
 _ROUNDS = 6
 """Newton steps for tangential distortion; each doubles the number of correct digits."""
 
+_SETTLED = 1e-12
+"""Error in focal lengths below which no further step is taken; an image is about one wide."""
+
 _NUDGE = 1e-5
 """Offset to either side for numerical derivatives."""
 
@@ -65,6 +68,7 @@ class Distortion:
 
     def __init__(self, lens: Lens, half_size: tuple[float, float]) -> None:
         self.lens = lens
+        self._half_size = half_size
         radius = float(np.hypot(*half_size))
         self._fisheye = lens.model == "fisheye"
         c = lens.coefficients
@@ -114,13 +118,22 @@ class Distortion:
         ideal = self._straight(points)
         if any(self._p):
             for _ in range(_ROUNDS):
-                along, across = self._slopes(ideal)
                 off = self.apply(ideal) - points
+                if np.abs(off).max(initial=0) < _SETTLED:
+                    break
+                along, across = self._slopes(ideal)
                 area = _cross(along, across)
                 area = np.where(np.abs(area) < _LEAST_SLOPE**2, 1.0, area)  # at a fold
                 step = np.stack([_cross(off, across), _cross(along, off)], axis=-1)
                 ideal = ideal - step / area[..., None]
         return ideal
+
+    @cached_property
+    def reach(self) -> Array:
+        """Half of the size [2] of a rectangle around the ideal points of the whole image."""
+        x, y = np.meshgrid(*(np.linspace(-1, 1, 33),) * 2)
+        ideal = self.remove(np.stack([x, y], axis=-1) * self._half_size)
+        return np.asarray(1.05 * np.abs(ideal).max(axis=(0, 1)))
 
     def _slopes(self, ideal: Array) -> tuple[Array, Array]:
         """Return the derivatives [..., 2] of `apply` by x and by y of the ideal point."""

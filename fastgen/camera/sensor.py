@@ -35,6 +35,9 @@ _UNMETERED = Exposure(1.0)
 _METER_STEP = 8
 """Distance in pixels between the pixels in which a meter looks for highlights."""
 
+_NODE_PX = 4
+"""Distance in pixels between the pixels whose rays are computed."""
+
 
 def is_needed(camera: Camera, weather: Weather) -> bool:
     """Return whether the camera model changes the image."""
@@ -125,24 +128,28 @@ def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: 
         for moved, speed in zip(sensor.motion, sensor.speed, strict=True)
     )
     light = motion_blurred(light, (right * width, down * width))
+    times = np.float32(2.0**sensor.exposure_error_ev)
     if sensor.vignetting:
-        light = light * vignette(view.size, sensor.vignetting)
-    if sensor.exposure_error_ev:
-        light = light * np.float32(2.0**sensor.exposure_error_ev)
+        light = light * (times * vignette(view.size, sensor.vignetting))
+    elif times != 1:
+        light = light * times
     if sensor.noise:
         light = noisy(light, sensor.noise, exposure.gain)
     if sensor.gains != (1, 1, 1):
-        planes = zip(cv2.split(light), sensor.gains, strict=True)
-        light = np.asarray(cv2.merge([plane * np.float32(gain) for plane, gain in planes]))
+        light = np.asarray(cv2.transform(light, np.diag(sensor.gains).astype(np.float32)))
     return light
 
 
 def _ray_m(frame: Frame, view: View) -> NDArray[np.float32]:
     """Return the distance along each pixel's ray in metres, float32 [H, W]."""
-    if view.distortion:
-        _, rays = view.rays()
-        return np.asarray(frame.depth / (rays @ view.rotation[2]), np.float32)
     (width, height), (x, y) = view.size, view.center_px
+    if view.distortion:
+        # smooth, so that it is found at nodes between which it is interpolated
+        nodes = [np.arange(-(-n // _NODE_PX) + 2) * _NODE_PX - 0.5 * _NODE_PX for n in view.size]
+        _, rays = view.rays(np.stack(np.meshgrid(*nodes), axis=-1))
+        stretch = np.asarray(1 / (rays @ view.rotation[2]), np.float32)
+        fine = cv2.resize(stretch, None, fx=_NODE_PX, fy=_NODE_PX)
+        return frame.depth * fine[_NODE_PX : _NODE_PX + height, _NODE_PX : _NODE_PX + width]
     across = (np.arange(width, dtype=np.float32) + 0.5 - x) / view.focal_px
     down = (np.arange(height, dtype=np.float32) + 0.5 - y) / view.focal_px
     return np.asarray(frame.depth * np.sqrt(1 + across**2 + down[:, None] ** 2), np.float32)

@@ -83,6 +83,9 @@ _MOST_COPIES = 8
 GROUND_FADE_START = 0.5
 """Share of the ground's reach at which it starts to fade into the panorama."""
 
+TILE_PX = 16
+"""Side of the tiles of an image that know which props they may show; even."""
+
 _SHADOW_TEXELS = 1.0
 """Least distance in texels between shadow lookups for the first directional light; closer lookups
 give slanted edges teeth."""
@@ -204,6 +207,7 @@ def _ground(v: ShaderVariant) -> Defines:
         "EACH_BOX(f)": _each("f", ground.boxes),
         "GROUND_FADE_START": GROUND_FADE_START,
         "MAX_BOXES": MAX_BOXES,
+        "TILE_PX": TILE_PX,
     }
 
 

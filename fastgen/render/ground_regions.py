@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.constants import GROUND_FADE_START
-from fastgen.render.regions import Region, merged, outside, region_of, within
+from fastgen.render.prop_tiles import joined, reaches, tile_masks
+from fastgen.render.regions import Region, hull_corners, outside, within
 from fastgen.render.variant import GroundVariant
-from fastgen.scene import Ground, Prop, Scene
+from fastgen.scene import Ground, Scene
 from fastgen.scene.boxes import OrientedBox, prop_box
 
 _BLOCK_PX = 16
@@ -28,11 +28,6 @@ _SHADED_MM = 600.0
 _BLURRED_MM = 150.0
 """Distance beyond a container's shadow to which its edge may be blurred."""
 
-_APART_MM = 400.0
-"""Least distance between the props of two vehicles."""
-
-_LONGEST_SHADOW_MM = 60000.0
-
 _BOX_COUNTS = (0, 1, 2, 4, 8, MAX_BOXES)
 """Numbers of containers that programs are compiled for."""
 
@@ -45,18 +40,28 @@ class GroundDraw(NamedTuple):
     Attributes:
         variant: What the program is compiled for.
         region: The region.
-        props: First prop that the region or a shadow in it may show, and the one after the last.
     """
 
     variant: GroundVariant
     region: Region
-    props: tuple[int, int] = (0, 0)
 
 
-def ground_regions(
+class GroundPlan(NamedTuple):
+    """What the ground pass draws in an image.
+
+    Attributes:
+        draws: Disjoint regions, with the program that draws each.
+        tiles: Which props each tile may show, see `tile_masks`; None without props.
+    """
+
+    draws: list[GroundDraw]
+    tiles: NDArray[np.uint32] | None
+
+
+def ground_plan(
     scene: Scene, ground: Ground, view: View, boxes: Sequence[OrientedBox], toward: Array
-) -> list[GroundDraw]:
-    """Return disjoint regions of the image with the program that draws each.
+) -> GroundPlan:
+    """Return what to draw where in an image.
 
     Args:
         scene: The scene, for its props.
@@ -65,67 +70,33 @@ def ground_regions(
         boxes: Outer boxes of the containers that are present.
         toward: Unit vector [3] to the first directional light.
     """
-    whole = (0, 0, *view.size)
     count = next(most for most in _BOX_COUNTS if most >= len(boxes))
     plain = GroundVariant(ground.kind, 0, view.distortion is not None, ground.wetness > 0)
     near = replace(plain, boxes=count, fades=True, shadows=True)
     draws: list[GroundDraw] = []
     rest = [*_bands(ground, view)]
+    tiles = None
     if scene.props:
-        vehicles = _clusters(scene.props)
-        bodies, shaded = [], []
-        for first, end in vehicles:
-            parts = [prop_box(prop) for prop in scene.props[first:end]]
-            corners = np.concatenate([part.corners_mm for part in parts])
-            bodies.append(region_of(view, _around(corners)) or whole)
-            shaded.append(region_of(view, _reach(parts, ground, toward, _SHADED_MM)) or whole)
-        shown = [region for region in merged(bodies) if region is not None]
-        around = [region for region in merged(shaded) if region is not None]
-        for variant, regions in (
-            (replace(near, props=True), shown),
-            (
-                near,
-                outside(
-                    [part for bands in rest for band in bands for part in within(around, band)],
-                    shown,
-                ),
-            ),
-        ):
-            for region in regions:
-                found = [v for v, s in zip(vehicles, shaded, strict=True) if within([s], region)]
-                if region[2] > 0 < region[3]:
-                    ends = (found[0][0], found[-1][1]) if found else (0, 0)
-                    draws.append(GroundDraw(variant, region, ends))
+        parts = [prop_box(prop) for prop in scene.props]
+        bodies, _ = hull_corners(view, np.stack([part.corners_mm for part in parts]))
+        shades, _ = hull_corners(view, reaches(parts, ground.height_mm, toward, _SHADED_MM))
+        tiles = tile_masks(bodies, shades, view.size)
+        shown, around = joined(bodies), joined(shades)
+        draws += [GroundDraw(replace(near, props=True), region) for region in shown]
+        ground_around = [part for band in [*rest[0], *rest[1]] for part in within(around, band)]
+        draws += [GroundDraw(near, region) for region in outside(ground_around, shown)]
         rest = [outside(outside(bands, around), shown) for bands in rest]
     # a wet plane mirrors boxes from everywhere
-    dark = (
-        [whole]
-        if plain.wet
-        else [region_of(view, _reach([box], ground, toward, _BLURRED_MM)) or whole for box in boxes]
-    )
+    dark = [(0, 0, *view.size)]
+    if not plain.wet and boxes:
+        dark = joined(hull_corners(view, reaches(boxes, ground.height_mm, toward, _BLURRED_MM))[0])
     for bands, fades in zip(rest, (False, True), strict=True):
         lit = outside(bands, dark) if boxes else bands
         draws += [GroundDraw(replace(plain, fades=fades), region) for region in lit]
         # one program for near and far, because each takes a while to compile
         by_boxes = replace(plain, boxes=count, fades=True)
         draws += [GroundDraw(by_boxes, region) for region in outside(bands, lit)]
-    return draws
-
-
-def _clusters(props: Sequence[Prop]) -> list[tuple[int, int]]:
-    """Return the ranges of consecutive props that are close to one another, such as a vehicle."""
-    found: list[tuple[int, int]] = []
-    low = high = np.zeros(2)
-    for number, prop in enumerate(props):
-        corners = prop_box(prop).corners_mm[:, :2]
-        least, most = corners.min(axis=0), corners.max(axis=0)
-        if found and (least < high + _APART_MM).all() and (most > low - _APART_MM).all():
-            found[-1] = (found[-1][0], number + 1)
-            low, high = np.minimum(low, least), np.maximum(high, most)
-        else:
-            found.append((number, number + 1))
-            low, high = least, most
-    return found
+    return GroundPlan(draws, tiles)
 
 
 def _bands(ground: Ground, view: View) -> tuple[list[Region], list[Region]]:
@@ -155,28 +126,3 @@ def _bands(ground: Ground, view: View) -> tuple[list[Region], list[Region]]:
             top, bottom = int(rows[first]), int(rows[end])
             regions.append((0, top, width, bottom - top))
     return found
-
-
-def _reach(boxes: Sequence[OrientedBox], ground: Ground, toward: Array, margin_mm: float) -> Array:
-    """Return points [N, 3] in mm whose hull contains boxes, a margin and their shadows."""
-    corners = np.concatenate([box.corners_mm for box in boxes])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    low[:2], high[:2] = low[:2] - margin_mm, high[:2] + margin_mm
-    low[2] = min(low[2], ground.height_mm)
-    hull = low + UNIT_CUBE * (high - low)
-    above = np.maximum(corners[:, 2:] - ground.height_mm, 0)
-    thrown = -toward[:2] * above / max(toward[2], 1e-3)
-    far = np.hypot(*thrown.T)[:, None]
-    thrown *= np.minimum(1, _LONGEST_SHADOW_MM / np.maximum(far, 1)) * 1.02
-    shadows = np.column_stack([corners[:, :2] + thrown, np.full(len(corners), ground.height_mm)])
-    return np.concatenate([hull, _around(shadows)])
-
-
-def _around(points: Array) -> Array:
-    """Return the corners [8, 3] of the upright box around points [N, 3].
-
-    Regions of few points are found much faster if the lens distorts.
-    """
-    low, high = points.min(axis=0), points.max(axis=0)
-    corners: Array = low + UNIT_CUBE * (high - low)
-    return corners

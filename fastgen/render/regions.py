@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.geometry.mesh import UNIT_CUBE
@@ -13,8 +14,15 @@ from fastgen.scene.limits import NEAR_M
 Region = tuple[int, int, int, int]
 """Left column, top row, width and height in pixels."""
 
-_BOW_STEPS = 17
-"""Points on a straight edge whose image is curved by lens distortion."""
+_STEPS = np.linspace(0, 1, 17)
+_SIDES = np.array(
+    [
+        np.stack(np.broadcast_arrays(*at), axis=1)
+        for k in (0, 1)
+        for at in ((_STEPS, k), (k, _STEPS))
+    ]
+)
+"""Points [4, 17, 2] on the sides of the unit square, which lens distortion curves."""
 
 
 def bands(regions: Sequence[Region | None]) -> list[Region | None]:
@@ -127,19 +135,47 @@ def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
         Region aligned to 2x2 pixel blocks, which classify.comp needs; None if a point lies nearer
         than the near plane.
     """
-    if view.distortion:  # A curved edge may extend beyond both of its corners.
-        a, b = corners_mm[:, None, None], corners_mm[:, None]
-        corners_mm = a + np.linspace(0, 1, _BOW_STEPS)[:, None] * (b - a)
-    pixels, depth = view.project(corners_mm)
-    if depth.min() <= NEAR_M:
+    corners, (near,) = hull_corners(view, corners_mm[None])
+    if near:
         return None
-    margin = 1.0
-    if view.distortion:  # An arc deviates from its chord by an eighth of the second difference.
-        margin += np.abs(np.diff(pixels, n=2, axis=-2)).max() / 8
-    pixels = pixels.reshape(-1, 2)
-    x0, y0 = np.clip(2 * np.floor((pixels.min(axis=0) - margin) / 2), 0, view.size)
-    x1, y1 = np.clip(2 * np.ceil((pixels.max(axis=0) + margin) / 2), 0, view.size)
-    return int(x0), int(y0), int(x1 - x0), int(y1 - y0)
+    x0, y0, x1, y1 = corners[0].tolist()
+    return x0, y0, x1 - x0, y1 - y0
+
+
+def hull_corners(
+    view: View, points_mm: NDArray[np.floating]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the rectangles that the convex hulls of several groups of points may cover.
+
+    Args:
+        view: Projection of the image.
+        points_mm: Points [N, P, 3] in the container frame, in mm; a group in each row.
+
+    Returns:
+        First column and row, and the column and row after the last, int [N, 4], all even or at the
+        border of the image. Those of the whole image for groups with a point nearer than the near
+        plane, and bool [N], which groups these are.
+    """
+    seen = view.to_view(points_mm)
+    near = seen[..., 2].min(axis=1) <= NEAR_M
+    plane = seen[..., :2] / np.maximum(seen[..., 2:], NEAR_M)
+    low, high = plane.min(axis=1), plane.max(axis=1)
+    margin = np.ones((len(plane), 1))
+    if view.distortion:
+        # the image of a rectangle around the hull is bounded by that of the rectangle's border
+        reach = view.distortion.reach
+        low, high = (np.clip(corner, -reach, reach)[:, None, None] for corner in (low, high))
+        border = view.distortion.apply(low + _SIDES * (high - low))
+        low, high = border.min(axis=(1, 2)), border.max(axis=(1, 2))
+        # an arc deviates from its chord by an eighth of the second difference
+        bow = np.abs(np.diff(border, n=2, axis=2)).max(axis=(1, 2, 3)) / 8
+        margin += view.focal_px * bow[:, None]
+    center = np.array(view.center_px)
+    first = 2 * np.floor((view.focal_px * low + center - margin) / 2)
+    last = 2 * np.ceil((view.focal_px * high + center + margin) / 2)
+    first[near], last[near] = 0, view.size
+    corners = np.concatenate([np.clip(first, 0, view.size), np.clip(last, 0, view.size)], axis=1)
+    return corners.astype(np.int64), near
 
 
 def box_corners(

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ground_light import GroundLight, ground_light
-from fastgen.render.blocks import GROUND_BLOCK, MAX_BOXES
+from fastgen.render.blocks import GROUND_BLOCK
 from fastgen.render.draw_inputs import DrawInputs
-from fastgen.render.ground_regions import GroundDraw, ground_regions
+from fastgen.render.ground_regions import GroundDraw, ground_plan
 from fastgen.render.ground_values import ground_values
 from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
+from fastgen.render.textures import data_texture
 from fastgen.render.variant import GroundVariant, ShaderVariant
 from fastgen.scene import EnvironmentView, Scene
 
@@ -84,13 +85,16 @@ class GroundPass:
         self._ctx.memory_barrier()  # compute shaders may have written the background
         self._ctx.enable_only(moderngl.NOTHING)
         boxes = [member.box for member in present]
-        draws = ground_regions(scene, ground, inputs.view, boxes, toward)
+        draws, tiles = ground_plan(scene, ground, inputs.view, boxes, toward)
         variant = ShaderVariant(
             layer=inputs.variant.layer,
             lights=inputs.variant.lights,
             radiance=inputs.variant.radiance,
         )
         textures = {**inputs.textures, "ground_grid": kept.texture}
+        made = None if tiles is None else data_texture(self._ctx, tiles)
+        if made is not None:
+            textures["prop_tiles"] = made
         if inputs.variant.coarse and variant.layer == "all":
             self._draw_coarse(inputs, variant, textures, draws)
             draws = [
@@ -105,13 +109,13 @@ class GroundPass:
             per_axis = inputs.variant.samples_per_axis if each.variant.props else 1
             self._draw(replace(variant, samples_per_axis=per_axis), textures, each)
         self._ctx.scissor = None
+        if made is not None:
+            made.release()
 
     def _draw(self, variant: ShaderVariant, textures: Textures, draw: GroundDraw) -> None:
         """Draw one region of the bound framebuffer."""
         own = replace(variant, ground=draw.variant)
         program = self._programs.get(("fullscreen.vert", "ground.frag"), own)
-        first, end = draw.props
-        program["prop_range"] = (MAX_BOXES + first, MAX_BOXES + end)
         program.bind(textures)
         self._ctx.scissor = draw.region
         program.draw_vertices(3)
@@ -133,7 +137,7 @@ class GroundPass:
             left, top = max(x // 2 - 1, 0), max(y // 2 - 1, 0)
             right, bottom = (x + across + 3) // 2, (y + down + 3) // 2
             own = replace(each.variant, props=False, coarse=True)
-            part = GroundDraw(own, (left, top, right - left, bottom - top), each.props)
+            part = GroundDraw(own, (left, top, right - left, bottom - top))
             self._draw(variant, textures, part)
         inputs.targets.image.use()
         lens = inputs.view.distortion is not None
