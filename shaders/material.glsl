@@ -27,6 +27,8 @@ const float COLUMN_SQUEEZE = 0.12;
 // Share of a scrape that rusts, relative to the rate of rust, and its upper limit.
 const float SCRAPE_RUST = 6.0;
 const float SCRAPE_RUST_MOST = 0.5;
+// Stain below a scrape, relative to its rust.
+const float SCRAPE_STAIN = 4.0;
 
 struct SurfacePoint {
     Material material;
@@ -82,10 +84,11 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
 #if SHOWN_REFLECTION
     roughness = worn_roughness(roughness, streaks);
 #endif
-    float bare = 0.0;
+    float bare = 0.0, run = 0.0;
 #if SHOWN_SCRATCHES
     float scraped = trait.z * scratches(streaks);
     bare = trait.z * scrapes(z, coarse, streaks, columns);
+    run = trait.z * scrape_runs(z, columns);
     albedo = mix(albedo, vec3(0.38, 0.36, 0.33), max(0.5 * scraped, 0.8 * bare));
 #endif
 #if SHOWN_DIRT
@@ -98,9 +101,9 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
     float rusty = 0.0;
 #if SHOWN_RUST
     float sticker = 1.0 - 0.8 * decal_alpha;
-    float bare_rust = bare * min(SCRAPE_RUST * rust_rate * trait.y, SCRAPE_RUST_MOST);
-    Rust rust = rust_at(z, coarse, bare_rust, trait.y);
-    albedo = stained(albedo, sticker * rust.stain);
+    float scrape_rust = min(SCRAPE_RUST * rust_rate * trait.y, SCRAPE_RUST_MOST);
+    Rust rust = rust_at(z, coarse, bare * scrape_rust, trait.y);
+    albedo = stained(albedo, sticker * max(rust.stain, run * min(SCRAPE_STAIN * scrape_rust, 1.0)));
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
     // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and

@@ -1,6 +1,7 @@
 // float scratches(NoiseSample streaks): share of the footprint scratched to bare steel, 0..1.
 // float scrapes(ZonePoint z, NoiseSample coarse, NoiseSample streaks, NoiseSample columns): share scraped by
 // forks and spreaders.
+// float scrape_runs(ZonePoint z, NoiseSample columns): share of the footprint down which water runs from scrapes.
 // SeaFront paper, section 3.2. Heights and shapes of scrapes are artistic choices.
 
 #include "noise.constants"
@@ -14,6 +15,18 @@ float scratches(NoiseSample streaks) {
     float worn = clamp(scratch_coverage / SCRATCHED_SHARE, 0.0, 1.0);
     return streaks.value.x * covered(streaks.value.y, 1.0 - worn, streaks.lost.y, 0.02) *
            step(1e-4, worn);
+}
+
+// Heights below the lower edge of the scrapes of a spreader, and above the foot, at which runs end.
+const float RUNS_MM = 500.0;
+const float FORK_RUNS_MM = 450.0;
+
+// The columns of noise are so tall that those which scraped the steel above are still the same here.
+float scrape_runs(ZonePoint z, NoiseSample columns) {
+    float spreader = smoothstep(200.0, 420.0, z.below_mm) * exp((420.0 - z.below_mm) / RUNS_MM);
+    float forks = 1.0 - smoothstep(0.4 * FORK_RUNS_MM, FORK_RUNS_MM, z.above_mm);
+    float share = scrape_share * z.steep * z.raised * min(max(spreader, forks), 1.0);
+    return covered(columns.value.y, 1.0 - share, columns.lost.y, 0.08) * step(1e-4, share);
 }
 
 float scrapes(ZonePoint z, NoiseSample coarse, NoiseSample streaks, NoiseSample columns) {

@@ -158,6 +158,22 @@ def test_scrapes_lie_at_the_heights_of_forks_and_spreaders_on_outer_flats(bare):
     assert bare_steel[rows(FORKS_MM)][:, outer].mean() > 0.03
 
 
+def test_rust_runs_down_below_scrapes(bare):
+    generator, scene = bare
+    rust = {"coverage": 0.03, "albedo": (0.0, 0.0, 0.0)}
+    scrapes = {"scrapes": 0.6}
+    steel = changed(generator, worn(scene, scratches=scrapes), "front", scene)
+    both = worn(scene, scratches=scrapes, rust=rust)
+    stain = changed(generator, both, "front", worn(scene, rust=rust))
+    for scraped, below in ((SPREADER_MM, (1850, 2050)), (FORKS_MM, (20, 150))):
+        above, stained = (
+            part[rows(band)].mean(axis=0) for part, band in ((steel, scraped), (stain, below))
+        )
+        assert stained[above > np.quantile(above, 0.9)].mean() > 2 * stained[above < 1e-3].mean()
+        assert np.corrcoef(above, stained)[0, 1] > 0.3
+    assert stain[rows((1000, 1200))].mean() < 0.2 * stain[rows((1850, 2050))].mean()
+
+
 def test_bleached_paint_is_lighter_and_greyer_and_uneven(bare):
     generator, scene = bare
     (sheet,) = baked(generator, worn(scene, paint={"bleach": 0.6}), "front")
