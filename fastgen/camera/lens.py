@@ -105,12 +105,24 @@ class Distortion:
     def apply(self, ideal: ArrayLike) -> Array:
         """Return the distorted positions of ideal points [..., 2]."""
         points = np.asarray(ideal, np.float64)
-        radius = np.hypot(points[..., 0], points[..., 1])
+        # NumPy is slow along an axis of two
+        x, y = np.ascontiguousarray(points[..., 0]), np.ascontiguousarray(points[..., 1])
+        radius = np.sqrt(x * x + y * y)
         t = np.arctan(radius) if self._fisheye else radius
         inner = np.minimum(t, self._end)
         bent = self._curve(inner) + self._end_slope * (t - inner)
         scale = np.divide(bent, radius, out=np.ones_like(bent), where=radius > 1e-12)
-        return points * scale[..., None] + self._shift(points)
+        across, down = x * scale, y * scale
+        if any(self._p):
+            # tangential distortion, which is constant beyond the end of the polynomial
+            p1, p2 = self._p
+            inside = np.minimum(1.0, self._end / np.maximum(radius, 1e-12))
+            x, y = x * inside, y * inside
+            q = x * x + y * y
+            twice = 2 * x * y
+            across += p1 * twice + p2 * (q + 2 * x * x)
+            down += p1 * (q + 2 * y * y) + p2 * twice
+        return np.stack([across, down], axis=-1)
 
     def remove(self, seen: ArrayLike) -> Array:
         """Return the ideal points of distorted positions [..., 2]: the inverse of `apply`."""
@@ -134,6 +146,11 @@ class Distortion:
         x, y = np.meshgrid(*(np.linspace(-1, 1, 33),) * 2)
         ideal = self.remove(np.stack([x, y], axis=-1) * self._half_size)
         return np.asarray(1.05 * np.abs(ideal).max(axis=(0, 1)))
+
+    @cached_property
+    def half_width(self) -> float:
+        """Distance of the ideal point of the middle of the left border from the principal point."""
+        return float(np.linalg.norm(self.remove([-self._half_size[0], 0.0])))
 
     def _slopes(self, ideal: Array) -> tuple[Array, Array]:
         """Return the derivatives [..., 2] of `apply` by x and by y of the ideal point."""
@@ -192,19 +209,6 @@ class Distortion:
         k1, k2, k3, k4 = self._k * (3, 5, 7, 9)
         q = t * t
         return np.asarray(1 + q * (k1 + q * (k2 + q * (k3 + q * k4))), np.float64)
-
-    def _shift(self, ideal: Array) -> Array | float:
-        """Return the tangential distortion, which is constant beyond the end of the polynomial."""
-        p1, p2 = self._p
-        if not (p1 or p2):
-            return 0.0
-        radius = np.hypot(ideal[..., 0], ideal[..., 1])
-        inside = np.minimum(1.0, self._end / np.maximum(radius, 1e-12))
-        x, y = np.moveaxis(ideal * inside[..., None], -1, 0)
-        q = x * x + y * y
-        across = 2 * p1 * x * y + p2 * (q + 2 * x * x)
-        down = p1 * (q + 2 * y * y) + 2 * p2 * x * y
-        return np.stack([across, down], axis=-1)
 
     def _straight(self, seen: Array) -> Array:
         """Invert the radial part by a table and Newton steps."""

@@ -7,7 +7,7 @@ applies between the division by depth and the camera matrix, see lens.py.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,12 +117,12 @@ class View:
         rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1) @ self.rotation
         return self.position_m / MM, rays / np.linalg.norm(rays, axis=-1, keepdims=True)
 
-    @cached_property
+    @property
     def half_angle_deg(self) -> float:
         """Angle between the optical axis and the ray of the middle of the left border, degrees."""
         edge = 0.5 * self.size[0] / self.focal_px
         if self.distortion:
-            edge = float(np.linalg.norm(self.distortion.remove([-edge, 0.0])))
+            edge = self.distortion.half_width
         return float(np.degrees(np.arctan(edge)))
 
     def lens_values(self, to_samples: NDArray[np.floating]) -> dict[str, ArrayLike]:
