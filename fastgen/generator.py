@@ -197,7 +197,10 @@ class Generator:
                 exposure = renderer.exposure(scene, camera, self.size)
                 light = renderer.ambient(scene.environment)
                 air = airlight(light, scene.environment.yaw_deg, exposure.factor)
-                image = apply_camera_model(frame, view, camera, scene.weather, air, exposure)
+                ground_mm = None if scene.ground is None else scene.ground.height_mm
+                image = apply_camera_model(
+                    frame, view, camera, scene.weather, air, exposure, ground_mm
+                )
                 frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)
         shot = Shot(frame, prepared, view, config)

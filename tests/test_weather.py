@@ -12,7 +12,7 @@ from fastgen.camera.weather import _streaks, add_fog, add_rain
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.light.exposure import airlight
-from fastgen.scene import Camera
+from fastgen.scene import Camera, Ground, Spreader
 from fastgen.scene.optics import Lens, Rain, Weather
 from tests.test_environment import write_exr
 from tests.tone_inverse import light_of
@@ -181,6 +181,28 @@ def test_fog_depends_on_the_distance_along_each_ray(generators, lens):
     unmixed = np.isin(clear.cover, (0, 255))
     assert unmixed.mean() > 0.9
     assert np.abs(expected.astype(int) - sample.image)[unmixed].max() <= 1
+
+
+def test_fog_continues_over_the_ground_of_the_surroundings(generators):
+    camera = Camera("T", (0, -6000, 2500), (0, -12000, 2200), 20.0)
+    generator = generators(seed=6, size=SIZE)
+    ground = Ground("asphalt", 0.0, (0.1, 0.1, 0.1), reach_mm=15000.0)
+    dry = replace(generator.scene(2), ground=ground, spreader=Spreader(), weather=Weather())
+    foggy = replace(dry, weather=Weather(visibility_mm=150e3))
+    clear, sample = (generator.render(scene=scene, camera=camera) for scene in (dry, foggy))
+    with generator.gpu.drawing() as renderer:
+        light, yaw_deg = renderer.ambient(dry.environment), dry.environment.yaw_deg
+        air = np.array(airlight(light, yaw_deg, generator.exposure(dry, camera)))
+    _, rays = sample.view.rays()
+    away = np.where(rays[..., 2] < 0, 2.5 / np.maximum(-rays[..., 2], 1e-6), 300).clip(max=300)
+    left = np.exp(-3.912 * away / 150)[..., None]
+    expected = tone_map_and_encode(
+        (light_of(clear.image) * left + air * (1 - left)).astype(np.float32)
+    )
+    beyond = (clear.cover == 0) & np.isinf(clear.depth)
+    below = beyond & (away > 20) & (away < 120)
+    assert below.sum() > 100
+    assert np.abs(expected.astype(int) - sample.image)[below].max() <= 2
 
 
 def test_in_front_of_an_even_sky_fog_is_as_bright_as_the_sky(tmp_path):

@@ -25,9 +25,10 @@ from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View
 from fastgen.camera.response import respond
 from fastgen.camera.tone_curve import Light, tone_map_and_encode
-from fastgen.camera.weather import add_fog, add_rain
+from fastgen.camera.weather import BACKDROP_M, add_fog, add_rain
 from fastgen.frame import Frame
 from fastgen.scene import Camera, Color
+from fastgen.scene.limits import MM
 from fastgen.scene.optics import Sensor, Weather
 
 _UNMETERED = Exposure(1.0)
@@ -58,6 +59,7 @@ def apply_camera_model(
     weather: Weather,
     airlight: Color,
     exposure: Exposure = _UNMETERED,
+    ground_mm: float | None = None,
 ) -> NDArray[np.uint8]:
     """Return the image that a camera records of a rendered frame.
 
@@ -68,6 +70,7 @@ def apply_camera_model(
         weather: Fog and rain between the camera and the scene.
         airlight: Mean linear light of the sky in the exposure of the frame: colour of fog and rain.
         exposure: Exposure of the frame, for cameras with a meter.
+        ground_mm: Height of the scene's ground, which the surroundings continue; None without one.
 
     Returns:
         uint8 [H, W, 3], sRGB.
@@ -77,7 +80,7 @@ def apply_camera_model(
     if needs_radiance(camera, weather):
         assert frame.radiance is not None, "render with radiance=True"
         sky = np.array(airlight, np.float32)
-        light = _through_weather(frame.radiance, frame, view, weather, sky)
+        light = _through_weather(frame, view, weather, sky, ground_mm)
         if sensor.meter:
             times = _for_highlights(light, sensor)
             if times < 1:
@@ -100,10 +103,15 @@ def _has_fog_or_rain(weather: Weather) -> bool:
     return bool(weather.visibility_mm or weather.rain)
 
 
-def _through_weather(light: Light, frame: Frame, view: View, weather: Weather, sky: Light) -> Light:
+def _through_weather(
+    frame: Frame, view: View, weather: Weather, sky: Light, ground_mm: float | None
+) -> Light:
+    light = frame.radiance
+    assert light is not None
     if weather.visibility_mm:
-        distance = _ray_m(frame, view)
-        light = add_fog(light, distance, frame.cover, weather.visibility_mm, sky)
+        stretch, backdrop_m = _along_rays(view, ground_mm)
+        ray_m = frame.depth * stretch
+        light = add_fog(light, ray_m, frame.cover, weather.visibility_mm, sky, backdrop_m)
     if weather.rain:
         light = add_rain(light, frame.depth, view, weather.rain, sky)
     return light
@@ -140,16 +148,31 @@ def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: 
     return light
 
 
-def _ray_m(frame: Frame, view: View) -> NDArray[np.float32]:
-    """Return the distance along each pixel's ray in metres, float32 [H, W]."""
-    (width, height), (x, y) = view.size, view.center_px
-    if view.distortion:
-        # smooth, so that it is found at nodes between which it is interpolated
-        nodes = [np.arange(-(-n // _NODE_PX) + 2) * _NODE_PX - 0.5 * _NODE_PX for n in view.size]
-        _, rays = view.rays(np.stack(np.meshgrid(*nodes), axis=-1))
-        stretch = np.asarray(1 / (rays @ view.rotation[2]), np.float32)
-        fine = cv2.resize(stretch, None, fx=_NODE_PX, fy=_NODE_PX)
-        return frame.depth * fine[_NODE_PX : _NODE_PX + height, _NODE_PX : _NODE_PX + width]
-    across = (np.arange(width, dtype=np.float32) + 0.5 - x) / view.focal_px
-    down = (np.arange(height, dtype=np.float32) + 0.5 - y) / view.focal_px
-    return np.asarray(frame.depth * np.sqrt(1 + across**2 + down[:, None] ** 2), np.float32)
+def _along_rays(
+    view: View, ground_mm: float | None
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the length of each pixel's ray per depth, and how far its surroundings are.
+
+    Rays are found at nodes between which they are interpolated.
+
+    Args:
+        view: Projection of the camera.
+        ground_mm: Height of the ground.
+
+    Returns:
+        float32 [H, W], and float32 [H, W] in metres, at most BACKDROP_M.
+    """
+    nodes = [(np.arange(-(-side // _NODE_PX) + 2) - 0.5) * _NODE_PX for side in view.size]
+    eye_mm, rays = view.rays(np.stack(np.meshgrid(*nodes), axis=-1))
+    width, height = view.size
+    inside = slice(_NODE_PX, _NODE_PX + height), slice(_NODE_PX, _NODE_PX + width)
+
+    def at_pixels(smooth: NDArray[np.float64]) -> NDArray[np.float32]:
+        fine = cv2.resize(smooth.astype(np.float32), None, fx=_NODE_PX, fy=_NODE_PX)
+        return np.asarray(fine[inside], np.float32)
+
+    stretch = at_pixels(1 / (rays @ view.rotation[2]))
+    if ground_mm is None:
+        return stretch, np.full_like(stretch, BACKDROP_M)
+    above_m = np.float32(max((eye_mm[2] - ground_mm) * MM, 1e-3))
+    return stretch, above_m / np.maximum(at_pixels(-rays[..., 2]), above_m / BACKDROP_M)

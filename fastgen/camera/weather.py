@@ -11,7 +11,7 @@ from fastgen.scene.optics import Rain
 _CONTRAST = 3.912
 """-ln 0.02: at the visibility distance 2 % of a contrast remains (Koschmieder 1924)."""
 
-_BACKDROP_M = 300.0
+BACKDROP_M = 300.0
 """Assumed distance of the surroundings, which an HDRI does not contain."""
 
 _BESIDE = 2
@@ -35,6 +35,7 @@ def add_fog(
     cover: NDArray[np.uint8],
     visibility_mm: float,
     airlight: Light,
+    backdrop_m: float | NDArray[np.float32] = BACKDROP_M,
 ) -> Light:
     """Return light seen through fog, by Koschmieder's law: L t + A (1 - t), t = exp(-3.912 d / V).
 
@@ -47,18 +48,20 @@ def add_fog(
         cover: uint8 [H, W], see Frame.
         visibility_mm: Meteorological visibility V.
         airlight: float32 [3], A.
+        backdrop_m: Distance of the surroundings along the ray in metres, one or float32 [H, W].
     """
     decay = np.float32(-_CONTRAST * 1e3 / visibility_mm)
-    far, near = np.exp(decay * np.float32(_BACKDROP_M)), np.exp(decay * _objects_m(ray_m))
+    far = np.broadcast_to(np.exp(decay * np.float32(backdrop_m)), ray_m.shape)
+    near = np.exp(decay * _objects_m(ray_m))
     left = np.where(cover == 0, far, near)
     seen = _mixed(light, airlight, 1 - left)
     mixed = np.nonzero((cover > 0) & (cover < 255))
     share = cover[mixed][:, None] * np.float32(1 / 255)
     own = light[mixed]
     behind = _behind(light, cover, mixed, share)
-    near_them = near[mixed][:, None]
-    left_of_them = near_them * share + far * (1 - share)
-    seen[mixed] = (own - behind) * near_them + behind * far + airlight * (1 - left_of_them)
+    near_them, beyond = near[mixed][:, None], far[mixed][:, None]
+    left_of_them = near_them * share + beyond * (1 - share)
+    seen[mixed] = (own - behind) * near_them + behind * beyond + airlight * (1 - left_of_them)
     return seen
 
 
@@ -102,7 +105,7 @@ def _objects_m(ray_m: NDArray[np.float32]) -> NDArray[np.float32]:
     may miss all pixel centres; it gets the smallest distance in the image.
     """
     beside = cv2.erode(ray_m, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_REPLICATE)
-    nearest = np.minimum(ray_m.min(), np.float32(_BACKDROP_M))
+    nearest = np.minimum(ray_m.min(), np.float32(BACKDROP_M))
     away = np.where(np.isfinite(beside), beside, nearest)
     return np.where(np.isfinite(ray_m), ray_m, away)
 

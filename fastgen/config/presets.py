@@ -59,6 +59,13 @@ _OUTDOORS: dict[str, Any] = {
 }
 """Fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
 
+_UNPAVED = ("dawn", "forest", "forest_2", "night", "night_2", "park", "sky", "sunrise")
+_ON_GROUND: dict[str, Any] = {
+    **_OUTDOORS,
+    "environment": {**_OUTDOORS["environment"], "weights": dict.fromkeys(_UNPAVED, 0.0)},
+}
+"""The same for presets with a ground, which must blend into that of the HDRI."""
+
 _GATE_END = {
     "focal_mm": 30.0,
     "distance_mm": [1900, 3800],
@@ -105,7 +112,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     "crane": {**_OUTDOORS, "cameras": _LENSES, "markings": {"marked_containers": 0.35}},
     # trucks that pass a gate in lanes; cameras on portals see parts of containers from near by
     "gate": {
-        **_OUTDOORS,
+        **_ON_GROUND,
         "markings": {"marked_containers": 0.15},
         "spreader": {"probability": 0.0},
         "placement": {
@@ -136,7 +143,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
     # piles and rows, seen from a reach stacker and from poles
     "yard": {
-        **_OUTDOORS,
+        **_ON_GROUND,
         "markings": {"marked_containers": 0.1},
         "spreader": {"probability": 0.0},
         "placement": {
@@ -169,7 +176,7 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
     # containers under a ship-to-shore crane: in the air, on trailers and on the quay
     "quay": {
-        **_OUTDOORS,
+        **_ON_GROUND,
         "markings": {"marked_containers": 0.35},
         "spreader": {"probability": 0.6},
         "placement": {

@@ -78,8 +78,15 @@ class LinearFrame:
             ),
         )
         camera = replace(self.camera, sensor=drawn)
+        ground = self.scene.ground
         return apply_camera_model(
-            self.frame, self.view, camera, self.scene.weather, self.air, self.exposure
+            self.frame,
+            self.view,
+            camera,
+            self.scene.weather,
+            self.air,
+            self.exposure,
+            None if ground is None else ground.height_mm,
         )
 
 
