@@ -81,7 +81,7 @@ BOMBS = tuple(partial(symbols.bomb, hand=hand) for hand in (0, 1))
 RINGS = tuple(partial(symbols.flame_over_circle, flame=flame) for flame in range(3))
 TREFOILS = (symbols.trefoil, partial(symbols.trefoil, radius=27.0))
 CORROSIONS = tuple(partial(symbols.corrosion, hand=hand) for hand in (0, 1))
-HAZARDS = (symbols.biohazard, partial(symbols.biohazard, size=5.2))
+HAZARDS = (symbols.biohazard, partial(symbols.biohazard, size=6.4))
 FISSILES = tuple(partial(symbols.fissile, font=font) for font in (0, 1))
 
 
@@ -89,7 +89,7 @@ def _divisions(*texts: str) -> tuple[Symbol, ...]:
     return tuple(
         partial(symbols.division, text=text, font=font)
         for text in texts
-        for font in ((0, 1) if len(texts) == 1 else (0,))
+        for font in ((0, 1, 2) if len(texts) == 1 else (0,))
     )
 
 

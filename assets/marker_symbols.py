@@ -5,6 +5,7 @@ units tall. `ink` is the symbol's colour. Voids are cut out, so the field shows 
 Descriptions: UN Model Regulations 5.2.2.2.2; 49 CFR 172, appendix B (trefoil).
 """
 
+import math
 from itertools import count
 
 from drawing import FONTS, rect, words
@@ -159,30 +160,40 @@ def _bones(y: float, angle: float, reach: float, thinner: float = 0.0) -> str:
     )
 
 
-def biohazard(ink: str, size: float = 5.8) -> str:
-    """Three crescents over a ring. `size` is the length of one unit of the construction."""
+def biohazard(ink: str, size: float = 7.4) -> str:
+    """Three crescents over a ring. `size` is the length of one unit of the construction.
+
+    Proportions of 29 CFR 1910.145, figure (f)(8)(ii): discs of diameter 30, 11 from the centre,
+    with holes of diameter 21, 15 from the centre, that open by 4.
+    """
+
+    def each(shape: str) -> str:
+        return "".join(f'<g transform="rotate({turn})">{shape}</g>' for turn in (0, 120, 240))
 
     def discs(distance: float, radius: float) -> str:
-        return "".join(
-            f'<circle transform="rotate({turn})" cx="0" cy="{-distance * size:.1f}" '
-            f'r="{radius * size:.1f}"/>'
-            for turn in (0, 120, 240)
+        return each(f'<circle cx="0" cy="{-distance * size:.1f}" r="{radius * size:.1f}"/>')
+
+    def slots(width: float, near: float, far: float) -> str:
+        return each(
+            f'<rect x="{-0.5 * width * size:.1f}" y="{-far * size:.1f}" '
+            f'width="{width * size:.1f}" height="{(far - near) * size:.1f}"/>'
         )
 
-    slits = "".join(
-        f'<rect transform="rotate({turn})" x="{-0.6 * size:.1f}" y="0" width="{1.2 * size:.1f}" '
-        f'height="{9 * size:.1f}"/>'
-        for turn in (60, 180, 300)
-    )
     hole = f'<circle cx="0" cy="0" r="{3 * size:.1f}"/>'
-    crescents = cut(ink, discs(15, 15), discs(19.6, 11) + hole + slits)
+    voids = discs(15, 10.5) + hole + slots(1, 0, 6) + slots(4, 20, 30)
+    crescents = cut(ink, discs(11, 15), voids)
     name = f"cut{next(_IDS)}"
-    ring = f'<circle cx="0" cy="0" r="{12.8 * size:.1f}" fill="none"'
-    inside = (
-        f'<clipPath id="{name}">{discs(19.6, 10)}</clipPath><g clip-path="url(#{name})">'
-        f'{ring} stroke="{ink}" stroke-width="{3.5 * size:.1f}"/></g>'
+    clip = "".join(
+        f'<circle cx="{15 * size * math.sin(turn):.1f}" cy="{-15 * size * math.cos(turn):.1f}" '
+        f'r="{9.5 * size:.1f}"/>'
+        for turn in (0, 2 * math.pi / 3, 4 * math.pi / 3)
     )
-    return f'<g transform="translate(0 26)">{crescents}{inside}</g>'
+    ring = (
+        f'<clipPath id="{name}">{clip}</clipPath><g clip-path="url(#{name})">'
+        f'<circle cx="0" cy="0" r="{11 * size:.1f}" fill="none" stroke="{ink}" '
+        f'stroke-width="{3.5 * size:.1f}"/></g>'
+    )
+    return f'<g transform="translate(0 40)">{crescents}{ring}</g>'
 
 
 def trefoil(ink: str, radius: float = 31.0) -> str:
@@ -244,7 +255,8 @@ def corrosion(ink: str, hand: int) -> str:
 
 def division(ink: str, text: str, font: int) -> str:
     """Division of class 1 in large digits, instead of a symbol."""
-    return words(text, 0, 92, 180, ink, font=FONTS[font], weight=0.03)
+    weight, stretch = ((0.03, 1.0), (0.05, 1.12), (0.02, 1.25))[font]
+    return words(text, 0, 92, 180, ink, font=FONTS[font], weight=weight, stretch=stretch)
 
 
 def fissile(ink: str, font: int) -> str:

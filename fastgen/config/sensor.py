@@ -88,7 +88,7 @@ class ResponseConfig:
 
     probability: Share = 0.0
     clip: Annotated[Range, Bounds(*CLIP_LIMITS)] = Range(1.0, 1.5)
-    contrast: Annotated[Range, Bounds(*CONTRAST_LIMITS)] = Range(1.0, 1.3)
+    contrast: Annotated[Range, Bounds(*CONTRAST_LIMITS)] = Range(1.0, 1.5)
     saturation: Annotated[Range, Bounds(0.0, 3.0)] = Range(0.9, 1.3)
 
 
