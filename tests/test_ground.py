@@ -14,7 +14,6 @@ from fastgen.light.ground_light import LOW_GAP_M, form_factors, ground_light
 from fastgen.light.hdri import bundled_hdris
 from fastgen.render.gl import open_context
 from fastgen.render.ground_regions import ground_plan
-from fastgen.sampling.ground import trailer_props, wagon_props
 from fastgen.scene import (
     Camera,
     EnvironmentView,
@@ -26,7 +25,6 @@ from fastgen.scene import (
     Spreader,
 )
 from fastgen.scene.boxes import container_box, prop_box
-from fastgen.scene.check import check_scene
 from fastgen.scene.optics import Weather
 from tests import glsl, oracle
 
@@ -383,19 +381,3 @@ def test_regions_are_disjoint_and_cover_the_ground(scene, camera, props):
     at = eye + np.where(seen, depth, 0)[..., None] * rays
     far = ~seen | (np.hypot(at[..., 0], at[..., 1]) > 0.5 * GROUND.reach_mm)
     assert fading[far & (count > 0)].all()
-
-
-@pytest.mark.parametrize("kind", ["20", "40", "45HC"])
-@pytest.mark.parametrize("build", [trailer_props, wagon_props])
-def test_vehicles_stand_on_the_ground_below_the_container(scene, build, kind):
-    for seed in range(5):
-        height, props = build(kind, np.random.default_rng(seed))
-        assert 12 <= len(props) <= 24
-        corners = np.concatenate([prop_box(prop).corners_mm for prop in props])
-        assert corners[:, 2].min() == pytest.approx(height, abs=1.0)
-        assert corners[:, 2].max() <= 1e-6
-        wheels = [prop for prop in props if prop.shape == "cylinder" and prop.size_mm[0] > 900]
-        assert len(wheels) in (4, 6, 8)
-    ground = replace(GROUND, height_mm=height)
-    neighbour = Neighbour(Pose((0.0, 4000.0, height)), scene.container, scene.surface)
-    check_scene(replace(scene, ground=ground, neighbours=(neighbour,), props=props, cameras=()))

@@ -119,6 +119,7 @@ PRESETS: dict[str, dict[str, Any]] = {
             "arrangements": {"trailer": 1.0, "twin": 0.5},
             "neighbours": [0, 3],
             "lifted_twins": 0.0,
+            "islands": 0.6,
         },
         "ground": {
             "kinds": {"asphalt": 0.4, "concrete": 0.2, "paving": 0.4},

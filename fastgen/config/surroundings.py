@@ -44,6 +44,7 @@ class PlacementConfig:
         end_gap_mm: Gap between the ends of neighbours in a row, of piles and of wagons.
         twin_gap_mm: Gap between the ends of twins.
         lane_mm: Distance between the middles of lanes and of tracks.
+        islands: Probability of raised islands with bollards on both sides of a trailer's lane.
         yaw_deg: Deviation of a neighbour's or pile's direction from that of the container.
         turned: Probability that the door of a neighbour is at the other end.
         offset_mm: Deviation of a neighbour's or pile's position, along and across.
@@ -65,6 +66,7 @@ class PlacementConfig:
     end_gap_mm: _Gap = Range(350, 1200)
     twin_gap_mm: _Gap = Range(76, 76)
     lane_mm: Annotated[Range, Bounds(2500.0, 20000.0, "mm")] = Range(3500, 4500)
+    islands: Share = 0.0
     yaw_deg: Annotated[Range, Bounds(-45.0, 45.0, "degrees")] = Range(-1.5, 1.5)
     turned: Share = 0.5
     offset_mm: Annotated[Range, Bounds(-5000.0, 5000.0, "mm")] = Range(-60, 60)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fastgen.config.config import Config
-from fastgen.sampling.ground import trailer_props, wagon_props
+from fastgen.sampling.ground import island_props, trailer_props, wagon_props
 from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import Pose, Prop, Vec3
 from fastgen.scene.boxes import rotation_of
@@ -34,8 +34,8 @@ _ON_GROUND = 0.5
 _VEHICLES = {"trailer": trailer_props, "wagon": wagon_props}
 
 _PARTS = 13
-"""Largest number of parts of a vehicle. Smaller parts are not drawn: each pixel near a vehicle is
-tested against all its parts."""
+"""Largest number of parts of a vehicle, because a scene has at most MAX_PROPS. Smaller parts are
+not drawn."""
 
 Cell = tuple[int, int]
 """Row and column of a pile; the container's own is (0, 0). Rows follow y and columns x."""
@@ -62,7 +62,8 @@ class Plan(NamedTuple):
 
     Attributes:
         ground_mm: Height of the ground, None for none.
-        props: Parts of the vehicle below the container, in the world.
+        props: Parts of the vehicle below the container and of the islands beside its lane, in the
+            world.
         below: Sites below the container, from the top; they are taken together or not at all.
         above: Sites on the container, from the bottom.
         twin: Site of the container's twin, or None.
@@ -177,6 +178,8 @@ class _Place:
     def on_vehicle(self, vehicle: str, count: int, cells: Iterable[Cell]) -> Plan:
         """Return a plan with all containers on vehicles in lanes or on tracks."""
         height, props = self._vehicle(vehicle, "placement", self.kind, Pose())
+        if vehicle == "trailer":
+            props += self._islands(-height)
         piles = ([self.bottom(cell, -height, vehicle)] for cell in cells)
         return Plan(-height, props=props, wanted=count, piles=piles)
 
@@ -198,6 +201,7 @@ class _Place:
             return Plan(ground, twin=twin, wanted=count, piles=self._below(cells, ground))
         middle = Pose((round(apart / 2, 1), 0.0, 0.0))
         height, props = self._vehicle("trailer", "placement", "40", middle)
+        props += self._islands(-height)
         piles = ([self.bottom(cell, -height, "trailer")] for cell in cells)
         return Plan(-height, props=props, twin=twin, wanted=count, piles=piles)
 
@@ -224,6 +228,13 @@ class _Place:
         height, props = self._vehicle(vehicle, name, kind, pose)
         lifted = (replace(prop, pose=_raised(prop.pose, height)) for prop in props)
         return Site(name, kind, _raised(pose, height), tuple(lifted))
+
+    def _islands(self, ground_mm: float) -> tuple[Prop, ...]:
+        """Return the parts of the islands beside the container's lane, if there are any."""
+        rng = self.streams("placement.islands")
+        if rng.random() >= self.config.placement.islands:
+            return ()
+        return island_props(self.draw("lane_mm"), ground_mm, rng)
 
     def _ground_mm(self) -> float:
         """Return the height of the ground below a lifted container."""

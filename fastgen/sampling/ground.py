@@ -1,4 +1,4 @@
-"""Sampling of the vehicle below a container, as boxes and cylinders: a trailer or a rail wagon."""
+"""Sampling of what stands on the ground, as boxes and cylinders: trailers, wagons and islands."""
 
 from collections.abc import Iterable
 
@@ -39,6 +39,18 @@ _RAIL_MM = 40.0
 
 _BOGIE_WHEELBASE_MM = 1800.0
 """Type Y25."""
+
+_KERB_MM = 150.0
+_BOLLARD_MM = 170.0
+_ISLAND_WIDE_MM = (400.0, 900.0)
+_ISLAND_CLEAR_MM = 500.0
+"""Least room between the containers of two lanes that an island leaves."""
+
+_ISLAND_SPANS_MM = (7000.0, 18000.0), (-4000.0, 4000.0)
+"""Length of islands, and the place of their middle along the lane."""
+
+_KERB_COLORS: tuple[Color, ...] = ((0.3, 0.29, 0.27), (0.22, 0.215, 0.21), (0.55, 0.42, 0.06))
+_BOLLARD_COLORS: tuple[Color, ...] = ((0.62, 0.45, 0.03), (0.5, 0.05, 0.04), (0.55, 0.55, 0.54))
 
 Built = tuple[float, tuple[Prop, ...]]
 
@@ -113,6 +125,32 @@ def wagon_props(kind: str, rng: np.random.Generator) -> Built:
             x = end * bogie_x + axle * _BOGIE_WHEELBASE_MM / 2
             parts += _wheels(x, axle_z, _GAUGE_MM / 2 + 65, 135, _WHEEL_MM, _RUST)
     return -deck - _RAIL_MM, tuple(parts)
+
+
+def island_props(lane_mm: float, ground_mm: float, rng: np.random.Generator) -> tuple[Prop, ...]:
+    """Sample the raised islands on both sides of a lane, with bollards at their ends.
+
+    Args:
+        lane_mm: Distance between the middles of lanes, along x; one of them is at y = 0.
+        ground_mm: Height of the ground.
+        rng: Random stream of the islands.
+    """
+    wide = min(lane_mm - KINDS["20"].width_mm - _ISLAND_CLEAR_MM, rng.uniform(*_ISLAND_WIDE_MM))
+    if wide < _ISLAND_WIDE_MM[0] / 2:
+        return ()
+    wide = float(np.round(wide))
+    long, middle = (float(np.round(rng.uniform(*span))) for span in _ISLAND_SPANS_MM)
+    kerb, paint = _darkened(_KERB_COLORS, rng), _darkened(_BOLLARD_COLORS, rng)
+    tall = float(np.round(rng.uniform(700, 1100)))
+    parts = []
+    for side in (-1, 1):
+        y = side * round(lane_mm / 2, 1)
+        parts.append(_box((middle, y, ground_mm + _KERB_MM / 2), (long, wide, _KERB_MM), kerb))
+        for end in (-1, 1):
+            x = middle + end * (long / 2 - 350)
+            z = ground_mm + _KERB_MM + tall / 2
+            parts.append(_box((x, y, z), (_BOLLARD_MM, _BOLLARD_MM, tall), paint))
+    return tuple(parts)
 
 
 def _darkened(colors: tuple[Color, ...], rng: np.random.Generator) -> Color:
