@@ -13,7 +13,7 @@
 #if GROUND_SHADOWS || GROUND_PROPS
 uniform usampler2D prop_tiles;   // See tile_masks in fastgen/render/prop_tiles.py.
 
-// Masks of a tile: of the props that it may show, and of those that may shade it.
+// Bit masks of a tile: xy of the props that it may show, zw of those that may shade it.
 uvec4 tile_props() {
     ivec2 pixel = ivec2(gl_FragCoord.xy) << GROUND_COARSE;
     return texelFetch(prop_tiles, pixel / TILE_PX, 0);

@@ -1,4 +1,4 @@
-"""Rectangular regions of the image: set operations, and those that points project to."""
+"""Rectangular regions of the image: set operations, and the regions that points project to."""
 
 import numpy as np
 import pytest

@@ -70,7 +70,7 @@ def apply_camera_model(
         weather: Fog and rain between the camera and the scene.
         airlight: Mean linear light of the sky in the exposure of the frame: colour of fog and rain.
         exposure: Exposure of the frame, for cameras with a meter.
-        ground_mm: Height of the scene's ground, which the surroundings continue; None without one.
+        ground_mm: Height of the scene's ground, None without one. Fog assumes it in the HDRI, too.
 
     Returns:
         uint8 [H, W, 3], sRGB.
@@ -118,7 +118,7 @@ def _through_weather(
 
 
 def _for_highlights(light: Light, sensor: Sensor) -> float:
-    """Return the factor, 0.5 to 1, that lets the meter's share of the pixels clip."""
+    """Return the factor, 0.5 to 1, by which a meter lowers the exposure to protect highlights."""
     assert sensor.meter is not None
     some = light[::_METER_STEP, ::_METER_STEP].max(axis=2).ravel()
     clipped = min(int(sensor.meter.highlights * some.size), some.size - 1)
@@ -151,16 +151,16 @@ def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: 
 def _along_rays(
     view: View, ground_mm: float | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the length of each pixel's ray per depth, and how far its surroundings are.
+    """Return the ray length per unit of depth and the distance of the background, by pixel.
 
-    Rays are found at nodes between which they are interpolated.
+    Both are interpolated between every fourth pixel.
 
     Args:
         view: Projection of the camera.
-        ground_mm: Height of the ground.
+        ground_mm: Height of the ground. None without one: the background is at BACKDROP_M.
 
     Returns:
-        float32 [H, W], and float32 [H, W] in metres, at most BACKDROP_M.
+        float32 [H, W] each. The distance is along the ray in metres, at most BACKDROP_M.
     """
     nodes = [(np.arange(-(-side // _NODE_PX) + 2) - 0.5) * _NODE_PX for side in view.size]
     eye_mm, rays = view.rays(np.stack(np.meshgrid(*nodes), axis=-1))

@@ -65,7 +65,7 @@ class NoiseConfig:
     Attributes:
         probability: Probability that an image has noise.
         full_well_e: Electrons of a white pixel without gain, drawn log-uniformly. Pixels of small
-            outdoor cameras hold 5,000 to 20,000. The gain of a meter divides it.
+            outdoor cameras hold 5,000 to 20,000. The number is divided by the gain of a meter.
         read_noise_e: Standard deviation without light.
     """
 
@@ -76,7 +76,7 @@ class NoiseConfig:
 
 @dataclass(frozen=True)
 class ResponseConfig:
-    """Response curve of a camera. It clips bright light, as the neutral tone curve does not.
+    """Response curve of a camera. Unlike the neutral tone curve, it clips bright light.
 
     Attributes:
         probability: Probability that an image has a camera's curve; others have the neutral one.
@@ -98,8 +98,8 @@ class ChromaNoiseConfig:
 
     Attributes:
         probability: Probability that an image has chroma noise.
-        strength: Standard deviation of Cb and Cr as a share of white, without gain. The gain of a
-            meter multiplies it by its square root.
+        strength: Standard deviation of Cb and Cr as a share of white, without gain. It grows with
+            the square root of a meter's gain.
         scale_px: Size of the blotches.
     """
 
@@ -164,8 +164,8 @@ class MotionConfig:
     Attributes:
         probability: Probability that an image has motion blur.
         extent: Length of the motion as a share of the image width, for cameras without a meter.
-        speed: Speed of the motion in image widths per second, for cameras with a meter. Its shutter
-            time decides the length.
+        speed: Speed of the motion in image widths per second, for cameras with a meter. The length of
+            the blur is this speed times the shutter time.
     """
 
     probability: Share = 0.0
@@ -175,7 +175,7 @@ class MotionConfig:
 
 @dataclass(frozen=True)
 class MeterConfig:
-    """Limits of automatic exposure, by which dim scenes become dark, noisy and blurred.
+    """Limits of automatic exposure. They leave dim scenes dark, noisy and blurred.
 
     Without a meter, every scene is exposed to the same mean, however dark it is. The illuminance of
     each HDRI is a key of `environment`.

@@ -26,13 +26,12 @@ class PlacementConfig:
     container, the ground is lowered instead.
 
     Attributes:
-        arrangements: Relative frequency of each arrangement. In alone, there is only the container
-            and the HDRI. In lifted, it is in the air above its neighbours. In standing, it is on
-            the ground without neighbours. In row, neighbours are beside it and at its ends. In
-            stack, it is in a pile among other piles. In trailer, it is on a trailer, with trailers
-            in other lanes. In wagon, it is on a rail wagon, with other wagons around. In twin, two
-            20-foot containers are end to end, on a trailer or lifted; containers of other kinds
-            draw one of the other arrangements.
+        arrangements: Relative frequency of each arrangement. alone: only the container and the
+            HDRI. lifted: in the air above its neighbours. standing: on the ground without
+            neighbours. row: neighbours beside it and at its ends. stack: in a pile among other
+            piles. trailer: on a trailer, with trailers in other lanes. wagon: on a rail wagon,
+            with other wagons around. twin: two 20-foot containers end to end, on a trailer or
+            lifted; containers of other kinds draw one of the other arrangements.
         neighbours: Number of further containers; all numbers are equally likely. A twin has one
             more, its second container.
         lift_mm: Height of a lifted container above the ground.
@@ -43,12 +42,12 @@ class PlacementConfig:
         row_gap_mm: Gap between the long sides of neighbours in a row and of piles.
         end_gap_mm: Gap between the ends of neighbours in a row, of piles and of wagons.
         twin_gap_mm: Gap between the ends of twins.
-        lane_mm: Distance between the middles of lanes and of tracks.
+        lane_mm: Distance between the centre lines of adjacent lanes or tracks.
         islands: Probability of raised islands with bollards on both sides of a trailer's lane.
         yaw_deg: Deviation of a neighbour's or pile's direction from that of the container.
         turned: Probability that the door of a neighbour is at the other end.
         offset_mm: Deviation of a neighbour's or pile's position, along and across.
-        lane_offset_mm: The same along a lane, where vehicles are not aligned.
+        lane_offset_mm: Deviation along the lane of containers in lanes, instead of offset_mm.
         damaged: Frequency of damage on neighbours, as a share of damage.probability.
         marked: Frequency of markers on neighbours, as a share of markings.marked_containers.
         same_paint: Probability that a neighbour has the color of the container.
@@ -106,8 +105,8 @@ class GroundConfig:
         asphalt: Albedo of dry asphalt; black when new, grey when old.
         concrete: Albedo of dry concrete.
         paving: Albedo of dry paving stones.
-        wet_probability: Probability of wet ground without rain. Where containers are wet, the
-            ground is at least as wet.
+        wet_probability: Probability of wet ground in a scene without rain. In a scene with wet
+            containers, the ground is at least as wet as they are.
         wetness: Wetness of wet ground; puddles cover low places first.
         wear: Strength of stains, cracks and patches.
         line_probability: Probability of painted lines along the containers.
@@ -115,7 +114,8 @@ class GroundConfig:
         line_colors: Colors of the lines; all are equally likely.
         line_spacing_mm: Distance between parallel lines.
         line_yaw_deg: Direction of the lines, relative to the length of the container.
-        reach_mm: Horizontal distance at which the HDRI has replaced the ground.
+        reach_mm: Horizontal distance at which the ground has faded completely into the HDRI. It
+            starts to fade at half of this distance.
     """
 
     kinds: Annotated[dict[Annotated[str, OneOf(GROUNDS)], Weight], MinLen(1)] = field(

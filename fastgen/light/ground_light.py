@@ -241,7 +241,7 @@ def _occlusion(
 
 
 def _visible_shares(boxes: Sequence[_Placed], points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the factor [B, P] on form factors that leaves out what nearer boxes hide.
+    """Return the factor [B, P] by which overlap with other boxes reduces form factors.
 
     Within a sector of azimuths a box covers an interval of elevations, with a form factor of sin^2
     of the upper elevation less that of the lower one. The factor is the ratio of the union of all

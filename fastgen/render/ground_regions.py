@@ -38,7 +38,7 @@ class GroundDraw(NamedTuple):
     """A region of the image, and the program that draws it.
 
     Attributes:
-        variant: What the program is compiled for.
+        variant: Choices that the program is compiled for.
         region: The region.
     """
 
@@ -47,11 +47,11 @@ class GroundDraw(NamedTuple):
 
 
 class GroundPlan(NamedTuple):
-    """What the ground pass draws in an image.
+    """Regions that the ground pass draws in an image, and the props of its tiles.
 
     Attributes:
         draws: Disjoint regions, with the program that draws each.
-        tiles: Which props each tile may show, see `tile_masks`; None without props.
+        tiles: Masks of the props of each tile, see `tile_masks`; None without props.
     """
 
     draws: list[GroundDraw]
@@ -61,7 +61,7 @@ class GroundPlan(NamedTuple):
 def ground_plan(
     scene: Scene, ground: Ground, view: View, boxes: Sequence[OrientedBox], toward: Array
 ) -> GroundPlan:
-    """Return what to draw where in an image.
+    """Return the regions that the ground pass draws in an image, each with its program.
 
     Args:
         scene: The scene, for its props.
@@ -86,7 +86,7 @@ def ground_plan(
         ground_around = [part for band in [*rest[0], *rest[1]] for part in within(around, band)]
         draws += [GroundDraw(near, region) for region in outside(ground_around, shown)]
         rest = [outside(outside(bands, around), shown) for bands in rest]
-    # a wet plane mirrors boxes from everywhere
+    # a wet plane may mirror a box anywhere
     dark = [(0, 0, *view.size)]
     if not plain.wet and boxes:
         dark = joined(hull_corners(view, reaches(boxes, ground.height_mm, toward, _BLURRED_MM))[0])
@@ -100,10 +100,10 @@ def ground_plan(
 
 
 def _bands(ground: Ground, view: View) -> tuple[list[Region], list[Region]]:
-    """Return the rows that see only the near ground, and the others that may see ground.
+    """Return the rows that see only the near ground, and the other rows that may see ground.
 
-    Near ground is not faded at all. It is the inside of a circle, and so is what an image sees of
-    it convex without lens distortion; the border columns decide.
+    Near ground is the disc in which the ground does not fade. Without lens distortion its image is
+    convex, so a row is near if its first and last columns are.
     """
     width, height = view.size
     rows = np.append(np.arange(0, height, _BLOCK_PX), height)

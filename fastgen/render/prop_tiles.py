@@ -1,4 +1,4 @@
-"""Which props each tile of an image may show, or may have in shadow: bit masks for the shaders."""
+"""Bit masks of the props that each tile of an image may show, or that may shade its ground."""
 
 from collections.abc import Sequence
 
@@ -25,8 +25,8 @@ def tile_masks(shown: Ints, shaded: Ints, size: tuple[int, int]) -> NDArray[np.u
         size: (width, height) of the image in pixels.
 
     Returns:
-        uint32 [rows, columns, 4]; bit k of the first two numbers is set in tiles that may show prop
-        k, and of the last two in tiles where it may shade the ground.
+        uint32 [rows, columns, 4]: two masks of 64 bits, low word first. Bit k of the first is set
+        in tiles that may show prop k, bit k of the second where prop k may shade the ground.
     """
     across, down = (np.arange(-(-side // TILE_PX)) * TILE_PX for side in size)
     words = []
@@ -52,13 +52,13 @@ def joined(rectangles: Ints) -> list[Region]:
 def reaches(
     boxes: Sequence[OrientedBox], ground_mm: float, toward: Array, margin_mm: float
 ) -> Array:
-    """Return points [N, 16, 3] in mm whose hulls contain each box, a margin and its shadow.
+    """Return points [N, 16, 3]; each row's hull contains a box, its margin and its shadow, in mm.
 
     Args:
         boxes: Boxes above the ground.
         ground_mm: Height of the ground.
         toward: Unit vector [3] to the light.
-        margin_mm: Least distance of the hull from the box on all sides.
+        margin_mm: Horizontal margin around each box.
     """
     corners = np.stack([box.corners_mm for box in boxes])
     low, high = corners.min(axis=1), corners.max(axis=1)

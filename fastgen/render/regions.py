@@ -152,9 +152,9 @@ def hull_corners(
         points_mm: Points [N, P, 3] in the container frame, in mm; a group in each row.
 
     Returns:
-        First column and row, and the column and row after the last, int [N, 4], all even or at the
-        border of the image. Those of the whole image for groups with a point nearer than the near
-        plane, and bool [N], which groups these are.
+        int [N, 4]: first column and row, and the column and row after the last, all even or at the
+        border of the image. They are those of the whole image for groups with a point nearer than
+        the near plane. bool [N]: True for these groups.
     """
     seen = view.to_view(points_mm)
     near = seen[..., 2].min(axis=1) <= NEAR_M

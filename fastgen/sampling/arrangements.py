@@ -23,7 +23,7 @@ _ROWS = range(-3, 4)
 _COLUMNS = range(-1, 2)
 
 _DISORDER = 1.5
-"""Spread of the random order in which sites are filled, in rows."""
+"""Largest random number, in rows, that is added to the distances by which cells are sorted."""
 
 _TIER_OFFSET_MM = 10.0
 """Largest offset of a container in a pile from the one below; twist locks allow no more."""
@@ -61,7 +61,7 @@ class Plan(NamedTuple):
     """Arrangement of a scene before its neighbours are chosen.
 
     Attributes:
-        ground_mm: Height of the ground, None for none.
+        ground_mm: Height of the ground; None without ground.
         props: Parts of the vehicle below the container and of the islands beside its lane, in the
             world.
         below: Sites below the container, from the top; they are taken together or not at all.
@@ -93,7 +93,7 @@ def sample_plan(
     Args:
         config: Distribution of scenes.
         kind: Kind of the container.
-        held: True if a spreader is on it, so that nothing else can be.
+        held: True if a spreader is on the container, so that no container can be.
         floor_mm: Greatest height of the ground below a lifted container.
         streams: Function from the name of a property to its independent random generator.
         at_bottom: Put the container at the bottom of its pile.
@@ -143,7 +143,7 @@ class _Place:
         return float(getattr(self.config.placement, name).draw(self.streams(f"placement.{name}")))
 
     def ordered(self, rows: Iterable[int], columns: Iterable[int]) -> list[Cell]:
-        """Return all cells but the container's own, the nearest ones first, in random order."""
+        """Return all cells except the container's own in random order, near ones mostly first."""
         cells = [(row, column) for column in columns for row in rows]
         handicaps = self.streams("placement.order").uniform(0, _DISORDER, len(cells))
         far = [
@@ -259,7 +259,7 @@ class _Place:
         return sites
 
     def _in_pile(self, name: str, kind: str, pose: Pose) -> Site:
-        """Return a site with a small offset, which may be turned by 180 degrees."""
+        """Return a site in a pile, with a small random offset and its door at a random end."""
         rng = self.streams(f"{name}.pose")
         x, y = rng.uniform(-_TIER_OFFSET_MM, _TIER_OFFSET_MM, 2).round(1).tolist()
         yaw = 180.0 * float(rng.random() < self.config.placement.turned)

@@ -38,7 +38,7 @@ class Surroundings(NamedTuple):
 
     Attributes:
         cameras: All cameras.
-        ground_mm: Height of the ground, None for none.
+        ground_mm: Height of the ground; None without ground.
         sites: Kinds and poses of the neighbours.
         props: Parts of all vehicles.
         twins: Whether the first neighbour is the container's twin.
