@@ -164,8 +164,8 @@ class MotionConfig:
     Attributes:
         probability: Probability that an image has motion blur.
         extent: Length of the motion as a share of the image width, for cameras without a meter.
-        speed: Speed of the motion in image widths per second, for cameras with a meter. The length of
-            the blur is this speed times the shutter time.
+        speed: Speed of the motion in image widths per second, for cameras with a meter. The
+            length of the blur is this speed times the shutter time.
     """
 
     probability: Share = 0.0
