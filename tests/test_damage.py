@@ -21,6 +21,7 @@ from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Scene, Spreader
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
+from tests.plain import FEW_DECALS
 
 SIZE = (256, 256)
 DAMAGED = Config.from_values({"damage": {"probability": 1.0}})
@@ -318,8 +319,8 @@ def test_a_concave_damage_moves_points_by_hand_computed_amounts():
 
 @pytest.fixture(scope="module")
 def many():
-    generator = Generator(seed=4)
-    return [generator.scene(i) for i in range(1500)]
+    generator = Generator(Config.from_values({"markings": FEW_DECALS}), seed=4)
+    return [generator.scene(i) for i in range(600)]
 
 
 def within(count, n, p):

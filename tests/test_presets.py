@@ -13,7 +13,7 @@ from fastgen.generator import Generator
 from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS
 
-COUNT = 300
+COUNT = 160
 REAL = ("crane", "gate")
 PORTS = ("gate", "yard", "quay")
 """Presets that have a file in examples/ports."""

@@ -17,8 +17,11 @@ ARGUMENTS = ["--images", "8", "--size", "64x64", "--cameras", "A", "--workers", 
 STOPPED = "fastgen: stopped; run the same command again to go on"
 
 
-def begun(out, images="4000"):
-    """Start a run in its own session and return it once it has begun to write."""
+def begun(out, images="900"):
+    """Start a run in its own session and return it once it has begun to write.
+
+    Workers of runs with more images would first load everything, which takes a while.
+    """
     command = [
         sys.executable,
         "-m",
