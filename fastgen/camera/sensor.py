@@ -174,5 +174,6 @@ def _along_rays(
     stretch = at_pixels(1 / (rays @ view.rotation[2]))
     if ground_mm is None:
         return stretch, np.full_like(stretch, BACKDROP_M)
-    above_m = np.float32(max((eye_mm[2] - ground_mm) * MM, 1e-3))
-    return stretch, above_m / np.maximum(at_pixels(-rays[..., 2]), above_m / BACKDROP_M)
+    above_m = max(float(eye_mm[2] - ground_mm) * MM, 1e-3)
+    falling = np.maximum(at_pixels(-rays[..., 2]), np.float32(above_m / BACKDROP_M))
+    return stretch, np.asarray(above_m / falling, np.float32)
