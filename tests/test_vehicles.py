@@ -12,6 +12,7 @@ from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Ground, Neighbour, Pose
 from fastgen.scene.boxes import prop_box
 from fastgen.scene.check import check_scene
+from tests.plain import FEW_DECALS
 
 
 def test_islands_stand_on_the_ground_beside_the_lane():
@@ -24,7 +25,7 @@ def test_islands_stand_on_the_ground_beside_the_lane():
         assert len(parts) == 6
         corners = np.stack([part.corners_mm for part in parts])
         assert corners[..., 2].min() == pytest.approx(ground_mm)
-        assert corners[..., 2].max() < ground_mm + 1300
+        assert corners[..., 2].max() < ground_mm + 1100  # below the lowest deck
         clear_mm.append(np.abs(corners[..., 1]).min())
         for island in corners[::3]:  # an island and two bollards on it
             low, high = island.min(axis=0), island.max(axis=0)
@@ -36,6 +37,14 @@ def test_islands_stand_on_the_ground_beside_the_lane():
     # half of a container's width and a margin
     assert min(clear_mm) > 2438 / 2 + 200
     assert island_props(2700.0, 0.0, np.random.default_rng(0)) == ()
+
+
+def test_scenes_with_islands_can_be_drawn():
+    values = {"placement": {"islands": 1}, "markings": FEW_DECALS}
+    config = Config.from_values(values, Config.preset("gate"))
+    for index in range(40):
+        scene = check_scene(sample_scene(config, 4, index, bundled_weights()))
+        assert len(scene.props) > 13
 
 
 @pytest.mark.parametrize("kind", ["20", "40", "45HC"])

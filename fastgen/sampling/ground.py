@@ -42,6 +42,9 @@ _BOGIE_WHEELBASE_MM = 1800.0
 
 _KERB_MM = 150.0
 _BOLLARD_MM = 170.0
+_BOLLARD_TALL_MM = (600.0, 900.0)
+"""Height above the kerb; props have to be below all containers, and so below any deck."""
+
 _ISLAND_WIDE_MM = (400.0, 900.0)
 _ISLAND_CLEAR_MM = 500.0
 """Least room between the containers of two lanes that an island leaves."""
@@ -141,7 +144,7 @@ def island_props(lane_mm: float, ground_mm: float, rng: np.random.Generator) -> 
     wide = float(np.round(wide))
     long, middle = (float(np.round(rng.uniform(*span))) for span in _ISLAND_SPANS_MM)
     kerb, paint = _darkened(_KERB_COLORS, rng), _darkened(_BOLLARD_COLORS, rng)
-    tall = float(np.round(rng.uniform(700, 1100)))
+    tall = float(np.round(rng.uniform(*_BOLLARD_TALL_MM)))
     parts = []
     for side in (-1, 1):
         y = side * round(lane_mm / 2, 1)
