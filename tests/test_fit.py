@@ -285,6 +285,41 @@ def test_a_proposal_is_a_file_that_a_config_reads(tmp_path):
     assert config.cameras["roof"] == Config.preset("gate").cameras["roof"]
 
 
+def test_a_file_that_cannot_be_written_is_refused_before_any_photograph_is_read(tmp_path, capsys):
+    for path, message in ((tmp_path / "none" / "p.yaml", "no folder"), (tmp_path, "is a folder")):
+        assert main(["fit", str(tmp_path / "photos"), "-o", str(path), "--force"]) != 0
+        assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("0.txt", b"\xe9 .5\n", r"0\.txt: not a YOLO file"),
+        ("0.txt", b"0 .5 .5 .4 -.5\n", r"0\.txt: line 1 is not a YOLO box"),
+        ("0.txt", b"0 50 40 30 30\n", r"0\.txt: line 1 is not a YOLO box"),
+        ("0.txt", b"0 .1 .2 .3 .4 .5 .6 .7\n", r"0\.txt: line 1 is not a YOLO box"),
+        ("0.txt", b"0 .5 nan .4 .5\n", r"0\.txt: line 1 is not a YOLO box"),
+        ("c.json", b"[" * 100000, r"c\.json: not a COCO file"),
+        *(
+            (
+                "c.json",
+                b'{"images":[{"id":1,"file_name":"0.jpg","height":%s}],"annotations":'
+                b'[{"image_id":1,"category_id":1,"bbox":[1,10,20,%s]}]}' % numbers,
+                r"c\.json: not a COCO file",
+            )
+            for numbers in ((b"0", b"30"), (b"9" * 400, b"30"), (b"100", b"-30"))
+        ),
+    ],
+)
+def test_files_of_boxes_that_cannot_be_used_are_named(tmp_path, name, content, message):
+    for number in range(2):
+        cv2.imwrite(str(tmp_path / f"{number}.jpg"), np.full((80, 100, 3), 90, np.uint8))
+    photographs = read_photographs(tmp_path, 640)
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(AssetError, match=message):
+        read_box_heights(tmp_path, photographs)
+
+
 def test_heights_of_boxes_give_distances(tmp_path):
     folder = photographs_in(tmp_path / "photos", 3)
     photographs = read_photographs(folder, 640)

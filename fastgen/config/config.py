@@ -86,9 +86,9 @@ class EnvironmentConfig:
         names: HDRIs to draw from, all equally likely, by file name without extension; assets/hdri
             has the bundled ones. If the list is empty, all HDRIs of --hdri are used. Without
             --hdri these are the bundled ones except interiors, ports more often than others.
-        weights: Relative frequency of HDRIs, by name. HDRIs that are not listed keep their default
-            frequency. Names
-            of HDRIs that are not available have no effect.
+        weights: Relative frequency of HDRIs, by name. 0 excludes one, even if names lists it; some
+            presets exclude HDRIs. HDRIs that are not listed keep their default frequency. Names of
+            HDRIs that are not available have no effect.
         yaw_deg: Rotation of the environment about the vertical.
         illuminance_lx: Light on level ground under the sky of an HDRI, by its name, for cameras
             with a meter (sensor.meter). Bundled HDRIs that are not listed have the estimates of

@@ -18,6 +18,12 @@ BoxHeights = Sequence[float]
 _TOUCHES = 0.005
 """Boxes closer than this share to the upper or lower border may be cut off."""
 
+_OUTSIDE = 0.05
+"""Share of the image's height by which boxes may reach beyond it."""
+
+_LEAST_HEIGHT = 0.02
+"""Height of the smallest boxes that say something about the distance of a camera."""
+
 _QUANTILES = (10, 90)
 _SIDES = ("front", "back", "door", "no_door")
 
@@ -42,7 +48,11 @@ def read_box_heights(folder: Path, photographs: Sequence[Photograph]) -> list[fl
         if path.is_file():
             found.setdefault(photograph.path.name, []).extend(_yolo(path))
     largest = (max(boxes, key=lambda ends: ends[1] - ends[0]) for boxes in found.values() if boxes)
-    return [low - top for top, low in largest if top > _TOUCHES and low < 1 - _TOUCHES]
+    return [
+        low - top
+        for top, low in largest
+        if top > _TOUCHES and low < 1 - _TOUCHES and low - top > _LEAST_HEIGHT
+    ]
 
 
 def camera_distances(preset: Config, heights: BoxHeights) -> tuple[dict[str, Any], str]:
@@ -88,21 +98,38 @@ def _coco(
             name = Path(image["file_name"]).name
             if name in known and (not names or each["category_id"] in wanted):
                 _, top, _, height = (float(v) for v in each["bbox"])
-                yield name, (top / image["height"], (top + height) / image["height"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+                yield name, _ends(top / image["height"], (top + height) / image["height"])
+    except (OSError, ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise AssetError(f"{path}: not a COCO file of boxes ({error!r})") from None
 
 
 def _yolo(path: Path) -> Iterator[tuple[float, float]]:
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        raise AssetError(f"{path}: not a YOLO file of boxes ({error}); move it away") from None
+    for number, line in enumerate(lines, 1):
         words = line.split()
         if not words:
             continue
         try:
+            if len(words) > 6:  # a polygon; a sixth number is a confidence
+                raise ValueError
             _, _, middle, _, height = (float(word) for word in words[:5])
+            yield _ends(middle - height / 2, middle + height / 2)
         except ValueError:
             raise AssetError(
                 f"{path}: line {number} is not a YOLO box; write class, centre x, centre y, width, "
-                "height"
+                "height, as shares of the image"
             ) from None
-        yield middle - height / 2, middle + height / 2
+
+
+def _ends(top: float, low: float) -> tuple[float, float]:
+    """Return the ends of a box as shares of the image's height.
+
+    Raises:
+        ValueError: They are not those of a box in the image.
+    """
+    if not (top >= -_OUTSIDE and low <= 1 + _OUTSIDE and low > top):
+        raise ValueError(f"a box from {top:g} to {low:g} of the image's height")
+    return top, low

@@ -124,6 +124,11 @@ def mixed_shares(shares: Mapping[str, float], point: Point) -> dict[str, float]:
     return {light: value / total for light, value in raw.items()}
 
 
+def check_optimizer() -> None:
+    """Raise ConfigError if the optimizer is not installed, before minutes of rendering."""
+    _cma()
+
+
 def _cma() -> Any:
     try:
         import cma
