@@ -197,9 +197,8 @@ class Generator:
                 exposure = renderer.exposure(scene, camera, self.size)
                 light = renderer.ambient(scene.environment)
                 air = airlight(light, scene.environment.yaw_deg, exposure.factor)
-                ground_mm = None if scene.ground is None else scene.ground.height_mm
                 image = apply_camera_model(
-                    frame, view, camera, scene.weather, air, exposure, ground_mm
+                    frame, view, camera, scene.weather, air, exposure, scene.ground
                 )
                 frame = replace(frame, image=image)
         config = self.config if labels is None else replace(self.config, labels=labels)

@@ -326,7 +326,7 @@ def test_backends_compute_the_same_sky_visibility(even_sky):
     np.testing.assert_array_equal(*found)
 
 
-@pytest.mark.parametrize(("camera", "index"), [("A", 2), ("Cr", 3)])
+@pytest.mark.parametrize(("camera", "index"), [("A", 2), ("Cl", 5), ("Cr", 3)])
 def test_sky_visibility_of_reflections_is_close_to_ray_casts(generators, camera, index):
     """Rays from visible points are spread by about 17 degrees around the mirror direction."""
     size = (96, 72)

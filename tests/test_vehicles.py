@@ -27,7 +27,7 @@ def test_islands_stand_on_the_ground_beside_the_lane():
         assert corners[..., 2].min() == pytest.approx(ground_mm)
         assert corners[..., 2].max() < ground_mm + 1100  # below the lowest deck
         clear_mm.append(np.abs(corners[..., 1]).min())
-        for island in corners[::3]:  # an island and two bollards on it
+        for island in corners[:2]:  # an island and two bollards on it
             low, high = island.min(axis=0), island.max(axis=0)
             on_top = [c for c in corners if c[:, 2].min() == pytest.approx(high[2])]
             inside = [

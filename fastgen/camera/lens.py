@@ -90,7 +90,7 @@ class Distortion:
         self._table, self._bent = table[: last + 1], bent[: last + 1]
         self._end, self._end_bent = float(table[last]), float(bent[last])
         self._end_slope = float(self._slope(table[last]))
-        if self._folds(half_size):
+        if self._folds():
             raise ConfigError(
                 "lens: its tangential distortion folds the image over; give p1 and p2 nearer to 0"
             )
@@ -160,7 +160,7 @@ class Distortion:
         )
         return x, y
 
-    def _folds(self, half_size: tuple[float, float]) -> bool:
+    def _folds(self) -> bool:
         """Return whether two ideal points share a position in the image."""
         t = self._table[1:]
         # radial distortion stretches by its slope along the radius and by curve / t across it;
@@ -174,7 +174,7 @@ class Distortion:
         ring = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
         ideal = np.linspace(0, self._end, 65)[1:, None, None] * ring
         seen = self.apply(ideal)
-        inside = (np.abs(seen) <= half_size).all(axis=-1)
+        inside = (np.abs(seen) <= self._half_size).all(axis=-1)
         ideal, seen = ideal[inside], seen[inside]
         if (_cross(*self._slopes(ideal)) < _LEAST_SLOPE**2).any():
             return True

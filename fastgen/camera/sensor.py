@@ -27,7 +27,7 @@ from fastgen.camera.response import respond
 from fastgen.camera.tone_curve import Light, tone_map_and_encode
 from fastgen.camera.weather import BACKDROP_M, add_fog, add_rain
 from fastgen.frame import Frame
-from fastgen.scene import Camera, Color
+from fastgen.scene import Camera, Color, Ground
 from fastgen.scene.limits import MM
 from fastgen.scene.optics import Sensor, Weather
 
@@ -59,7 +59,7 @@ def apply_camera_model(
     weather: Weather,
     airlight: Color,
     exposure: Exposure = _UNMETERED,
-    ground_mm: float | None = None,
+    ground: Ground | None = None,
 ) -> NDArray[np.uint8]:
     """Return the image that a camera records of a rendered frame.
 
@@ -70,7 +70,7 @@ def apply_camera_model(
         weather: Fog and rain between the camera and the scene.
         airlight: Mean linear light of the sky in the exposure of the frame: colour of fog and rain.
         exposure: Exposure of the frame, for cameras with a meter.
-        ground_mm: Height of the scene's ground, None without one. Fog assumes it in the HDRI, too.
+        ground: The scene's ground; fog continues it in the HDRI.
 
     Returns:
         uint8 [H, W, 3], sRGB.
@@ -80,7 +80,7 @@ def apply_camera_model(
     if needs_radiance(camera, weather):
         assert frame.radiance is not None, "render with radiance=True"
         sky = np.array(airlight, np.float32)
-        light = _through_weather(frame, view, weather, sky, ground_mm)
+        light = _through_weather(frame, view, weather, sky, ground)
         if sensor.meter:
             times = _for_highlights(light, sensor)
             if times < 1:
@@ -104,12 +104,12 @@ def _has_fog_or_rain(weather: Weather) -> bool:
 
 
 def _through_weather(
-    frame: Frame, view: View, weather: Weather, sky: Light, ground_mm: float | None
+    frame: Frame, view: View, weather: Weather, sky: Light, ground: Ground | None
 ) -> Light:
     light = frame.radiance
     assert light is not None
     if weather.visibility_mm:
-        stretch, backdrop_m = _along_rays(view, ground_mm)
+        stretch, backdrop_m = _along_rays(view, ground)
         ray_m = frame.depth * stretch
         light = add_fog(light, ray_m, frame.cover, weather.visibility_mm, sky, backdrop_m)
     if weather.rain:
@@ -149,7 +149,7 @@ def _recorded(light: Light, frame: Frame, view: View, camera: Camera, exposure: 
 
 
 def _along_rays(
-    view: View, ground_mm: float | None
+    view: View, ground: Ground | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return the ray length per unit of depth and the distance of the background, by pixel.
 
@@ -157,7 +157,7 @@ def _along_rays(
 
     Args:
         view: Projection of the camera.
-        ground_mm: Height of the ground. None without one: the background is at BACKDROP_M.
+        ground: The ground. Without one the background is at BACKDROP_M.
 
     Returns:
         float32 [H, W] each. The distance is along the ray in metres, at most BACKDROP_M.
@@ -172,8 +172,8 @@ def _along_rays(
         return np.asarray(fine[inside], np.float32)
 
     stretch = at_pixels(1 / (rays @ view.rotation[2]))
-    if ground_mm is None:
+    if ground is None:
         return stretch, np.full_like(stretch, BACKDROP_M)
-    above_m = max(float(eye_mm[2] - ground_mm) * MM, 1e-3)
+    above_m = max(float(eye_mm[2] - ground.height_mm) * MM, 1e-3)
     falling = np.maximum(at_pixels(-rays[..., 2]), np.float32(above_m / BACKDROP_M))
     return stretch, np.asarray(above_m / falling, np.float32)

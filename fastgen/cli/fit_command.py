@@ -68,7 +68,7 @@ def _fit(options: argparse.Namespace) -> int:
     from fastgen.fit.gap import table
     from fastgen.fit.photographs import read_photographs
     from fastgen.fit.proposal import TRIALS_PER_MINUTE, Effort, propose
-    from fastgen.fit.search import check_optimizer
+    from fastgen.fit.search import optimizer
 
     if not 0.1 <= options.budget <= 600:
         raise ConfigError(f"budget: {options.budget:g} is out of range; give 0.1 to 600 minutes")
@@ -80,7 +80,7 @@ def _fit(options: argparse.Namespace) -> int:
         raise OutputError(f"{options.file}: is a folder; give a file with -o")
     if not options.file.absolute().parent.is_dir():
         raise OutputError(f"{options.file}: no folder {options.file.parent}; make it first")
-    check_optimizer()
+    optimizer()  # refuses a missing one before minutes of rendering
     preset = Config.preset(options.preset)
     photographs = read_photographs(options.photos, options.longest)
     boxes = read_box_heights(options.photos, photographs)

@@ -78,15 +78,9 @@ class LinearFrame:
             ),
         )
         camera = replace(self.camera, sensor=drawn)
-        ground = self.scene.ground
+        scene = self.scene
         return apply_camera_model(
-            self.frame,
-            self.view,
-            camera,
-            self.scene.weather,
-            self.air,
-            self.exposure,
-            None if ground is None else ground.height_mm,
+            self.frame, self.view, camera, scene.weather, self.air, self.exposure, scene.ground
         )
 
 

@@ -73,7 +73,7 @@ def search(
     Raises:
         ConfigError: The package cma is not installed.
     """
-    cma = _cma()
+    cma = optimizer()
     lights = list(shares) if len(shares) > 1 else []
     start = np.concatenate([point_of(preset), np.full(len(lights), 0.5)])
     size = len(start) - len(lights)
@@ -124,12 +124,12 @@ def mixed_shares(shares: Mapping[str, float], point: Point) -> dict[str, float]:
     return {light: value / total for light, value in raw.items()}
 
 
-def check_optimizer() -> None:
-    """Raise ConfigError if the optimizer is not installed, before minutes of rendering."""
-    _cma()
+def optimizer() -> Any:
+    """Return the module of the optimizer.
 
-
-def _cma() -> Any:
+    Raises:
+        ConfigError: It is not installed.
+    """
     try:
         import cma
     except ImportError:

@@ -86,12 +86,13 @@ def ground_plan(
         ground_around = [part for band in [*rest[0], *rest[1]] for part in within(around, band)]
         draws += [GroundDraw(near, region) for region in outside(ground_around, shown)]
         rest = [outside(outside(bands, around), shown) for bands in rest]
-    # a wet plane may mirror a box anywhere
-    dark = [(0, 0, *view.size)]
-    if not plain.wet and boxes:
+    dark: list[Region] = []
+    if boxes and plain.wet:  # it may mirror a box anywhere
+        dark = [(0, 0, *view.size)]
+    elif boxes:
         dark = joined(hull_corners(view, reaches(boxes, ground.height_mm, toward, _BLURRED_MM))[0])
     for bands, fades in zip(rest, (False, True), strict=True):
-        lit = outside(bands, dark) if boxes else bands
+        lit = outside(bands, dark)
         draws += [GroundDraw(replace(plain, fades=fades), region) for region in lit]
         # one program for near and far, because each takes a while to compile
         by_boxes = replace(plain, boxes=count, fades=True)

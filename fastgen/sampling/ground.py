@@ -1,4 +1,4 @@
-"""Sampling of what stands on the ground, as boxes and cylinders: trailers, wagons and islands."""
+"""Sampling of trailers, wagons and islands on the ground, as boxes and cylinders."""
 
 from collections.abc import Iterable
 
@@ -145,14 +145,11 @@ def island_props(lane_mm: float, ground_mm: float, rng: np.random.Generator) -> 
     long, middle = (float(np.round(rng.uniform(*span))) for span in _ISLAND_SPANS_MM)
     kerb, paint = _darkened(_KERB_COLORS, rng), _darkened(_BOLLARD_COLORS, rng)
     tall = float(np.round(rng.uniform(*_BOLLARD_TALL_MM)))
-    parts = []
-    for side in (-1, 1):
-        y = side * round(lane_mm / 2, 1)
-        parts.append(_box((middle, y, ground_mm + _KERB_MM / 2), (long, wide, _KERB_MM), kerb))
-        for end in (-1, 1):
-            x = middle + end * (long / 2 - 350)
-            z = ground_mm + _KERB_MM + tall / 2
-            parts.append(_box((x, y, z), (_BOLLARD_MM, _BOLLARD_MM, tall), paint))
+    y = round(lane_mm / 2, 1)
+    parts = _mirrored((middle, y, ground_mm + _KERB_MM / 2), (long, wide, _KERB_MM), kerb)
+    for end in (-1, 1):
+        center = (middle + end * (long / 2 - 350), y, ground_mm + _KERB_MM + tall / 2)
+        parts += _mirrored(center, (_BOLLARD_MM, _BOLLARD_MM, tall), paint)
     return tuple(parts)
 
 
