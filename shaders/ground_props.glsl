@@ -11,7 +11,7 @@
 #include "ground_light.glsl"
 
 #if GROUND_SHADOWS || GROUND_PROPS
-uniform usampler2D prop_tiles;   // See tile_masks in fastgen/render/prop_tiles.py.
+uniform usampler2D prop_tiles;   // See GroundPlan.masks.
 
 // Bit masks of a tile: xy of the props that it may show, zw of those that may shade it.
 uvec4 tile_props() {

@@ -36,18 +36,15 @@ float undistortion_ratio(vec2 seen) {
     return 1.0 / ((((ratio * q + low.w) * q + low.z) * q + low.y) * q + low.x);
 }
 
-const int TANGENTIAL_STEPS = 6;   // Each leaves a third of the error or less.
-
 // The tangential term depends on the undistorted point, which fixed-point iteration finds.
 vec2 undistorted(vec2 pixel) {
     if (lens_model == 0.0) return pixel;
     vec2 seen = (pixel - lens_center) / lens_focal;
     vec2 ideal = seen * undistortion_ratio(seen);
-    int steps = lens_tangential == vec2(0.0) ? 1 : TANGENTIAL_STEPS;
     int i = 0;
     do {
         vec2 radial = seen - tangential(ideal);
         ideal = radial * undistortion_ratio(radial);
-    } while (++i < steps);
+    } while (++i < lens_steps);
     return lens_center + lens_focal * ideal;
 }

@@ -13,7 +13,6 @@ from fastgen.light.environment import Ambient, load_environment, sky_irradiance,
 from fastgen.light.ground_light import LOW_GAP_M, form_factors, ground_light
 from fastgen.light.hdri import bundled_hdris
 from fastgen.render.gl import open_context
-from fastgen.render.ground_regions import ground_plan
 from fastgen.scene import (
     Camera,
     EnvironmentView,
@@ -313,7 +312,8 @@ def test_the_plane_fades_into_the_panorama(generator, scene):
     plain = generator.render(camera=camera.name, scene=replace(bare, ground=None))
     depth = plane_depth_mm(camera, GROUND)
     beyond = np.isinf(depth) & ~oracle.near_edge(np.isinf(depth))
-    np.testing.assert_array_equal(faded.image[beyond], plain.image[beyond])
+    # the background is interpolated without ground, and found by rays beside one
+    np.testing.assert_allclose(faded.image[beyond].astype(int), plain.image[beyond], atol=1)
     assert np.isinf(faded.depth[beyond]).all()
     change = np.abs(faded.image.astype(float) - plain.image).mean(axis=-1)
     eye, rays = rays_of(camera)
@@ -359,25 +359,3 @@ def test_drafts_show_the_same_ground(scene):
             )
     difference = np.abs(images[0].astype(float) - images[1])
     assert difference.mean() < 3
-
-
-@pytest.mark.parametrize("camera", CAMERAS, ids=lambda c: c.name)
-@pytest.mark.parametrize("props", [(), PROPS])
-def test_regions_are_disjoint_and_cover_the_ground(scene, camera, props):
-    boxes = [container_box("20", Pose()), container_box("20", Pose((0.0, 6000.0, 0.0), 30.0))]
-    toward = np.array([0.4, 0.3, 0.866])
-    plan = ground_plan(replace(scene, props=props), GROUND, view_of(camera, SIZE), boxes, toward)
-    count = np.zeros(SIZE[::-1], int)
-    fading = np.zeros(SIZE[::-1], bool)
-    for each in plan.draws:
-        x, y, width, height = each.region
-        count[y : y + height, x : x + width] += 1
-        fading[y : y + height, x : x + width] |= each.variant.fades
-    depth = plane_depth_mm(camera, GROUND)
-    seen = np.isfinite(depth)
-    assert count.max() == 1
-    assert count[seen].min() == 1
-    eye, rays = rays_of(camera)
-    at = eye + np.where(seen, depth, 0)[..., None] * rays
-    far = ~seen | (np.hypot(at[..., 0], at[..., 1]) > 0.5 * GROUND.reach_mm)
-    assert fading[far & (count > 0)].all()

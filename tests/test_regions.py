@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from fastgen.camera.projection import view_of
-from fastgen.render.constants import TILE_PX
-from fastgen.render.prop_tiles import tile_masks
 from fastgen.render.regions import bands, hull_corners, merged, outside, within
 from fastgen.scene import Camera
 from fastgen.scene.optics import Lens
@@ -114,25 +112,3 @@ def test_hulls_project_into_their_rectangles(lens):
             checked += 1
     assert checked > 60
     assert np.median(spare) < 1.6  # random points do not reach the corners of their hull
-
-
-def test_tiles_know_the_props_whose_rectangles_touch_them():
-    rng = np.random.default_rng(12)
-    size = (150, 90)
-    for count in (1, 31, 64):
-        low = rng.integers(0, [150, 90], (2, count, 2))
-        rectangles = np.concatenate(
-            [low, np.minimum(low + rng.integers(1, 50, low.shape), size)], -1
-        )
-        masks = tile_masks(*rectangles, size)
-        assert masks.shape == (-(-90 // TILE_PX), -(-150 // TILE_PX), 4)
-        for which, group in enumerate(rectangles):
-            for number, (x0, y0, x1, y1) in enumerate(group):
-                touched = np.zeros(size[::-1], bool)
-                touched[y0:y1, x0:x1] = True
-                word = masks[..., 2 * which + number // 32]
-                found = (word >> np.uint32(number % 32)) & 1
-                for row, column in np.ndindex(found.shape):
-                    part = touched[row * TILE_PX : (row + 1) * TILE_PX]
-                    tile = part[:, column * TILE_PX : (column + 1) * TILE_PX]
-                    assert found[row, column] == tile.any()

@@ -1,5 +1,8 @@
 """Vignetting and noise of linear light; what cameras do to the encoded image."""
 
+from functools import lru_cache
+from statistics import NormalDist
+
 import cv2
 import numpy as np
 import simplejpeg
@@ -10,6 +13,8 @@ from fastgen.scene.optics import ChromaNoise, Noise, Sharpening, Stamp
 
 _CHROMA_TO_RGB = np.array([[0, 1.402], [-0.344136, -0.714136], [1.772, 0]])
 """Red, green and blue per unit of Cb and Cr at constant luma (ITU-R BT.601, as in JFIF)."""
+
+_QUANTILES = 1 << 16
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
 _CAP_PX = 21.0
@@ -52,10 +57,26 @@ def noisy(light: Light, noise: Noise, gain: float = 1.0) -> Light:
     well = np.float32(noise.full_well_e / gain)
     variance = np.maximum(light, 0) * well + np.float32(noise.read_noise_e**2)
     spread = np.sqrt(variance, out=variance)
-    spread *= rng.standard_normal(light.shape, np.float32)
+    spread *= _standard_normal(rng, light.shape)
     spread /= well
     spread += light
     return np.asarray(spread, np.float32)
+
+
+def _standard_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> Light:
+    """Return normally distributed numbers of a shape, in a third of NumPy's time."""
+    return _quantiles().take(rng.integers(0, _QUANTILES, shape, np.uint16))
+
+
+@lru_cache(maxsize=1)
+def _quantiles() -> Light:
+    """Return the middle of each of equally probable ranges of the standard normal distribution.
+
+    They reach 4.3 standard deviations; their variance is 0.99998.
+    """
+    inverse = NormalDist().inv_cdf
+    above = [inverse(0.5 + (k + 0.5) / _QUANTILES) for k in range(_QUANTILES // 2)]
+    return np.array([-value for value in above[::-1]] + above, np.float32)
 
 
 def with_chroma_noise(

@@ -3,6 +3,8 @@
 Unlike the neutral tone curve, they clip: light that fills a pixel's well is white in every channel.
 """
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +34,20 @@ def respond(light: Light, response: Response) -> NDArray[np.uint8]:
     Returns:
         uint8 [H, W, 3], sRGB.
     """
-    steps = np.linspace(0, response.clip, _CODES)
-    table = np.rint(255 * response_curve(steps, response)).astype(np.uint8)
     mix = response.saturation * np.eye(3) + (1 - response.saturation) * REC_709
     wells = np.clip(light, 0, np.float32(response.clip))
     scale = (_CODES - 1) / response.clip
     codes = np.asarray(cv2.transform(wells, (mix * scale).astype(np.float32)), np.float32)
     np.clip(codes, 0, _CODES - 1, out=codes)
     codes += np.float32(0.5)
-    return np.asarray(table[codes.astype(np.uint16)])
+    return _table(response).take(codes.astype(np.uint16))
+
+
+@lru_cache(maxsize=16)
+def _table(response: Response) -> NDArray[np.uint8]:
+    """Return the encoded values of _CODES steps of light from 0 to `response.clip`."""
+    steps = np.linspace(0, response.clip, _CODES)
+    return np.asarray(np.rint(255 * response_curve(steps, response)), np.uint8)
 
 
 def response_curve(light: NDArray[np.floating], response: Response) -> NDArray[np.floating]:

@@ -60,9 +60,20 @@ _OUTDOORS: dict[str, Any] = {
 """Fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
 
 _UNPAVED = ("dawn", "forest", "forest_2", "night", "night_2", "park", "sky", "sunrise")
+_HOURS = {
+    **dict.fromkeys(("port_noon", "port_afternoon", "port_morning", "port_pier"), 3.0),
+    **{"port_golden": 2.0, "port_overcast": 5.0, "city": 1.0, "city_2": 1.0, "venice": 1.0},
+    **{"port_dusk": 1.0, "port_blue_hour": 1.0, "sunset": 0.5, "sunset_2": 0.5, "port_night": 2.0},
+}
+"""Weights of HDRIs by hours of work: half in sunshine, the others mostly under clouds, a tenth at
+dusk and less at night. A choice; `fastgen fit` finds those of a camera."""
+
 _ON_GROUND: dict[str, Any] = {
     **_OUTDOORS,
-    "environment": {**_OUTDOORS["environment"], "weights": dict.fromkeys(_UNPAVED, 0.0)},
+    "environment": {
+        **_OUTDOORS["environment"],
+        "weights": {**_HOURS, **dict.fromkeys(_UNPAVED, 0.0)},
+    },
 }
 """The same for presets with a ground, which must blend into that of the HDRI."""
 

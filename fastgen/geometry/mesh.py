@@ -43,6 +43,10 @@ MAX_ZONES = 500
 """Upper limit of the zones of one mesh: the zone numbers of a container and a spreader together fit
 into ten bits of the visibility buffer."""
 
+_RIM_MM = 60.0
+"""Distance from two sides of the box around a mesh within which a point is at its rim. Posts and
+rails are that near; walls between them do not count."""
+
 GROUP_SLACK_MM = 12.0
 """Largest distance of a face's frame behind the plane of the castings, see Mesh.groups."""
 
@@ -210,7 +214,7 @@ class Mesh:
         Args:
             damages: Prepare for damaged scenes too.
         """
-        _ = self.panels, self.hull, self.zone_areas_mm2
+        _ = self.panels, self.hull, self.rim, self.zone_areas_mm2
         if damages:
             _ = self.triangle_bounds_mm
 
@@ -255,6 +259,13 @@ class Mesh:
             return {"hull": np.asarray(ConvexHull(self.points_mm).vertices, np.int64)}
 
         return disk_cache.cached("hull", VERSION, self.shape_digest, found)["hull"]
+
+    @cached_property
+    def rim(self) -> NDArray[np.int64]:
+        """Indices into points_mm of points near the edges of the box around the mesh."""
+        low, high = self.points_mm.min(axis=0), self.points_mm.max(axis=0)
+        beside = (self.points_mm < low + _RIM_MM) | (self.points_mm > high - _RIM_MM)
+        return np.flatnonzero(beside.sum(axis=1) > 1)
 
     @cached_property
     def shape_digest(self) -> str:

@@ -100,6 +100,11 @@ class PreparedScene:
         return tuple(found)
 
     @cached_property
+    def present(self) -> tuple["Member", ...]:
+        """The containers that the scene shows."""
+        return tuple(m for m in self.members if m.prepared.scene.container.present)
+
+    @cached_property
     def others(self) -> tuple[Body | None, ...]:
         """Outer boxes of all other containers in the frame of each member, None without any."""
         found: list[Body | None] = []
@@ -196,13 +201,6 @@ class PreparedScene:
         return deform(self.scene.damages, rest)
 
     @cached_property
-    def points_mm(self) -> Array:
-        """All distinct vertices float64 [P, 3] of the container after damage."""
-        if not self.scene.damages:
-            return self.container.points_mm
-        return deform(self.scene.damages, self.container.points_mm)
-
-    @cached_property
     def hull_points_mm(self) -> Array:
         """Vertices float64 [P, 3] after damage that include the corners of the convex hull."""
         if not self.scene.damages:
@@ -211,6 +209,18 @@ class PreparedScene:
         corners = self.corners_mm
         least = np.where(CORNER_SIGNS > 0, -np.inf, corners).max(axis=0)
         most = np.where(CORNER_SIGNS > 0, corners, np.inf).min(axis=0)
-        moved = self.points_mm
+        moved = deform(self.scene.damages, self.container.points_mm)
         inside = [(x > a) & (x < b) for x, a, b in zip(moved.T, least, most, strict=True)]
         return moved.compress(~np.logical_and.reduce(inside), axis=0)
+
+    @cached_property
+    def rim_points_mm(self) -> Array:
+        """Vertices float64 [P, 3] after damage, of which some are outermost in any image.
+
+        Lens distortion curves the edges of the outer box, so that vertices along them count as
+        well as its corners. Everything else is behind or between them.
+        """
+        rim = self.container.points_mm[self.container.rim]
+        if not self.scene.damages:
+            return rim
+        return np.concatenate([deform(self.scene.damages, rim), self.hull_points_mm])

@@ -20,7 +20,7 @@ Ints = NDArray[np.int64]
 Runs = tuple[Ints, Ints, Ints, Ints]
 """Runs of pixels, int [R] each: owner, row, first column, and the column after the last."""
 
-_MOST_ROWS = 100_000
+_MOST_ROWS = 2000
 """Objects over more rows than this are counted on a coarser grid, accurate to a thousandth."""
 
 

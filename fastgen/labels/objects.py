@@ -23,7 +23,7 @@ from fastgen.scene import Decal, Scene
 from fastgen.scene.limits import MM, NEAR_M
 from fastgen.scene.object_ids import scene_numbers
 
-_PIECES = 24
+_PIECES = 12
 """Pieces along each edge of the container's outer box in images with lens distortion."""
 
 CASTINGS = tuple(
@@ -166,16 +166,18 @@ def _container(shot: Shot) -> Object:
     frame, view, prepared = shot.frame, shot.view, shot.prepared
     area = cv2.countNonZero(frame.damage)
     corners = prepared.corners_mm
-    # with lens distortion, points inside the convex hull may be outermost in the image
-    points = prepared.points_mm if shot.lens else prepared.hull_points_mm
+    points = prepared.rim_points_mm if shot.lens else prepared.hull_points_mm
     pixels, depth = view.project(points)
-    if depth.min() < NEAR_M:
+    passes_camera = depth.min() < NEAR_M
+    if passes_camera:
         pixels = project(mesh_facets(prepared.container, shot.scene.damages), view).pixels
     (bounds,) = boxes(pixels, np.zeros(len(pixels), np.int64), 1)
     sides = corners[list(_SIDES)]
     if shot.lens:
         sides = _pieces(sides)
     polygons = project(Facets.of(sides, np.zeros(len(sides), np.int64)), view).polygons
+    if not passes_camera:  # otherwise the near plane opens the box, and its inner sides are seen
+        polygons = polygons[facing(polygons)]
     # void pixels within the box are not hidden; only the spreader and other containers hide any
     asked = None if shot.hiding is None else mask_box(shot.hiding)
     alone = covered(

@@ -60,6 +60,7 @@ VIEW_BLOCK = Block(
         ("vec4", "lens_radial"),
         ("vec4", "lens_inverse", 2),  # polynomial of the inverse distortion
         ("vec2", "lens_tangential"),
+        ("int", "lens_steps"),  # of the inverse, for tangential distortion
         ("vec4", "lens_to_clip"),  # columns of the matrix from the image plane to clip space
         ("vec2", "lens_center"),
         ("vec2", "lens_linear_from"),  # radius beyond which the distortion is linear, slope there

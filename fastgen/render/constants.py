@@ -84,7 +84,7 @@ GROUND_FADE_START = 0.5
 """Share of the ground's reach at which it starts to fade into the panorama."""
 
 TILE_PX = 16
-"""Side in pixels of the tiles that have masks of props, see prop_tiles.py; even."""
+"""Side in pixels of the tiles that have masks of props, see ground_plan.py; even."""
 
 _SHADOW_TEXELS = 1.0
 """Least distance in texels between shadow lookups for the first directional light; closer lookups

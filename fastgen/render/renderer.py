@@ -169,9 +169,11 @@ class Renderer:
             self._background.run(inputs)
             self._shade(inputs, normals)
             return inputs.targets
-        self._background.run(inputs)
-        self._ground.run(inputs, prepared)
-        present = [m for m in prepared.members if m.prepared.scene.container.present]
+        plan = self._ground.plan(prepared, view)
+        self._background.run(inputs, plan)
+        if plan is not None:
+            self._ground.run(inputs, prepared, plan)
+        present = prepared.present
         for number in back_to_front([each.box for each in present], view.position_m / MM):
             member = present[number]
             inputs = self._inputs(member.prepared, view.in_frame(member.pose), options, around)

@@ -29,7 +29,7 @@ MAX_NEIGHBOURS = 15
 """Containers of a scene beside the first; see object_ids for the ids of each."""
 
 MAX_PROPS = 64
-"""Props of a scene; each has a bit in the tile masks of render/prop_tiles.py."""
+"""Props of a scene; each has a bit in the tile masks of render/ground_plan.py."""
 
 LOWEST_GROUND_MM = -1e5
 """Lowest height of the ground."""

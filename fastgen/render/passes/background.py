@@ -6,6 +6,8 @@ import moderngl
 
 from fastgen.render.constants import LIST_GROUP
 from fastgen.render.draw_inputs import DrawInputs
+from fastgen.render.drawn_tiles import DrawnTiles
+from fastgen.render.ground_plan import GroundPlan
 from fastgen.render.program import Programs
 
 _OCTAHEDRON = 24
@@ -32,27 +34,39 @@ class BackgroundPass:
         self._programs = programs
         self._by_compute = by_compute
 
-    def run(self, inputs: DrawInputs) -> None:
-        """Draw the sky and leave the image's targets bound for compute shaders."""
+    def run(self, inputs: DrawInputs, plan: GroundPlan | None = None) -> None:
+        """Draw the sky and leave the image's targets bound for compute shaders.
+
+        Args:
+            inputs: The image.
+            plan: Says which tiles need it, if there is ground; by default all do.
+        """
         if self._by_compute:
             self._ctx.memory_barrier()  # the last image has been read
             inputs.targets.bind_images()
             self._store(inputs)
         else:
-            self._draw(inputs)
+            self._draw(inputs, plan)
             inputs.targets.bind_images()
 
-    def _draw(self, inputs: DrawInputs) -> None:
+    def _draw(self, inputs: DrawInputs, plan: GroundPlan | None) -> None:
         single_layer = inputs.variant.layer != "all"
-        per_pixel = single_layer or inputs.view.distortion is not None
-        by_ray = ("fullscreen.vert", "background_by_ray.frag")
-        stages = by_ray if per_pixel else ("background.vert", "background.frag")
+        per_pixel = single_layer or inputs.view.distortion is not None or plan is not None
+        if per_pixel:
+            vertex = "fullscreen.vert" if plan is None else "rectangles.vert"
+            stages = (vertex, "background_by_ray.frag")
+        else:
+            stages = ("background.vert", "background.frag")
         program = self._programs.get(
             stages, replace(inputs.variant, damage="undamaged", lights=0, over=False)
         )
         self._ctx.scissor = None
         only_sky = inputs.targets.begin(inputs.variant.over)
         self._ctx.enable_only(moderngl.DEPTH_TEST if only_sky else moderngl.NOTHING)
+        if plan is not None:
+            with DrawnTiles(self._ctx, plan.tiles, [plan.sky]) as drawn:
+                drawn.draw(0, program, inputs.textures, inputs.targets.size)
+            return
         program.bind(inputs.textures)
         program.draw_vertices(3 if per_pixel else _OCTAHEDRON)
 

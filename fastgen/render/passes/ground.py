@@ -1,23 +1,27 @@
 """Ground pass: the plane below the containers and the props on it, drawn over the background."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.light.environment import Ambient, to_map_frame
 from fastgen.light.ground_light import GroundLight, ground_light
 from fastgen.render.blocks import GROUND_BLOCK
 from fastgen.render.draw_inputs import DrawInputs
-from fastgen.render.ground_regions import GroundDraw, ground_plan
+from fastgen.render.drawn_tiles import DrawnTiles
+from fastgen.render.ground_plan import GroundPlan, ground_plan
 from fastgen.render.ground_values import ground_values
 from fastgen.render.passes.bake import Atlas, bake_ground
 from fastgen.render.program import Programs, Textures
 from fastgen.render.recent_cache import ReleasingCache
 from fastgen.render.textures import data_texture
+from fastgen.render.tiles import Mask
 from fastgen.render.variant import GroundVariant, ShaderVariant
 from fastgen.scene import EnvironmentView, Scene
 
@@ -52,19 +56,57 @@ class GroundPass:
         self._scenes: ReleasingCache[_SceneLight] = ReleasingCache(2)
         self._coarse: ReleasingCache[_CoarseTarget] = ReleasingCache(2)
 
-    def run(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
-        """Draw the ground of a scene, if it has one.
+    def plan(self, prepared: PreparedScene, view: View) -> GroundPlan | None:
+        """Return what of an image is background, plane and props; None without ground.
+
+        Args:
+            prepared: The scene.
+            view: Projection of the image, in the world frame.
+        """
+        scene = prepared.scene
+        if scene.ground is None:
+            return None
+        toward = _first_light(scene, self._ambient(scene.environment))
+        return ground_plan(scene.ground, scene.props, prepared.present, view, toward)
+
+    def run(self, inputs: DrawInputs, prepared: PreparedScene, plan: GroundPlan) -> None:
+        """Draw the ground of a scene that has one.
 
         Args:
             inputs: The image, with the view in the world frame.
             prepared: The scene.
+            plan: What to draw.
         """
-        scene = prepared.scene
-        ground = scene.ground
-        if ground is None:
-            return
-        present = [m for m in prepared.members if m.prepared.scene.container.present]
-        ambient = self._ambient(scene.environment)
+        light = self._fill_block(prepared)
+        self._ctx.memory_barrier()  # compute shaders may have written the background
+        self._ctx.enable_only(moderngl.NOTHING)
+        self._ctx.scissor = None
+        width, height = inputs.targets.size
+        half = (width + 1) // 2, (height + 1) // 2
+        coarse = self._coarse.get(half, lambda: _CoarseTarget(self._ctx, *half))
+        textures = {
+            **inputs.textures,
+            "ground_grid": light.texture,
+            "ground_coarse": coarse.texture,
+        }
+        masks = None if plan.masks is None else data_texture(self._ctx, plan.masks)
+        if masks is not None:
+            textures["prop_tiles"] = masks
+        steps = _steps(plan, inputs)
+        with DrawnTiles(self._ctx, plan.tiles, [step.tiles for step in steps]) as drawn:
+            for number, step in enumerate(steps):
+                shrunk = step.variant.ground.coarse
+                (coarse.framebuffer if shrunk else inputs.targets.image).use()
+                program = self._programs.get(("rectangles.vert", step.fragment), step.variant)
+                drawn.draw(number, program, textures, half if shrunk else (width, height))
+        if masks is not None:
+            masks.release()
+
+    def _fill_block(self, prepared: PreparedScene) -> "_SceneLight":
+        """Fill and bind the ground's uniform block, and return the light on the ground."""
+        scene, present = prepared.scene, prepared.present
+        ground, ambient = scene.ground, self._ambient(scene.environment)
+        assert ground is not None
         kept = self._scenes.get(
             prepared,
             lambda: _SceneLight(
@@ -82,73 +124,7 @@ class GroundPass:
         values = ground_values(ground, present, scene.props, kept.light, toward)
         self._block.write(GROUND_BLOCK.pack(values))
         self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
-        self._ctx.memory_barrier()  # compute shaders may have written the background
-        self._ctx.enable_only(moderngl.NOTHING)
-        boxes = [member.box for member in present]
-        draws, tiles = ground_plan(scene, ground, inputs.view, boxes, toward)
-        variant = ShaderVariant(
-            layer=inputs.variant.layer,
-            lights=inputs.variant.lights,
-            radiance=inputs.variant.radiance,
-        )
-        textures = {**inputs.textures, "ground_grid": kept.texture}
-        made = None if tiles is None else data_texture(self._ctx, tiles)
-        if made is not None:
-            textures["prop_tiles"] = made
-        if inputs.variant.coarse and variant.layer == "all":
-            self._draw_coarse(inputs, variant, textures, draws)
-            draws = [
-                each._replace(
-                    variant=replace(each.variant, plane=False, shadows=False, fades=False)
-                )
-                for each in draws
-                if each.variant.props
-            ]
-        inputs.targets.image.use()
-        for each in draws:
-            per_axis = inputs.variant.samples_per_axis if each.variant.props else 1
-            self._draw(replace(variant, samples_per_axis=per_axis), textures, each)
-        self._ctx.scissor = None
-        if made is not None:
-            made.release()
-
-    def _draw(self, variant: ShaderVariant, textures: Textures, draw: GroundDraw) -> None:
-        """Draw one region of the bound framebuffer."""
-        own = replace(variant, ground=draw.variant)
-        program = self._programs.get(("fullscreen.vert", "ground.frag"), own)
-        program.bind(textures)
-        self._ctx.scissor = draw.region
-        program.draw_vertices(3)
-
-    def _draw_coarse(
-        self,
-        inputs: DrawInputs,
-        variant: ShaderVariant,
-        textures: Textures,
-        draws: Sequence[GroundDraw],
-    ) -> None:
-        """Shade the plane at half the resolution, and spread it over the image."""
-        width, height = ((side + 1) // 2 for side in inputs.targets.size)
-        target = self._coarse.get((width, height), lambda: _CoarseTarget(self._ctx, width, height))
-        target.framebuffer.use()
-        for each in draws:
-            x, y, across, down = each.region
-            # one texel more, because spreading interpolates
-            left, top = max(x // 2 - 1, 0), max(y // 2 - 1, 0)
-            right, bottom = (x + across + 3) // 2, (y + down + 3) // 2
-            own = replace(each.variant, props=False, coarse=True)
-            part = GroundDraw(own, (left, top, right - left, bottom - top))
-            self._draw(variant, textures, part)
-        inputs.targets.image.use()
-        lens = inputs.view.distortion is not None
-        program = self._programs.get(
-            ("fullscreen.vert", "ground_spread.frag"),
-            replace(variant, lights=0, ground=GroundVariant(lens=lens)),
-        )
-        program.bind({"ground_coarse": target.texture})
-        for each in draws:
-            self._ctx.scissor = each.region
-            program.draw_vertices(3)
+        return kept
 
     def bake(self, scene: Scene, textures: Textures, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None if it has none.
@@ -175,6 +151,49 @@ class GroundPass:
         self._scenes.release()
         self._coarse.release()
         self._block.release()
+
+
+class _Step(NamedTuple):
+    """Tiles that one program draws.
+
+    Attributes:
+        fragment: File of the fragment stage.
+        variant: Choices that the program is compiled for.
+        tiles: bool [R, C].
+    """
+
+    fragment: str
+    variant: ShaderVariant
+    tiles: Mask
+
+
+def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
+    """Return what is drawn one after the other.
+
+    Coarse images shade the plane at half the resolution, then spread it over the image.
+    """
+    variant = ShaderVariant(
+        layer=inputs.variant.layer,
+        lights=inputs.variant.lights,
+        radiance=inputs.variant.radiance,
+    )
+    steps = []
+    props = plan.props.variant
+    if inputs.variant.coarse and variant.layer == "all":
+        for each in plan.plane:
+            shrunk = replace(variant, ground=replace(each.variant, coarse=True))
+            steps.append(_Step("ground.frag", shrunk, each.tiles))
+        spread = replace(variant, lights=0, ground=GroundVariant(lens=props.lens))
+        seen = np.logical_or.reduce([each.tiles for each in plan.plane])
+        steps.append(_Step("ground_spread.frag", spread, seen))
+        props = GroundVariant(boxes=props.boxes, lens=props.lens, props=True, plane=False)
+    else:
+        for each in plan.plane:
+            own = replace(variant, ground=each.variant)
+            steps.append(_Step("ground.frag", own, each.tiles & ~plan.props.tiles))
+    own = replace(variant, samples_per_axis=inputs.variant.samples_per_axis, ground=props)
+    steps.append(_Step("ground.frag", own, plan.props.tiles))
+    return [step for step in steps if step.tiles.any()]
 
 
 class _CoarseTarget:
