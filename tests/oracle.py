@@ -125,14 +125,21 @@ def _spreader_depth(scene: Scene, view: View, start: np.ndarray, rays: np.ndarra
 
 def with_seals(ids: np.ndarray, hits: Hits, scene: Scene, view: View) -> np.ndarray:
     """Return the id target of `object_ids` with the seals of the scene in front of `hits`."""
+    seals, depth = seal_hits(scene, view)
+    return np.where(depth < hits.depth_m, seals, ids).astype(np.uint16)
+
+
+def seal_hits(
+    scene: Scene, view: View, pixels: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the id of the seal that each ray hits first, and its depth in metres, inf for none."""
     seals = scene_seals(scene)
     assert seals is not None
-    start, rays = view.rays(None)
+    start, rays = view.rays(pixels)
     triangle, depth = first_hits(seals.mesh, view, start, rays.reshape(-1, 3))
-    owner = seals.facets.owner[seals.mesh.triangles[triangle, 0]].reshape(ids.shape)
+    owner = seals.facets.owner[seals.mesh.triangles[triangle, 0]]
     numbers = np.array([SEAL + seal.hasp for seal in scene.seals])
-    nearer = depth.reshape(ids.shape) < hits.depth_m
-    return np.where(nearer, numbers[owner], ids).astype(np.uint16)
+    return numbers[owner].reshape(rays.shape[:-1]), depth.reshape(rays.shape[:-1])
 
 
 def first_hits(

@@ -7,7 +7,6 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
-from fastgen.geometry.container import build_container
 from fastgen.light.environment import (
     load_environment,
     lower_irradiance,
@@ -19,7 +18,7 @@ from fastgen.light.sky_visibility import sky_directions
 from fastgen.light.surrounding_light import Paving, _lattice, surrounding_light
 from fastgen.scene import Camera, EnvironmentView, Neighbour, Pose, Spreader
 from fastgen.scene.boxes import back_to_front, container_box, overlap
-from tests import oracle
+from tests import oracle, oracle_scene
 
 SIZE = (320, 240)
 THRESHOLD_MM = 5.0
@@ -64,22 +63,6 @@ def neighbours_of(scenes, poses):
     )
 
 
-def alone(scene):
-    """Return each container as a scene of its own in its own frame, with its pose."""
-    found = [(replace(scene, neighbours=()), Pose())]
-    for each in scene.neighbours:
-        own = replace(
-            scene,
-            container=each.container,
-            decals=each.decals,
-            damages=each.damages,
-            seals=each.seals,
-            neighbours=(),
-        )
-        found.append((own, each.pose))
-    return found
-
-
 def turned(camera, pose):
     """Return a camera in the frame of a pose."""
     angle = np.deg2rad(-pose.yaw_deg)
@@ -93,46 +76,20 @@ def turned(camera, pose):
 
 
 def expected(scene, camera):
-    """Return ids, damage, depth and owner of each pixel from rays at each container alone."""
-    ids = np.zeros(SIZE[::-1], np.uint16)
-    damage = np.zeros_like(ids)
-    owner = np.full(ids.shape, -1)
-    depth = np.full(ids.shape, np.inf)
-    following, instances = 1, {}
-    for number, (own, pose) in enumerate(alone(scene)):
-        mesh = build_container(own.container.kind, own.container.profiles)
-        hits = oracle.cast(mesh, view_of(turned(camera, pose), SIZE), own)
-        nearer = (hits.depth_m < depth) | ((hits.hole >= 0) & ~hits.hit & (owner < 0))
-        numbers = {0: 0}
-        for k in range(1 + sum(bool(decal.class_name) for decal in own.decals)):
-            numbers[k + 1] = following
-            following = 600 if following == 199 else following + 1
-        values, counts = {0: 0, 101: 101 + number}, {}
-        for item in own.damages:
-            category = ("axis", "concave", "dented", "perforation").index(item.kind) + 2
-            counts[category] = counts.get(category, 0) + 1
-            before = instances.get(category, 0)
-            values[100 * category + counts[category]] = 100 * category + before + counts[category]
-        for category, count in counts.items():
-            instances[category] = instances.get(category, 0) + count
-        found = oracle.damage_values(own, hits, THRESHOLD_MM)
-        ids[nearer] = np.vectorize(numbers.get)(oracle.object_ids(own, mesh, hits))[nearer]
-        damage[nearer] = np.vectorize(values.get)(found)[nearer]
-        owner[nearer], depth[nearer] = number, hits.depth_m[nearer]
-    return ids, damage, depth, owner
+    return oracle_scene.truth(scene, view_of(camera, SIZE), THRESHOLD_MM)
 
 
 @pytest.mark.parametrize("camera", CAMERAS, ids=lambda camera: camera.name)
 def test_pixels_equal_the_nearest_hit_of_rays_at_each_container(generator, scene, camera):
     sample = generator.render(scene=scene, camera=camera)
-    ids, damage, depth, owner = expected(scene, camera)
-    for drawn, wanted in ((sample.ids, ids), (sample.damage, damage)):
+    found = expected(scene, camera)
+    for drawn, wanted in ((sample.ids, found.ids), (sample.damage, found.damage)):
         wrong = drawn != wanted
         assert wrong.mean() < 4e-4
-        assert not (wrong & ~oracle.near_edge(wanted) & ~oracle.near_edge(owner)).any()
-    both = np.isfinite(depth) & (sample.ids > 0)
+        assert not (wrong & ~oracle.near_edge(wanted) & ~oracle.near_edge(found.owner)).any()
+    both = np.isfinite(found.depth_m) & (sample.ids > 0)
     assert both.mean() > 0.1
-    assert np.quantile(np.abs(sample.depth[both] / depth[both] - 1), 0.995) < 1e-5
+    assert np.quantile(np.abs(sample.depth[both] / found.depth_m[both] - 1), 0.995) < 1e-5
 
 
 def own_values(objects, container):
@@ -158,7 +115,7 @@ def test_labels_follow_from_the_pixels_and_from_each_container_alone(generator, 
         assert item.area == shown.sum()
     for found in classes.values():
         assert sorted(found) == list(range(1, len(found) + 1))
-    for number, (own, pose) in enumerate(alone(scene)):
+    for number, (own, pose) in enumerate(oracle_scene.alone(scene)):
         single = generator.render(scene=own, camera=turned(camera, pose)).objects
         single = [item for item in single if not item.background]
         mine = [item for item in objects if item.container == number]
@@ -194,7 +151,7 @@ def test_labels_do_not_depend_on_the_quality_and_edges_between_containers_are_op
 ):
     generator = generators(CONFIG, seed=6, size=SIZE, quality=quality)
     drawn = generator.render(scene=scene, camera=CAMERAS[1])
-    assert (drawn.ids != expected(scene, CAMERAS[1])[0]).mean() < 4e-4
+    assert (drawn.ids != expected(scene, CAMERAS[1]).ids).mean() < 4e-4
     seen = np.isfinite(drawn.depth)
     assert (drawn.cover[seen & ~oracle.near_edge(seen)] == 255).mean() > 0.995
 
