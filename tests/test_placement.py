@@ -345,6 +345,30 @@ def test_misplaced_props_are_named(trailer):
         check_scene(replace(trailer, ground=None))
 
 
+def test_props_in_a_container_below_another_are_named(trailer):
+    # the other container is higher, so that the prop is below the highest underside
+    high = replace(trailer.neighbours[0], pose=Pose((0.0, 9000.0, 2000.0)))
+    prop = Prop("box", Pose((200.0, 300.0, 500.0), 20.0), (900.0, 100.0, 100.0), (0.1, 0.1, 0.1))
+    scene = replace(trailer, neighbours=(high,), props=(prop,), cameras=())
+    with pytest.raises(ConfigError, match=r"^scene.props\[0\].pose: overlaps the container; move"):
+        check_scene(scene)
+    aside = replace(prop, pose=Pose((200.0, 9300.0, 500.0)))
+    check_scene(replace(scene, props=(aside,)))
+
+
+@pytest.mark.parametrize(("x", "refused"), [(0.0, True), (290.0, True), (360.0, False)])
+def test_cameras_in_props_or_beside_them_are_named(trailer, x, refused):
+    low = trailer.ground.height_mm
+    prop = Prop("box", Pose((0.0, -9000.0, low + 300.0)), (400.0, 400.0, 500.0), (0.1, 0.1, 0.1))
+    scene = replace(trailer, props=(prop,), cameras=())
+    camera = replace(trailer.cameras[0], position_mm=(x, -9000.0, low + 300.0))
+    if refused:
+        with pytest.raises(ConfigError, match=r"^camera.position_mm: .* is inside props\[0\] or "):
+            check_camera(camera, scene)
+    else:
+        check_camera(camera, scene)
+
+
 def test_cameras_in_neighbours_or_below_the_ground_are_named(trailer):
     x, y, z = trailer.neighbours[0].pose.position_mm
     camera = trailer.cameras[0]

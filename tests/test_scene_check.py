@@ -165,6 +165,7 @@ def test_a_camera_passed_separately_is_checked_too(full):
 
 @pytest.mark.parametrize("inside", [(0, 0, 1300), (2900, -1200, 10)])
 def test_a_camera_inside_the_container_is_refused(full, inside):
+    full = replace(full, props=())  # vehicle parts are just below the container
     camera = Camera("c", inside, (9000, 0, 1000), 20)
     with pytest.raises(ConfigError, match=r"^camera.position_mm: .* is inside the container"):
         check_camera(camera, full)
@@ -223,3 +224,9 @@ def test_a_camera_too_far_away_is_refused(full):
     assert check_camera(near, full) == near
     with pytest.raises(ConfigError, match=r"camera.position_mm: .* sight ends at 180 m"):
         check_camera(replace(near, position_mm=(0.0, -300e3, 0.0)), full)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[" * 100_000, '{"scene": ' * 100_000])
+def test_text_that_is_no_scene_gets_one_error(text):
+    with pytest.raises(ConfigError, match=r"^scene: is no JSON \("):
+        Scene.from_json(text)

@@ -9,7 +9,7 @@ import numpy as np
 from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
-from fastgen.scene.boxes import away_mm
+from fastgen.scene.boxes import away_mm, prop_box
 from fastgen.scene.limits import (
     CAMERA_REACH_MM,
     COMPUTED_ART,
@@ -115,7 +115,13 @@ def _check_camera(camera: Camera, path: str, scene: Scene) -> None:
         if distance_mm > CAMERA_REACH_MM:
             raise ConfigError(
                 f"{place} is {distance_mm * MM:.0f} m from {name}; sight ends at "
-                f"{CAMERA_REACH_MM * MM:.0f} m, move it nearer"
+                f"{CAMERA_REACH_MM * MM:.0f} m, move one of them"
+            )
+    for i, prop in enumerate(scene.props):
+        if away_mm(prop_box(prop), eye) < NEAR_M / MM:
+            raise ConfigError(
+                f"{place} is inside props[{i}] or nearer to it than {NEAR_M / MM:g} mm; move it "
+                "away"
             )
     if scene.ground is not None and eye[2] < scene.ground.height_mm + NEAR_M / MM:
         raise ConfigError(

@@ -370,7 +370,7 @@ class Scene:
         """
         try:
             data = json.loads(text)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise ConfigError(f"scene: is no JSON ({error})") from None
         if isinstance(data, dict) and "scene" in data:
             data = data["scene"]

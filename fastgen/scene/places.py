@@ -57,7 +57,11 @@ def check_places(scene: Scene) -> None:
                 f"is {scene.ground.height_mm:g}; raise it"
             )
     for i, prop in enumerate(scene.props):
-        _check_prop(prop, f"scene.props[{i}]", scene, boxes)
+        path = f"scene.props[{i}]"
+        _check_prop(prop, path, scene, boxes)
+        for other, name in zip(boxes, names, strict=True):
+            if overlap(prop_box(prop), other):
+                raise ConfigError(f"{path}.pose: overlaps {name}; move it away")
 
 
 def _check_prop(prop: Prop, path: str, scene: Scene, boxes: list[OrientedBox]) -> None:
