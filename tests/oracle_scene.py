@@ -12,7 +12,7 @@ from tests import oracle
 
 @dataclass
 class Truth:
-    """What the ray through each pixel sees.
+    """Labels and depth by the ray through each pixel.
 
     Attributes:
         ids: int [H, W], values of the id target.

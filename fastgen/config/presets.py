@@ -65,8 +65,9 @@ _HOURS = {
     **{"port_golden": 2.0, "port_overcast": 5.0, "city": 1.0, "city_2": 1.0, "venice": 1.0},
     **{"port_dusk": 1.0, "port_blue_hour": 1.0, "sunset": 0.5, "sunset_2": 0.5, "port_night": 2.0},
 }
-"""Weights of HDRIs by hours of work: half in sunshine, the others mostly under clouds, a tenth at
-dusk and less at night. A choice; `fastgen fit` finds those of a camera."""
+"""Weights of HDRIs by hours of work. Half of the scenes are in sunshine and 30 % under clouds; a
+tenth are at dusk, and the rest at night. This is a choice; `fastgen fit` finds the weights of a
+camera."""
 
 _ON_GROUND: dict[str, Any] = {
     **_OUTDOORS,

@@ -215,7 +215,7 @@ class PreparedScene:
 
     @cached_property
     def rim_points_mm(self) -> Array:
-        """Vertices float64 [P, 3] after damage, of which some are outermost in any image.
+        """Vertices float64 [P, 3] after damage that include the outermost ones of any image.
 
         Lens distortion curves the edges of the outer box, so that vertices along them count as
         well as its corners. Everything else is behind or between them.

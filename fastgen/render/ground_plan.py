@@ -1,4 +1,4 @@
-"""What of an image the background and the ground pass draw, by tiles."""
+"""Choice of the tiles that the background and the ground pass draw in an image."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -54,9 +54,9 @@ class GroundPlan(NamedTuple):
         sky: Tiles that may show the background alone.
         plane: Disjoint tiles that may show the plane, each with the program that draws them.
         props: Tiles that may show props; the program draws the plane behind them as well.
-        masks: Bit masks uint32 [R, C, 4] of the props of each tile, low word first: two of 64 bits,
-            for the props that it may show and for those that may shade its ground. None without
-            props.
+        masks: Two masks of 64 bits for each tile, uint32 [R, C, 4], low word first. Bit k of the
+            first is set if the tile may show prop k, and bit k of the second if prop k may shade
+            its ground. None without props.
     """
 
     tiles: Tiles
@@ -130,7 +130,7 @@ def _any(masks: Mask) -> Mask:
 
 
 def _plane_tiles(tiles: Tiles, ground: Ground) -> tuple[Mask, Mask]:
-    """Return the tiles that may see the plane, and those that see nothing else.
+    """Return the tiles that may see the plane, and the tiles that see the plane alone.
 
     The latter see the disc in which the plane does not fade. Without lens distortion its image is
     convex, so a tile sees nothing else if its corners do not.

@@ -1,4 +1,4 @@
-"""Square tiles of an image: which of them bodies touch or fill, and the rectangles of a set."""
+"""Square tiles of an image, tiles that bodies touch or fill, and rectangles of sets of tiles."""
 
 from collections.abc import Iterator
 from functools import cached_property
