@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.camera.projection import View
+from fastgen.camera.projection import View, view_of
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.generator import Generator
@@ -16,11 +16,16 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.labels.coverage import covered
 from fastgen.labels.objects import decal_of
-from fastgen.scene import Camera, Spreader
+from fastgen.scene import Camera, Lens, Spreader
 from tests import oracle
 
 SIZE = (200, 150)
 PAD = 160
+LENSES = (
+    Lens("brown_conrady", (-0.25, 0.06, 0.001, 0.0, 0.0)),
+    Lens("brown_conrady", (0.15, 0.02, 0.0, -0.002, 0.0)),
+    Lens("fisheye", (-0.05, 0.01, 0.0, 0.0)),
+)
 
 
 def unbounded(view):
@@ -297,3 +302,41 @@ def test_huge_objects_are_counted_to_within_a_thousandth():
     found = covered(square, np.zeros(1, np.int64), 1, (64, 48))
     assert (found.pixels()[0] == np.arange(64 * 48)).all()
     assert found.beyond == pytest.approx(16e5 * 17e5, rel=1e-3)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_vertices_at_the_rim_bound_the_container_in_images_with_lens_distortion(lens):
+    """Boxes come from these vertices; here all of them are projected."""
+    config = Config.from_values({"damage": {"probability": 0.7}, "spreader": {"probability": 0}})
+    generator = Generator(config, seed=8)
+    rng = np.random.default_rng(4)
+    compared = 0
+    for index in range(12):
+        scene = generator.scene(index)
+        prepared = PreparedScene(scene)
+        every = damage_law.deform(scene.damages, prepared.container.points_mm)
+        for _ in range(6):
+            eye = rng.uniform((-14000, -9000, -3000), (14000, 9000, 9000))
+            target = rng.uniform((-6000, -1200, 0), (6000, 1200, 2600))
+            view = view_of(Camera("a", tuple(eye), tuple(target), 28.0, lens=lens), SIZE)
+            pixels, depth = view.project(every)
+            if depth.min() < 0.1:
+                continue
+            rim, _ = view.project(prepared.rim_points_mm)
+            np.testing.assert_allclose(rim.min(axis=0), pixels.min(axis=0), atol=0.01)
+            np.testing.assert_allclose(rim.max(axis=0), pixels.max(axis=0), atol=0.01)
+            compared += 1
+    assert compared > 20
+
+
+def test_a_container_of_many_rows_is_counted_to_a_thousandth():
+    view = view_of(Camera("a", (0.0, -3500.0, 1300.0), (0.0, 0.0, 1300.0), 24.0), SIZE)
+    for times in (1.0, 20.0, 300.0):
+        polygon = times * np.array(
+            [[[-60.0, -30.0], [210.0, 20.0], [190.0, 170.0], [-40.0, 120.0]]]
+        )
+        found = covered(polygon, np.zeros(1, np.int64), 1, view.size)
+        x, y = polygon[0].T
+        area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+        whole = int(found.area[0] + found.beyond[0])
+        assert whole == pytest.approx(area, rel=1e-2 if times == 1 else 1e-3)
