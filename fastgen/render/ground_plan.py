@@ -16,6 +16,7 @@ from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
+from fastgen.scene.limits import MM
 
 _SHADED_MM = 600.0
 """Distance from a prop within which it shades the ground, see ground_props.glsl."""
@@ -93,7 +94,7 @@ def ground_plan(
     if props:
         parts = [prop_box(prop) for prop in props]
         seen_props = tiles.touched(np.stack([part.corners_mm for part in parts]))
-        shades = tiles.touched(reaches(parts, ground.height_mm, toward, _SHADED_MM))
+        shades = tiles.touched(_reaches(parts, ground.height_mm, toward, _SHADED_MM))
         shown, shaded = _any(seen_props), _any(shades)
         masks = np.concatenate([bit_masks(seen_props), bit_masks(shades)], axis=-1)
     wet = ground.wetness > 0
@@ -101,7 +102,7 @@ def ground_plan(
         dark = ~_none(tiles)
     elif members:
         boxes = [member.box for member in members]
-        dark = _any(tiles.touched(reaches(boxes, ground.height_mm, toward, _BLURRED_MM)))
+        dark = _any(tiles.touched(_reaches(boxes, ground.height_mm, toward, _BLURRED_MM)))
     count = next(most for most in _BOX_COUNTS if most >= len(members))
     plain = GroundVariant(ground.kind, 0, view.distortion is not None, wet)
     far = replace(plain, fades=True)
@@ -135,7 +136,7 @@ def _plane_tiles(tiles: Tiles, ground: Ground) -> tuple[Mask, Mask]:
     The latter see the disc in which the plane does not fade. Without lens distortion its image is
     convex, so a tile sees nothing else if its corners do not.
     """
-    eye_mm, rays = tiles.view.position_m * 1e3, tiles.rays
+    eye_mm, rays = tiles.view.position_m / MM, tiles.rays
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (ground.height_mm - eye_mm[2]) / rays[..., 2]
         at = eye_mm[:2] + distance[..., None] * rays[..., :2]
@@ -162,7 +163,7 @@ def _solid_mm(member: Member) -> Array | None:
     return OrientedBox(member.box.center_mm, half, member.box.rotation).corners_mm
 
 
-def reaches(
+def _reaches(
     boxes: Sequence[OrientedBox], ground_mm: float, toward: Array, margin_mm: float
 ) -> Array:
     """Return points [N, 16, 3]; each row's hull contains a box, its margin and its shadow, in mm.
