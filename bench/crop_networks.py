@@ -111,7 +111,9 @@ def fit_reader(texts: Sequence[Text], steps: int, seed: int) -> Reader:
         seed: Seed of weights, order and variation.
     """
     torch.manual_seed(seed)
-    model = Reader().to(memory_format=torch.channels_last)  # takes a quarter less time on CPUs
+    model = Reader()
+    # takes a quarter less time on CPUs
+    nn.utils.convert_conv2d_weight_memory_format(model, torch.channels_last)
     batches = _text_batches(texts, np.random.default_rng(seed))
     _optimize(model, lambda: model.text_loss(next(batches)), steps)
     return model
