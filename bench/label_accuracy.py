@@ -82,8 +82,7 @@ def differences(generator: Generator, scene: Scene, camera: Camera) -> Counter[s
     found = truth()
     labels = (sample.ids != found[..., 0]) | (sample.damage != found[..., 1])
     depth_m = np.where(found[..., 2] < 0, np.inf, found[..., 2] / 1e4)
-    # the ground has a depth and no label
-    both = np.isfinite(depth_m) & (sample.ids > 0)
+    both = np.isfinite(depth_m) & np.isfinite(sample.depth)
     gap = np.abs(np.where(both, sample.depth, 0) - np.where(both, depth_m, 0))
     deep = both & (gap > np.maximum(1e-3, 1e-3 * np.where(both, depth_m, 0)))
     rows, columns = np.nonzero(labels | deep)

@@ -306,7 +306,7 @@ def test_huge_objects_are_counted_to_within_a_thousandth():
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_vertices_at_the_rim_bound_the_container_in_images_with_lens_distortion(lens):
-    """Boxes come from these vertices; here all of them are projected."""
+    """Labels use these vertices. The expected box is that of all vertices of the mesh."""
     config = Config.from_values({"damage": {"probability": 0.7}, "spreader": {"probability": 0}})
     generator = Generator(config, seed=8)
     rng = np.random.default_rng(4)

@@ -201,6 +201,13 @@ class PreparedScene:
         return deform(self.scene.damages, rest)
 
     @cached_property
+    def points_mm(self) -> Array:
+        """All distinct vertices float64 [P, 3] of the container after damage."""
+        if not self.scene.damages:
+            return self.container.points_mm
+        return deform(self.scene.damages, self.container.points_mm)
+
+    @cached_property
     def hull_points_mm(self) -> Array:
         """Vertices float64 [P, 3] after damage that include the corners of the convex hull."""
         if not self.scene.damages:
@@ -209,7 +216,7 @@ class PreparedScene:
         corners = self.corners_mm
         least = np.where(CORNER_SIGNS > 0, -np.inf, corners).max(axis=0)
         most = np.where(CORNER_SIGNS > 0, corners, np.inf).min(axis=0)
-        moved = deform(self.scene.damages, self.container.points_mm)
+        moved = self.points_mm
         inside = [(x > a) & (x < b) for x, a, b in zip(moved.T, least, most, strict=True)]
         return moved.compress(~np.logical_and.reduce(inside), axis=0)
 
@@ -220,7 +227,5 @@ class PreparedScene:
         Lens distortion curves the edges of the outer box, so that vertices along them count as
         well as its corners. Everything else is behind or between them.
         """
-        rim = self.container.points_mm[self.container.rim]
-        if not self.scene.damages:
-            return rim
-        return np.concatenate([deform(self.scene.damages, rim), self.hull_points_mm])
+        rim = self.points_mm[self.container.rim]
+        return np.concatenate([rim, self.hull_points_mm]) if self.scene.damages else rim

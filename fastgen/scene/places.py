@@ -1,5 +1,7 @@
 """Checks of the places of containers, props and the ground in a scene."""
 
+from collections.abc import Sequence
+
 from fastgen.errors import ConfigError
 from fastgen.scene.boxes import (
     OrientedBox,
@@ -42,9 +44,7 @@ def check_places(scene: Scene) -> None:
         if not neighbour.container.present:
             raise ConfigError(f"{path}.container.present: false; remove the neighbour")
         box = boxes[i + 1]
-        for other, name in zip(boxes[: i + 1], names, strict=False):
-            if overlap(box, other):
-                raise ConfigError(f"{path}.pose: overlaps {name}; move it away")
+        _check_apart(box, path, boxes[: i + 1], names[: i + 1])
         if scene.spreader.present and overlap(box, spreader_box(scene.container.kind)):
             raise ConfigError(
                 f"{path}.pose: is above the container, where its spreader hangs; move it away, or "
@@ -59,9 +59,15 @@ def check_places(scene: Scene) -> None:
     for i, prop in enumerate(scene.props):
         path = f"scene.props[{i}]"
         _check_prop(prop, path, scene, boxes)
-        for other, name in zip(boxes, names, strict=True):
-            if overlap(prop_box(prop), other):
-                raise ConfigError(f"{path}.pose: overlaps {name}; move it away")
+        _check_apart(prop_box(prop), path, boxes, names)
+
+
+def _check_apart(
+    box: OrientedBox, path: str, others: Sequence[OrientedBox], names: Sequence[str]
+) -> None:
+    for other, name in zip(others, names, strict=True):
+        if overlap(box, other):
+            raise ConfigError(f"{path}.pose: overlaps {name}; move it away")
 
 
 def _check_prop(prop: Prop, path: str, scene: Scene, boxes: list[OrientedBox]) -> None:
