@@ -7,7 +7,6 @@ them.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -22,11 +21,11 @@ from crop_statistics import (
     single_aucs,
     statistics_of,
 )
+from gap_renders import Effort, Renders
 from marker_search import overlap, search, true_scores
 from numpy.typing import NDArray
 from real_crops import DAMAGE_KINDS, LAYOUTS, RealCrops
-from rendered_crops import MARKER_PX, PANEL_PX, Crops, Pixels, Text, square_crop, training_crops
-from rendered_views import View, default_texts, default_views
+from rendered_crops import MARKER_PX, PANEL_PX, Crops, Pixels, square_crop
 from text import edit_distance
 
 from fastgen.classes import MARKER_CLASSES
@@ -48,36 +47,10 @@ class Count(NamedTuple):
 Measure = Share | Interval | Count
 Measures = dict[str, Measure]
 
-HELD_OUT, MINED = 1_000_000, 500_000
-"""First scene of the held-out renders, and of the images that background crops are mined from."""
-
 _BACKGROUND = len(MARKER_CLASSES)
 _RECALL = 0.6
 _HOLE = "perforation"
 _LONGEST = {"photographs": 640, "panels": PANEL_PX, "identifiers": 256}
-
-
-@dataclass(frozen=True)
-class Effort:
-    """Amount of rendering and training of one seed.
-
-    Attributes:
-        scenes: Training scenes.
-        held_out: Held-out scenes.
-        images: Whole images of the preset, for the search and for the statistics.
-        mined: Images that background crops are mined from.
-        marker_steps: Training steps of the marker classifier.
-        reader_steps: Training steps of the reader.
-        damage_steps: Training steps of the damage classifier.
-    """
-
-    scenes: int = 300
-    held_out: int = 50
-    images: int = 40
-    mined: int = 40
-    marker_steps: int = 700
-    reader_steps: int = 900
-    damage_steps: int = 400
 
 
 class Trial:
@@ -85,42 +58,23 @@ class Trial:
 
     Args:
         real: The real pictures.
-        seed: Seed of scenes, weights and order.
-        effort: Amount of rendering and training.
-        workers: Processes that render.
-        kinds: Crops to render: some of rendered_crops.KINDS.
+        renders: Renders of all seeds.
+        seed: Seed of weights and order; it also chooses the training scenes.
+        effort: Amount of training.
+        workers: Processes that read with rapidocr.
     """
 
     def __init__(
-        self, real: RealCrops, seed: int, effort: Effort, workers: int, kinds: Sequence[str]
+        self, real: RealCrops, renders: Renders, seed: int, effort: Effort, workers: int
     ) -> None:
-        self.real, self.seed, self.effort, self.workers = real, seed, effort, workers
-        self._kinds = kinds
+        self.real, self.renders, self.seed = real, renders, seed
+        self.effort, self.workers = effort, workers
         self.confused: Counter[tuple[str, str]] = Counter()
 
     @cached_property
     def crops(self) -> Crops:
         """Training crops."""
-        return training_crops(self.seed, range(self.effort.scenes), self._kinds, self.workers)
-
-    @cached_property
-    def held_out(self) -> Crops:
-        """Crops of other scenes of the same kind."""
-        scenes = range(HELD_OUT, HELD_OUT + self.effort.held_out)
-        return training_crops(self.seed, scenes, self._kinds, self.workers)
-
-    @cached_property
-    def texts(self) -> list[Text]:
-        """Held-out identifiers as the preset's own cameras see them."""
-        scenes = range(HELD_OUT, HELD_OUT + self.effort.held_out // 4)
-        return default_texts(self.seed, scenes, self.workers)
-
-    @cached_property
-    def views(self) -> list[View]:
-        """Held-out images of the preset."""
-        return default_views(
-            "seafront", self.seed, range(HELD_OUT, HELD_OUT + self.effort.images), self.workers
-        )
+        return self.renders.crops(self.seed)
 
     @cached_property
     def marker_model(self) -> Classifier:
@@ -140,7 +94,7 @@ class Trial:
 def markers(trial: Trial) -> Measures:
     """Return top-1 accuracy of markers, on ours and theirs, and theirs by class."""
     model, real = trial.marker_model, trial.real.placards
-    mine = trial.held_out.markers
+    mine = trial.renders.held_out.markers
     found: Measures = {
         "ours, held out": _top1(model, [c for c, _ in mine], [name for _, name in mine])[0]
     }
@@ -161,7 +115,7 @@ def markers(trial: Trial) -> Measures:
 def identifiers(trial: Trial) -> Measures:
     """Return exact reads and character errors of a small reader, by layout."""
     reader = fit_reader(trial.crops.texts, trial.effort.reader_steps, trial.seed)
-    ours = [(t.framed(), t.layout, t.code) for t in trial.held_out.texts]
+    ours = [(t.framed(), t.layout, t.code) for t in trial.renders.held_out.texts]
     theirs = [(r.pixels, r.layout, r.code) for r in trial.real.identifiers]
     found: Measures = {}
     for whose, texts in (("ours, held out", ours), ("theirs", theirs)):
@@ -183,10 +137,9 @@ def identifiers(trial: Trial) -> Measures:
 
 def false_markers(trial: Trial) -> Measures:
     """Return markers found in photographs without any, at a recall of 60 % on our own images."""
-    scenes = range(MINED, MINED + trial.effort.mined)
     pixels: list[Pixels] = []
     classes: list[int] = []
-    for view in default_views("seafront", trial.seed, scenes, trial.workers):
+    for view in trial.renders.mined:
         found = search(trial.marker_model, view.image)
         near = overlap(found.boxes, view.seen).max(axis=1, initial=0.0)
         for box in found.boxes[near < 0.2][:40]:
@@ -204,7 +157,7 @@ def false_markers(trial: Trial) -> Measures:
         trial.seed,
         start=trial.marker_model,
     )
-    ours = [(search(model, view.image), view) for view in trial.views]
+    ours = [(search(model, view.image), view) for view in trial.renders.views("seafront")]
     scores = np.concatenate([true_scores(f, v.boxes, v.classes) for f, v in ours])
     least = max(float(np.quantile(scores, 1 - _RECALL, method="lower")), 1e-6)
     false = sum(
@@ -228,7 +181,7 @@ def damage(trial: Trial) -> Measures:
     pixels = np.stack([crop for crop, _ in panels])
     classes = np.array([int(kind != "") for _, kind in panels])
     model = fit_classifier(pixels, classes, 2, trial.effort.damage_steps, trial.seed)
-    mine = trial.held_out.panels
+    mine = trial.renders.held_out.panels
     ours = model.shares(np.stack([crop for crop, _ in mine]))[:, 1]
     kinds = np.array([kind for _, kind in mine])
     whole = ours[kinds == ""]
@@ -278,15 +231,18 @@ def _groups(trial: Trial) -> Iterator[tuple[str, list[Pixels], list[Pixels]]]:
     """Yield the name of a group, our pictures and theirs."""
     real = trial.real
     if real.photos:
-        yield "photographs", [view.image for view in trial.views], list(real.photos)
-        scenes = range(HELD_OUT, HELD_OUT + trial.effort.images)
-        gate = default_views("gate", trial.seed, scenes, trial.workers)
+        yield (
+            "photographs",
+            [view.image for view in trial.renders.views("seafront")],
+            list(real.photos),
+        )
+        gate = trial.renders.views("gate")
         yield "photographs, preset gate", [view.image for view in gate], list(real.photos)
     if real.panels:
         theirs = [p for pair in real.panels for p in (pair.damaged, pair.undamaged)]
-        yield "panels", [crop for crop, _ in trial.held_out.panels], theirs
+        yield "panels", [crop for crop, _ in trial.renders.held_out.panels], theirs
     if real.identifiers:
-        ours = [text.framed() for text in trial.texts]
+        ours = [text.framed() for text in trial.renders.texts]
         yield "identifiers", ours, [r.pixels for r in real.identifiers]
 
 

@@ -15,9 +15,10 @@ Sections:
     damage       AUC of damaged against undamaged panels
     statistics   AUC of telling our pictures from theirs by named statistics
 
-Every figure is the median of all seeds with its range. The interval in brackets covers the choice
-of test pictures: Wilson's for shares, a bootstrap for AUCs. Needs fastgen[examples] and
-fastgen[bench]. Writes bench/results/real_gap.json.
+Every figure is the median of all seeds with its range. The seeds share their renders; each leaves
+out another quarter of the training scenes. The interval in brackets covers the choice of test
+pictures: Wilson's for shares, a bootstrap for AUCs. Needs fastgen[examples] and fastgen[bench].
+Writes bench/results/real_gap.json.
 """
 
 import argparse
@@ -35,7 +36,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
 
 import torch
 from crop_statistics import Interval, wilson
-from gap_sections import SECTIONS, Effort, Measure, Measures, Share, Trial
+from gap_renders import Effort, Renders
+from gap_sections import SECTIONS, Measure, Measures, Share, Trial
 from peers import install
 from real_crops import RealCrops, load_real
 from reporting import origin, save
@@ -77,7 +79,7 @@ _SHOWN_CUES = 6
 
 def ocr(trial: Trial, real: dict[str, Share]) -> Measures:
     """Return the identifiers that rapidocr reads on ours, by view and layout, beside `real`."""
-    texts = trial.texts
+    texts = trial.renders.texts
     read = read_texts([text.framed() for text in texts], trial.workers)
     right = [
         contains_code(found, text.code, text.layout == "column")
@@ -182,8 +184,9 @@ def measure(
     theirs = real_ocr(real, workers) if "ocr" in wanted else {}
     results: dict[str, list[Measures]] = {name: [] for name in wanted}
     confused: dict[str, int] = {}
+    renders = Renders(seeds[0], effort, workers, kinds)
     for seed in seeds:
-        trial = Trial(real, seed, effort, workers, kinds)
+        trial = Trial(real, renders, seed, effort, workers)
         for name in wanted:
             began = time.perf_counter()
             results[name].append(ocr(trial, theirs) if name == "ocr" else SECTIONS[name](trial))

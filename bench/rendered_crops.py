@@ -31,7 +31,7 @@ from fastgen.scene import Camera, Decal, Scene
 Pixels = NDArray[np.uint8]
 """RGB picture [H, W, 3]."""
 
-MARKER_PX, PANEL_PX = 48, 64
+MARKER_PX, PANEL_PX = 48, 80
 """Sides of the crops of markers and backgrounds, and of panels."""
 
 MARGIN = 0.1
