@@ -61,14 +61,10 @@ class Trial:
         renders: Renders of all seeds.
         seed: Seed of weights and order; it also chooses the training scenes.
         effort: Amount of training.
-        workers: Processes that read with rapidocr.
     """
 
-    def __init__(
-        self, real: RealCrops, renders: Renders, seed: int, effort: Effort, workers: int
-    ) -> None:
-        self.real, self.renders, self.seed = real, renders, seed
-        self.effort, self.workers = effort, workers
+    def __init__(self, real: RealCrops, renders: Renders, seed: int, effort: Effort) -> None:
+        self.real, self.renders, self.seed, self.effort = real, renders, seed, effort
         self.confused: Counter[tuple[str, str]] = Counter()
 
     @cached_property

@@ -40,6 +40,7 @@ from gap_renders import Effort, Renders
 from gap_sections import SECTIONS, Measure, Measures, Share, Trial
 from peers import install
 from real_crops import RealCrops, load_real
+from rendered_crops import Text
 from reporting import origin, save
 from text_peer import RAPIDOCR, contains_code, read_texts
 
@@ -77,17 +78,16 @@ _SMOKE = Effort(2, 2, 4, 1, 4, 4, 4)
 _SHOWN_CUES = 6
 
 
-def ocr(trial: Trial, real: dict[str, Share]) -> Measures:
-    """Return the identifiers that rapidocr reads on ours, by view and layout, beside `real`."""
-    texts = trial.renders.texts
-    read = read_texts([text.framed() for text in texts], trial.workers)
+def ocr(texts: Sequence[Text], real: RealCrops, workers: int) -> Measures:
+    """Return the identifiers that rapidocr reads on ours and on theirs, by view and layout."""
+    read = read_texts([text.framed() for text in texts], workers)
     right = [
         contains_code(found, text.code, text.layout == "column")
         for found, text in zip(read, texts, strict=True)
     ]
     groups = [_group(text.layout, text.on_end) for text in texts]
     ours = {f"ours, {group}": _share(right, groups, group) for group in sorted(set(groups))}
-    return {**ours, **real}
+    return {**ours, **real_ocr(real, workers)}
 
 
 def real_ocr(real: RealCrops, threads: int) -> dict[str, Share]:
@@ -181,15 +181,16 @@ def measure(
 ) -> tuple[dict[str, dict[str, dict[str, Any]]], dict[str, int]]:
     """Return the figures of each section, and the confused classes "true as guess" with counts."""
     kinds = list(dict.fromkeys(kind for name in wanted for kind in _CROPS.get(name, ())))
-    theirs = real_ocr(real, workers) if "ocr" in wanted else {}
     results: dict[str, list[Measures]] = {name: [] for name in wanted}
     confused: dict[str, int] = {}
     renders = Renders(seeds[0], effort, workers, kinds)
+    # all seeds share these renders, and rapidocr learns nothing from them
+    read = ocr(renders.texts, real, workers) if "ocr" in wanted else {}
     for seed in seeds:
-        trial = Trial(real, renders, seed, effort, workers)
+        trial = Trial(real, renders, seed, effort)
         for name in wanted:
             began = time.perf_counter()
-            results[name].append(ocr(trial, theirs) if name == "ocr" else SECTIONS[name](trial))
+            results[name].append(read if name == "ocr" else SECTIONS[name](trial))
             spent = time.perf_counter() - began
             print(f"seed {seed}, {name}: {spent:.0f} s", file=sys.stderr, flush=True)
         for (truth, guess), times in trial.confused.items():
