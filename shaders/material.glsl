@@ -1,6 +1,6 @@
-// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar): material of a
+// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, vec2 scar): material of a
 // point after all layers. footprint_mm: Width of the lookup on the surface. scar: Wear of the steel by
-// damage, 0..1. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
+// damage, 0..1, and share of it that is bright. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
 // artistic choices.
 
 #include "reflectance.constants"
@@ -20,6 +20,7 @@
 #include "zone.glsl"
 #include "zone_point.glsl"
 
+const vec3 BARE_STEEL = vec3(0.42, 0.41, 0.39);
 const vec3 STREAK_ALBEDO = vec3(0.07, 0.06, 0.05);
 // Height of noise relative to its width: of rust on steep parts, and of dirt and scrapes, which run down.
 const float RUST_SQUEEZE = 0.6;
@@ -37,7 +38,7 @@ struct SurfacePoint {
     float printed;   // Share of the footprint that shows a decal.
 };
 
-SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar) {
+SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, vec2 scar) {
     vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
     vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
     int code = int(part.x);
@@ -108,10 +109,10 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, float scar
 #if WITH_DAMAGE
     // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and
     // door gear in front of the sheet is not scarred.
-    scar *= (code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0;
-    albedo = mix(albedo, rust_albedo * 0.7, 0.5 * scar);
-    rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(scar), coarse.lost.y, 0.3) *
-                       step(0.01, scar));
+    float worn = scar.x * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0);
+    albedo = mix(albedo, mix(rust_albedo * 0.7, BARE_STEEL, scar.y), mix(0.5, 0.9, scar.y) * worn);
+    rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(worn), coarse.lost.y, 0.3) *
+                       step(0.01, worn) * (1.0 - scar.y));
 #endif
     float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
     // The factor is 1 on average: RUST_OLD of the rust is old.

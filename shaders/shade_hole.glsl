@@ -32,6 +32,6 @@ Shaded shade_hole(ivec2 sample_at, uint key, Shaded behind) {
 #endif
         s = Shaded(seen, uint(container_id), 0u, depth, 1.0);
     }
-    s.damage = uint(damage_shape[3 * int(key >> 10) + 2].w);
+    s.damage = uint(damage_reach[int(key >> 10)].w);
     return s;
 }

@@ -10,13 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.damage_law import (
-    FADE_START_MM,
-    deform,
-    hole_radius_mm,
-    local_coordinates,
-    reach_mm,
-)
+from fastgen.geometry.damage_forms import form_of
+from fastgen.geometry.damage_forms.form import FADE_START_MM
+from fastgen.geometry.damage_law import deform, local_coordinates, reach_mm
 from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage
@@ -70,7 +66,7 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
         made.append(part)
     fine = np.concatenate([np.empty((0, 3, vertices.shape[1])), *made])
     for damage in damages:
-        if damage.kind == "perforation":
+        if form_of(damage).outline:
             near = _within_reach(damage, fine) & (fine[:, 0, _SPARED] == 0)
             fine = np.concatenate([fine[~near], _cut(damage, _refined(fine[near], HOLE_EDGE_MM))])
 
@@ -112,7 +108,9 @@ def _refined(corners: Array, max_edge_mm: float) -> Array:
 def _cut(hole: Damage, corners: Array) -> Array:
     """Cut a perforation out of small triangles, along straight pieces of its outline."""
     u, v, w = local_coordinates(hole, corners[..., _REST])
-    outside_mm = np.hypot(u, v) - hole_radius_mm(hole, np.arctan2(v, u))
+    outline = form_of(hole).outline
+    assert outline is not None
+    outside_mm = outline(hole, u, v)
     level = np.maximum(outside_mm, np.abs(w) - FADE_START_MM)
     left = (level >= 0).sum(axis=1)
     one, two = (corners[left == count] for count in (1, 2))

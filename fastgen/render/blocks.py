@@ -5,6 +5,7 @@ A shader declares a block with `#include "NAME.block"`.
 
 from collections.abc import Mapping
 
+from fastgen.geometry.damage_forms import FORMS
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render.noise import NOISE_LEVELS
@@ -86,12 +87,13 @@ DAMAGE_BLOCK = Block(
         ("vec4", "damage_along", MAX_DAMAGES),  # axis; half length
         ("vec4", "damage_across", MAX_DAMAGES),  # axis; half width
         ("vec4", "damage_inward", MAX_DAMAGES),  # axis; depth
-        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape; the mask value comes last
+        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape
+        ("vec4", "damage_reach", MAX_DAMAGES),  # along, across, inward; mask value
+        ("vec4", "damage_wear", MAX_DAMAGES),  # Damage.paint_loss and fresh; unused
         ("int", "damage_count"),
-        # damages are sorted by kind: perforation, dented, concave, axis
+        # damages are sorted by form, in the order of damage_forms.FORMS
+        *(("int", f"{form.kind}_{form.name}_end") for form in FORMS),
         ("int", "hole_count"),
-        ("int", "dent_end"),
-        ("int", "concave_end"),
         ("float", "damage_threshold_mm"),
         ("int", "inner_row"),  # first row of the interior in the visibility buffer
     ),

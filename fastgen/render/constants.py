@@ -13,7 +13,7 @@ from typing import NamedTuple
 from fastgen.camera import tone_curve
 from fastgen.classes import SPREADER_ID
 from fastgen.decals.artwork import ART_SIZE
-from fastgen.geometry import damage_law
+from fastgen.geometry.damage_forms import creased, form, torn
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.light import environment
@@ -241,10 +241,17 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "ZONE_LEVEL": ZONE_LEVEL,
     },
     "damage": lambda _: {
-        "DAMAGE_FADE_START_MM": f"{damage_law.FADE_START_MM:.1f}",
-        "DAMAGE_FADE_END_MM": f"{damage_law.FADE_END_MM:.1f}",
+        "DAMAGE_FADE_START_MM": f"{form.FADE_START_MM:.1f}",
+        "DAMAGE_FADE_END_MM": f"{form.FADE_END_MM:.1f}",
         "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
-        "HOLE_REACH": f"{damage_law.HOLE_REACH:g}",
+        "CREASED_EDGE": f"{creased.EDGE_STEEPNESS:.1f}",
+        "CREASED_FLATTENED_AT": f"{creased.FLATTENED_AT:g}",
+        "CREASED_LEVEL_MM": f"{creased.LEVEL_MM:.1f}",
+        "CREASED_DEEPEST_MM": f"{creased.DEEPEST_MM:.1f}",
+        "TORN_WEDGE_END": f"{torn.WEDGE_END:.1f}",
+        "TORN_LONG_TEETH_MM": f"{torn.TEETH_MM[0]:.1f}",
+        "TORN_SHORT_TEETH_MM": f"{torn.TEETH_MM[1]:.1f}",
+        "TORN_ARM_GAPE": f"{torn.ARM_GAPE:g}",
     },
     "ground": _ground,
     "inside": lambda _: {

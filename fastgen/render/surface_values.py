@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fastgen.geometry.damage_forms import FORMS, form_of
 from fastgen.geometry.damage_law import reach_mm
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -145,23 +146,27 @@ def damage_values(
         for damage, value in zip(prepared.scene.damages, prepared.numbers.damages, strict=True)
         if damage in shown
     ]
-    order = ("perforation", "dented", "concave", "axis")
-    valued.sort(key=lambda pair: order.index(pair[0].kind))
+    valued.sort(key=lambda pair: FORMS.index(form_of(pair[0])))
     damages = [damage for damage, _ in valued]
     shape = np.zeros((len(damages), 12), np.float32)
-    for row, (damage, value) in zip(shape, valued, strict=True):
+    for row, damage in zip(shape, damages, strict=True):
         row[: len(damage.shape)] = damage.shape
-        row[11] = value
+    counts = [sum(form_of(damage) is form for damage in damages) for form in FORMS]
+    ends = {
+        f"{form.kind}_{form.name}_end": int(end)
+        for form, end in zip(FORMS, np.cumsum(counts), strict=True)
+    }
     return {
         "damage_origin": [(*d.origin_mm, _squared_reach(d)) for d in damages],
         "damage_along": [(*d.along, d.size_mm[0] / 2) for d in damages],
         "damage_across": [(*d.across, d.size_mm[1] / 2) for d in damages],
         "damage_inward": [(*d.inward, d.depth_mm) for d in damages],
         "damage_shape": shape.reshape(-1, 4),
+        "damage_reach": [(*reach_mm(d), value) for d, value in valued],
+        "damage_wear": [(d.paint_loss, d.fresh, 0.0, 0.0) for d in damages],
         "damage_count": len(damages),
-        "hole_count": sum(damage.kind == "perforation" for damage in damages),
-        "dent_end": sum(damage.kind in ("perforation", "dented") for damage in damages),
-        "concave_end": sum(damage.kind != "axis" for damage in damages),
+        **ends,
+        "hole_count": sum(form_of(d).outline is not None for d in damages),
         "damage_threshold_mm": threshold_mm,
         "inner_row": inner_row,
     }

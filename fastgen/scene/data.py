@@ -131,12 +131,13 @@ class Damage:
         along: First of three orthonormal axes of the field, in the container frame.
         across: Second axis.
         inward: Third axis. A positive `depth_mm` moves the sheet in its direction.
-        size_mm: Full length along and full width across. For a perforation both are the mean
-            diameter; for an axis damage the width is twice the reach from the edge.
+        size_mm: Full length along and full width across. For a star both are the mean diameter;
+            for an axis damage the width is twice the reach from the edge.
         depth_mm: Largest displacement.
-        shape: Further parameters. Dented: half width of the crease in mm, sink share 0..1,
-            amplitude in mm, wavelength in mm, phase in radians, stretch length in mm. Perforation:
-            rim width in mm, then share and phase of 5 harmonics of the outline. Otherwise empty.
+        shape: Further parameters, those of damage_shapes.SHAPES[kind, form] in this order.
+        form: One of the forms of the kind in damage_shapes.SHAPES.
+        paint_loss: Share of the worst places that is bare of paint, 0..1.
+        fresh: Share of the bare steel that shines and has not rusted yet, 0..1.
     """
 
     kind: Annotated[str, OneOf(DAMAGE_CLASSES)]
@@ -148,6 +149,9 @@ class Damage:
     size_mm: tuple[_Length, _Length]
     depth_mm: Millimetres
     shape: tuple[Number, ...] = ()
+    form: str = "plain"
+    paint_loss: Share = 1.0
+    fresh: Share = 0.0
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ FAR_M = 200.0
 CAMERA_REACH_MM = (FAR_M - 20.0) / MM
 """Largest distance of a camera from a container; a whole container then fits before FAR_M."""
 
-MAX_DAMAGES = 128
+MAX_DAMAGES = 112
 """Damages per scene; they fit the 16 KiB that every driver grants a uniform block."""
 
 MAX_DECALS = 4096

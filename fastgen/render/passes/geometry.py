@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import moderngl
 
+from fastgen.geometry.damage_forms.creased import DEEPEST_MM
 from fastgen.geometry.damage_law import corners_mm
 from fastgen.light.sky_visibility import lobe_masks
 from fastgen.render.constants import LOBE_CELLS, REACH_MARGIN_MM
@@ -72,7 +73,7 @@ class GeometryPass:
             container.draw("damaged", touched)
         else:
             container.draw("undamaged", seen)
-        moved_mm = sum(abs(d.depth_mm) for d in damages)
+        moved_mm = sum(abs(d.depth_mm) + DEEPEST_MM for d in damages)
         self._programs["holed"].bind(textures)
         for region in regions.holes:
             samples.limit_inside(region)

@@ -1,0 +1,22 @@
+"""A local kink of an edge: a notch in a rail, or a post that is bent at one height.
+
+shaders/damage_kinked.glsl is the GLSL twin.
+"""
+
+import numpy as np
+
+from fastgen.geometry.damage_forms.form import Array, Form, above_zero, bump, half_size, lesser
+from fastgen.scene import Damage
+
+
+def _kinked(damage: Damage, u: Array, v: Array, w: Array) -> Array:
+    """The notch has two straight flanks; its deepest point is at `apex` half lengths."""
+    apex, softness = damage.shape
+    half_length, half_width = half_size(damage)
+    t = u / half_length
+    notch = lesser((1 + t) / (1 + apex), (1 - t) / (1 - apex), softness)
+    away = np.hypot(v, w) / half_width
+    return np.asarray(damage.depth_mm * above_zero(notch, softness) * bump(away))
+
+
+KINKED = Form("axis", "kinked", _kinked, half_size, along_edge=True)

@@ -1,0 +1,66 @@
+"""Torn sheet: slits, flaps, triangles and Ls with curled lips.
+
+A slit runs along u. Its two lips gape by different amounts, evenly or like a wedge, with ragged
+edges. A second slit at its end, across it, makes an L. shaders/damage_torn.glsl is the GLSL twin.
+"""
+
+import numpy as np
+
+from fastgen.geometry.damage_forms.form import Array, Form, half_size
+from fastgen.scene import Damage
+
+WEDGE_END = 5.0
+"""Steepness of the blunt end of a wedge."""
+
+TEETH_MM = (47.0, 19.0)
+"""Wavelengths of the ragged edges."""
+
+ARM_GAPE = 0.7
+"""Gape of the second slit, as a share of the first."""
+
+ANYWHERE_MM = 1e6
+
+
+def _ragged_mm(damage: Damage, u: Array, phase: float) -> Array:
+    long, short = (2 * np.pi * u / wave for wave in TEETH_MM)
+    return np.asarray(
+        damage.shape[3] / 1.6 * (np.sin(long + phase) + 0.6 * np.sin(short + 2.3 * phase))
+    )
+
+
+def outside_mm(damage: Damage, u: Array, v: Array) -> Array:
+    """Return about the distance [...] in mm from the hole at u and v [...], negative within."""
+    _, belly, wedge, _, phase, arm_mm, *_ = damage.shape
+    half_length, half_gape = half_size(damage)
+    t = u / half_length
+    even = np.maximum(1 - t * t, 0.0)
+    wedged = np.maximum(np.minimum(0.5 * (1 + t), WEDGE_END * (1 - t)), 0.0)
+    gape = even + wedge * (wedged - even)
+    teeth = np.minimum(4 * gape, 1.0)
+    upper = 2 * half_gape * gape * (1 - belly) + teeth * _ragged_mm(damage, u, phase)
+    lower = 2 * half_gape * gape * belly + teeth * _ragged_mm(damage, u, phase + 2.0)
+    outside = np.maximum(np.maximum(v - upper, -v - lower), np.abs(u) - half_length)
+    half_arm = max(arm_mm, 1.0) / 2
+    s = v / half_arm - 1
+    gape_mm = ARM_GAPE * half_gape * np.maximum(1 - s * s, 0.0)
+    across = np.abs(u - (half_length - half_gape)) - gape_mm
+    arm = np.maximum(across, np.abs(v - half_arm) - half_arm)
+    return np.asarray(np.minimum(outside, arm + (ANYWHERE_MM if arm_mm < 1 else 0.0)))
+
+
+def _torn(damage: Damage, u: Array, v: Array, _w: Array) -> Array:
+    """The lips bend inward; with `twist` the lower one less, or outward."""
+    rim_mm, twist = damage.shape[0], damage.shape[6]
+    rim = np.clip(1 - outside_mm(damage, u, v) / rim_mm, 0.0, 1.0)
+    upward = v / (np.abs(v) + half_size(damage)[1])
+    return np.asarray(damage.depth_mm * rim**2 * (1 - twist * (0.5 - 0.5 * upward)))
+
+
+def _reach(damage: Damage) -> tuple[float, float]:
+    rim_mm, jag_mm, arm_mm = damage.shape[0], damage.shape[3], damage.shape[5]
+    half_length, half_gape = half_size(damage)
+    across = max(2 * half_gape + abs(jag_mm), arm_mm)
+    return half_length + half_gape + rim_mm, across + rim_mm
+
+
+TORN = Form("perforation", "torn", _torn, _reach, outside_mm)

@@ -1,0 +1,49 @@
+// DamageField torn_field(int i, vec3 q): lips of torn sheet, at local coordinates q.
+// float outside_tear(int i, vec2 q): about the distance from its hole in mm, negative within.
+// Twin of fastgen/geometry/damage_forms/torn.py.
+
+#include "damage_field.glsl"
+
+const float ANYWHERE_MM = 1e6;
+
+float ragged(float height, float u, float phase) {
+    return height / 1.6 * (sin(2.0 * PI * u / TORN_LONG_TEETH_MM + phase) +
+                           0.6 * sin(2.0 * PI * u / TORN_SHORT_TEETH_MM + 2.3 * phase));
+}
+
+float outside_tear(int i, vec2 q) {
+    vec4 shape = damage_shape[3 * i];      // Rim, belly, wedge, teeth.
+    vec4 more = damage_shape[3 * i + 1];   // Phase, second slit, twist.
+    float half_length = damage_along[i].w;
+    float half_gape = damage_across[i].w;
+    float t = q.x / half_length;
+    float even = max(1.0 - t * t, 0.0);
+    float wedged = max(min(0.5 * (1.0 + t), TORN_WEDGE_END * (1.0 - t)), 0.0);
+    float gape = even + shape.z * (wedged - even);
+    float teeth = min(4.0 * gape, 1.0);
+    float upper = 2.0 * half_gape * gape * (1.0 - shape.y) + teeth * ragged(shape.w, q.x, more.x);
+    float lower = 2.0 * half_gape * gape * shape.y + teeth * ragged(shape.w, q.x, more.x + 2.0);
+    float outside = max(max(q.y - upper, -q.y - lower), abs(q.x) - half_length);
+    float half_arm = 0.5 * max(more.y, 1.0);
+    float s = q.y / half_arm - 1.0;
+    float across = abs(q.x - (half_length - half_gape)) -
+                   TORN_ARM_GAPE * half_gape * max(1.0 - s * s, 0.0);
+    float arm = max(across, abs(q.y - half_arm) - half_arm);
+    return min(outside, arm + (more.y < 1.0 ? ANYWHERE_MM : 0.0));
+}
+
+float torn_amount(int i, vec2 q) {
+    float rim = clamp(1.0 - outside_tear(i, q) / damage_shape[3 * i].x, 0.0, 1.0);
+    float upward = q.y / (abs(q.y) + damage_across[i].w);
+    return damage_inward[i].w * rim * rim *
+           (1.0 - damage_shape[3 * i + 1].z * (0.5 - 0.5 * upward));
+}
+
+DamageField torn_field(int i, vec3 q) {
+    float fade = sheet_fade(q.z);
+    float amount = torn_amount(i, q.xy);
+    // One-sided differences stay outside the hole, where the sheet is.
+    vec2 slope = vec2(torn_amount(i, q.xy + vec2(1.0, 0.0)), torn_amount(i, q.xy + vec2(0.0, 1.0)));
+    float edge = clamp(1.0 - outside_tear(i, q.xy) / min(0.35 * damage_shape[3 * i].x, 25.0), 0.0, 1.0);
+    return DamageField(fade * amount, fade * vec3(slope - amount, 0.0), edge * step(0.5, fade));
+}
