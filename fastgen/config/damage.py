@@ -27,11 +27,23 @@ class AxisConfig:
         length_mm: Length along the edge.
         reach_mm: Distance from the edge up to which the faces beside it are bent.
         depth_mm: Largest displacement.
+        kinked: Probability that the edge has a local kink instead: a notch of a rail or a bent
+            post.
+        kink_length_mm: Length of a kink along the edge.
+        kink_reach_mm: Distance from the edge up to which a kink bends the faces beside it.
+        kink_depth_mm: Largest displacement of a kink.
+        kinked_posts: Probability that a kink is in a corner post, just above its lower casting or
+            below its upper one. Other kinks may be in any edge.
     """
 
     length_mm: _Extent = Range(700, 1900)
     reach_mm: _Reach = Range(320, 650)
     depth_mm: _Depth = Range(110, 260)
+    kinked: Share = 0.85
+    kink_length_mm: _Extent = Range(200, 500)
+    kink_reach_mm: _Reach = Range(120, 260)
+    kink_depth_mm: _Depth = Range(40, 130)
+    kinked_posts: Share = 0.5
 
 
 @dataclass(frozen=True)
@@ -43,12 +55,39 @@ class ConcaveConfig:
         width_mm: Vertical size; across the container on the roof.
         depth_mm: Largest displacement.
         outward: Probability that the area bulges outward.
+        creased: Probability that the sheet breaks into flat parts between sharp folds.
+        crease_softness: Length over which a fold is rounded, as a share of the depth.
+        flattened: Share by which the corrugation between the folds is flattened.
     """
 
     length_mm: _Extent = Range(900, 2600)
     width_mm: _Extent = Range(800, 2000)
     depth_mm: _Depth = Range(110, 250)
     outward: Share = 0.3
+    creased: Share = 0.85
+    crease_softness: Annotated[Range, Bounds(1e-3, 1.0)] = Range(0.02, 0.1)
+    flattened: Annotated[Range, UNIT] = Range(0.1, 0.8)
+
+
+@dataclass(frozen=True)
+class RibMarksConfig:
+    """Crush marks on the outer ribs, in a row at one height.
+
+    Attributes:
+        probability: Probability that a dent is such a row.
+        length_mm: Length of the row.
+        height_mm: Height of its marks.
+        depth_mm: Distance by which the object that was pressed against the wall reaches in.
+        unevenness: Variation of the depth along the row.
+        turn_deg: Angle between the row and the horizontal.
+    """
+
+    probability: Share = 0.7
+    length_mm: _Extent = Range(120, 2200)
+    height_mm: _Reach = Range(50, 170)
+    depth_mm: _Depth = Range(14, 42)
+    unevenness: Annotated[Range, UNIT] = Range(0.0, 0.7)
+    turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-6, 6)
 
 
 @dataclass(frozen=True)
@@ -65,6 +104,7 @@ class DentedConfig:
         wavelength_mm: Wavelength of the swings.
         stretch_mm: Length of the stretches in which the path alternately swings and runs straight.
         turn_deg: Angle between the path and the horizontal.
+        marks: Rows of crush marks on the ribs, which take the place of most folds.
     """
 
     length_mm: _Extent = Range(600, 1700)
@@ -76,6 +116,7 @@ class DentedConfig:
     wavelength_mm: Annotated[Range, Bounds(20, 1e5, "mm")] = Range(280, 800)
     stretch_mm: Annotated[Range, Bounds(20, 1e5, "mm")] = Range(250, 600)
     turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-50, 50)
+    marks: RibMarksConfig = field(default_factory=RibMarksConfig)
 
 
 @dataclass(frozen=True)
@@ -87,12 +128,22 @@ class PerforationConfig:
         rim_mm: Width of the rim that is bent inward.
         depth_mm: Displacement of the rim at the edge of the hole.
         lobes: Amplitude of each of the five harmonics of the outline, as a share of the radius.
+        torn: Probability that the hole is a slit, flap, triangle or L instead of a star.
+        tear_length_mm: Length of such a tear.
+        tear_aspect: Length divided by width.
+        teeth_mm: Height of the teeth of its edges.
+        twist: Amount by which its lower lip bends less than the upper; above 1 it bends outward.
     """
 
     diameter_mm: Annotated[Range, Bounds(5, 2000, "mm")] = Range(90, 320)
     rim_mm: Annotated[Range, Bounds(5, 1000, "mm")] = Range(50, 150)
     depth_mm: _Depth = Range(35, 100)
     lobes: Annotated[Range, Bounds(0.0, LOBE_LIMIT)] = Range(0.05, 0.16)
+    torn: Share = 0.85
+    tear_length_mm: _Extent = Range(90, 700)
+    tear_aspect: Annotated[Range, Bounds(1.0, 100.0)] = Range(2.0, 7.0)
+    teeth_mm: _Depth = Range(2, 12)
+    twist: Annotated[Range, Bounds(0.0, 2.0)] = Range(0.0, 1.6)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,6 +52,9 @@ class _Form:
         shape: Further parameters of the kind, see `scene.Damage`.
         turn_deg: Angle of its length against the face's horizontal.
         reach: Extent of the displaced sheet divided by `size_mm`.
+        name: Form of the kind, see `scene.Damage`.
+        paint_loss: Share of the worst places that is bare of paint.
+        fresh: Share of the bare steel that has not rusted yet.
     """
 
     size_mm: tuple[float, float]
@@ -59,6 +62,9 @@ class _Form:
     shape: tuple[float, ...] = ()
     turn_deg: float = 0.0
     reach: float = 1.0
+    name: str = "plain"
+    paint_loss: float = 1.0
+    fresh: float = 0.0
 
 
 def sample_damages(
@@ -108,8 +114,10 @@ def _planes(size_mm: Vec3) -> dict[str, _Plane]:
     return {plane.face: plane for plane in planes}
 
 
-def _draw(rng: np.random.Generator, values: Range, most: float = math.inf) -> float:
-    return round(min(values.draw(rng), most), 2)
+def _draw(
+    rng: np.random.Generator, values: Range, most: float = math.inf, digits: int = 2
+) -> float:
+    return round(min(values.draw(rng), most), digits)
 
 
 def _place(
@@ -150,20 +158,34 @@ def _on_sheet(kind: str, form: _Form, plane: _Plane, rng: np.random.Generator) -
         size_mm=size,
         depth_mm=form.depth_mm,
         shape=form.shape,
+        form=form.name,
+        paint_loss=form.paint_loss,
+        fresh=form.fresh,
     )
 
 
 def _concave(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.concave
+    creased = rng.random() < c.creased
     length = _draw(rng, c.length_mm, plane.size[0] - 2 * _FRAME_MM)
     width = _draw(rng, c.width_mm, plane.size[1] - 2 * _FRAME_MM)
     depth = _draw(rng, c.depth_mm)
     sign = -1.0 if rng.random() < c.outward else 1.0
-    return _Form((length, width), sign * depth)
+    if not creased:
+        return _Form((length, width), sign * depth)
+    shape = (
+        _angle(rng),
+        *(round(float(rng.uniform(0.35, 0.9)), 3) for _ in range(5)),
+        _draw(rng, c.crease_softness, digits=4),
+        _draw(rng, c.flattened),
+    )
+    return _Form((length, width), sign * depth, shape, 0.0, 1.0, "creased", *_wear(rng))
 
 
 def _dented(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.dented
+    if rng.random() < c.marks.probability:
+        return _rib_marks(config, plane, rng)
     length = _draw(rng, c.length_mm, min(plane.size) - 2 * _FRAME_MM)
     shape = (
         _draw(rng, c.crease_mm),
@@ -181,6 +203,8 @@ def _dented(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _F
 
 def _perforation(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
     c = config.perforation
+    if rng.random() < c.torn:
+        return _tear(config, plane, rng)
     diameter = _draw(rng, c.diameter_mm)
     shape = [_draw(rng, c.rim_mm)]
     for _ in range(LOBES):
@@ -188,6 +212,56 @@ def _perforation(config: DamageConfig, plane: _Plane, rng: np.random.Generator) 
         shape.append(round(float(rng.uniform(0, 2 * math.pi)), 4))
     reach = 1 + LOBES * c.lobes.hi + 2 * shape[0] / diameter
     return _Form((diameter, diameter), _draw(rng, c.depth_mm), tuple(shape), reach=reach)
+
+
+def _rib_marks(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
+    c = config.dented.marks
+    length = _draw(rng, c.length_mm, plane.size[0] - 2 * _FRAME_MM)
+    size = (length, _draw(rng, c.height_mm))
+    shape = (
+        round(float(rng.uniform(1.0, 4.0)), 2),
+        round(min(60.0, length / 3), 2),
+        _draw(rng, c.unevenness),
+        round(float(rng.uniform(300.0, 1200.0)), 1),
+        _angle(rng),
+        round(float(rng.uniform(0.8, 0.95)), 3),
+    )
+    form = _Form(size, _draw(rng, c.depth_mm), shape, _draw(rng, c.turn_deg), 1.0, "ribs")
+    loss, fresh = _wear(rng)
+    return replace(form, paint_loss=loss, fresh=fresh)
+
+
+def _tear(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _Form:
+    c = config.perforation
+    length = _draw(rng, c.tear_length_mm, min(plane.size) / 2)
+    width = round(max(length / _draw(rng, c.tear_aspect), 12.0), 2)
+    arm = round(length * float(rng.uniform(0.4, 0.9)), 2) if rng.random() < 0.2 else 0.0
+    shape = (
+        _draw(rng, c.rim_mm),
+        round(float(rng.beta(0.5, 0.5)), 3),
+        round(float(rng.beta(0.4, 0.4)), 3),
+        _draw(rng, c.teeth_mm),
+        _angle(rng),
+        arm,
+        _draw(rng, c.twist),
+    )
+    # most tears follow a rib or run along a rail
+    turn = round(float(rng.choice([0.0, 90.0]) + rng.normal(0, 12)), 2)
+    reach = 1 + 2 * (shape[0] + width + arm) / length
+    return _Form(
+        (length, width), _draw(rng, c.depth_mm), shape, turn, reach, "torn", *_wear(rng)
+    )
+
+
+def _angle(rng: np.random.Generator) -> float:
+    return round(float(rng.uniform(0, 2 * math.pi)), 4)
+
+
+def _wear(rng: np.random.Generator) -> tuple[float, float]:
+    """Sample paint loss and freshness: some damages are clean, some bright, some rusty."""
+    loss = float(rng.choice([0.0, 0.3, 0.7, 1.0], p=[0.25, 0.25, 0.25, 0.25]))
+    fresh = float(rng.choice([0.0, 0.5, 1.0], p=[0.5, 0.25, 0.25]))
+    return loss, fresh
 
 
 _FORMS: dict[str, Callable[[DamageConfig, _Plane, np.random.Generator], _Form]] = {
@@ -201,7 +275,9 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
     """Sample a dent of one of the twelve edges, pushed in diagonally and clear of the castings."""
     c = config.axis
     half = np.array(size_mm) / 2
-    axis = int(rng.integers(3))
+    kinked = bool(rng.random() < c.kinked)
+    post = kinked and bool(rng.random() < c.kinked_posts)
+    axis = 2 if post else int(rng.integers(3))
     others = [i for i in range(3) if i != axis]
     signs = rng.choice([-1.0, 1.0], size=2)
     inward, middle = np.zeros(3), np.array([0.0, 0.0, half[2]])
@@ -210,18 +286,32 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
         middle[i] += sign * half[i]
     along = np.eye(3)[axis]
     room = 2 * half[axis] - 2 * _FRAME_MM
-    length = _draw(rng, c.length_mm, room)
+    length = _draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
     slack = (room - length) / 2
-    origin = middle + along * float(rng.uniform(-slack, slack))
-    return Damage(
+    at = float(rng.uniform(-slack, slack))
+    if post:
+        # three in four are just above the lower casting
+        at = slack * (1.0 if rng.random() < 0.25 else -1.0)
+    damage = Damage(
         kind="axis",
         face=_edge_name(others, signs),
-        origin_mm=_vector(origin, 1),
+        origin_mm=_vector(middle + along * at, 1),
         along=_vector(along),
         across=_vector(np.cross(inward, along)),
         inward=_vector(inward),
-        size_mm=(length, 2 * _draw(rng, c.reach_mm)),
-        depth_mm=_draw(rng, c.depth_mm),
+        size_mm=(length, 2 * _draw(rng, c.kink_reach_mm if kinked else c.reach_mm)),
+        depth_mm=_draw(rng, c.kink_depth_mm if kinked else c.depth_mm),
+    )
+    if not kinked:
+        return damage
+    apex, softness = float(rng.uniform(-0.5, 0.5)), float(rng.uniform(0.03, 0.15))
+    loss, fresh = _wear(rng)
+    return replace(
+        damage,
+        form="kinked",
+        shape=(round(apex, 3), round(softness, 4)),
+        paint_loss=loss,
+        fresh=fresh,
     )
 
 

@@ -10,24 +10,17 @@ from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box
+from fastgen.scene.damage_shapes import SHAPES
 from fastgen.scene.limits import (
     CAMERA_REACH_MM,
     COMPUTED_ART,
     GLYPH_RANGE,
-    LOBE_LIMIT,
-    LOBES,
     MAX_INSTANCES,
     MM,
     NEAR_M,
 )
 from fastgen.scene.places import check_places, container_boxes, container_names
 from fastgen.validation import check_fields, check_known
-
-_SHAPES = {"axis": 0, "concave": 0, "dented": 6, "perforation": 1 + 2 * LOBES}
-"""Length of Damage.shape by damage kind."""
-
-_DIVISORS = {"dented": (0, 3, 5), "perforation": (0,)}
-"""Indices into Damage.shape of the values that the displacement field divides by."""
 
 _ART_KINDS = ("marker", "sticker", "triangle", "emblem")
 
@@ -173,20 +166,17 @@ def _check_damage(damage: Damage, path: str) -> None:
                 raise ConfigError(
                     f"{path}.along, across, inward: these must be three orthogonal unit vectors"
                 )
-    wanted = _SHAPES[damage.kind]
-    if len(damage.shape) != wanted:
+    forms = [form for kind, form in SHAPES if kind == damage.kind]
+    check_known(f"{path}.form", damage.form, forms)
+    wanted = SHAPES[damage.kind, damage.form]
+    if len(damage.shape) != len(wanted):
         raise ConfigError(
-            f"{path}.shape: a {damage.kind} has {wanted} numbers, not {len(damage.shape)}"
+            f"{path}.shape: a {damage.kind} of form {damage.form} has {len(wanted)} numbers, not "
+            f"{len(damage.shape)}"
         )
-    if damage.kind == "perforation":
-        for i, lobe in enumerate(damage.shape[1::2]):
-            if abs(lobe) > LOBE_LIMIT:
-                raise ConfigError(
-                    f"{path}.shape[{1 + 2 * i}]: {lobe!r} is out of range; give a lobe of "
-                    f"{-LOBE_LIMIT:g} to {LOBE_LIMIT:g} of the radius"
-                )
-    for i in _DIVISORS.get(damage.kind, ()):
-        if not damage.shape[i] > 0:
+    for i, (value, parameter) in enumerate(zip(damage.shape, wanted, strict=True)):
+        if not parameter.low <= value <= parameter.high:
             raise ConfigError(
-                f"{path}.shape[{i}]: {damage.shape[i]!r} is out of range; give more than 0"
+                f"{path}.shape[{i}]: {value!r} is out of range; give a {parameter.name} of "
+                f"{parameter.low:g} to {parameter.high:g}"
             )
