@@ -30,5 +30,5 @@ DamageField creased_field(int i, vec3 q) {
     float through = q.z > 0.0 && q.z < CREASED_DEEPEST_MM ? -flattened : 0.0;
     return DamageField(sheet * (depth * up + flattened * level),
                        sheet * vec3(depth * tilt + more, through),
-                       0.8 * sheet * clamp(1.0 - scar / 0.06, 0.0, 1.0) * step(1e-4, up));
+                       0.3 * sheet * clamp(1.0 - scar / 0.03, 0.0, 1.0) * step(1e-4, up));
 }

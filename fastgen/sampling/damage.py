@@ -175,7 +175,7 @@ def _concave(config: DamageConfig, plane: _Plane, rng: np.random.Generator) -> _
         return _Form((length, width), sign * depth)
     shape = (
         _angle(rng),
-        *(round(float(rng.uniform(0.35, 0.9)), 3) for _ in range(5)),
+        *(round(float(rng.uniform(0.25, 0.75)), 3) for _ in range(5)),
         _draw(rng, c.crease_softness, digits=4),
         _draw(rng, c.flattened),
     )
