@@ -42,10 +42,9 @@ CODE_LENGTH = 11
 
 KINDS = ("markers", "texts", "panels")
 
-TRAINING = Config.from_values(
+_LETTERED = Config.from_values(
     {
         "markings": {"markers_per_face": [2, 10]},
-        "damage": {"probability": 0.8, "count": [2, 5]},
         "sensor": {
             "motion": {"probability": 0.2, "extent": [0.001, 0.006]},
             "exposure_error_ev": [-0.7, 0.7],
@@ -55,8 +54,26 @@ TRAINING = Config.from_values(
         },
     }
 )
-"""More markers and damages than the preset, and the sensor effects of the preset `crane` that are
-not part of a scene's surroundings."""
+"""More markers than the preset, and the sensor effects of the preset `crane` that are not part of a
+scene's surroundings."""
+
+_DAMAGED = Config.from_values(
+    {
+        "damage": {
+            "probability": 0.9,
+            "count": [2, 5],
+            "kinds": ["axis", "concave", "dented", "perforation"],
+        },
+        "markings": {"marked_containers": 0.15},
+        "environment": {"weights": dict(Config.preset("gate").environment.weights)},
+    },
+    base=Config.preset("crane"),
+)
+"""More damages than the preset `crane`, in the daylight of the preset `gate`. Its walls have few
+markers, as those that surveyors photograph."""
+
+TRAINING = {"markers": _LETTERED, "texts": _LETTERED, "panels": _DAMAGED}
+"""Distribution of the scenes by the kind of crop."""
 
 _FACES = ("front", "back", "door", "no_door")
 _VIEW_PX = 352
@@ -118,9 +135,7 @@ class Crops:
             mine += getattr(other, name)
 
 
-def training_crops(
-    seed: int, scenes: range, wanted: Sequence[str], workers: int, config: Config = TRAINING
-) -> Crops:
+def training_crops(seed: int, scenes: range, wanted: Sequence[str], workers: int) -> Crops:
     """Render scenes and cut out crops.
 
     Args:
@@ -128,9 +143,8 @@ def training_crops(
         scenes: Indices of the scenes.
         wanted: Kinds of crops to render, from KINDS.
         workers: Processes that render.
-        config: Distribution of the scenes.
     """
-    share = partial(_crops_of, config, seed, tuple(wanted))
+    share = partial(_crops_of, seed, tuple(wanted))
     shares = [scenes[i :: 4 * workers] for i in range(4 * workers)]
     shares = [each for each in shares if len(each)]
     made = Crops()
@@ -150,13 +164,13 @@ def in_processes(task: Any, arguments: Sequence[Any], workers: int) -> Iterator[
         yield from pool.map(task, arguments)
 
 
-def _crops_of(config: Config, seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crops:
+def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crops:
     made = Crops()
-    with Generator(config, seed, (_VIEW_PX, _VIEW_PX)) as generator:
-        for index in scenes:
-            scene = generator.scene(index)
-            rng = stream(seed, index, "gap")
-            for kind in wanted:
+    for kind in wanted:
+        with Generator(TRAINING[kind], seed, (_VIEW_PX, _VIEW_PX)) as generator:
+            for index in scenes:
+                scene = generator.scene(index)
+                rng = stream(seed, index, f"gap.{kind}")
                 for camera in _cameras(scene, kind, rng):
                     sample = generator.render(scene=scene, camera=camera)
                     if kind == "texts":

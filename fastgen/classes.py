@@ -24,14 +24,22 @@ ALL_DETECTION_CLASSES = (*DETECTION_CLASSES, *MARK_CLASSES)
 """Classes of the marker task with the marks; the first 28 are DETECTION_CLASSES."""
 
 DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
+"""The four kinds of the SeaFront paper, section 3.3.2."""
+
+ALL_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
+"""The paper's kinds and those that are drawn only where `damage.kinds` lists them."""
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
-"""COCO category i + 1 is SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance."""
+"""The five classes of the damage task, in the order of YOLO labels."""
+
+ALL_SEGMENTATION_CLASSES = ("container", *ALL_DAMAGE_CLASSES)
+"""COCO category i + 1 is ALL_SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance. The
+first five are SEGMENTATION_CLASSES."""
 
 UNDAMAGED_CONTAINER = 101
 """Mask value of the undamaged container: category 1, instance 1 (SeaFront paper, 3.3.4)."""
 
-DAMAGE_VALUES = range(200, (len(SEGMENTATION_CLASSES) + 1) * 100)
+DAMAGE_VALUES = range(200, (len(ALL_SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance. They are also the ids of damages."""
 
 CONTAINER_ID = 1

@@ -66,6 +66,9 @@ class Object:
             seal, the middle of its barrel or body; of a bolt without a barrel, that of its head.
         container: Number of the container that the object is or belongs to: 0, or k for
             Scene.neighbours[k - 1]; -1 for containers of the panorama.
+        face: Face or edge of the container that a damage is on, as in `scene.Damage`; '' for other
+            objects.
+        severity_mm: Depth of a damage, or length of a hole or scrape; 0 for other objects.
         background: Whether the object is a container of the panorama around the scene. It has no
             amodal box, polygon or keypoints, and no pixels in the id target; see Sample.background.
     """
@@ -87,6 +90,8 @@ class Object:
     parts: tuple[LabelledPart, ...] = ()
     keypoints: tuple[Keypoint, ...] = ()
     container: int = 0
+    face: str = ""
+    severity_mm: float = 0.0
     background: bool = False
 
 

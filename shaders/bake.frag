@@ -20,7 +20,7 @@ layout(location = 0) out vec4 out_albedo;    // sRGB-encoded; alpha is 1 inside 
 layout(location = 1) out vec4 out_surface;   // Unused, roughness, metallic: glTF 2.0, section 3.9.2.
 
 void main() {
-    vec2 scar = vec2(0.0);
+    Scar scar = NO_SCAR;
 #if WITH_DAMAGE
     scar = damage_at(rest_mm).scar;
 #endif

@@ -1,6 +1,9 @@
 // DamageField creased_field(int i, vec3 q): flat parts between sharp folds, at local coordinates q.
 // Twin of fastgen/geometry/damage_forms/creased.py.
 
+#include "units.constants"
+#include "damage.constants"
+#include "damage.block"
 #include "damage_field.glsl"
 
 DamageField creased_field(int i, vec3 q) {

@@ -2,8 +2,6 @@
 // Functions for the forms of damage in damage_*.glsl. Twin of fastgen/geometry/damage_forms/form.py.
 
 #include "damage.constants"
-#include "units.constants"
-#include "damage.block"
 
 struct DamageField {
     float amount;   // Displacement along the inward axis, mm.

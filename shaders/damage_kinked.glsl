@@ -1,6 +1,7 @@
 // DamageField kinked_field(int i, vec3 q): a notch of an edge, at local coordinates q.
 // Twin of fastgen/geometry/damage_forms/kinked.py.
 
+#include "damage.block"
 #include "damage_field.glsl"
 
 DamageField kinked_field(int i, vec3 q) {

@@ -12,6 +12,8 @@
 #include "damage_ribs.glsl"
 #include "damage_creased.glsl"
 #include "damage_kinked.glsl"
+#include "damage_scraped.glsl"
+#include "scar.glsl"
 
 // Coordinates of p along, across and inward from the origin of damage i, in mm.
 vec3 damage_local(int i, vec3 p) {
@@ -81,24 +83,40 @@ vec3 deformed(vec3 p) {
 
 struct DamageSample {
     mat3 bend;    // Derivative of the deformed position by the rest position.
-    vec2 scar;    // Wear of the steel, 0..1, and share of it that is bright.
-    uint value;   // Mask value of the damage with the largest displacement; 0 below the threshold.
+    Scar scar;    // The strongest.
+    // Mask value of the damage with the largest displacement. 0 where that is below the threshold, or
+    // where the displacements of several damages cancel.
+    uint value;
 };
 
+void add_scar(inout Scar scar, int i, float wear) {
+    wear *= damage_wear[i].x;
+    if (wear > scar.wear) scar = Scar(wear, damage_wear[i].y, damage_bare[i].rgb);
+}
+
 DamageSample damage_at(vec3 p) {
-    DamageSample d = DamageSample(mat3(1.0), vec2(0.0), 0u);
+    DamageSample d = DamageSample(mat3(1.0), NO_SCAR, 0u);
+    vec3 moved = vec3(0.0);
     float most = damage_threshold_mm;
 #define SAMPLE(i, field)                                                                    \
     vec3 slope = field.slope.x * damage_along[i].xyz + field.slope.y * damage_across[i].xyz + \
                  field.slope.z * damage_inward[i].xyz;                                      \
     d.bend += outerProduct(damage_inward[i].xyz, slope);                                    \
-    float scar = field.scar * damage_wear[i].x;                                             \
-    if (scar > d.scar.x) d.scar = vec2(scar, damage_wear[i].y);                             \
+    moved += field.amount * damage_inward[i].xyz;                                           \
+    add_scar(d.scar, i, field.scar);                                                        \
     if (abs(field.amount) > most) {                                                         \
         most = abs(field.amount);                                                           \
         d.value = uint(damage_reach[i].w);                                                  \
     }
     EACH_DAMAGE(SAMPLE)
+    if (length(moved) < damage_threshold_mm) d.value = 0u;
+    for (int i = next_damage_near(axis_kinked_end, scrape_plain_end, p); i < scrape_plain_end;
+         i = next_damage_near(i + 1, scrape_plain_end, p)) {
+        vec3 q = damage_local(i, p);
+        bool here = scraped(i, q);
+        if (here && d.value == 0u) d.value = uint(damage_reach[i].w);
+        add_scar(d.scar, i, here ? scrape_wear(i, q) : 0.0);
+    }
     return d;
 }
 

@@ -2,6 +2,8 @@
 // 3.3.2 of the SeaFront paper, at local coordinates q of damage i. float outside_star(int i, vec2 q):
 // distance in mm from its hole. Twin of fastgen/geometry/damage_forms/plain.py.
 
+#include "units.constants"
+#include "damage.block"
 #include "damage_field.glsl"
 
 // Sideways offset of a dent's fold in mm at u mm along it: by turns straight and sinusoidal. a, b: the

@@ -1,6 +1,8 @@
 // DamageField ribs_field(int i, vec3 q): crush marks on the outer ribs, at local coordinates q.
 // Twin of fastgen/geometry/damage_forms/ribs.py.
 
+#include "units.constants"
+#include "damage.block"
 #include "damage_field.glsl"
 
 DamageField ribs_field(int i, vec3 q) {
@@ -13,11 +15,11 @@ DamageField ribs_field(int i, vec3 q) {
     float turn = 2.0 * PI / shape.w;
     float uneven = (1.0 + shape.z * sin(turn * q.x + more.x)) / (1.0 + shape.z);
     float uneven_slope = shape.z * turn * cos(turn * q.x + more.x) / (1.0 + shape.z);
-    float across = 1.0 - t * t;
+    float across = bump(t);
     float inside = depth * (uneven * across - beyond * beyond) - max(q.z, 0.0);
     float pushed = more.y * above_zero_slope(inside, shape.x);
     vec3 slope = vec3(depth * (uneven_slope * across - 2.0 * beyond * sign(q.x) / shape.y),
-                      depth * uneven * -2.0 * t / half_width, q.z > 0.0 ? -1.0 : 0.0);
+                      depth * uneven * bump_slope(t) / half_width, q.z > 0.0 ? -1.0 : 0.0);
     // Paint comes off where the object pressed hardest, and along the lips.
     float rubbed = clamp(1.5 - q.z / 12.0, 0.0, 1.0) * above_zero_slope(inside, shape.x);
     return DamageField(more.y * above_zero(inside, shape.x) * sheet_fade(q.z),

@@ -2,13 +2,18 @@
 // float outside_tear(int i, vec2 q): about the distance from its hole in mm, negative within.
 // Twin of fastgen/geometry/damage_forms/torn.py.
 
+#include "units.constants"
+#include "damage.constants"
+#include "damage.block"
 #include "damage_field.glsl"
 
 const float ANYWHERE_MM = 1e6;
 
 float ragged(float height, float u, float phase) {
-    return height / 1.6 * (sin(2.0 * PI * u / TORN_LONG_TEETH_MM + phase) +
-                           0.6 * sin(2.0 * PI * u / TORN_SHORT_TEETH_MM + 2.3 * phase));
+    float turn = 2.0 * PI * u / TORN_LONG_TEETH_MM;
+    float irregular = 1.4 * sin(0.31 * turn + phase);
+    return height / 1.6 * (sin(turn + phase + irregular) +
+                           0.6 * sin(2.0 * PI * u / TORN_SHORT_TEETH_MM + 2.3 * phase + 2.0 * irregular));
 }
 
 float outside_tear(int i, vec2 q) {

@@ -1,7 +1,6 @@
-// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, vec2 scar): material of a
-// point after all layers. footprint_mm: Width of the lookup on the surface. scar: Wear of the steel by
-// damage, 0..1, and share of it that is bright. The layers follow section 3.2 of the SeaFront paper. Colours and blend weights here are
-// artistic choices.
+// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar): material of a
+// point after all layers. footprint_mm: Width of the lookup on the surface. The layers follow section
+// 3.2 of the SeaFront paper. Colours and blend weights here are artistic choices.
 
 #include "reflectance.constants"
 #include "variant.constants"
@@ -12,6 +11,7 @@
 #include "ageing.glsl"
 #include "dirt.glsl"
 #include "rust.glsl"
+#include "scar.glsl"
 #include "scratches.glsl"
 #include "wear.glsl"
 #include "wetness.glsl"
@@ -20,7 +20,6 @@
 #include "zone.glsl"
 #include "zone_point.glsl"
 
-const vec3 BARE_STEEL = vec3(0.42, 0.41, 0.39);
 const vec3 STREAK_ALBEDO = vec3(0.07, 0.06, 0.05);
 // Height of noise relative to its width: of rust on steep parts, and of dirt and scrapes, which run down.
 const float RUST_SQUEEZE = 0.6;
@@ -38,7 +37,7 @@ struct SurfacePoint {
     float printed;   // Share of the footprint that shows a decal.
 };
 
-SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, vec2 scar) {
+SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar) {
     vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
     vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
     int code = int(part.x);
@@ -109,10 +108,10 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, vec2 scar)
 #if WITH_DAMAGE
     // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and
     // door gear in front of the sheet is not scarred.
-    float worn = scar.x * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0);
-    albedo = mix(albedo, mix(rust_albedo * 0.7, BARE_STEEL, scar.y), mix(0.5, 0.9, scar.y) * worn);
+    float worn = scar.wear * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0);
+    albedo = mix(albedo, mix(rust_albedo * 0.7, scar.albedo, scar.fresh), mix(0.5, 0.9, scar.fresh) * worn);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(worn), coarse.lost.y, 0.3) *
-                       step(0.01, worn) * (1.0 - scar.y));
+                       step(0.01, worn) * (1.0 - scar.fresh));
 #endif
     float old = clamp(sticker * rust.old / max(rusty, 1e-4), 0.0, 1.0);
     // The factor is 1 on average: RUST_OLD of the rust is old.

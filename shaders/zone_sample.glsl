@@ -23,7 +23,7 @@ struct ZoneSample {
     uint damage;          // Value in the damage mask.
     float depth;          // In m along the optical axis.
     float footprint_mm;   // Width of a material lookup on the surface.
-    vec2 scar;            // See DamageSample; 0 without damage.
+    Scar scar;            // See DamageSample.
 #if WITH_DAMAGE
     mat3 bend;            // See DamageSample.
 #endif
@@ -35,7 +35,7 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     ZoneSample p;
     p.damage = uint(undamaged_value);
     p.depth = coarse_mean(surface_depths, sample_at).r;
-    p.scar = vec2(0.0);
+    p.scar = NO_SCAR;
 #if WITH_DAMAGE
     DamageSample d = damage_at(rest_at(sample_at));
     if (d.value != 0u) p.damage = d.value;

@@ -215,7 +215,7 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
 
 def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
     """Return the damage target expected from the rays, uint16 [H, W]."""
-    order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5}
+    order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5, "scrape": 6}
     values, counts = [], dict.fromkeys(order, 0)
     for damage in scene.damages:
         counts[damage.kind] += 1
@@ -226,6 +226,13 @@ def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
         amount = np.abs(damage_law.amount_mm(damage, hits.rest_mm))
         more = hits.hit & (hits.hole < 0) & (amount > most)
         target[more], most[more] = value, amount[more]
+    together = np.linalg.norm(
+        damage_law.deform(scene.damages, hits.rest_mm) - hits.rest_mm, axis=-1
+    )
+    target[hits.hit & (together < threshold_mm)] = 101
+    for damage, value in zip(scene.damages, values, strict=True):
+        scraped = hits.hit & (hits.hole < 0) & damage_law.is_marked(damage, hits.rest_mm)
+        target[scraped & (target == 101)] = value
     for i, value in enumerate(values):
         target[hits.hole == i] = value
     return target

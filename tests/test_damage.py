@@ -9,12 +9,14 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.classes import DAMAGE_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES, DAMAGE_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
+from fastgen.geometry.damage_forms import FORMS
+from fastgen.geometry.damage_forms.plain import fold_path_mm
 from fastgen.geometry.door_gear import BAR_Y_MM
 from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
@@ -24,13 +26,32 @@ from tests import oracle
 from tests.plain import FEW_DECALS
 
 SIZE = (256, 256)
-DAMAGED = Config.from_values({"damage": {"probability": 1.0}})
+DAMAGED = Config.from_values({"damage": {"probability": 1.0, "kinds": list(ALL_DAMAGE_CLASSES)}})
+PAPER = Config.from_values(
+    {
+        "damage": {
+            "probability": 1.0,
+            "axis": {"kinked": 0},
+            "concave": {"creased": 0},
+            "dented": {"marks": {"probability": 0}},
+            "perforation": {"torn": 0},
+        }
+    }
+)
+"""Damage of the forms that the SeaFront paper describes."""
+
 THRESHOLD_MM = DAMAGED.damage.mask_threshold_mm
 
 
 @pytest.fixture(scope="module")
 def generator():
     with Generator(DAMAGED, seed=21, size=SIZE) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def paper():
+    with Generator(PAPER, seed=21, size=SIZE) as made:
         yield made
 
 
@@ -66,9 +87,9 @@ def test_ids_on_a_bulge_are_right_from_behind_the_plane_of_its_sheet(generators)
         assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
 
 
-def close_up(scene: Scene, kind: str) -> Scene:
-    """Return the scene with only its first damage of `kind` and a camera in front of it."""
-    damage = next(d for d in scene.damages if d.kind == kind)
+def close_up(scene: Scene, kind: str, form: str | None = None) -> Scene:
+    """Return the scene with only its first damage of a kind, and a camera in front of it."""
+    damage = next(d for d in scene.damages if d.kind == kind and form in (None, d.form))
     origin, inward = np.array(damage.origin_mm), np.array(damage.inward)
     place = origin - 2500 * inward + 150 * np.array(damage.along)
     camera = replace(
@@ -78,17 +99,17 @@ def close_up(scene: Scene, kind: str) -> Scene:
     return replace(scene, damages=(damage,), cameras=(camera,))
 
 
-def scene_with(generator, kind):
+def scene_with(generator, kind, form=None):
     return next(
         scene
         for scene in map(generator.scene, range(200))
-        if any(damage.kind == kind for damage in scene.damages)
+        if any(d.kind == kind and form in (None, d.form) for d in scene.damages)
     )
 
 
-@pytest.mark.parametrize("kind", DAMAGE_CLASSES)
-def test_every_kind_matches_rays_from_close_by(generator, kind):
-    scene = close_up(scene_with(generator, kind), kind)
+@pytest.mark.parametrize(("kind", "form"), [(form.kind, form.name) for form in FORMS])
+def test_every_form_matches_rays_from_close_by(generator, kind, form):
+    scene = close_up(scene_with(generator, kind, form), kind, form)
     sample = generator.render(scene=scene, camera="close")
     value = mask_values(scene.damages)[0]
     assert (sample.damage == value).sum() > 200
@@ -121,9 +142,9 @@ def test_a_mask_covers_all_steel_that_its_damage_moves(generators, kind, ranges)
         assert (wrong & ~oracle.near_edge(expected)).sum() <= 3
 
 
-def test_a_hole_shows_the_inside_and_never_the_sky(generator):
-    scene = close_up(scene_with(generator, "perforation"), "perforation")
-    sample = generator.render(scene=scene, camera="close")
+def test_a_hole_shows_the_inside_and_never_the_sky(paper):
+    scene = close_up(scene_with(paper, "perforation"), "perforation")
+    sample = paper.render(scene=scene, camera="close")
     through = (sample.damage == 501) & (sample.depth > 3.5)
     assert through.sum() > 50  # rim and sheet are at about 2.5 m, the far wall beyond 4 m
     assert np.isfinite(sample.depth[through]).all()
@@ -132,14 +153,14 @@ def test_a_hole_shows_the_inside_and_never_the_sky(generator):
     assert sample.image[through].mean() < 0.6 * around
 
 
-def test_a_hole_shows_brown_floor_boards_and_grey_walls(generator):
-    scene = close_up(scene_with(generator, "perforation"), "perforation")
+def test_a_hole_shows_brown_floor_boards_and_grey_walls(paper):
+    scene = close_up(scene_with(paper, "perforation"), "perforation")
     above = replace(scene.cameras[0], position_mm=tuple(
         np.array(scene.cameras[0].position_mm) + (0.0, 0.0, 600.0)
     ))  # fmt: skip
     scene = replace(scene, cameras=(above,))
-    albedo = generator.render(scene=scene, camera="close", layer="base")
-    sample = generator.render(scene=scene, camera="close", normals=True)
+    albedo = paper.render(scene=scene, camera="close", layer="base")
+    sample = paper.render(scene=scene, camera="close", normals=True)
     through = (sample.damage == 501) & (sample.depth > 3.5)
     up = (sample.normals @ sample.view.rotation)[..., 2]
     for part, low, high in ((up > 0.95, 1.3, 2.0), (np.abs(up) < 0.4, 0.9, 1.1)):
@@ -148,9 +169,9 @@ def test_a_hole_shows_brown_floor_boards_and_grey_walls(generator):
         assert low < seen[0] / seen[2] < high
 
 
-def test_normals_in_a_hole_are_those_of_the_walls_behind_it(generator):
-    scene = close_up(scene_with(generator, "perforation"), "perforation")
-    sample = generator.render(scene=scene, camera="close", normals=True)
+def test_normals_in_a_hole_are_those_of_the_walls_behind_it(paper):
+    scene = close_up(scene_with(paper, "perforation"), "perforation")
+    sample = paper.render(scene=scene, camera="close", normals=True)
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, sample.view, scene)
     behind = (hits.hole >= 0) & (hits.triangle >= 0) & (sample.depth > 3.5)
@@ -201,8 +222,8 @@ def test_a_hole_behind_rods_and_handles_shows_no_sky(generators):
         assert np.isfinite(sample.depth[hole]).all()
 
 
-def test_opposite_holes_let_the_sky_through(generator):
-    scene = close_up(scene_with(generator, "perforation"), "perforation")
+def test_opposite_holes_let_the_sky_through(paper):
+    scene = close_up(scene_with(paper, "perforation"), "perforation")
     first = replace(scene.damages[0], size_mm=(300.0, 300.0), shape=(60.0, *[0.0] * 10))
     inward = np.array(first.inward)
     if abs(inward[0]) > 0.5:
@@ -221,23 +242,25 @@ def test_opposite_holes_let_the_sky_through(generator):
         target_mm=first.origin_mm,
     )
     holed = replace(scene, damages=(first, second), cameras=(camera,))
-    sample = generator.render(scene=holed, camera="close")
+    sample = paper.render(scene=holed, camera="close")
     assert sample.ids[128, 128] == 0
     assert sample.damage[128, 128] == 501
     assert np.isinf(sample.depth[128, 128])
     assert sample.cover[128, 128] == 0
 
 
-def test_deformed_steel_is_dulled_and_rusts(generator):
+def test_deformed_steel_is_dulled_and_rusts(paper):
     """Blue paint without other rust becomes partly brown where a dent is deep."""
-    scene = close_up(scene_with(generator, "dented"), "dented")
+    scene = close_up(scene_with(paper, "dented"), "dented")
+    worn = replace(scene.damages[0], paint_loss=1.0, fresh=0.0)
+    scene = replace(scene, damages=(worn,))
     surface = scene.surface
     paint = replace(surface.paint, albedo=(0.02, 0.05, 0.4))
     rust = replace(surface.rust, coverage=0.0)
     scene = replace(scene, surface=replace(surface, paint=paint, rust=rust), decals=())
     undamaged = replace(scene, damages=())
     dented, whole = (
-        generator.render(scene=one, camera="close", layer="rust") for one in (scene, undamaged)
+        paper.render(scene=one, camera="close", layer="rust") for one in (scene, undamaged)
     )
     marked = dented.damage == mask_values(scene.damages)[0]
     worked, painted = (one.image[marked].astype(float).mean(axis=0) for one in (dented, whole))
@@ -247,7 +270,7 @@ def test_deformed_steel_is_dulled_and_rusts(generator):
     mesh = build_container(scene.container.kind, scene.container.profiles)
     hits = oracle.cast(mesh, dented.view, scene)
     along, across, _ = damage_law.local_coordinates(damage, hits.rest_mm)
-    fold = np.abs(across - damage_law.fold_path_mm(damage, along)) < 0.3 * damage.shape[0]
+    fold = np.abs(across - fold_path_mm(damage, along)) < 0.3 * damage.shape[0]
     fold &= marked & (np.abs(along) < 0.6 * damage.size_mm[0] / 2)
     assert fold.sum() > 100
     blue = (one.image[fold][:, 2].astype(int) for one in (dented, whole))
@@ -343,10 +366,20 @@ def test_kinds_and_counts_are_uniform(many):
 
 def test_damage_stays_in_its_ranges_and_on_the_container(many):
     config = Config.preset().damage
+    depths = {
+        ("axis", "plain"): config.axis.depth_mm,
+        ("axis", "kinked"): config.axis.kink_depth_mm,
+        ("concave", "plain"): config.concave.depth_mm,
+        ("concave", "creased"): config.concave.depth_mm,
+        ("dented", "plain"): config.dented.depth_mm,
+        ("dented", "ribs"): config.dented.marks.depth_mm,
+        ("perforation", "plain"): config.perforation.depth_mm,
+        ("perforation", "torn"): config.perforation.depth_mm,
+    }
     for scene in many:
         for damage in scene.damages:
-            ranges = getattr(config, damage.kind)
-            assert ranges.depth_mm.lo <= abs(damage.depth_mm) <= ranges.depth_mm.hi
+            ranges = depths[damage.kind, damage.form]
+            assert ranges.lo <= abs(damage.depth_mm) <= ranges.hi
             assert abs(damage.origin_mm[0]) <= 13716 / 2
             assert abs(damage.origin_mm[1]) <= 2438 / 2
             assert 0 <= damage.origin_mm[2] <= 2896

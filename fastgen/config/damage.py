@@ -1,9 +1,14 @@
-"""Ranges of the four kinds of damage (SeaFront paper, section 3.3.2)."""
+"""Ranges of the kinds of damage; SeaFront paper, section 3.3.2, for the first four."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from fastgen.classes import DAMAGE_CLASSES
+from fastgen.classes import (
+    ALL_DAMAGE_CLASSES,
+    ALL_SEGMENTATION_CLASSES,
+    DAMAGE_CLASSES,
+    SEGMENTATION_CLASSES,
+)
 from fastgen.errors import ConfigError
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.scene.limits import LOBE_LIMIT, MAX_INSTANCES
@@ -55,6 +60,7 @@ class ConcaveConfig:
         width_mm: Vertical size; across the container on the roof.
         depth_mm: Largest displacement.
         outward: Probability that the area bulges outward.
+        at_bottom: Probability that a bulge is at the lower wall and ends at the bottom rail.
         creased: Probability that the sheet breaks into flat parts between sharp folds.
         crease_softness: Length over which a fold is rounded, as a share of the depth.
         flattened: Share by which the corrugation between the folds is flattened.
@@ -64,9 +70,10 @@ class ConcaveConfig:
     width_mm: _Extent = Range(800, 2000)
     depth_mm: _Depth = Range(110, 250)
     outward: Share = 0.3
+    at_bottom: Share = 0.7
     creased: Share = 0.85
-    crease_softness: Annotated[Range, Bounds(1e-3, 1.0)] = Range(0.02, 0.1)
-    flattened: Annotated[Range, UNIT] = Range(0.1, 0.8)
+    crease_softness: Annotated[Range, Bounds(1e-3, 1.0)] = Range(0.04, 0.3)
+    flattened: Annotated[Range, UNIT] = Range(0.0, 0.3)
 
 
 @dataclass(frozen=True)
@@ -84,8 +91,8 @@ class RibMarksConfig:
 
     probability: Share = 0.7
     length_mm: _Extent = Range(120, 2200)
-    height_mm: _Reach = Range(50, 170)
-    depth_mm: _Depth = Range(14, 42)
+    height_mm: _Reach = Range(90, 380)
+    depth_mm: _Depth = Range(15, 60)
     unevenness: Annotated[Range, UNIT] = Range(0.0, 0.7)
     turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-6, 6)
 
@@ -131,8 +138,12 @@ class PerforationConfig:
         torn: Probability that the hole is a slit, flap, triangle or L instead of a star.
         tear_length_mm: Length of such a tear.
         tear_aspect: Length divided by width.
+        split: Probability that a tear is a long split along a rib or across the ribs.
+        split_length_mm: Length of such a split.
+        split_gape_mm: Width of such a split.
         teeth_mm: Height of the teeth of its edges.
         twist: Amount by which its lower lip bends less than the upper; above 1 it bends outward.
+        at_castings: Probability that a hole in the roof is within half a metre of a casting.
     """
 
     diameter_mm: Annotated[Range, Bounds(5, 2000, "mm")] = Range(90, 320)
@@ -142,8 +153,39 @@ class PerforationConfig:
     torn: Share = 0.85
     tear_length_mm: _Extent = Range(90, 700)
     tear_aspect: Annotated[Range, Bounds(1.0, 100.0)] = Range(2.0, 7.0)
-    teeth_mm: _Depth = Range(2, 12)
+    split: Share = 0.15
+    split_length_mm: _Extent = Range(500, 2500)
+    split_gape_mm: _Extent = Range(15, 90)
+    teeth_mm: _Depth = Range(1, 9)
     twist: Annotated[Range, Bounds(0.0, 2.0)] = Range(0.0, 1.6)
+    at_castings: Share = 0.7
+
+
+@dataclass(frozen=True)
+class ScrapeConfig:
+    """Bundle of parallel scratches without displacement.
+
+    Attributes:
+        length_mm: Length of the bundle.
+        width_mm: Height of the bundle.
+        turn_deg: Angle between the scratches and the horizontal.
+        pitch_mm: Distance between scratches.
+        density: Share of these distances that have a scratch.
+        contact_mm: Depth behind the outermost sheet up to which it is scraped. Small values leave
+            the troughs of the corrugation alone.
+        paint: Probability that the scratches show the paint of what scraped the container.
+        beside: Probability that a dent or a bowed area has a scrape beside it. It applies where
+            `kinds` has scrapes.
+    """
+
+    length_mm: _Extent = Range(300, 2500)
+    width_mm: _Extent = Range(60, 450)
+    turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-12, 12)
+    pitch_mm: Annotated[Range, Bounds(1.0, 500.0, "mm")] = Range(6, 24)
+    density: Annotated[Range, UNIT] = Range(0.3, 0.9)
+    contact_mm: _Extent = Range(8, 60)
+    paint: Share = 0.35
+    beside: Share = 0.5
 
 
 @dataclass(frozen=True)
@@ -153,21 +195,29 @@ class DamageConfig:
     Attributes:
         probability: Probability that a container is damaged.
         count: Number of damages of a damaged container; all numbers are equally likely.
-        kinds: Kinds to draw from; all are equally likely.
+        kinds: Kinds to draw from; all are equally likely. `scrape` is not among the paper's kinds.
+            It becomes a sixth class of the damage task where it is listed.
         faces: Faces to draw from; axis damages are not limited to them but take any edge. The
             extents below are cut to the size of the face.
-        mask_threshold_mm: Displacement above which a pixel belongs to the mask of a damage.
+        mask_threshold_mm: Displacement above which a pixel belongs to the mask of a damage. The
+            mask of a scrape covers the area of its scratches that no other damage moves.
     """
 
     probability: Share = 0.4
     count: Annotated[tuple[int, int], Bounds(0, MAX_INSTANCES)] = (1, 4)
-    kinds: tuple[Annotated[str, OneOf(DAMAGE_CLASSES)], ...] = DAMAGE_CLASSES
+    kinds: tuple[Annotated[str, OneOf(ALL_DAMAGE_CLASSES)], ...] = DAMAGE_CLASSES
     faces: tuple[Annotated[str, OneOf(SHEET_FACES)], ...] = ("front", "back", "door", "no_door")
     mask_threshold_mm: Annotated[float, Bounds(0.1, 1000.0, "mm")] = 5.0
     axis: AxisConfig = field(default_factory=AxisConfig)
     concave: ConcaveConfig = field(default_factory=ConcaveConfig)
     dented: DentedConfig = field(default_factory=DentedConfig)
     perforation: PerforationConfig = field(default_factory=PerforationConfig)
+    scrape: ScrapeConfig = field(default_factory=ScrapeConfig)
+
+    @property
+    def segmentation_classes(self) -> tuple[str, ...]:
+        """Classes of the damage task, in the order of YOLO labels."""
+        return ALL_SEGMENTATION_CLASSES if "scrape" in self.kinds else SEGMENTATION_CLASSES
 
     def __post_init__(self) -> None:
         """Refuse repeated names, and damages that have no face."""

@@ -37,6 +37,10 @@ _LENSES = {
 }
 
 _OUTDOORS: dict[str, Any] = {
+    "damage": {
+        "kinds": ["axis", "concave", "dented", "perforation", "scrape"],
+        "faces": ["front", "back", "door", "no_door", "roof"],
+    },
     "surface": {"color_weights": _FLEET_PAINT},
     "sensor": {
         "defocus": {"probability": 0.15},
@@ -57,7 +61,7 @@ _OUTDOORS: dict[str, Any] = {
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
+"""Damage, fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
 
 _UNPAVED = ("dawn", "forest", "forest_2", "night", "night_2", "park", "sky", "sunrise")
 _HOURS = {

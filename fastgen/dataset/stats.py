@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fastgen.classes import DAMAGE_CLASSES, MARK_CLASSES, MARKER_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES, MARK_CLASSES, MARKER_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
@@ -42,7 +42,7 @@ class _Labels:
         before = len(self.sizes)
         for name, (_, _, width, height) in task.labels(record["facts"][task.name]):
             self.by_class[name] += 1
-            if name in DAMAGE_CLASSES or name in MARKER_CLASSES:
+            if name in ALL_DAMAGE_CLASSES or name in MARKER_CLASSES:
                 self.sizes.append((width / image_width, height / image_height))
         self.images += len(self.sizes) > before
 
@@ -104,8 +104,9 @@ def _records(out: str) -> Iterator[Record]:
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:
     rows = {name: [each.by_class[name] for each in found.values()] for name in task.classes}
-    # most datasets do not label the marks
-    return _table({n: row for n, row in rows.items() if n not in MARK_CLASSES or any(row)})
+    # most datasets have neither marks nor scrapes
+    optional = (*MARK_CLASSES, "scrape")
+    return _table({n: row for n, row in rows.items() if n not in optional or any(row)})
 
 
 def _table(rows: dict[str, list[int]]) -> str:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import (
-    DAMAGE_CLASSES,
+    ALL_DAMAGE_CLASSES,
+    ALL_SEGMENTATION_CLASSES,
     DAMAGE_VALUES,
-    SEGMENTATION_CLASSES,
     UNDAMAGED_CONTAINER,
 )
 from fastgen.config.config import Config
@@ -22,12 +22,6 @@ from fastgen.labels.overlay import draw_outline
 from fastgen.labels.visibility import window
 from fastgen.sample import Box, Sample
 
-CATEGORIES = [
-    {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
-    for i, name in enumerate(SEGMENTATION_CLASSES)
-]
-"""COCO categories of the task."""
-
 
 def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], bool]]:
     """Yield the visible containers and each visible damage.
@@ -38,7 +32,11 @@ def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], boo
     """
     found = []
     for thing in sample.objects:
-        if thing.bbox is None or thing.background or thing.class_name not in SEGMENTATION_CLASSES:
+        if (
+            thing.bbox is None
+            or thing.background
+            or thing.class_name not in ALL_SEGMENTATION_CLASSES
+        ):
             continue
         if thing.class_name == "container":
             mask = sample.container_mask(thing.container)
@@ -51,7 +49,7 @@ def instances(sample: Sample) -> Iterator[tuple[int, Box, NDArray[np.bool_], boo
 
 class _Damage(Format):
     name = "damage"
-    classes = SEGMENTATION_CLASSES
+    classes = ALL_SEGMENTATION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         found = list(instances(item.sample))
@@ -84,15 +82,18 @@ class _Damage(Format):
 
     def counts(self, facts: Iterable[Any]) -> dict[str, int]:
         names = (name for each in facts for name, _ in self.labels(each))
-        return {"damages": sum(name in DAMAGE_CLASSES for name in names)}
+        return {"damages": sum(name in ALL_DAMAGE_CLASSES for name in names)}
 
     def folders(self, split: str) -> Sequence[str]:
         return (f"damage/masks/{split}", f"damage/yolo/{split}")
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Synthetic shipping containers with damage masks"
-        text = coco.file_text(words, CATEGORIES, records, self.name)
-        yield f"damage/coco_{split}.json", text
+        categories = [
+            {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
+            for i, name in enumerate(config.damage.segmentation_classes)
+        ]
+        yield f"damage/coco_{split}.json", coco.file_text(words, categories, records, self.name)
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         size = picture.shape[1::-1]
@@ -117,7 +118,7 @@ class _Damage(Format):
 
 def _outline_faults(found: list[tuple[int, list[float]]]) -> Iterator[str]:
     for index, values in found:
-        if not 0 <= index < len(SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:
+        if not 0 <= index < len(ALL_SEGMENTATION_CLASSES) or len(values) < 6 or len(values) % 2:
             yield f"class {index} with {len(values)} numbers is not an outline"
         elif not (min(values) >= 0 and max(values) <= 1):
             yield "a value lies outside 0..1"

@@ -38,10 +38,10 @@ def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
     """
     u, v, w = local_coordinates(damage, points_mm)
     form = form_of(damage)
-    amount: NDArray[np.float64] = form.amount(damage, u, v, w)
+    amount = np.asarray(form.amount(damage, u, v, w), np.float64)
     if form.along_edge:
         return amount
-    return amount * (1 - smoothstep(FADE_START_MM, FADE_END_MM, np.abs(w)))
+    return np.asarray(amount * (1 - smoothstep(FADE_START_MM, FADE_END_MM, np.abs(w))))
 
 
 def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
@@ -52,6 +52,15 @@ def in_hole(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
         return np.zeros(np.shape(points_mm)[:-1], bool)
     u, v, w = local_coordinates(damage, points_mm)
     return np.asarray((outline(damage, u, v) < 0) & (np.abs(w) < FADE_START_MM))
+
+
+def is_marked(damage: Damage, points_mm: Array) -> NDArray[np.bool_]:
+    """Test at which points [..., 3] at rest a damage without displacement changes the surface; bool
+    [...]."""
+    marked = form_of(damage).marked
+    if marked is None:
+        return np.zeros(np.shape(points_mm)[:-1], bool)
+    return marked(damage, *local_coordinates(damage, points_mm))
 
 
 def deform(damages: tuple[Damage, ...], points_mm: Array) -> NDArray[np.float64]:

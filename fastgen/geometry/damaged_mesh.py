@@ -59,6 +59,8 @@ def damaged_mesh(mesh: Mesh, damages: tuple[Damage, ...]) -> DamagedMesh:
     kept = np.ones(len(corners), bool)
     made = []
     for damage in damages:
+        if form_of(damage).marked:
+            continue
         near = kept & _within_reach(damage, corners)
         kept &= ~near
         # pieces that one damage has divided are small enough for the next

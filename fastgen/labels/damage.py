@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES
-from fastgen.geometry.damage_law import amount_mm, in_hole, may_be_seen
+from fastgen.geometry.damage_forms import form_of
+from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, may_be_seen
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
 from fastgen.labels.visibility import Shot, float_boxes, visibility
@@ -19,9 +20,9 @@ _DEPTH_SLACK = 1e-3
 def damage_objects(shot: Shot) -> list[Object]:
     """Return the damages of a scene; their ids are their values in the damage target.
 
-    A damage covers the places where it alone moves the sheet farther than the mask threshold, or
-    tears it away. Its amodal box is that of the pixels there, None if the damage faces away from
-    the camera.
+    A damage covers the places where it alone moves the sheet farther than the mask threshold, tears
+    it away, or scrapes it. Its amodal box is that of the pixels there, None if the damage faces
+    away from the camera.
     """
     damages = shot.scene.damages
     if not damages:
@@ -42,10 +43,18 @@ def damage_objects(shot: Shot) -> list[Object]:
                 bbox=bbox,
                 amodal_bbox=amodal_bbox,
                 area=int(area),
+                face=damages[number].face,
+                severity_mm=severity_mm(damages[number]),
                 **visibility(shot.config, shot.view.size, int(area), hidden, beyond),
             )
         )
     return objects
+
+
+def severity_mm(damage: Damage) -> float:
+    """Return the depth of a displacement, or the length of a hole or scrape, in mm."""
+    cut = form_of(damage).outline or form_of(damage).marked
+    return damage.size_mm[0] if cut else abs(damage.depth_mm)
 
 
 def _alone(
@@ -106,7 +115,7 @@ def _damaged(
     asked = np.flatnonzero(~known)
     rest_mm = points.rest_mm(asked)
     part = np.abs(amount_mm(damage, rest_mm)) > shot.config.damage.mask_threshold_mm
-    part |= in_hole(damage, rest_mm)
+    part |= in_hole(damage, rest_mm) | is_marked(damage, rest_mm)
     found = asked[part]
     return found, points.within.take(found) & (drawn.take(found) != value)
 

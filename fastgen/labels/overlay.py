@@ -33,7 +33,7 @@ DAMAGE_GREYS = MappingProxyType(
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal")
+_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal", "scrape")
 _PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 
 

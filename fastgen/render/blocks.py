@@ -90,6 +90,7 @@ DAMAGE_BLOCK = Block(
         ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape
         ("vec4", "damage_reach", MAX_DAMAGES),  # along, across, inward; mask value
         ("vec4", "damage_wear", MAX_DAMAGES),  # Damage.paint_loss and fresh; unused
+        ("vec4", "damage_bare", MAX_DAMAGES),  # Damage.bare_albedo; unused
         ("int", "damage_count"),
         # damages are sorted by form, in the order of damage_forms.FORMS
         *(("int", f"{form.kind}_{form.name}_end") for form in FORMS),

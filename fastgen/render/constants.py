@@ -13,7 +13,7 @@ from typing import NamedTuple
 from fastgen.camera import tone_curve
 from fastgen.classes import SPREADER_ID
 from fastgen.decals.artwork import ART_SIZE
-from fastgen.geometry.damage_forms import creased, form, torn
+from fastgen.geometry.damage_forms import creased, form, scraped, torn
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.light import environment
@@ -248,6 +248,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "CREASED_FLATTENED_AT": f"{creased.FLATTENED_AT:g}",
         "CREASED_LEVEL_MM": f"{creased.LEVEL_MM:.1f}",
         "CREASED_DEEPEST_MM": f"{creased.DEEPEST_MM:.1f}",
+        "SCRAPED_PROUD_MM": f"{scraped.PROUD_MM:.1f}",
         "TORN_WEDGE_END": f"{torn.WEDGE_END:.1f}",
         "TORN_LONG_TEETH_MM": f"{torn.TEETH_MM[0]:.1f}",
         "TORN_SHORT_TEETH_MM": f"{torn.TEETH_MM[1]:.1f}",

@@ -164,6 +164,7 @@ def damage_values(
         "damage_shape": shape.reshape(-1, 4),
         "damage_reach": [(*reach_mm(d), value) for d, value in valued],
         "damage_wear": [(d.paint_loss, d.fresh, 0.0, 0.0) for d in damages],
+        "damage_bare": [(*d.bare_albedo, 0.0) for d in damages],
         "damage_count": len(damages),
         **ends,
         "hole_count": sum(form_of(d).outline is not None for d in damages),

@@ -77,5 +77,13 @@ SHAPES: Mapping[tuple[str, str], tuple[Parameter, ...]] = {
         _mm("length of the second slit", 0.0),
         Parameter("amount by which the lower lip bends less than the upper", 0.0, 2.0),
     ),
+    ("scrape", "plain"): (
+        _mm("distance between scratches"),
+        Parameter("density of scratches", 0.0, 1.0),
+        _mm("depth behind the face up to which the sheet is scraped"),
+        _mm("raggedness of the ends", 0.0),
+        _PHASE,
+        _mm("waviness of the scratches", 0.0),
+    ),
 }  # fmt: skip
 """Parameters by the kind and the form of a damage."""

@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import MaxLen
 from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DETECTION_CLASSES, DAMAGE_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES, ALL_DETECTION_CLASSES
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.errors import ConfigError
@@ -125,7 +125,7 @@ class Damage:
     """One damage: a displacement field, see geometry/damage_law.py for its formula.
 
     Attributes:
-        kind: One of classes.DAMAGE_CLASSES.
+        kind: One of classes.ALL_DAMAGE_CLASSES.
         face: Damaged face, for information only.
         origin_mm: Origin of the field in the undamaged container.
         along: First of three orthonormal axes of the field, in the container frame.
@@ -137,10 +137,11 @@ class Damage:
         shape: Further parameters, those of damage_shapes.SHAPES[kind, form] in this order.
         form: One of the forms of the kind in damage_shapes.SHAPES.
         paint_loss: Share of the worst places that is bare of paint, 0..1.
-        fresh: Share of the bare steel that shines and has not rusted yet, 0..1.
+        fresh: Share of the bare places that has not rusted yet, 0..1.
+        bare_albedo: Linear color of the fresh share: steel, primer, or paint of what scraped it.
     """
 
-    kind: Annotated[str, OneOf(DAMAGE_CLASSES)]
+    kind: Annotated[str, OneOf(ALL_DAMAGE_CLASSES)]
     face: str
     origin_mm: Vec3
     along: Vec3
@@ -152,6 +153,7 @@ class Damage:
     form: str = "plain"
     paint_loss: Share = 1.0
     fresh: Share = 0.0
+    bare_albedo: Color = (0.42, 0.41, 0.39)
 
 
 @dataclass(frozen=True)

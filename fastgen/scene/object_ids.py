@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from fastgen.classes import (
+    ALL_DAMAGE_CLASSES,
+    ALL_SEGMENTATION_CLASSES,
     CONTAINER_ID,
-    DAMAGE_CLASSES,
-    DAMAGE_VALUES,
     SEAL_ID,
     SEGMENTATION_CLASSES,
     SPREADER_ID,
@@ -44,9 +44,13 @@ def scene_numbers(scene: Scene) -> list[Numbers]:
     Ids count up from CONTAINER_ID, container by container, and skip the values of damages.
     Instances of damages count up over all containers (SeaFront paper, section 3.3.4).
     """
-    free = (number for number in range(CONTAINER_ID, SPREADER_ID) if number not in DAMAGE_VALUES)
     carried: list[tuple[tuple[Decal, ...], tuple[Damage, ...]]] = [(scene.decals, scene.damages)]
     carried += [(each.decals, each.damages) for each in scene.neighbours]
+    kinds = {damage.kind for _, damages in carried for damage in damages}
+    # values of further kinds are free without them, so that they leave other scenes' ids alone
+    known = SEGMENTATION_CLASSES if kinds <= set(SEGMENTATION_CLASSES) else ALL_SEGMENTATION_CLASSES
+    taken = range(200, 100 * (len(known) + 1))
+    free = (number for number in range(CONTAINER_ID, SPREADER_ID) if number not in taken)
     values = iter(mask_values(tuple(damage for _, damages in carried for damage in damages)))
     return [
         Numbers(
@@ -70,10 +74,10 @@ def mask_values(damages: tuple[Damage, ...]) -> list[int]:
 
     Source: SeaFront paper, section 3.3.4.
     """
-    counts = dict.fromkeys(DAMAGE_CLASSES, 0)
+    counts = dict.fromkeys(ALL_DAMAGE_CLASSES, 0)
     values = []
     for damage in damages:
         counts[damage.kind] += 1
-        category = SEGMENTATION_CLASSES.index(damage.kind) + 1
+        category = ALL_SEGMENTATION_CLASSES.index(damage.kind) + 1
         values.append(category * 100 + counts[damage.kind])
     return values

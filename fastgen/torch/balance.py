@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View, view_of
-from fastgen.classes import ALL_DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, ALL_SEGMENTATION_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
@@ -114,7 +114,7 @@ def _count_damages(counts: NDArray[np.int64], scene: Scene, camera: Camera, view
         # only the rim of a bulge shows from behind its face: too little to count
         flat = replace(damage, depth_mm=abs(damage.depth_mm))
         if may_be_seen(flat, camera.position_mm) and _inside(view, np.array(damage.origin_mm)):
-            counts[SEGMENTATION_CLASSES.index(damage.kind)] += 1
+            counts[ALL_SEGMENTATION_CLASSES.index(damage.kind)] += 1
 
 
 def _count_decals(

@@ -78,7 +78,7 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     Args:
         task: damage, imdg, text, door or seal.
         config: Configuration of the dataset. With `markings.marks` the imdg task has five more
-            classes; None stands for a configuration without.
+            classes, with scrapes the damage task one; None stands for a configuration without.
 
     Raises:
         ConfigError: The task is unknown.
@@ -86,6 +86,8 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     check_known("task", task, _NAMES)
     if task == "imdg" and config is not None:
         return config.markings.detection_classes
+    if task == "damage" and config is not None:
+        return config.damage.segmentation_classes
     return _NAMES[task]
 
 

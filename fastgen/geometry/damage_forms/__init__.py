@@ -5,11 +5,13 @@ from fastgen.geometry.damage_forms.form import Form
 from fastgen.geometry.damage_forms.kinked import KINKED
 from fastgen.geometry.damage_forms.plain import BOW, EDGE, FOLD, STAR
 from fastgen.geometry.damage_forms.ribs import RIBS
+from fastgen.geometry.damage_forms.scraped import SCRAPED
 from fastgen.geometry.damage_forms.torn import TORN
 from fastgen.scene import Damage
 
-FORMS: tuple[Form, ...] = (STAR, TORN, FOLD, RIBS, BOW, CREASED, EDGE, KINKED)
-"""All forms in the order in which the shaders go through them; those with holes come first."""
+FORMS: tuple[Form, ...] = (STAR, TORN, FOLD, RIBS, BOW, CREASED, EDGE, KINKED, SCRAPED)
+"""All forms in the order in which the shaders go through them; those with holes come first, those
+without displacement last."""
 
 _BY_NAME = {(form.kind, form.name): form for form in FORMS}
 

@@ -24,13 +24,15 @@ class Form:
     """One form of one kind of damage.
 
     Attributes:
-        kind: One of classes.DAMAGE_CLASSES.
+        kind: One of classes.ALL_DAMAGE_CLASSES.
         name: Value of `Damage.form`.
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
         reach: Function of a damage to the distances along and across within which it acts.
         outline: Function of a damage and of u and v [...] to the distance [...] in mm outside its
             hole, negative within. None for forms without a hole.
+        marked: Function of a damage and of u, v and w [...] to bool [...]: a form without
+            displacement changes the surface there. None for other forms.
         along_edge: True for a form that bends an edge of the container. It acts up to its reach
             across in every direction from the edge, and does not fade.
     """
@@ -40,6 +42,7 @@ class Form:
     amount: Callable[[Damage, Array, Array, Array], Array]
     reach: Callable[[Damage], tuple[float, float]]
     outline: Callable[[Damage, Array, Array], Array] | None = None
+    marked: Callable[[Damage, Array, Array, Array], NDArray[np.bool_]] | None = None
     along_edge: bool = False
 
 

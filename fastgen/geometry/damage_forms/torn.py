@@ -12,7 +12,7 @@ from fastgen.scene import Damage
 WEDGE_END = 5.0
 """Steepness of the blunt end of a wedge."""
 
-TEETH_MM = (47.0, 19.0)
+TEETH_MM = (90.0, 37.0)
 """Wavelengths of the ragged edges."""
 
 ARM_GAPE = 0.7
@@ -23,9 +23,10 @@ ANYWHERE_MM = 1e6
 
 def _ragged_mm(damage: Damage, u: Array, phase: float) -> Array:
     long, short = (2 * np.pi * u / wave for wave in TEETH_MM)
-    return np.asarray(
-        damage.shape[3] / 1.6 * (np.sin(long + phase) + 0.6 * np.sin(short + 2.3 * phase))
-    )
+    # phase modulation keeps the teeth from repeating
+    irregular = 1.4 * np.sin(0.31 * long + phase)
+    teeth = np.sin(long + phase + irregular) + 0.6 * np.sin(short + 2.3 * phase + 2 * irregular)
+    return np.asarray(damage.shape[3] / 1.6 * teeth)
 
 
 def outside_mm(damage: Damage, u: Array, v: Array) -> Array:
