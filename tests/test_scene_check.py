@@ -4,14 +4,17 @@ import dataclasses
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
 from fastgen.errors import ConfigError
+from fastgen.geometry.damage_law import amount_mm, in_hole
 from fastgen.render.decal_tables import SceneError
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import check_camera, check_scene
+from fastgen.scene.damage_shapes import SHAPES
 from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
 
 SIZE = (64, 64)
@@ -137,22 +140,40 @@ def test_out_of_range_values_are_named(full, path, value):
     assert str(caught.value).startswith(f"{name(path)}: ")
 
 
-def test_divisors_in_a_damages_formula_must_be_above_zero(full):
-    for kind, places in (("dented", (0, 3, 5)), ("perforation", (0,))):
-        number = next(i for i, damage in enumerate(full.damages) if damage.kind == kind)
-        for i in places:
-            path = ("damages", number, "shape", i)
-            with pytest.raises(ConfigError, match="more than 0"):
-                check_scene(spoilt(full, path, 0.0))
+def shaped(full, kind, form, shape):
+    """Return the scene with one damage of a form."""
+    place = next(damage for damage in full.damages if damage.kind != "axis")
+    return replace(full, damages=(replace(place, kind=kind, form=form, shape=tuple(shape)),))
 
 
-def test_a_holes_outline_must_go_once_around_its_centre(full):
-    number = next(i for i, damage in enumerate(full.damages) if damage.kind == "perforation")
-    for i in (1, 3, 5, 7, 9):
-        path = ("damages", number, "shape", i)
-        assert check_scene(spoilt(full, path, -0.19))
-        with pytest.raises(ConfigError, match=rf"shape\[{i}\]: 0.2 is out of range"):
-            check_scene(spoilt(full, path, 0.2))
+@pytest.mark.parametrize(("kind", "form"), SHAPES)
+def test_every_number_of_a_damage_is_checked(full, kind, form):
+    middle = [0.5 * (each.low + min(each.high, 100.0)) for each in SHAPES[kind, form]]
+    check_scene(shaped(full, kind, form, middle))
+    with pytest.raises(ConfigError, match=rf"^scene.damages\[0\].shape: a {kind} of form {form}"):
+        check_scene(shaped(full, kind, form, [*middle, 1.0]))
+    for i, each in enumerate(SHAPES[kind, form]):
+        for value in (each.low - 1e-3, each.high * 1.01 + 1e-3, math.nan):
+            with pytest.raises(ConfigError, match=rf"^scene.damages\[0\].shape\[{i}\]: "):
+                check_scene(shaped(full, kind, form, [*middle[:i], value, *middle[i + 1 :]]))
+
+
+@pytest.mark.parametrize(("kind", "form"), SHAPES)
+def test_fields_are_finite_at_the_bounds_of_each_number(full, kind, form):
+    middle = [0.5 * (each.low + min(each.high, 100.0)) for each in SHAPES[kind, form]]
+    (damage,) = shaped(full, kind, form, middle).damages
+    points = np.array(damage.origin_mm) + np.random.default_rng(0).uniform(-300, 300, (500, 3))
+    points = np.concatenate([points, [damage.origin_mm]])
+    for i, each in enumerate(SHAPES[kind, form]):
+        for value in (each.low, each.high):
+            other = replace(damage, shape=(*middle[:i], value, *middle[i + 1 :]))
+            assert np.isfinite(amount_mm(other, points)).all()
+            assert np.isfinite(in_hole(other, points)).all()
+
+
+def test_an_unknown_form_of_damage_is_named(full):
+    with pytest.raises(ConfigError, match=r"^scene.damages\[0\].form: .*torn"):
+        check_scene(shaped(full, "perforation", "tron", ()))
 
 
 def test_a_camera_passed_separately_is_checked_too(full):
