@@ -176,7 +176,12 @@ def test_coarse_sampling_outside_a_large_image_keeps_damage_boxes_and_fractions(
         Generator(config, seed=3, size=(288, 216)) as large,
     ):
         scene = small.scene(0)
-        target = np.array(scene.damages[0].origin_mm) + 700 * np.array(scene.damages[0].along)
+        first, second = scene.damages
+        along = np.array(first.along)
+        beside = tuple((np.array(first.origin_mm) + 300 * along).tolist())
+        second = dataclasses.replace(second, origin_mm=beside)
+        scene = dataclasses.replace(scene, damages=(first, second))
+        target = np.array(first.origin_mm) + 700 * along
         camera = scene.camera("Cr")
         camera = dataclasses.replace(camera, target_mm=tuple(target.tolist()), focal_mm=120.0)
         wanted = small.render(scene=scene, camera=camera).objects

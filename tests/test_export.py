@@ -216,10 +216,9 @@ def test_holes_are_cut_to_within_a_millimetre(torn):
         distance.append(np.where(triangle >= 0, depth, np.inf))
     open_here = distance[0] > distance[1] + 1e-3
     point = start + np.where(np.isfinite(distance[1]), distance[1], 0)[:, None] * rays
-    shrunk, grown = (
-        in_hole(replace(hole, size_mm=(hole.size_mm[0] + d, hole.size_mm[1] + d)), point)
-        for d in (-2.0, 2.0)
-    )
+    turns = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    around = [in_hole(hole, point + np.cos(t) * along + np.sin(t) * across) for t in turns]
+    shrunk, grown = np.all(around, axis=0), np.any(around, axis=0)
     hit = np.isfinite(distance[1])
     assert shrunk[hit].any()
     assert open_here[hit & shrunk].all()

@@ -72,7 +72,7 @@ class ConcaveConfig:
     outward: Share = 0.3
     at_bottom: Share = 0.7
     creased: Share = 0.85
-    crease_softness: Annotated[Range, Bounds(1e-3, 1.0)] = Range(0.04, 0.3)
+    crease_softness: Annotated[Range, Bounds(1e-3, 1.0)] = Range(0.02, 0.2)
     flattened: Annotated[Range, UNIT] = Range(0.0, 0.3)
 
 
@@ -92,7 +92,7 @@ class RibMarksConfig:
     probability: Share = 0.7
     length_mm: _Extent = Range(120, 2200)
     height_mm: _Reach = Range(90, 380)
-    depth_mm: _Depth = Range(15, 60)
+    depth_mm: _Depth = Range(20, 65)
     unevenness: Annotated[Range, UNIT] = Range(0.0, 0.7)
     turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-6, 6)
 

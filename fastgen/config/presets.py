@@ -61,7 +61,8 @@ _OUTDOORS: dict[str, Any] = {
     "seals": {"probability": 0.7},
     "weather": {"fog_probability": 0.12, "rain_probability": 0.15, "wet_probability": 0.1},
 }
-"""Damage, fleets, labels, seals, weather and sensor effects that all presets of real cameras share."""
+"""Damage, fleets, labels, seals, weather and sensor effects, which the presets of real cameras
+share."""
 
 _UNPAVED = ("dawn", "forest", "forest_2", "night", "night_2", "park", "sky", "sunrise")
 _HOURS = {

@@ -20,8 +20,9 @@ from fastgen.scene import Damage
 BENT_EDGE_MM = 45.0
 """Longest edge near a damage; a fold is about 60 mm wide."""
 
-HOLE_EDGE_MM = 15.0
-"""Longest edge near a hole; a chord of this length is within 0.6 mm of an arc of radius 50 mm."""
+HOLE_EDGE_MM = 8.0
+"""Longest edge near a hole; a chord of this length is within 1 mm of the teeth of a tear, whose
+radius is 8 mm or more."""
 
 _SLOPE_STEP_MM = 0.5
 

@@ -14,12 +14,15 @@ from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
 from fastgen.generator import Generator
-from fastgen.geometry.damage_law import may_be_seen
+from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, may_be_seen
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.scene import Camera, Scene
+from fastgen.scene import Camera, Damage, Scene
 from fastgen.torch.plan import chosen_cameras
 from fastgen.torch.targets import class_names
 from fastgen.validation import whole
+
+_GRID = 12
+"""Points per side of the grid on which the covered part of a damage is estimated."""
 
 
 def class_counts(
@@ -33,8 +36,9 @@ def class_counts(
     """Count the labels of each class over the first scenes.
 
     A marker or text counts if its outline faces the camera, covers at least labels.min_visible_px
-    pixels and has its center in the image. A damage counts if its face may be visible and its
-    center is in the image. Occlusion is ignored, so counts of markers are a few percent too high.
+    pixels and has its center in the image. A damage counts if its face may be visible, it covers
+    about as many pixels and its center is in the image. Occlusion is ignored, so counts of markers
+    are a few percent too high.
 
     Args:
         task: damage, imdg or door; text has no classes.
@@ -71,7 +75,7 @@ def class_counts(
             counts[0] += 1  # the container, in both other tasks
             view = view_of(camera, size)
             if task == "damage":
-                _count_damages(counts, scene, camera, view)
+                _count_damages(counts, scene, camera, view, config)
             else:
                 _count_decals(counts, prepared, view, config.labels.min_visible_px)
     return torch.from_numpy(counts)
@@ -109,12 +113,34 @@ def class_weights(
     return counts.sum() / (len(counts) * counts.clamp(min=1)).float()
 
 
-def _count_damages(counts: NDArray[np.int64], scene: Scene, camera: Camera, view: View) -> None:
+def _count_damages(
+    counts: NDArray[np.int64], scene: Scene, camera: Camera, view: View, config: Config
+) -> None:
     for damage in scene.damages:
         # only the rim of a bulge shows from behind its face: too little to count
         flat = replace(damage, depth_mm=abs(damage.depth_mm))
-        if may_be_seen(flat, camera.position_mm) and _inside(view, np.array(damage.origin_mm)):
+        if not may_be_seen(flat, camera.position_mm):
+            continue
+        if not _inside(view, np.array(damage.origin_mm)):
+            continue
+        if (
+            _covered_px(damage, view, config.damage.mask_threshold_mm)
+            >= config.labels.min_visible_px
+        ):
             counts[ALL_SEGMENTATION_CLASSES.index(damage.kind)] += 1
+
+
+def _covered_px(damage: Damage, view: View, threshold_mm: float) -> float:
+    """Return about how many pixels a damage covers, from a grid of points on its plane."""
+    u, v = (half * np.linspace(-1, 1, _GRID) for half in np.array(damage.size_mm) / 2)
+    offsets = u[:, None, None] * np.array(damage.along) + v[None, :, None] * np.array(damage.across)
+    points_mm = np.array(damage.origin_mm) + offsets
+    covered = np.abs(amount_mm(damage, points_mm)) > threshold_mm
+    covered |= in_hole(damage, points_mm) | is_marked(damage, points_mm)
+    pixels, _ = view.project(points_mm[[0, 0, -1, -1], [0, -1, -1, 0]])
+    x, y = pixels.T
+    area = 0.5 * abs((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    return float(area * covered.mean())
 
 
 def _count_decals(
