@@ -95,7 +95,7 @@ def _concave(config: DamageConfig, face: str, size: _Size, rng: np.random.Genera
         return form
     shape = (
         _angle(rng),
-        *(round(float(rng.uniform(0.25, 0.75)), 3) for _ in range(5)),
+        *(round(float(rng.uniform(0.3, 0.95)), 3) for _ in range(5)),
         draw(rng, c.crease_softness, digits=4),
         draw(rng, c.flattened),
     )
