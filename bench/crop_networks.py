@@ -8,7 +8,8 @@ import numpy as np
 import torch
 from common.reader import CANVAS, Reader, TextBatch, convolution, varied_batch
 from numpy.typing import NDArray
-from rendered_crops import Pixels, Text
+from panel_crops import Pixels
+from rendered_crops import Text
 from torch import nn
 from torch.nn import functional
 

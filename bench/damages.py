@@ -26,6 +26,7 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")  # one thread, like a worker of `fastgen generate`
 
 import numpy as np
+from panel_crops import VISIBLE_LEVELS, change_levels
 from rendered_crops import aimed
 from reporting import origin, parse_size, save
 
@@ -35,7 +36,6 @@ from fastgen.errors import ConfigError
 from fastgen.sampling.scene import stream
 from fastgen.scene import Camera, Damage, Scene
 
-VISIBLE_LEVELS = 6.0
 WIDTHS = {"near": 2.0, "far": 5.0}
 """Width of the view in lengths of the damage."""
 
@@ -80,10 +80,8 @@ def change(generator: Generator, scene: Scene, damage: Damage, camera: Camera) -
     item = next(o for o in with_it.objects if o.class_name == damage.kind)
     if item.area < 60:
         return None
-    mask = with_it.damage == item.id
     without = generator.render(scene=replace(scene, damages=()), camera=camera)
-    difference = np.abs(with_it.image[mask].astype(int) - without.image[mask].astype(int))
-    return float(difference.mean())
+    return change_levels(with_it, without.image, item.id)
 
 
 def changes(size: tuple[int, int], scenes: int) -> dict[str, dict[str, list[float]]]:

@@ -24,8 +24,9 @@ from crop_statistics import (
 from gap_renders import Effort, Renders
 from marker_search import overlap, search, true_scores
 from numpy.typing import NDArray
+from panel_crops import PANEL_PX, Pixels, square_crop
 from real_crops import DAMAGE_KINDS, LAYOUTS, RealCrops
-from rendered_crops import MARKER_PX, PANEL_PX, Crops, Pixels, square_crop
+from rendered_crops import MARKER_PX, Crops
 from text import edit_distance
 
 from fastgen.classes import MARKER_CLASSES

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 from crop_networks import STRIDE, Classifier
 from numpy.typing import NDArray
-from rendered_crops import MARGIN, MARKER_PX, Pixels
+from panel_crops import MARGIN, Pixels
+from rendered_crops import MARKER_PX
 
 from fastgen.classes import MARKER_CLASSES
 

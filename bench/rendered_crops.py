@@ -13,12 +13,12 @@ from functools import partial
 from multiprocessing import get_context
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from panel_crops import Pixels, panels_of, square_crop
 
 from fastgen import Config, Generator
-from fastgen.classes import DAMAGE_CLASSES, DAMAGE_VALUES, MARKER_CLASSES
+from fastgen.classes import MARKER_CLASSES
 from fastgen.config.cameras import direction_from, face_frame
 from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
@@ -28,14 +28,8 @@ from fastgen.sample import Object, Sample
 from fastgen.sampling.scene import stream
 from fastgen.scene import Camera, Decal, Scene
 
-Pixels = NDArray[np.uint8]
-"""RGB picture [H, W, 3]."""
-
-MARKER_PX, PANEL_PX = 48, 80
-"""Sides of the crops of markers and backgrounds, and of panels."""
-
-MARGIN = 0.1
-"""Total margin of a marker's crop, as a share of its box."""
+MARKER_PX = 48
+"""Side of the crops of markers and backgrounds."""
 
 CODE_LENGTH = 11
 """Characters of an identifier: owner code, serial number, check digit."""
@@ -176,7 +170,8 @@ def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crop
                     if kind == "texts":
                         made.texts += texts_of(sample)
                     elif kind == "panels":
-                        made.panels += _panels_of(sample, rng)
+                        whole = generator.render(scene=replace(scene, damages=()), camera=camera)
+                        made.panels += panels_of(sample, whole.image, rng)
                     else:
                         pairs = marker_objects(sample)
                         made.markers += [
@@ -256,21 +251,6 @@ def marker_objects(sample: Sample) -> list[tuple[str, tuple[float, float, float,
         and item.amodal_bbox is not None
         and min(_sides(item.amodal_bbox)) >= MARKER_PX / 2
     ]
-
-
-def square_crop(image: Pixels, box: Sequence[float], side: int, margin: float = MARGIN) -> Pixels:
-    """Return the square around a box with a margin, scaled to [side, side, 3]."""
-    x0, y0, x1, y1 = box
-    half = max(x1 - x0, y1 - y0) * (1 + margin) / 2
-    left, top = round((x0 + x1) / 2 - half), round((y0 + y1) / 2 - half)
-    size = max(round(2 * half), 1)
-    height, width = image.shape[:2]
-    pad = max(0, -left, -top, left + size - width, top + size - height)
-    if pad:
-        image = cv2.copyMakeBorder(image, pad, pad, pad, pad, cv2.BORDER_REPLICATE).astype(np.uint8)
-    cut = image[top + pad : top + pad + size, left + pad : left + pad + size]
-    way = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
-    return cv2.resize(cut, (side, side), interpolation=way).astype(np.uint8)
 
 
 def _backgrounds_of(sample: Sample, rng: np.random.Generator, count: int = 3) -> list[Pixels]:
@@ -362,36 +342,6 @@ def _layout(letters_px: NDArray[np.float64]) -> str:
         return "column"
     drop, advance = letters_px[-1, 1] - letters_px[0, 1], letters_px[2, 0] - letters_px[0, 0]
     return "rows" if abs(drop) < abs(advance) * 0.8 else "block"
-
-
-def _panels_of(sample: Sample, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
-    """Return a square around each damage, and as large a square of undamaged container."""
-    damaged = np.isin(sample.damage, np.array(DAMAGE_VALUES))
-    height, width = damaged.shape
-    found = []
-    for item in sample.objects:
-        if item.class_name not in DAMAGE_CLASSES or item.bbox is None:
-            continue
-        if item.area < 60 or item.visible_fraction < 0.5:
-            continue
-        side = max(_sides(item.bbox)) * float(rng.uniform(1.2, 3.0))
-        side = min(max(side, 40.0), 0.9 * min(height, width))
-        middle = np.array([item.bbox[0] + item.bbox[2], item.bbox[1] + item.bbox[3]]) / 2
-        corner = middle - side / 2 + rng.uniform(-0.15, 0.15, 2) * side
-        corner = corner.clip(0, (width - side, height - side))
-        found.append((_square(sample.image, corner, side), item.class_name))
-        for _ in range(12):
-            x, y = rng.uniform(0, (width - side, height - side))
-            area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
-            if (sample.ids[area] > 0).mean() > 0.8 and not damaged[area].any():
-                found.append((_square(sample.image, (x, y), side), ""))
-                break
-    return found
-
-
-def _square(image: Pixels, corner: Any, side: float) -> Pixels:
-    x, y = corner
-    return square_crop(image, (x, y, x + side, y + side), PANEL_PX, margin=0.0)
 
 
 def _sides(box: Sequence[float]) -> tuple[float, float]:

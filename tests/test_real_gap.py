@@ -14,8 +14,8 @@ from crop_statistics import (
     wilson,
 )
 from marker_search import Found, overlap, true_scores
+from panel_crops import square_crop
 from real_crops import load_real
-from rendered_crops import square_crop
 from text_peer import contains_code, joined
 
 from fastgen.errors import ConfigError
