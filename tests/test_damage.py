@@ -1,6 +1,5 @@
 """Damage: the shader compared with Embree rays on its numpy twin, and sampled proportions."""
 
-import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,9 +8,8 @@ import pytest
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from fastgen.classes import ALL_DAMAGE_CLASSES, DAMAGE_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES
 from fastgen.config.config import Config
-from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
@@ -23,7 +21,6 @@ from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Scene, Spreader
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
-from tests.plain import FEW_DECALS
 
 SIZE = (256, 256)
 DAMAGED = Config.from_values({"damage": {"probability": 1.0, "kinds": list(ALL_DAMAGE_CLASSES)}})
@@ -347,91 +344,3 @@ def test_a_concave_damage_moves_points_by_hand_computed_amounts():
     assert 0 < damage_law.amount_mm(damage, points)[4] < 80
     moved = damage_law.deform((damage,), points)
     np.testing.assert_allclose(moved[0], [0, 80, 0])
-
-
-@pytest.fixture(scope="module")
-def many():
-    generator = Generator(Config.from_values({"markings": FEW_DECALS}), seed=4)
-    return [generator.scene(i) for i in range(600)]
-
-
-def within(count, n, p):
-    """Return whether `count` is within 4 binomial standard deviations; 1 in 16,000 runs is not."""
-    return abs(count - n * p) < 4 * math.sqrt(n * p * (1 - p))
-
-
-def test_two_scenes_in_five_are_damaged(many):
-    assert within(sum(bool(scene.damages) for scene in many), len(many), 0.4)
-
-
-def test_kinds_and_counts_are_uniform(many):
-    kinds = [damage.kind for scene in many for damage in scene.damages]
-    for kind in DAMAGE_CLASSES:
-        assert within(kinds.count(kind), len(kinds), 0.25)
-    counts = [len(scene.damages) for scene in many if scene.damages]
-    for count in range(1, 5):
-        assert within(counts.count(count), len(counts), 0.25)
-
-
-def test_damage_stays_in_its_ranges_and_on_the_container(many):
-    config = Config.preset().damage
-    depths = {
-        ("axis", "plain"): config.axis.depth_mm,
-        ("axis", "kinked"): config.axis.kink_depth_mm,
-        ("concave", "plain"): config.concave.depth_mm,
-        ("concave", "creased"): config.concave.depth_mm,
-        ("dented", "plain"): config.dented.depth_mm,
-        ("dented", "ribs"): config.dented.marks.depth_mm,
-        ("perforation", "plain"): config.perforation.depth_mm,
-        ("perforation", "torn"): config.perforation.depth_mm,
-    }
-    for scene in many:
-        for damage in scene.damages:
-            ranges = depths[damage.kind, damage.form]
-            assert ranges.lo <= abs(damage.depth_mm) <= ranges.hi
-            assert abs(damage.origin_mm[0]) <= 13716 / 2
-            assert abs(damage.origin_mm[1]) <= 2438 / 2
-            assert 0 <= damage.origin_mm[2] <= 2896
-            axes = np.array([damage.along, damage.across, damage.inward])
-            np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-5)
-
-
-def test_scenes_with_damage_round_trip_through_json(many):
-    scene = next(scene for scene in many if len(scene.damages) > 2)
-    assert Scene.from_json(scene.to_json()) == scene
-
-
-def test_a_hundred_damages_of_one_kind_are_refused():
-    with pytest.raises(ConfigError, match=r"damage.count: 100 is out of range; give 0 to 99"):
-        Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("axis.reach_mm", "axis.depth_mm", "concave.depth_mm", "dented.depth_mm"),
-        *("dented.width_mm", "dented.amplitude_mm", "perforation.depth_mm"),
-    ],
-)
-def test_sizes_beyond_the_container_width_are_refused(name):
-    kind, key = name.split(".")
-    inward = {"concave": {"outward": 0}}
-    Config.from_values({"damage": inward | {kind: inward.get(kind, {}) | {key: 2400}}})
-    with pytest.raises(ConfigError, match=rf"damage.{name}: 2438 is out of range; give \d to 2400"):
-        Config.from_values({"damage": {kind: {key: 2438}}})
-
-
-def test_displacements_of_damages_add_up_even_for_a_wide_crease(many):
-    dents = [d for scene in many for d in scene.damages if d.kind == "dented"][:4]
-    assert len(dents) == 4
-    rng = np.random.default_rng(2)
-    for dent in dents:
-        wide = replace(dent, shape=(900.0, *dent.shape[1:]))
-        points = np.array(dent.origin_mm) + rng.uniform(-1500, 1500, (3000, 3))
-        moved = sum(
-            damage_law.amount_mm(d, points)[:, None] * np.array(d.inward) for d in (wide, *dents)
-        )
-        assert np.abs(moved).max() > 5
-        np.testing.assert_allclose(
-            damage_law.deform((wide, *dents), points), points + moved, atol=1e-9
-        )

@@ -126,11 +126,8 @@ def _vector(v: np.ndarray, digits: int = 6) -> Vec3:
 def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generator) -> Damage:
     """Place a damage at a random position of the sheet."""
     cos, sin = (abs(f(math.radians(form.turn_deg))) for f in (math.cos, math.sin))
-    size = form.size_mm
-    half = (
-        form.reach * (cos * size[0] + sin * size[1]) / 2,
-        form.reach * (sin * size[0] + cos * size[1]) / 2,
-    )
+    along, across = form.half_mm or (form.size_mm[0] / 2, form.size_mm[1] / 2)
+    half = (cos * along + sin * across, sin * along + cos * across)
     x, y = _place(plane, form, half, rng)
     return _placed(kind, form, plane, plane.corner + x * plane.right + y * plane.up)
 

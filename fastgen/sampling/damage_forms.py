@@ -39,7 +39,8 @@ class SheetForm:
         depth_mm: Largest displacement, positive inward.
         shape: Further parameters of the form, see `scene.Damage`.
         turn_deg: Angle of its length against the face's horizontal.
-        reach: Extent of the displaced sheet divided by `size_mm`.
+        half_mm: Distances along and across from the origin that the displaced sheet reaches; half
+            of `size_mm` where it is None.
         name: Form of the kind, see `scene.Damage`.
         wear: Its surface.
         place: 'anywhere' on the face, at the 'bottom', or near a 'casting'.
@@ -49,7 +50,7 @@ class SheetForm:
     depth_mm: float
     shape: tuple[float, ...] = ()
     turn_deg: float = 0.0
-    reach: float = 1.0
+    half_mm: tuple[float, float] | None = None
     name: str = "plain"
     wear: Wear = Wear()
     place: str = "anywhere"
@@ -149,9 +150,10 @@ def _perforation(
     for _ in range(LOBES):
         shape.append(round(draw(rng, c.lobes) * float(rng.choice([-1, 1])), 4))
         shape.append(_angle(rng))
-    reach = 1 + LOBES * c.lobes.hi + 2 * shape[0] / diameter
+    half = diameter / 2 * (1 + LOBES * c.lobes.hi) + shape[0]
     depth = draw(rng, c.depth_mm)
-    return SheetForm((diameter, diameter), depth, tuple(shape), reach=reach, place=place)
+    size = (diameter, diameter)
+    return SheetForm(size, depth, tuple(shape), half_mm=(half, half), place=place)
 
 
 def _tear(config: DamageConfig, size: _Size, rng: np.random.Generator) -> SheetForm:
@@ -176,9 +178,9 @@ def _tear(config: DamageConfig, size: _Size, rng: np.random.Generator) -> SheetF
     )
     # most tears follow a rib or run along a rail
     turn = round(float(rng.choice([0.0, 90.0]) + rng.normal(0, 2 if split else 12)), 2)
-    reach = 1 + 2 * (shape[0] + width + arm) / length
+    half = (length / 2 + width / 2 + shape[0], max(width + shape[3], arm) + shape[0])
     depth = draw(rng, c.depth_mm)
-    return SheetForm((length, width), depth, shape, turn, reach, "torn", draw_wear(rng))
+    return SheetForm((length, width), depth, shape, turn, half, "torn", draw_wear(rng))
 
 
 def draw_scrape(

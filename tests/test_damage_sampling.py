@@ -1,0 +1,184 @@
+"""Sampled damages: kinds, forms, sizes and places."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fastgen.classes import ALL_DAMAGE_CLASSES, DAMAGE_CLASSES
+from fastgen.config.config import Config
+from fastgen.errors import ConfigError
+from fastgen.generator import Generator
+from fastgen.geometry import damage_law
+from fastgen.scene import Scene
+from fastgen.scene.container_kinds import KINDS
+from tests.plain import FEW_DECALS
+
+
+@pytest.fixture(scope="module")
+def many():
+    generator = Generator(Config.from_values({"markings": FEW_DECALS}), seed=4)
+    return [generator.scene(i) for i in range(600)]
+
+
+def within(count, n, p):
+    """Return whether `count` is within 4 binomial standard deviations; 1 in 16,000 runs is not."""
+    return abs(count - n * p) < 4 * math.sqrt(n * p * (1 - p))
+
+
+def test_two_scenes_in_five_are_damaged(many):
+    assert within(sum(bool(scene.damages) for scene in many), len(many), 0.4)
+
+
+def test_kinds_and_counts_are_uniform(many):
+    kinds = [damage.kind for scene in many for damage in scene.damages]
+    for kind in DAMAGE_CLASSES:
+        assert within(kinds.count(kind), len(kinds), 0.25)
+    counts = [len(scene.damages) for scene in many if scene.damages]
+    for count in range(1, 5):
+        assert within(counts.count(count), len(counts), 0.25)
+
+
+def test_damage_stays_in_its_ranges_and_on_the_container(many):
+    config = Config.preset().damage
+    depths = {
+        ("axis", "plain"): config.axis.depth_mm,
+        ("axis", "kinked"): config.axis.kink_depth_mm,
+        ("concave", "plain"): config.concave.depth_mm,
+        ("concave", "creased"): config.concave.depth_mm,
+        ("dented", "plain"): config.dented.depth_mm,
+        ("dented", "ribs"): config.dented.marks.depth_mm,
+        ("perforation", "plain"): config.perforation.depth_mm,
+        ("perforation", "torn"): config.perforation.depth_mm,
+    }
+    for scene in many:
+        for damage in scene.damages:
+            ranges = depths[damage.kind, damage.form]
+            assert ranges.lo <= abs(damage.depth_mm) <= ranges.hi
+            assert abs(damage.origin_mm[0]) <= 13716 / 2
+            assert abs(damage.origin_mm[1]) <= 2438 / 2
+            assert 0 <= damage.origin_mm[2] <= 2896
+            axes = np.array([damage.along, damage.across, damage.inward])
+            np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-5)
+
+
+def test_scenes_with_damage_round_trip_through_json(many):
+    scene = next(scene for scene in many if len(scene.damages) > 2)
+    assert Scene.from_json(scene.to_json()) == scene
+
+
+def test_a_hundred_damages_of_one_kind_are_refused():
+    with pytest.raises(ConfigError, match=r"damage.count: 100 is out of range; give 0 to 99"):
+        Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("axis.reach_mm", "axis.depth_mm", "concave.depth_mm", "dented.depth_mm"),
+        *("dented.width_mm", "dented.amplitude_mm", "perforation.depth_mm"),
+    ],
+)
+def test_sizes_beyond_the_container_width_are_refused(name):
+    kind, key = name.split(".")
+    inward = {"concave": {"outward": 0}}
+    Config.from_values({"damage": inward | {kind: inward.get(kind, {}) | {key: 2400}}})
+    with pytest.raises(ConfigError, match=rf"damage.{name}: 2438 is out of range; give \d to 2400"):
+        Config.from_values({"damage": {kind: {key: 2438}}})
+
+
+def test_displacements_of_damages_add_up_even_for_a_wide_crease(many):
+    dents = [d for scene in many for d in scene.damages if (d.kind, d.form) == ("dented", "plain")][
+        :4
+    ]
+    assert len(dents) == 4
+    rng = np.random.default_rng(2)
+    for dent in dents:
+        wide = replace(dent, shape=(900.0, *dent.shape[1:]))
+        points = np.array(dent.origin_mm) + rng.uniform(-1500, 1500, (3000, 3))
+        moved = sum(
+            damage_law.amount_mm(d, points)[:, None] * np.array(d.inward) for d in (wide, *dents)
+        )
+        assert np.abs(moved).max() > 5
+        np.testing.assert_allclose(
+            damage_law.deform((wide, *dents), points), points + moved, atol=1e-9
+        )
+
+
+def damages_of(**values):
+    """Return containers and damages of 150 scenes with these values of the section `damage`."""
+    values = {"damage": {"probability": 1, **values}, "markings": FEW_DECALS}
+    generator = Generator(Config.from_values(values), seed=7)
+    return [(s.container, d) for s in map(generator.scene, range(150)) for d in s.damages]
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "form"),
+    [
+        ("axis", ("kinked",), "kinked"),
+        ("concave", ("creased",), "creased"),
+        ("dented", ("marks", "probability"), "ribs"),
+        ("perforation", ("torn",), "torn"),
+    ],
+)
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_forms_have_their_configured_shares(kind, key, form, share):
+    values = share
+    for name in reversed(key):
+        values = {name: values}
+    forms = [damage.form for _, damage in damages_of(kinds=[kind], **{kind: values})]
+    assert set(forms) <= {"plain", form}
+    if 0 < share < 1:
+        assert within(forms.count(form), len(forms), share)
+    else:
+        assert forms.count(form) == share * len(forms)
+
+
+def test_scrapes_are_drawn_where_they_are_listed_alone_and_beside_dents():
+    assert {d.kind for _, d in damages_of()} == set(DAMAGE_CLASSES)
+    found = [d for _, d in damages_of(kinds=["scrape"])]
+    assert {d.kind for d in found} == {"scrape"}
+    both = [d for _, d in damages_of(kinds=list(ALL_DAMAGE_CLASSES), scrape={"beside": 0.5})]
+    moved = sum(d.kind in ("concave", "dented") for d in both)
+    drawn = sum(d.kind not in ("concave", "dented") for d in both)
+    # of the kinds that are drawn, three in five bring none
+    beside = drawn - 1.5 * moved
+    assert abs(beside - 0.5 * moved) < 4 * math.sqrt(len(both))
+    bare = [d for _, d in damages_of(kinds=["dented", "scrape"], scrape={"beside": 1.0})]
+    scrapes = [d for d in bare if d.kind == "scrape"]
+    for dent in (d for d in bare if d.kind == "dented"):
+        reach = math.hypot(*dent.size_mm) / 2
+        distances = [math.dist(dent.origin_mm, s.origin_mm) for s in scrapes]
+        assert min(distances) <= reach + 1
+
+
+def test_bulges_end_at_the_bottom_rail_where_the_configuration_says_so():
+    outward = {"outward": 1.0, "at_bottom": 1.0}
+    for _, damage in damages_of(kinds=["concave"], concave=outward):
+        assert damage.depth_mm < 0
+        assert damage.origin_mm[2] - damage.size_mm[1] / 2 == pytest.approx(190, abs=0.2)
+
+
+def test_holes_in_the_roof_are_near_its_castings():
+    values = {"kinds": ["perforation"], "faces": ["roof"]}
+    for container, damage in damages_of(**values, perforation={"at_castings": 1.0}):
+        half = KINDS[container.kind].length_mm / 2, KINDS[container.kind].width_mm / 2
+        gaps = [h - abs(x) for h, x in zip(half, damage.origin_mm, strict=False)]
+        reach = math.hypot(*damage_law.reach_mm(damage)[:2])
+        # a casting is 180 mm long and stands within the frame of 190 mm
+        assert max(gaps) < 190 + 350 + reach + 20
+    apart = [d for _, d in damages_of(**values, perforation={"at_castings": 0.0})]
+    assert np.median([abs(d.origin_mm[0]) for d in apart]) < 5000
+
+
+def test_splits_are_long():
+    lengths = [
+        damage.size_mm[0]
+        for _, damage in damages_of(
+            kinds=["perforation"],
+            perforation={"torn": 1, "split": 1, "split_length_mm": [900, 1800]},
+        )
+    ]
+    assert min(lengths) >= 900
+    assert max(lengths) <= 1800
