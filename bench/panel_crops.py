@@ -26,8 +26,8 @@ VISIBLE_LEVELS = 6.0
 def panels_of(sample: Sample, whole: Pixels, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
     """Return a square around each visible damage, and two undamaged ones of the same size.
 
-    One of them is the same place without damage, so that nothing else tells them apart. Damages
-    that hardly change their pixels are left out, as people do not mark them.
+    The first undamaged square is the same place without damage, so only the damage tells the two
+    apart. Damages that hardly change their pixels are left out, because people would not mark them.
 
     Args:
         sample: Image of a damaged container.

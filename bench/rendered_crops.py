@@ -63,8 +63,8 @@ _DAMAGED = Config.from_values(
     },
     base=Config.preset("crane"),
 )
-"""More damages than the preset `crane`, in the daylight of the preset `gate`. Its walls have few
-markers, as those that surveyors photograph."""
+"""More damages than the preset `crane`, in the daylight of the preset `gate`. Few of its walls
+have markers, as in photographs of damages."""
 
 TRAINING = {"markers": _LETTERED, "texts": _LETTERED, "panels": _DAMAGED}
 """Distribution of the scenes by the kind of crop."""

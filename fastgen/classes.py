@@ -27,7 +27,7 @@ DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
 """The four kinds of the SeaFront paper, section 3.3.2."""
 
 ALL_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
-"""The paper's kinds and those that are drawn only where `damage.kinds` lists them."""
+"""The paper's kinds, and scrapes, which are drawn only if `damage.kinds` lists them."""
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 """The five classes of the damage task, in the order of YOLO labels."""

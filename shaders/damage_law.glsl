@@ -84,8 +84,8 @@ vec3 deformed(vec3 p) {
 struct DamageSample {
     mat3 bend;    // Derivative of the deformed position by the rest position.
     Scar scar;    // The strongest.
-    // Mask value of the damage with the largest displacement. 0 where that is below the threshold, or
-    // where the displacements of several damages cancel.
+    // Mask value of the damage with the largest displacement. It is 0 if that is below the threshold,
+    // or if the displacements of several damages cancel.
     uint value;
 };
 

@@ -170,10 +170,10 @@ class ScrapeConfig:
         width_mm: Height of the bundle.
         turn_deg: Angle between the scratches and the horizontal.
         pitch_mm: Distance between scratches.
-        density: Share of these distances that have a scratch.
+        density: Probability of a scratch at each such distance.
         contact_mm: Depth behind the outermost sheet up to which it is scraped. Small values leave
             the troughs of the corrugation alone.
-        paint: Probability that the scratches show the paint of what scraped the container.
+        paint: Probability that the scratches show the paint of another object.
         beside: Probability that a dent or a bowed area has a scrape beside it. It applies where
             `kinds` has scrapes.
     """

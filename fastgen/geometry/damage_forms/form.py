@@ -1,4 +1,4 @@
-"""What a form of damage consists of, and functions that several forms use.
+"""A form of damage, and functions that several forms use.
 
 Local coordinates of a point at rest are u along the damage, v across it and w inward, in mm from
 its origin. Every field is zero outside its reach.

@@ -1,7 +1,7 @@
 """Crush marks on the outer ribs of corrugated sheet, in a row at one height.
 
 A stiff object, such as a fork's tine, a neighbour or a lashing, is pressed against the wall. It
-pushes in what stands in its way, the crests of the corrugation, and leaves the troughs alone.
+pushes in the crests of the corrugation and leaves the troughs alone.
 shaders/damage_ribs.glsl is the GLSL twin.
 """
 

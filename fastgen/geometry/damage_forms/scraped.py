@@ -1,4 +1,4 @@
-"""Bundle of parallel scratches to primer or steel, or of paint from whatever scraped the container.
+"""Bundle of parallel scratches to primer or steel, or with the paint of another object.
 
 It moves nothing. shaders/damage_scraped.glsl is the GLSL twin.
 """
