@@ -19,8 +19,8 @@ _THIN_ART = ("run_thin_1", "run_thin_2")
 _FITTINGS = "marker_"
 """Begin of the names of holders and rivets, which share their place with a marker."""
 
-_LEAKY = ("perforation", "dented")
-"""Kinds of damage that lose their paint."""
+_LEAKY = ("perforation", "dented", "scrape")
+"""Kinds of damage that lose their paint on a small part of the sheet."""
 
 _WIDE_MM = 100.0
 """Least width of a run that consists of several streaks."""
@@ -73,7 +73,7 @@ def sample_runs(
     surface: Surface,
     streams: Streams,
 ) -> list[Decal]:
-    """Sample streaks of dirt below markers and stickers, and of rust below holes and dents.
+    """Sample streaks of dirt below markers and stickers, and of rust below rusty damages.
 
     About as many streaks are below nothing, so that a streak tells little about what is above it.
 
@@ -98,7 +98,7 @@ def sample_runs(
         here = [decal for decal in decals if decal.face == face]
         size = mesh.charts[mesh.chart_index(face)].rect_mm[2:]
         above: list[Decal | Damage | None] = [decal for decal in here if _sheds_water(decal)]
-        above += [d for d in damages if d.face == face and d.kind in _LEAKY]
+        above += [d for d in damages if d.face == face and _rusts(d)]
         above += [None] * (len(above) + 1)
         for thing in above:
             elsewhere = thing is None and rng.random() < _ELSEWHERE_RUST
@@ -130,6 +130,10 @@ def _below_decal(decal: Decal, rng: np.random.Generator) -> _Source:
     return _Source(x, y - height / 2, rng.uniform(0.5, 0.9) * width, False)
 
 
+def _rusts(damage: Damage) -> bool:
+    return damage.kind in _LEAKY and damage.paint_loss > 0 and damage.fresh < 1
+
+
 def _below_damage(mesh: Mesh, damage: Damage) -> _Source:
     """Return the place of a damage on its sheet."""
     chart = mesh.chart_index(damage.face)
@@ -138,7 +142,10 @@ def _below_damage(mesh: Mesh, damage: Damage) -> _Source:
     nearest = int((away * away).sum(axis=1).argmin())
     x, y = mesh.atlas_mm[own[nearest]] - mesh.charts[chart].rect_mm[:2]
     right = np.cross(damage.inward, (0.0, 0.0, 1.0))
-    width, height = damage.size_mm
+    slant = float(abs(right @ np.array(damage.along)))
+    steep = abs(damage.along[2])
+    length, breadth = damage.size_mm
+    width, height = slant * length + steep * breadth, steep * length + slant * breadth
     if damage.kind == "dented":
         width, height = 0.4 * width, 0.0
     return _Source(
