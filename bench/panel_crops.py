@@ -19,21 +19,9 @@ PANEL_PX = 80
 MARGIN = 0.1
 """Total margin of a marker's crop, as a share of its box."""
 
-VISIBLE_LEVELS = 6.0
-"""Least mean change of a damage's pixels that people notice; twice the noise of a usual image."""
 
-
-def panels_of(sample: Sample, whole: Pixels, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
-    """Return a square around each visible damage, and two undamaged ones of the same size.
-
-    The first undamaged square is the same place without damage, so only the damage tells the two
-    apart. Damages that hardly change their pixels are left out, because people would not mark them.
-
-    Args:
-        sample: Image of a damaged container.
-        whole: The same image [H, W, 3] without damages.
-        rng: Random generator.
-    """
+def panels_of(sample: Sample, rng: np.random.Generator) -> list[tuple[Pixels, str]]:
+    """Return a square around each damage, and as large a square of undamaged container."""
     damaged = np.isin(sample.damage, np.array(DAMAGE_VALUES))
     height, width = damaged.shape
     found = []
@@ -41,8 +29,6 @@ def panels_of(sample: Sample, whole: Pixels, rng: np.random.Generator) -> list[t
         if item.class_name not in DAMAGE_CLASSES or item.bbox is None:
             continue
         if item.area < 60 or item.visible_fraction < 0.5:
-            continue
-        if change_levels(sample, whole, item.id) < VISIBLE_LEVELS:
             continue
         side = max(item.bbox[2] - item.bbox[0], item.bbox[3] - item.bbox[1]) * float(
             rng.uniform(1.2, 3.0)
@@ -52,7 +38,6 @@ def panels_of(sample: Sample, whole: Pixels, rng: np.random.Generator) -> list[t
         corner = middle - side / 2 + rng.uniform(-0.15, 0.15, 2) * side
         corner = corner.clip(0, (width - side, height - side))
         found.append((_square(sample.image, corner, side), item.class_name))
-        found.append((_square(whole, corner, side), ""))
         for _ in range(12):
             x, y = rng.uniform(0, (width - side, height - side))
             area = np.s_[int(y) : int(y + side), int(x) : int(x + side)]
@@ -60,18 +45,6 @@ def panels_of(sample: Sample, whole: Pixels, rng: np.random.Generator) -> list[t
                 found.append((_square(sample.image, (x, y), side), ""))
                 break
     return found
-
-
-def change_levels(sample: Sample, whole: Pixels, damage: int) -> float:
-    """Return the mean difference of a damage's pixels from the image without it, of 255 levels.
-
-    Args:
-        sample: Image of a damaged container.
-        whole: The same image [H, W, 3] without damages.
-        damage: Value of the damage in the damage target, which has some pixels.
-    """
-    mask = sample.damage == damage
-    return float(np.abs(sample.image[mask].astype(int) - whole[mask].astype(int)).mean())
 
 
 def _square(image: Pixels, corner: Any, side: float) -> Pixels:

@@ -170,8 +170,7 @@ def _crops_of(seed: int, wanted: tuple[str, ...], scenes: Iterable[int]) -> Crop
                     if kind == "texts":
                         made.texts += texts_of(sample)
                     elif kind == "panels":
-                        whole = generator.render(scene=replace(scene, damages=()), camera=camera)
-                        made.panels += panels_of(sample, whole.image, rng)
+                        made.panels += panels_of(sample, rng)
                     else:
                         pairs = marker_objects(sample)
                         made.markers += [

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from panel_crops import Pixels
 from rendered_crops import (
-    Pixels,
     Text,
     in_processes,
     marker_objects,
