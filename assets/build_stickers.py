@@ -1,4 +1,4 @@
-"""Draw plates, stickers, marks and invented brand emblems, and write them as SVG and PNG.
+"""Draw plates, stickers, marks, crayon marks and invented emblems, and write them as SVG and PNG.
 
     python assets/build_stickers.py
 
@@ -12,6 +12,7 @@ from math import cos, pi, sin
 from typing import Any
 
 import cv2
+from crayon_marks import CRAYON
 from drawing import ASSETS, BLACK, WHITE, bake
 from mark_drawings import MARKS
 from sticker_plates import (
@@ -231,6 +232,9 @@ def main() -> None:
     for name, drawing in RUNS.items():
         drawings[name] = drawing
         index[name] = {"role": "run", "size_mm": (1000, 1000)}
+    for name, drawing in CRAYON.items():
+        drawings[name] = drawing
+        index[name] = {"role": "crayon", "size_mm": (1000, 1000)}
     for old in folder.glob("*.*"):
         if old.stem not in drawings and old.suffix in (".svg", ".png"):
             old.unlink()

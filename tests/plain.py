@@ -13,6 +13,9 @@ EVEN_PAINT = {
 }
 """Values of `surface` for clean paint of one colour and roughness."""
 
+NO_REPAIRS = {"repairs": {"probability": 0}, "chalk": {"probability": 0}}
+"""Values of `markings` without repairs and surveyors' chalk."""
+
 _NOWHERE = {"front": 0, "back": 0, "door": 0, "no_door": 0}
 FEW_DECALS = {
     "marked_containers": 0,
@@ -23,6 +26,7 @@ FEW_DECALS = {
     "stickers_per_face": 0,
     "patches_per_face": 0,
     "runs": 0,
+    **NO_REPAIRS,
     "height_marks": 0,
 }
 """Values of `markings` that halve the time to sample a scene, and change nothing else in it."""

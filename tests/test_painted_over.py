@@ -15,12 +15,14 @@ from fastgen.sampling.sheet import has_slots
 from fastgen.scene import Decal
 from fastgen.scene.limits import MOST_NEARBY, NEARBY_MM
 from fastgen.scene.object_ids import object_ids
+from tests.plain import NO_REPAIRS
 
 COUNT = 60
 
 
 def config(share):
-    return Config.from_values({"markings": {"identifiers": {"painted_over": share}}})
+    markings = {"identifiers": {"painted_over": share}, **NO_REPAIRS}
+    return Config.from_values({"markings": markings})
 
 
 @pytest.fixture(scope="module")

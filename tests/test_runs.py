@@ -10,6 +10,7 @@ from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.scene.object_ids import object_ids
+from tests.plain import NO_REPAIRS
 
 COUNT = 40
 DIRTY = {"dirt_streaks": [0.7, 0.7], "rust_coverage": [0.1, 0.1]}
@@ -17,8 +18,9 @@ DAMAGED = {"probability": 1.0, "kinds": ["perforation", "dented"]}
 
 
 def config(share, **surface):
+    markings = {"runs": share, **NO_REPAIRS}
     return Config.from_values(
-        {"markings": {"runs": share}, "surface": {**DIRTY, **surface}, "damage": DAMAGED}
+        {"markings": markings, "surface": {**DIRTY, **surface}, "damage": DAMAGED}
     )
 
 

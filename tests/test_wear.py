@@ -10,7 +10,7 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Spreader
 from fastgen.srgb import DECODED
-from tests.plain import EVEN_PAINT
+from tests.plain import EVEN_PAINT, NO_REPAIRS
 
 TEXEL_MM = 10.0
 PAINT = (0.8, 0.2, 0.2)
@@ -186,8 +186,8 @@ def test_bleached_paint_is_lighter_and_greyer_and_uneven(bare):
 def test_patches_are_paint_beside_all_other_decals():
     scenes = []
     for number in (0, 2):
-        # runs and old codes depend on the other decals of their face
-        others = {"runs": 0, "identifiers": {"painted_over": 0}}
+        # repairs are patches as well; runs and old codes depend on the other decals of their face
+        others = {"runs": 0, "identifiers": {"painted_over": 0}, **NO_REPAIRS}
         values = {"markings": {"patches_per_face": [number, number], **others}}
         scenes.append(Config.from_values(values))
     without, with_patches = ([sample(config, index) for index in range(6)] for config in scenes)

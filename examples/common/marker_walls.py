@@ -47,7 +47,12 @@ CONFIG = Config.from_values(
         "environment": {"names": list(LIGHTS)},
         "cameras": {name: {"focal_mm": 62.0} for name in CAMERAS},
         # these may lie over or under other decals
-        "markings": {"runs": 0.0, "identifiers": {"painted_over": 0.0}},
+        "markings": {
+            "runs": 0.0,
+            "identifiers": {"painted_over": 0.0},
+            "repairs": {"probability": 0.0},
+            "chalk": {"probability": 0.0},
+        },
     }
 )
 

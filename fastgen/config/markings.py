@@ -22,6 +22,48 @@ _Face = Annotated[str, OneOf(SHEET_FACES)]
 
 
 @dataclass(frozen=True)
+class RepairsConfig:
+    """Repairs without a label: patches of welded sheet or of fresh paint, and strips of tape.
+
+    A repair that finds no room is omitted.
+
+    Attributes:
+        probability: Share of the containers with repairs.
+        count: Number of repairs; all numbers are equally likely.
+        side_mm: Sides of a patch. It has nearly the colour of the container, or is primer grey.
+        seam: Probability of a visible weld seam around a patch.
+        tape: Probability that a repair is tape, silver or brown, instead of a patch.
+        tape_mm: Width of a strip of tape.
+        at_damage: Probability that a repair of a damaged container is over or beside a damage.
+    """
+
+    probability: Share = 0.25
+    count: Annotated[tuple[int, int], Bounds(1, 20)] = (1, 3)
+    side_mm: Annotated[Range, Bounds(20, 2000, "mm")] = Range(150, 900)
+    seam: Share = 0.45
+    tape: Share = 0.25
+    tape_mm: Annotated[Range, Bounds(10, 300, "mm")] = Range(50, 75)
+    at_damage: Share = 0.4
+
+
+@dataclass(frozen=True)
+class ChalkConfig:
+    """Surveyors' crayon marks: rings, arrows, crosses, ticks, slashes and codes, without a label.
+
+    Attributes:
+        probability: Share of the containers with such marks; it does not depend on damage.
+        count: Number of marks; all numbers are equally likely. A mark without room is omitted.
+        around_mm: Width and height of the places that marks are put around where no damage is.
+        at_damage: Probability that a mark of a damaged container is at a damage.
+    """
+
+    probability: Share = 0.2
+    count: Annotated[tuple[int, int], Bounds(1, 20)] = (1, 3)
+    around_mm: Annotated[Range, Bounds(10, 2000, "mm")] = Range(60, 1500)
+    at_damage: Share = 0.5
+
+
+@dataclass(frozen=True)
 class MarkingsConfig:
     """Markers, identifiers, brands and stickers (SeaFront paper, 3.3.3, Algorithms A1 and A2).
 
@@ -66,6 +108,8 @@ class MarkingsConfig:
         patches_per_face: Number of rectangles that were painted over with slightly different paint.
         runs: Probability that dirt has run down from a marker or sticker, and rust from a hole or
             dent; less on clean containers. About as many runs are below nothing.
+        repairs: Patches and tape.
+        chalk: Crayon marks of surveyors.
         height_marks: Probability of striped height marks on a high cube.
     """
 
@@ -101,6 +145,8 @@ class MarkingsConfig:
     sticker_wear: Annotated[Range, UNIT] = Range(0.0, 0.5)
     patches_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
     runs: Share = 0.2
+    repairs: RepairsConfig = field(default_factory=RepairsConfig)
+    chalk: ChalkConfig = field(default_factory=ChalkConfig)
     height_marks: Share = 0.85
 
     @property

@@ -10,8 +10,11 @@ from fastgen.config.fields import linear_color
 from fastgen.config.surface import SurfaceConfig
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.shape_library import SHAPES
+from fastgen.sampling.chalk import sample_chalk
 from fastgen.sampling.damage import sample_damages
+from fastgen.sampling.damage_spots import damage_spots
 from fastgen.sampling.markings import sample_decals
+from fastgen.sampling.repairs import sample_repairs
 from fastgen.sampling.runs import sample_runs
 from fastgen.sampling.seals import sample_seals
 from fastgen.sampling.sheet import Sheet
@@ -63,8 +66,13 @@ def sample_contents(
     sheets = _empty_sheets(container, mesh)
     decals = sample_decals(config.markings, kind, sheets, surface.paint.albedo, streams)
     runs = sample_runs(config.markings.runs, mesh, decals, damages, surface, streams)
+    drawn = [*decals, *runs]
+    # after all others, so that nothing makes room for them
+    spots = damage_spots(mesh, damages)
+    repairs = sample_repairs(config.markings.repairs, sheets, spots, surface, drawn, streams)
+    chalk = sample_chalk(config.markings.chalk, sheets, spots, [*repairs, *drawn], streams)
     seals = sample_seals(config.seals, streams)
-    return Contents(container, surface, (*decals, *runs), damages, seals)
+    return Contents(container, surface, (*repairs, *drawn, *chalk), damages, seals)
 
 
 def of_neighbours(config: Config) -> Config:

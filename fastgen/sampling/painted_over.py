@@ -8,7 +8,7 @@ import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.iso6346 import Identifier, sample_identifier
-from fastgen.sampling.colors import mixed
+from fastgen.sampling.colors import fresh_paint, mixed
 from fastgen.sampling.lettering_style import Style
 from fastgen.sampling.sheet import GAP_MM, Sheet, between, has_slots, tenth
 from fastgen.sampling.streams import Streams
@@ -56,7 +56,7 @@ def sample_painted_over(
     if rng.random() >= config.identifiers.painted_over:
         return []
     old = sample_identifier(rng, config.identifiers.owner_codes, style.identifier.size_type)
-    fresh = _fresh(paint_albedo, rng)
+    fresh = fresh_paint(paint_albedo, rng)
     shown = float(rng.uniform(0.05, 0.25)) if rng.random() < _SHOWS else 0.0
     ink = mixed(fresh, style.albedo, shown)
     rolled = bool(rng.random() < 0.5)
@@ -76,17 +76,6 @@ def sample_painted_over(
         if has_slots(added, here):
             made += added
     return made
-
-
-def _fresh(paint: Color, rng: np.random.Generator) -> Color:
-    """Return paint of nearly the container's colour: mostly darker, because it has not faded."""
-    tone = rng.uniform(0.6, 0.88) if rng.random() < 0.7 else rng.uniform(1.08, 1.3)
-    return mixed(_scaled(paint, tone), (float(np.mean(paint)),) * 3, float(rng.uniform(0, 0.12)))
-
-
-def _scaled(color: Color, factor: float) -> Color:
-    red, green, blue = (min(float(factor * part), 1.0) for part in color)
-    return red, green, blue
 
 
 def _respelled(present: Decal, old: Identifier, ink: Color) -> Decal:

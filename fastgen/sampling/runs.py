@@ -7,6 +7,7 @@ import numpy as np
 
 from fastgen.geometry.mesh import Mesh
 from fastgen.sampling.colors import mixed
+from fastgen.sampling.damage_spots import damage_spots
 from fastgen.sampling.sheet import has_slots, tenth
 from fastgen.sampling.streams import Streams
 from fastgen.scene import Color, Damage, Decal, Surface
@@ -136,21 +137,13 @@ def _rusts(damage: Damage) -> bool:
 
 def _below_damage(mesh: Mesh, damage: Damage) -> _Source:
     """Return the place of a damage on its sheet."""
-    chart = mesh.chart_index(damage.face)
-    own = np.flatnonzero(mesh.chart == chart)
-    away = damage.origin_mm - mesh.positions_mm[own].astype(np.float64)
-    nearest = int((away * away).sum(axis=1).argmin())
-    x, y = mesh.atlas_mm[own[nearest]] - mesh.charts[chart].rect_mm[:2]
-    right = np.cross(damage.inward, (0.0, 0.0, 1.0))
-    slant = float(abs(right @ np.array(damage.along)))
-    steep = abs(damage.along[2])
-    length, breadth = damage.size_mm
-    width, height = slant * length + steep * breadth, steep * length + slant * breadth
+    (spot,) = damage_spots(mesh, (damage,))
+    (x, y), (width, height) = spot.center_mm, spot.size_mm
     if damage.kind == "dented":
         width, height = 0.4 * width, 0.0
     return _Source(
-        float(x + away[nearest] @ right),
-        float(y + away[nearest, 2] - 0.45 * height),
+        x,
+        y - 0.45 * height,
         max(0.8 * width, _THIN_MM[0]),
         True,
     )

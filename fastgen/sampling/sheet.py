@@ -66,6 +66,13 @@ class Sheet:
         edge = _LEAF_EDGE_MM if self.clearance else EDGE_MM
         return x0 >= edge and x1 <= self.size[0] - edge
 
+    def holds(self, decal: Decal) -> bool:
+        """Test whether a turned decal lies inside the strip along the edges of the sheet."""
+        return all(
+            reach + EDGE_MM <= at <= side - EDGE_MM - reach
+            for at, reach, side in zip(decal.center_mm, half_extent(decal), self.size, strict=True)
+        )
+
     def claim(self, center: Vec2, size: Vec2, parts: Sequence[PartBox] = ()) -> bool:
         """Reserve a rectangle if it is free and on the sheet.
 
@@ -127,6 +134,14 @@ class Sheet:
         return None
 
 
+def half_extent(decal: Decal) -> Vec2:
+    """Return half the width and height of the upright box around a turned decal, mm."""
+    width, height = decal.size_mm
+    angle = math.radians(decal.rotation_deg)
+    cos, sin = abs(math.cos(angle)), abs(math.sin(angle))
+    return (cos * width + sin * height) / 2, (sin * width + cos * height) / 2
+
+
 def has_slots(added: Sequence[Decal], others: Sequence[Decal]) -> bool:
     """Test whether the renderer can draw more decals on a face.
 
@@ -151,11 +166,8 @@ def has_slots(added: Sequence[Decal], others: Sequence[Decal]) -> bool:
 
 def _surroundings(decal: Decal) -> _Box:
     """Return the box around a decal and half of NEARBY_MM on each side."""
-    (x, y), (width, height) = decal.center_mm, decal.size_mm
-    angle = math.radians(decal.rotation_deg)
-    cos, sin = abs(math.cos(angle)), abs(math.sin(angle))
-    across = (cos * width + sin * height + NEARBY_MM) / 2
-    up = (sin * width + cos * height + NEARBY_MM) / 2
+    (x, y), reach = decal.center_mm, half_extent(decal)
+    across, up = (each + NEARBY_MM / 2 for each in reach)
     return x - across, y - up, x + across, y + up
 
 

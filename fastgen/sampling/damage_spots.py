@@ -1,0 +1,59 @@
+"""Places of damages on the unfolded sheets, for decals that are put on or beside a damage."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fastgen.geometry.mesh import Mesh
+from fastgen.scene import Damage, Vec2
+from fastgen.scene.faces import FACE_AXES, SHEET_FACES
+
+
+class Spot(NamedTuple):
+    """Upright rectangle on a sheet.
+
+    Attributes:
+        face: Face of the sheet.
+        center_mm: Centre, in sheet coordinates.
+        size_mm: Width and height.
+        kind: Kind of the damage, '' without one.
+    """
+
+    face: str
+    center_mm: Vec2
+    size_mm: Vec2
+    kind: str = ""
+
+
+def damage_spots(mesh: Mesh, damages: Sequence[Damage]) -> list[Spot]:
+    """Return the place of each damage on a sheet. Damages of edges have none.
+
+    Args:
+        mesh: Mesh of the undamaged container.
+        damages: Damages of the container.
+    """
+    made = []
+    for damage in (each for each in damages if each.face in SHEET_FACES):
+        axes = FACE_AXES[damage.face]
+        turn = np.array([axes.right, axes.up]) @ np.transpose([damage.along, damage.across])
+        width, height = np.abs(turn) @ damage.size_mm
+        place = sheet_place(mesh, damage)
+        made.append(Spot(damage.face, place, (float(width), float(height)), damage.kind))
+    return made
+
+
+def sheet_place(mesh: Mesh, damage: Damage) -> Vec2:
+    """Return the origin of a damage in the coordinates of its sheet, mm.
+
+    Args:
+        mesh: Mesh of the undamaged container.
+        damage: A damage on one of `SHEET_FACES`.
+    """
+    chart = mesh.chart_index(damage.face)
+    own = np.flatnonzero(mesh.chart == chart)
+    away = damage.origin_mm - mesh.positions_mm[own].astype(np.float64)
+    nearest = int((away * away).sum(axis=1).argmin())
+    x, y = mesh.atlas_mm[own[nearest]] - mesh.charts[chart].rect_mm[:2]
+    axes = FACE_AXES[damage.face]
+    return float(x + away[nearest] @ axes.right), float(y + away[nearest] @ axes.up)
