@@ -1,9 +1,11 @@
 """Tests of fastgen.
 
-llvmpipe gets no threads of its own here: pytest-xdist already runs one process per core, and
-without threads a forked process can use the contexts that its parent opened.
+pytest-xdist already runs one process per core, so libraries get no threads of their own here.
+Threads that wait for work would spin on the cores of the other processes. Without threads in
+llvmpipe, a forked process can also use the contexts that its parent opened.
 """
 
 import os
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # PyTorch and OpenBLAS
