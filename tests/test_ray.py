@@ -23,48 +23,18 @@ from fastgen.errors import OutputError
 from fastgen.render.settings import RenderSettings
 from tests.crash_run import FAULTY_SCENE, QuickMaker
 from tests.folders import content
+from tests.ray_makers import (
+    HANG_S,
+    HANGING_SCENE,
+    BrokenMaker,
+    FaultyMaker,
+    LocatedMaker,
+    PreparingMaker,
+)
 
 ROOT = str(Path(__file__).parent.parent)
 SCENES = 24
-HANGING_SCENE = 14
-HANG_S = 1.5
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
-
-
-class SlowMaker(QuickMaker):
-    """Maker slow enough to kill a node in mid-run; reports the node and process of each shard."""
-
-    def __call__(self, task):
-        self._report("made on", (ray.get_runtime_context().get_node_id(), os.getpid()))
-        time.sleep(0.25)
-        super().__call__(task)
-
-
-class FaultyMaker(QuickMaker):
-    def _image(self, index, camera):
-        if index == FAULTY_SCENE:
-            os.abort()
-        if index == HANGING_SCENE:
-            time.sleep(3600)
-        return super()._image(index, camera)
-
-
-class PreparingMaker(QuickMaker):
-    """Maker that needs four times HANG_S before its first shard, and reports that it is busy."""
-
-    _prepared = False
-
-    def __call__(self, task):
-        for _ in range(0 if self._prepared else 16):
-            time.sleep(HANG_S / 4)
-            self._report("busy", None)
-        self._prepared = True
-        super().__call__(task)
-
-
-class BrokenMaker(QuickMaker):
-    def _image(self, index, camera):
-        raise OSError(28, "No space left on device")
 
 
 def job_at(out, scenes):
@@ -78,7 +48,7 @@ def cluster():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
-        # the nodes' processes must import this file and the fastgen under test
+        # the nodes' processes must import the makers and the fastgen under test
         patch.setenv("PYTHONPATH", ROOT, prepend=os.pathsep)
         made = Cluster(initialize_head=True, head_node_args=NODE)
         made.add_node(**NODE)
@@ -109,7 +79,7 @@ def test_a_node_killed_in_mid_run_changes_no_byte(cluster, whole, tmp_path):
             else:
                 on_report(kind, value)
 
-        run_on_ray(None, maker=SlowMaker)(job, tasks, hear)
+        run_on_ray(None, maker=LocatedMaker)(job, tasks, hear)
 
     def kill():
         while [node for node, _ in seen].count(victim.node_id) < 2:
@@ -172,8 +142,19 @@ def test_rendered_images_equal_a_run_without_ray(cluster, tmp_path):
     assert content(tmp_path / "there") == content(tmp_path / "here")
 
 
+WITHOUT_RENDERING = """
+import runpy
+from functools import partial
+from fastgen.cli import dataset_commands
+from tests.ray_makers import SlowMaker
+
+dataset_commands.run_on_ray = partial(dataset_commands.run_on_ray, maker=SlowMaker)
+runpy.run_module("fastgen", run_name="__main__", alter_sys=True)
+"""
+
+
 def run_alone(out, *more):
-    command = [sys.executable, "-m", "fastgen", "generate", str(out), "--images", "400"]
+    command = [sys.executable, "-c", WITHOUT_RENDERING, "generate", str(out), "--images", "400"]
     return subprocess.Popen(
         [*command, "--size", "64x64", *more],
         stderr=subprocess.PIPE,
@@ -187,6 +168,7 @@ def run_alone(out, *more):
 def test_a_signal_stops_ray_and_the_folder_is_left_clean(tmp_path, monkeypatch, stop):
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     monkeypatch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
+    monkeypatch.setenv("PYTHONPATH", ROOT, prepend=os.pathsep)
     out = tmp_path / "out"
     process = run_alone(out, "--ray", "--workers", "1", "--shard", "1")
     while not list(out.glob("shards/*.json")) and process.poll() is None:
