@@ -11,6 +11,30 @@ from fastgen import Config, Generator
 OPEN_GENERATORS = 4
 """Generators that are kept open; each holds a GL context and its textures."""
 
+LONGEST = (
+    "test_ray.py",
+    "test_damage.py",
+    "test_examples.py",
+    "test_storage.py",
+    "test_stopping.py",
+    "test_renderer.py",
+    "test_coverage.py",
+    "test_generate.py",
+    "test_light_points.py",
+    "test_indirect_light.py",
+    "test_placement.py",
+    "test_wear.py",
+    "test_marks.py",
+    "test_limits.py",
+)
+"""Files that take longest. One that started last would run on while the other workers idle."""
+
+
+def pytest_collection_modifyitems(items):
+    """Put the longest files first; pytest-xdist hands out files in this order."""
+    places = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.name, len(LONGEST)))
+
 
 @pytest.fixture
 def copy(dataset, tmp_path):
