@@ -127,20 +127,28 @@ def test_a_marker_behind_a_locking_bar_shows_up_to_the_bar():
     assert error[-2] < 0.25
 
 
+TIMES = 12
+"""Pixels of `fine_ids` along a side of a pixel of SIZE."""
+
+
+@pytest.fixture(scope="module")
+def fine_ids():
+    """Ids of a view at TIMES x TIMES the resolution."""
+    with Generator(SOUND, 5, (TIMES * SIZE[0], TIMES * SIZE[1]), quality="draft") as generator:
+        return generator.render(index=1, camera="B").ids
+
+
 @pytest.mark.parametrize("samples", [9, 25, 4])
-def test_cover_is_the_share_of_a_pixel_that_objects_cover(samples, monkeypatch):
+def test_cover_is_the_share_of_a_pixel_that_objects_cover(fine_ids, samples, monkeypatch):
     """Compare with ids at 12x12 the resolution, filtered by a tent for four samples, else a box.
 
     Pixel centres alone would have a mean error of 0.006.
     """
-    times = 12
-    fine = (times * SIZE[0], times * SIZE[1])
-    with Generator(SOUND, seed=5, size=fine, quality="draft") as generator:
-        seen = (generator.render(index=1, camera="B").ids > 0).astype(np.float32)
-    half = times // 2
+    seen = (fine_ids > 0).astype(np.float32)
+    half = TIMES // 2
     if samples == 4:
-        seen = cv2.blur(seen, (times + 1, times + 1))  # two box filters make a tent
-    expected = cv2.blur(seen, (times, times), anchor=(half, half))[half::times, half::times]
+        seen = cv2.blur(seen, (TIMES + 1, TIMES + 1))  # two box filters make a tent
+    expected = cv2.blur(seen, (TIMES, TIMES), anchor=(half, half))[half::TIMES, half::TIMES]
     monkeypatch.setitem(QUALITY, "balanced", Quality(round(samples**0.5), 1))
     with Generator(SOUND, seed=5, size=SIZE) as generator:
         sample = generator.render(index=1, camera="B")
