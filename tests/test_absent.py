@@ -16,6 +16,7 @@ from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 from fastgen.sampling.scene import without_container
 from fastgen.scene import Scene
+from tests.plain import FEW_DECALS
 
 SIZE = (320, 240)
 EMPTY = Config.from_values({"container": {"absent": 1.0}})
@@ -23,14 +24,21 @@ EMPTY = Config.from_values({"container": {"absent": 1.0}})
 
 def test_the_configured_share_of_scenes_has_no_container():
     share, count = 0.3, 300
-    generator = Generator(Config.from_values({"container": {"absent": share}}), seed=4)
-    plain = Generator(seed=4)
-    absent = 0
-    for index in range(count):
-        scene, usual = generator.scene(index), plain.scene(index)
-        absent += not scene.container.present
-        assert scene == (usual if scene.container.present else without_container(usual))
+    values = {"container": {"absent": share}, "markings": FEW_DECALS}
+    generator = Generator(Config.from_values(values), seed=4)
+    absent = sum(not generator.scene(index).container.present for index in range(count))
     assert abs(absent - share * count) < 4 * math.sqrt(share * (1 - share) * count)
+
+
+def test_scenes_differ_only_in_the_absence_of_the_container():
+    generator = Generator(Config.from_values({"container": {"absent": 0.3}}), seed=4)
+    plain = Generator(seed=4)
+    found = set()
+    for index in range(60):
+        scene, usual = generator.scene(index), plain.scene(index)
+        found.add(scene.container.present)
+        assert scene == (usual if scene.container.present else without_container(usual))
+    assert found == {True, False}
 
 
 @pytest.mark.parametrize("quality", ["draft", "balanced", "high"])
