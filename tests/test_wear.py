@@ -87,7 +87,7 @@ def test_rust_covers_the_given_share_of_the_sheet(bare, coverage):
     shares = []
     for offset in ((0.0, 0.0), (20000.0, 7000.0), (33000.0, 41000.0)):
         surface = replace(rusty.surface, noise_offset_mm=offset)
-        atlas = generator.bake(replace(rusty, surface=surface), 5.0)
+        atlas = generator.bake(replace(rusty, surface=surface), 8.0)
         height, width = atlas.base_color.shape[:2]
         u, v = atlas.uv(points).T
         albedo = DECODED[atlas.base_color[(v * height).astype(int), (u * width).astype(int)]]
