@@ -59,7 +59,7 @@ class ChalkConfig:
 
     probability: Share = 0.2
     count: Annotated[tuple[int, int], Bounds(1, 20)] = (1, 3)
-    around_mm: Annotated[Range, Bounds(10, 2000, "mm")] = Range(60, 1500)
+    around_mm: Annotated[Range, Bounds(10, 2000, "mm")] = Range(100, 1500)
     at_damage: Share = 0.5
 
 
