@@ -179,14 +179,15 @@ STRONG = {
 def test_a_fit_recovers_the_camera_of_photographs(generators):
     response = {"probability": 1.0, "clip": 1.2, "contrast": 1.0, "saturation": 1.0}
     sensor = {"response": response, "noise": {"probability": 1.0, "full_well_e": 8000}}
-    config = Config.from_values({"environment": {"names": ["park", "city"]}, "sensor": sensor})
+    whole = {"damage": {"probability": 0.0}, "environment": {"names": ["park", "city"]}}
+    config = Config.from_values({**whole, "sensor": sensor})
     generator = generators(config, seed=3, size=(160, 120), quality="draft")
     frames = linear_frames(generator, 8)
     others = linear_frames(generator, 8, first=100)
     with ThreadPoolExecutor(2) as workers:
         taken = from_plain(SensorConfig, STRONG, base=SensorConfig())
         real = statistics_of_frames([*frames, *others], taken, workers)
-        found = search(real, frames, config.sensor, {}, 180, seed=1)
+        found = search(real, frames, config.sensor, {}, 300, seed=1)
         sensor = sensor_at(found.point, config.sensor)
         before, after = (
             [

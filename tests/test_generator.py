@@ -104,7 +104,11 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
             r"decals\[0\].center_mm\[1\]: inf is out of range",
         ),
         ("damages", {"kind": "dent"}, r"damages\[0\].kind: 'dent' is unknown"),
-        ("damages", {"shape": (1.0,)}, r"damages\[0\].shape: a concave has 0 numbers, not 1"),
+        (
+            "damages",
+            {"form": "plain", "shape": (1.0,)},
+            r"damages\[0\].shape: a concave of form plain has 0 numbers, not 1",
+        ),
         ("damages", {"size_mm": (9.0, -1.0)}, r"damages\[0\].size_mm\[1\]: -1.0 is out of range"),
         ("damages", {"along": (0.0, 0.0, 0.0)}, r"damages\[0\].along, across, inward: these"),
         ("container", {"kind": "30"}, "container.kind: '30' is unknown"),

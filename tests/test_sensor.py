@@ -182,6 +182,7 @@ def test_the_preset_of_real_cameras_shares_all_other_draws_and_survives_json():
     same["spreader"] = {"probability": Config.preset().spreader.probability}
     same["seals"] = {"probability": 0.0}
     same["environment"] = {"lamps": {"probability": 0.0}}
+    same["damage"] = Config.preset().to_plain()["damage"]
     crane = Generator(Config.from_values(same, Config.preset("crane")), seed=4)
     plain = Generator(seed=4)
     kinds = set()

@@ -249,6 +249,7 @@ def test_streaks_of_dirt_run_down(generators, part):
 def test_holes_do_not_cut_the_locking_bars(generators):
     """The bar's depth equals ray casts on the undamaged door, within the bend of the torn rim."""
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
+    values["perforation"] = {"torn": 0}
     bare = {"probability": 0}
     config = Config.from_values({"damage": values, "spreader": bare})
     generator = generators(config, 77, (320, 320))
