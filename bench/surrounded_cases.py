@@ -1,9 +1,6 @@
-"""Test cases with a ground, neighbours, props and all forms of damage, beside the 32 of
-reference_set.py."""
+"""Test cases with a ground, neighbours and props, beside the 32 of reference_set.py."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from reference_set import RUSTY, SEED, SIZE, Case, cases
@@ -32,7 +29,6 @@ class SurroundedCase(Case):
         view: The only camera.
         poses: Poses of the neighbours.
         on_trailer: Put the last neighbour on a trailer.
-        damage: Values of the section `damage` of the configuration that differ from the preset.
     """
 
     name: str
@@ -41,7 +37,6 @@ class SurroundedCase(Case):
     view: Camera
     poses: tuple[Pose, ...] = ()
     on_trailer: bool = False
-    damage: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def config(self) -> Config:
@@ -51,7 +46,7 @@ class SurroundedCase(Case):
                 "container": {"kinds": {"20": 1}},
                 "spreader": {"probability": 0},
                 "environment": {"names": [self.light]},
-                "damage": {"probability": float(self.damaged), **self.damage},
+                "damage": {"probability": float(self.damaged)},
                 "surface": {"rust_coverage": RUSTY if self.rusty else 0.0},
             }
         )
@@ -136,31 +131,7 @@ def surrounded_cases() -> list[SurroundedCase]:
             _ground("asphalt", asphalt, 0.4, 0.5),
             Camera(_CAMERA, (4500.0, 4500.0, 8500.0), (200.0, 400.0, 1200.0), 26.0),
         ),
-        SurroundedCase(
-            37, _CAMERA, "sky", True, False, "folds and rib marks", 60.0,
-            _ground("concrete", concrete, 0.0, 0.0),
-            Camera(_CAMERA, (1800.0, -6000.0, 2300.0), (0.0, -1200.0, 1300.0), 28.0),
-            damage=_wall_damage("concave", "dented"),
-        ),
-        SurroundedCase(
-            38, _CAMERA, "port_noon", True, False, "tears with lips", 150.0,
-            _ground("asphalt", asphalt, 0.3, 0.0),
-            Camera(_CAMERA, (-1200.0, -5200.0, 2000.0), (0.0, -1200.0, 1300.0), 28.0),
-            damage=_wall_damage("perforation"),
-        ),
     ]  # fmt: skip
-
-
-def _wall_damage(*kinds: str) -> Mapping[str, Any]:
-    """Return the values for six damages of the front, all of the forms that the paper lacks."""
-    return {
-        "kinds": kinds,
-        "count": [6, 6],
-        "faces": ["front"],
-        "concave": {"creased": 1.0},
-        "dented": {"marks": {"probability": 1.0}},
-        "perforation": {"torn": 1.0},
-    }
 
 
 def every_case() -> list[Case]:

@@ -1,7 +1,7 @@
 """Path-trace the references that `bench/accuracy.py` compares with.
 
     python bench/trace_references.py --blender-python PYTHON [--cases 32] [--twice 8] [--series 8]
-    python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36,37,38
+    python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36
 
 Run it once, in the background: with these defaults it takes an hour on two cores. PYTHON is a
 Python 3.11 with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be
