@@ -90,8 +90,8 @@ struct DamageSample {
 };
 
 void add_scar(inout Scar scar, int i, float wear) {
-    wear *= damage_wear[i].x;
-    if (wear > scar.wear) scar = Scar(wear, damage_wear[i].y, damage_bare[i].rgb);
+    wear *= damage_bare[i].w;
+    if (wear > scar.wear) scar = Scar(wear, damage_shape[3 * i + 2].w, damage_bare[i].rgb);
 }
 
 DamageSample damage_at(vec3 p) {

@@ -87,10 +87,9 @@ DAMAGE_BLOCK = Block(
         ("vec4", "damage_along", MAX_DAMAGES),  # axis; half length
         ("vec4", "damage_across", MAX_DAMAGES),  # axis; half width
         ("vec4", "damage_inward", MAX_DAMAGES),  # axis; depth
-        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape
+        ("vec4", "damage_shape", 3 * MAX_DAMAGES),  # Damage.shape, up to 11 numbers; fresh
         ("vec4", "damage_reach", MAX_DAMAGES),  # along, across, inward; mask value
-        ("vec4", "damage_wear", MAX_DAMAGES),  # Damage.paint_loss and fresh; unused
-        ("vec4", "damage_bare", MAX_DAMAGES),  # Damage.bare_albedo; unused
+        ("vec4", "damage_bare", MAX_DAMAGES),  # Damage.bare_albedo; paint_loss
         ("int", "damage_count"),
         # damages are sorted by form, in the order of damage_forms.FORMS
         *(("int", f"{form.kind}_{form.name}_end") for form in FORMS),

@@ -151,6 +151,7 @@ def damage_values(
     shape = np.zeros((len(damages), 12), np.float32)
     for row, damage in zip(shape, damages, strict=True):
         row[: len(damage.shape)] = damage.shape
+        row[-1] = damage.fresh
     counts = [sum(form_of(damage) is form for damage in damages) for form in FORMS]
     ends = {
         f"{form.kind}_{form.name}_end": int(end)
@@ -163,8 +164,7 @@ def damage_values(
         "damage_inward": [(*d.inward, d.depth_mm) for d in damages],
         "damage_shape": shape.reshape(-1, 4),
         "damage_reach": [(*reach_mm(d), value) for d, value in valued],
-        "damage_wear": [(d.paint_loss, d.fresh, 0.0, 0.0) for d in damages],
-        "damage_bare": [(*d.bare_albedo, 0.0) for d in damages],
+        "damage_bare": [(*d.bare_albedo, d.paint_loss) for d in damages],
         "damage_count": len(damages),
         **ends,
         "hole_count": sum(form_of(d).outline is not None for d in damages),
