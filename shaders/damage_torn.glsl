@@ -37,8 +37,9 @@ float outside_tear(int i, vec2 q) {
     return min(outside, arm + (more.y < 1.0 ? ANYWHERE_MM : 0.0));
 }
 
-float torn_amount(int i, vec2 q) {
-    float rim = clamp(1.0 - outside_tear(i, q) / damage_shape[3 * i].x, 0.0, 1.0);
+// Displacement at q, without the fade. outside: outside_tear(i, q).
+float torn_amount(int i, vec2 q, float outside) {
+    float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
     float upward = q.y / (abs(q.y) + damage_across[i].w);
     return damage_inward[i].w * rim * rim *
            (1.0 - damage_shape[3 * i + 1].z * (0.5 - 0.5 * upward));
@@ -46,9 +47,12 @@ float torn_amount(int i, vec2 q) {
 
 DamageField torn_field(int i, vec3 q) {
     float fade = sheet_fade(q.z);
-    float amount = torn_amount(i, q.xy);
-    // One-sided differences stay outside the hole, where the sheet is.
-    vec2 slope = vec2(torn_amount(i, q.xy + vec2(1.0, 0.0)), torn_amount(i, q.xy + vec2(0.0, 1.0)));
-    float edge = clamp(1.0 - outside_tear(i, q.xy) / min(0.35 * damage_shape[3 * i].x, 25.0), 0.0, 1.0);
+    float outside = outside_tear(i, q.xy);
+    float amount = torn_amount(i, q.xy, outside);
+    vec2 right = q.xy + vec2(1.0, 0.0);
+    vec2 up = q.xy + vec2(0.0, 1.0);
+    vec2 slope = vec2(torn_amount(i, right, outside_tear(i, right)),
+                      torn_amount(i, up, outside_tear(i, up)));
+    float edge = clamp(1.0 - outside / min(0.35 * damage_shape[3 * i].x, 25.0), 0.0, 1.0);
     return DamageField(fade * amount, fade * vec3(slope - amount, 0.0), edge * step(0.5, fade));
 }

@@ -88,7 +88,7 @@ def sample_chalk(
 def _nowhere(config: ChalkConfig, faces: Mapping[str, Sheet], rng: np.random.Generator) -> Spot:
     """Return a place without a damage of its own. Small ones are more frequent."""
     sheet = faces[str(rng.choice(sorted(faces)))]
-    low, high = np.log(np.maximum(config.around_mm, 1.0))
+    low, high = np.log(config.around_mm)
     width, height = np.exp(rng.uniform(low, high, 2))
     x, y = (rng.uniform(EDGE_MM, max(side - EDGE_MM, EDGE_MM + 1)) for side in sheet.size)
     return Spot(sheet.face, (float(x), float(y)), (float(width), float(height)))

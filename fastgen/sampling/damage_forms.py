@@ -152,8 +152,7 @@ def _perforation(
         shape.append(_angle(rng))
     half = diameter / 2 * (1 + LOBES * c.lobes.hi) + shape[0]
     depth = draw(rng, c.depth_mm)
-    size = (diameter, diameter)
-    return SheetForm(size, depth, tuple(shape), half_mm=(half, half), place=place)
+    return SheetForm((diameter, diameter), depth, tuple(shape), half_mm=(half, half), place=place)
 
 
 def _tear(config: DamageConfig, size: _Size, rng: np.random.Generator) -> SheetForm:

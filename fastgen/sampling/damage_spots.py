@@ -38,18 +38,13 @@ def damage_spots(mesh: Mesh, damages: Sequence[Damage]) -> list[Spot]:
         axes = FACE_AXES[damage.face]
         turn = np.array([axes.right, axes.up]) @ np.transpose([damage.along, damage.across])
         width, height = np.abs(turn) @ damage.size_mm
-        place = sheet_place(mesh, damage)
+        place = _sheet_place(mesh, damage)
         made.append(Spot(damage.face, place, (float(width), float(height)), damage.kind))
     return made
 
 
-def sheet_place(mesh: Mesh, damage: Damage) -> Vec2:
-    """Return the origin of a damage in the coordinates of its sheet, mm.
-
-    Args:
-        mesh: Mesh of the undamaged container.
-        damage: A damage on one of `SHEET_FACES`.
-    """
+def _sheet_place(mesh: Mesh, damage: Damage) -> Vec2:
+    """Return the origin of a damage in the coordinates of its sheet, mm."""
     chart = mesh.chart_index(damage.face)
     own = np.flatnonzero(mesh.chart == chart)
     away = damage.origin_mm - mesh.positions_mm[own].astype(np.float64)
