@@ -15,6 +15,7 @@ from fastgen.scene.faces import FACE_AXES
 from fastgen.scene.object_ids import object_ids
 from fastgen.srgb import DECODED
 from tests.plain import EVEN_PAINT
+from tests.unlabelled import added, assert_same_labels
 
 COUNT = 60
 FRAME_MM = 110.0
@@ -34,13 +35,6 @@ def pairs():
     """Scenes without and with repairs."""
     without, given = Generator(config(0.0), seed=4), Generator(config(1.0), seed=4)
     return [(without.scene(index), given.scene(index)) for index in range(COUNT)]
-
-
-def added(pair):
-    without, given = pair
-    count = len(given.decals) - len(without.decals)
-    assert given.decals[count:] == without.decals
-    return given.decals[:count]
 
 
 def corners(decal):
@@ -215,6 +209,4 @@ def test_a_patch_shows_its_colour_at_its_place_and_no_label(generators, quality)
             column, row = at[((at > 1) & (at < size - 1)).all(axis=1)].astype(int).T
             away = np.abs(DECODED[shown.image[row, column]] - patch.albedo).max(axis=1)
             assert abs((away < 0.03).mean() - share) < 0.02
-        np.testing.assert_array_equal(shown.ids, plain.ids)
-        np.testing.assert_array_equal(shown.damage, plain.damage)
-        assert shown.objects == plain.objects
+        assert_same_labels(plain, shown)
