@@ -143,7 +143,8 @@ class PerforationConfig:
         split_gape_mm: Width of such a split.
         teeth_mm: Height of the teeth of its edges.
         twist: Amount by which its lower lip bends less than the upper; above 1 it bends outward.
-        at_castings: Probability that a hole in the roof is within half a metre of a casting.
+        at_castings: Probability that a hole in the roof is near a casting. Its rim then ends within
+            350 mm of the frame in both directions.
     """
 
     diameter_mm: Annotated[Range, Bounds(5, 2000, "mm")] = Range(90, 320)

@@ -52,7 +52,7 @@ def damage_objects(shot: Shot) -> list[Object]:
 
 
 def severity_mm(damage: Damage) -> float:
-    """Return the depth of a displacement, or the length of a hole or scrape, in mm."""
+    """Return the nominal depth of a displacement, or the length of a hole or scrape, in mm."""
     cut = form_of(damage).outline or form_of(damage).marked
     return damage.size_mm[0] if cut else abs(damage.depth_mm)
 

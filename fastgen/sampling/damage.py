@@ -19,7 +19,7 @@ from fastgen.scene import Damage, Vec3
 from fastgen.scene.limits import MAX_INSTANCES
 
 _CASTING_MM = 350.0
-"""Distance from the frame within which a hole near a casting has its centre."""
+"""Distance from the frame within which the rim of a hole near a casting ends."""
 
 _SHEET_MM = 15.0
 """Approximate depth of the sheet's outer flats behind the outermost plane of the castings."""
@@ -135,7 +135,7 @@ def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generato
 def _beside(
     damage: Damage, config: DamageConfig, plane: _Plane, rng: np.random.Generator
 ) -> Damage:
-    """Sample a scrape across a damage or just beside it, inside the frame of the face."""
+    """Sample a scrape across a damage or just beside it, whose centre is inside the frame."""
     form = draw_scrape(config, plane.face, plane.size, rng)
     shift = [0.5 * extent * float(rng.uniform(-1, 1)) for extent in damage.size_mm]
     moved = (

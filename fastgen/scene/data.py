@@ -133,7 +133,7 @@ class Damage:
         inward: Third axis. A positive `depth_mm` moves the sheet in its direction.
         size_mm: Full length along and full width across. For a star both are the mean diameter;
             for an axis damage the width is twice the reach from the edge.
-        depth_mm: Largest displacement.
+        depth_mm: Nominal depth: the largest displacement, if the form had no rounded folds.
         shape: Further parameters, those of damage_shapes.SHAPES[kind, form] in this order.
         form: One of the forms of the kind in damage_shapes.SHAPES.
         paint_loss: Share of the worst places that is bare of paint, 0..1.

@@ -47,7 +47,7 @@ def scene_numbers(scene: Scene) -> list[Numbers]:
     carried: list[tuple[tuple[Decal, ...], tuple[Damage, ...]]] = [(scene.decals, scene.damages)]
     carried += [(each.decals, each.damages) for each in scene.neighbours]
     kinds = {damage.kind for _, damages in carried for damage in damages}
-    # values of further kinds are free without them, so that they leave other scenes' ids alone
+    # without scrapes, their values stay free for ids, so that older scenes keep their ids
     known = SEGMENTATION_CLASSES if kinds <= set(SEGMENTATION_CLASSES) else ALL_SEGMENTATION_CLASSES
     taken = range(200, 100 * (len(known) + 1))
     free = (number for number in range(CONTAINER_ID, SPREADER_ID) if number not in taken)

@@ -37,8 +37,8 @@ def class_counts(
 
     A marker or text counts if its outline faces the camera, covers at least labels.min_visible_px
     pixels and has its center in the image. A damage counts if its face may be visible, it covers
-    about as many pixels and its center is in the image. Occlusion is ignored, so counts of markers
-    are a few percent too high.
+    about labels.min_visible_px pixels or more, and its center is in the image. Occlusion is
+    ignored, so counts of markers are a few percent too high.
 
     Args:
         task: damage, imdg or door; text has no classes.

@@ -11,14 +11,15 @@ from fastgen.scene import Damage
 
 SIDES = 5
 EDGE_STEEPNESS = 2.5
-"""Height of the pyramid's limits at the centre, where its apex is 1. They end it at its size."""
+"""Height at the centre of the planes that bring the pyramid to 0 at the edges of its size; its apex
+is at 1."""
 
 FLATTENED_AT = 0.4
 """Height of the pyramid, as a share of its apex, from which the corrugation is fully flattened."""
 
 LEVEL_MM, DEEPEST_MM = 18.0, 48.0
-"""Depth behind the outermost sheet to which corrugation is flattened, and of the deepest sheet that
-is. Gear in front of the sheet moves as its crests do."""
+"""Depth behind the outermost sheet to which the corrugation is flattened, and depth of the deepest
+sheet that is flattened. Gear in front of the sheet moves like the crests of the sheet."""
 
 
 def _pyramid(damage: Damage, u: Array, v: Array) -> Array:
