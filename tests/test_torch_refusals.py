@@ -21,6 +21,7 @@ from fastgen.torch import (
 )
 from tests.test_torch import SMALL, dataset, stream
 
+SCRAPED = Config.from_values({"damage": {"kinds": ["axis", "scrape"]}})
 SLANTED = Config.from_values({"cameras": {"Cr": {"azimuth_deg": [40, 80]}, "Cl": {}}})
 
 
@@ -73,6 +74,14 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
         (
             {"curriculum": lambda epoch: {"damage": {"mask_threshold_mm": 9.0}}},
             "curriculum: epoch 0 changes damage.mask_threshold_mm",
+        ),
+        (
+            {"curriculum": lambda epoch: {"damage": {"kinds": ["axis", "scrape"]}}},
+            "curriculum: epoch 0 changes which classes there are; list scrape in damage.kinds in",
+        ),
+        (
+            {"config": SCRAPED, "curriculum": lambda epoch: {"damage": {"kinds": ["axis"]}}},
+            "curriculum: epoch 0 changes which classes there are; list scrape in damage.kinds in",
         ),
         (
             {"split": "val", "config": Config.from_values({"split": {"val": 0.0}})},

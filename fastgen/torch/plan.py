@@ -175,6 +175,11 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
             f"curriculum: epoch {epoch} changes which classes there are; give markings.marks in "
             "every epoch or in none, with 0 for no mark"
         )
+    if made.damage.segmentation_classes != base.damage.segmentation_classes:
+        raise ConfigError(
+            f"curriculum: epoch {epoch} changes which classes there are; list scrape in "
+            "damage.kinds in every epoch or in none"
+        )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")
     return made
