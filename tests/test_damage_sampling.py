@@ -12,6 +12,7 @@ from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.scene import Scene
+from fastgen.scene.check import check_scene
 from fastgen.scene.container_kinds import KINDS
 from tests.plain import FEW_DECALS
 
@@ -71,6 +72,24 @@ def test_scenes_with_damage_round_trip_through_json(many):
 def test_a_hundred_damages_of_one_kind_are_refused():
     with pytest.raises(ConfigError, match=r"damage.count: 100 is out of range; give 0 to 99"):
         Config.from_values({"damage": {"count": [99, 100], "kinds": ["axis"]}})
+
+
+def test_scrapes_that_would_reach_the_opposite_wall_are_refused():
+    """The bound is the same in configurations and in scenes."""
+    widest = {"damage": {"probability": 1, "kinds": ["scrape"], "scrape": {"contact_mm": 200}}}
+    scene = Generator(Config.from_values(widest), seed=1).scene(0)
+    assert check_scene(scene).damages[0].shape[2] == 200
+    widest["damage"]["scrape"]["contact_mm"] = 201
+    with pytest.raises(ConfigError, match=r"scrape.contact_mm: 201 is out of range; give 5 to 200"):
+        Config.from_values(widest)
+    (first, *_) = scene.damages
+    deep = replace(first, shape=(*first.shape[:2], 201.0, *first.shape[3:]))
+    words = (
+        r"scene.damages\[0\].shape\[2\]: 201.0 is out of range; give a depth behind the face up to "
+        r"which the sheet is scraped in mm of 0.001 to 200"
+    )
+    with pytest.raises(ConfigError, match=words):
+        check_scene(replace(scene, damages=(deep,)))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from fastgen.classes import (
 )
 from fastgen.errors import ConfigError
 from fastgen.scene.faces import SHEET_FACES
-from fastgen.scene.limits import LOBE_LIMIT, MAX_INSTANCES
+from fastgen.scene.limits import LOBE_LIMIT, MAX_INSTANCES, MOST_CONTACT_MM
 from fastgen.validation import UNIT, Bounds, OneOf, Range, Share, check_distinct
 
 _Extent = Annotated[Range, Bounds(5.0, 20000.0, "mm")]
@@ -184,7 +184,7 @@ class ScrapeConfig:
     turn_deg: Annotated[Range, Bounds(-180, 180, "degrees")] = Range(-12, 12)
     pitch_mm: Annotated[Range, Bounds(1.0, 500.0, "mm")] = Range(6, 24)
     density: Annotated[Range, UNIT] = Range(0.3, 0.9)
-    contact_mm: _Extent = Range(8, 60)
+    contact_mm: Annotated[Range, Bounds(5.0, MOST_CONTACT_MM, "mm")] = Range(8, 60)
     paint: Share = 0.35
     beside: Share = 0.5
 

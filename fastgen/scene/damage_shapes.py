@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from fastgen.scene.limits import FARTHEST, LOBE_LIMIT, LOBES
+from fastgen.scene.limits import FARTHEST, LOBE_LIMIT, LOBES, MOST_CONTACT_MM
 
 
 class Parameter(NamedTuple):
@@ -27,8 +27,8 @@ _PHASE = Parameter("phase in radians", -FARTHEST, FARTHEST)
 _SOFTNESS = Parameter("softness of the folds, as a share of the depth", _LEAST, 1.0)
 
 
-def _mm(name: str, low: float = _LEAST) -> Parameter:
-    return Parameter(f"{name} in mm", low, FARTHEST)
+def _mm(name: str, low: float = _LEAST, high: float = FARTHEST) -> Parameter:
+    return Parameter(f"{name} in mm", low, high)
 
 
 SHAPES: Mapping[tuple[str, str], tuple[Parameter, ...]] = {
@@ -80,7 +80,7 @@ SHAPES: Mapping[tuple[str, str], tuple[Parameter, ...]] = {
     ("scrape", "plain"): (
         _mm("distance between scratches"),
         Parameter("density of scratches", 0.0, 1.0),
-        _mm("depth behind the face up to which the sheet is scraped"),
+        _mm("depth behind the face up to which the sheet is scraped", high=MOST_CONTACT_MM),
         _mm("raggedness of the ends", 0.0),
         _PHASE,
         _mm("waviness of the scratches", 0.0),

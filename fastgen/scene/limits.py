@@ -63,6 +63,10 @@ LOBE_LIMIT = 0.19
 """Largest amplitude of each harmonic, as a share of the mean radius. The sum of all harmonics then
 stays below the radius, so the outline runs once around its centre."""
 
+MOST_CONTACT_MM = 200.0
+"""Largest depth behind the face up to which a scrape marks the sheet. Corrugation is a quarter as
+deep, and a few times more would reach the opposite wall."""
+
 GAP_LIMITS_MM = (0.0, 200.0)
 """Distance between container and spreader; a wider gap would not look connected."""
 
