@@ -16,7 +16,7 @@ DamageField ribs_field(int i, vec3 q) {
     float uneven = (1.0 + shape.z * sin(turn * q.x + more.x)) / (1.0 + shape.z);
     float uneven_slope = shape.z * turn * cos(turn * q.x + more.x) / (1.0 + shape.z);
     float across = bump(t);
-    float inside = depth * (uneven * across - beyond * beyond) - max(q.z, 0.0);
+    float inside = depth * max(uneven * across - beyond * beyond, 0.0) - max(q.z, 0.0);
     float pushed = more.y * above_zero_slope(inside, shape.x);
     vec3 slope = vec3(depth * (uneven_slope * across - 2.0 * beyond * sign(q.x) / shape.y),
                       depth * uneven * bump_slope(t) / half_width, q.z > 0.0 ? -1.0 : 0.0);

@@ -47,7 +47,8 @@ def fold_path_mm(damage: Damage, u: Array) -> Array:
 
 def _fold_reach(damage: Damage) -> tuple[float, float]:
     u, v = half_size(damage)
-    return u, max(v, damage.shape[0]) + damage.shape[2]  # the fold swings aside
+    crease_mm, _, amplitude_mm, *_ = damage.shape
+    return u, max(v, crease_mm) + abs(amplitude_mm)  # the fold swings aside
 
 
 def hole_radius_mm(damage: Damage, angle: Array) -> Array:

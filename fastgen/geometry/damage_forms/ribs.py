@@ -17,7 +17,7 @@ def _pressed(damage: Damage, u: Array, v: Array, w: Array) -> Array:
     half_length, half_width = half_size(damage)
     beyond = np.maximum(np.abs(u) - (half_length - ramp_mm), 0.0) / ramp_mm
     uneven = (1 + wobble * np.sin(2 * np.pi * u / wavelength_mm + phase)) / (1 + wobble)
-    object_mm = damage.depth_mm * (uneven * bump(v / half_width) - beyond * beyond)
+    object_mm = damage.depth_mm * np.maximum(uneven * bump(v / half_width) - beyond**2, 0.0)
     return give * above_zero(object_mm - np.maximum(w, 0.0), softness_mm)
 
 

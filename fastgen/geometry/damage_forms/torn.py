@@ -60,8 +60,10 @@ def _torn(damage: Damage, u: Array, v: Array, _w: Array) -> Array:
 def _reach(damage: Damage) -> tuple[float, float]:
     rim_mm, jag_mm, arm_mm = damage.shape[0], damage.shape[3], damage.shape[5]
     half_length, half_gape = half_size(damage)
-    across = max(2 * half_gape + abs(jag_mm), arm_mm)
-    return half_length + half_gape + rim_mm, across + rim_mm
+    across = max(2 * half_gape + jag_mm, arm_mm)
+    # a second slit that is wider than the first is long protrudes behind its beginning
+    along = half_length + max(half_gape, (1 + ARM_GAPE) * half_gape - 2 * half_length)
+    return along + rim_mm, across + rim_mm
 
 
 TORN = Form("perforation", "torn", _torn, _reach, outside_mm)
