@@ -137,6 +137,14 @@ def test_the_required_distance_includes_outward_damage():
         # both settings are in another section, so the error has to name them
         assert "damage.concave.depth_mm" in str(caught.value)
         assert "damage.concave.outward: 0" in str(caught.value)
+    # the lower lip of a tear bends outward by its depth, times the twist above 1
+    hole = {"torn": 1, "depth_mm": 600, "twist": [0, 1.5]}
+    for values in ({"torn": 0}, {"twist": 1}, {"depth_mm": 300}):
+        config(301, {"concave": inward, "perforation": hole | values})
+    config(301, {"concave": inward, "perforation": hole, "kinds": ["concave"]})
+    config(401, {"concave": inward, "perforation": hole})
+    with pytest.raises(ConfigError, match=r"may bulge by 300 mm .* and a twist up to 1"):
+        config(399, {"concave": inward, "perforation": hole})
 
 
 def test_a_rig_made_in_python_is_checked_like_one_from_a_file():

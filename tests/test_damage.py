@@ -18,7 +18,8 @@ from fastgen.geometry.damage_forms.plain import fold_path_mm
 from fastgen.geometry.door_gear import BAR_Y_MM
 from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
-from fastgen.scene import Scene, Spreader
+from fastgen.scene import Damage, Scene, Spreader
+from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
 
@@ -82,6 +83,29 @@ def test_ids_on_a_bulge_are_right_from_behind_the_plane_of_its_sheet(generators)
         mesh = build_container(sample.scene.container.kind, sample.scene.container.profiles)
         ids = oracle.object_ids(sample.scene, mesh, oracle.cast(mesh, sample.view, sample.scene))
         assert ((sample.ids != ids) & ~oracle.near_edge(ids)).sum() <= 3
+
+
+def test_outward_lips_show_from_behind_the_plane_of_their_sheet(paper):
+    """The lower lip of the tear, which runs upright near a post, bends outward by up to 150 mm."""
+    scene = paper.scene(0)
+    end_mm = KINDS[scene.container.kind].length_mm / 2
+    tear = Damage(
+        kind="perforation", form="torn", face="front", origin_mm=(end_mm - 500, -1204.0, 1300.0),
+        along=(0.0, 0.0, 1.0), across=(-1.0, 0.0, 0.0), inward=(0.0, 1.0, 0.0),
+        size_mm=(500.0, 80.0), depth_mm=150.0, shape=(120.0, 1.0, 0.0, 5.0, 1.0, 0.0, 2.0),
+    )  # fmt: skip
+    camera = replace(
+        scene.cameras[0], name="end", position_mm=(end_mm + 6000, -1000.0, 1300.0),
+        target_mm=(end_mm, -1250.0, 1300.0), focal_mm=150.0, roll_deg=0.0,
+    )  # fmt: skip
+    scene = replace(scene, damages=(tear,), cameras=(camera,), spreader=Spreader())
+    sample = paper.render(scene=scene, camera="end")
+    mesh = build_container(scene.container.kind, scene.container.profiles)
+    expected = oracle.damage_values(scene, oracle.cast(mesh, sample.view, scene), THRESHOLD_MM)
+    assert (expected == 501).sum() > 30
+    wrong = sample.damage != expected
+    assert (wrong & ~oracle.near_edge(expected)).sum() == 0
+    assert wrong.sum() <= 3
 
 
 def close_up(scene: Scene, kind: str, form: str | None = None, away_mm: float = 2500) -> Scene:

@@ -6,12 +6,21 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, reach_mm
+from fastgen.geometry.damage_law import (
+    amount_mm,
+    in_hole,
+    inward_mm,
+    is_marked,
+    may_be_seen,
+    outward_mm,
+    reach_mm,
+)
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.labels.damage import severity_mm
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
 from tests.glsl import blocks, run
-from tests.random_damages import FORM_NAMES, points_around, random_damage
+from tests.random_damages import AXES, FORM_NAMES, points_around, random_damage
 
 ONE_DAMAGE = """
 #include "damage_law.glsl"
@@ -33,6 +42,58 @@ vec4 f(vec4 x) {
 def gl():
     with open_context() as made:
         yield made
+
+
+def displacements(damage, low, high, count):
+    """Return the displacement [2, N, N] on a grid between local points [2], and u and v [N].
+
+    The first is of the outermost sheet, the second of sheet behind all corrugation.
+    """
+    u, v = (np.linspace(*ends, count) for ends in zip(low, high, strict=True))
+    w = np.array([0.0, 60.0])[:, None, None]
+    local = np.stack(np.broadcast_arrays(u[:, None], v[None, :], w), axis=-1)
+    return amount_mm(damage, local @ np.array(AXES)), u, v
+
+
+@pytest.mark.parametrize(
+    ("kind", "form"), [name for name in FORM_NAMES if name[0] not in ("perforation", "scrape")]
+)
+def test_severity_is_the_largest_displacement(kind, form):
+    """The largest one is looked for on a grid, and on finer grids around the places found."""
+    rng = np.random.default_rng(3)
+    differ = 0
+    for _ in range(60):
+        damage = random_damage(rng, kind, form)
+        reach = np.array(reach_mm(damage)[:2])
+        middle, most = np.zeros(2), 0.0
+        for zoom in (1, 5, 20, 100, 500):
+            moved, u, v = displacements(damage, middle - reach / zoom, middle + reach / zoom, 161)
+            _, i, j = np.unravel_index(np.abs(moved).argmax(), moved.shape)
+            middle, most = np.array([u[i], v[j]]), max(most, float(np.abs(moved).max()))
+        assert severity_mm(damage) == pytest.approx(most, rel=0.01, abs=0.02)
+        differ += abs(most - abs(damage.depth_mm)) > 0.05 * most
+    assert differ > 10 if form in ("creased", "kinked", "ribs") else differ == 0
+
+
+@pytest.mark.parametrize(("kind", "form"), FORM_NAMES)
+def test_sheet_that_moves_outward_may_be_seen_from_behind(kind, form):
+    rng = np.random.default_rng(4)
+    outward = 0
+    for _ in range(150):
+        damage = random_damage(rng, kind, form)
+        reach = np.array(reach_mm(damage)[:2])
+        moved, *_ = displacements(damage, -reach, reach, 81)
+        low, high = -outward_mm(damage), inward_mm(damage)
+        assert low <= moved[0].min() + 1e-6
+        assert moved[0].max() - 1e-6 <= high
+        front = min(moved[0].min(), (60.0 + moved[1]).min())
+        assert low <= front + 1e-6
+        seen = may_be_seen(damage, (0.0, 5000.0, 0.0) if kind != "axis" else (0.0, 9e3, 9e3))
+        assert seen or front > -1e-6
+        outward += front < -1.0
+        if low == 0.0:
+            assert not seen
+    assert outward > 10 or kind == "scrape" or form == "ribs"
 
 
 @pytest.mark.parametrize(("kind", "form"), FORM_NAMES)

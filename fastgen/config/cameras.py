@@ -142,8 +142,11 @@ def check_room(name: str, rig: CameraConfig, kinds: Iterable[str], bulge_mm: flo
         if nearest_mm < least_mm + _ROUNDED_MM:
             bulges, less = "", "a smaller target_shift_mm"
             if bulge_mm:
-                bulges = f" that may bulge by {bulge_mm:g} mm (damage.concave.depth_mm)"
-                less = f"{less} or depth_mm, or damage.concave.outward: 0"
+                bulges = (
+                    f" that may bulge by {bulge_mm:g} mm (damage.concave.depth_mm, and "
+                    "damage.perforation.depth_mm with a twist above 1)"
+                )
+                less = f"{less} or depth_mm, damage.concave.outward: 0 and a twist up to 1"
             raise ConfigError(
                 f"cameras.{name}: may come within {nearest_mm:.0f} mm of a container of kind "
                 f"{kind}{bulges}, and nothing nearer than {NEAR_M / MM:g} mm is drawn; give a "

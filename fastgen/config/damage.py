@@ -229,7 +229,12 @@ class DamageConfig:
 
     @property
     def bulge_mm(self) -> float:
-        """Largest outward displacement of a face."""
-        damaged = self.probability > 0 and self.count[1] > 0
-        bulges = damaged and "concave" in self.kinds and self.concave.outward > 0
-        return self.concave.depth_mm.hi if bulges else 0.0
+        """Largest outward displacement of a face by one damage."""
+        if not (self.probability > 0 and self.count[1] > 0):
+            return 0.0
+        bulge, hole, most = self.concave, self.perforation, 0.0
+        if "concave" in self.kinds and bulge.outward > 0:
+            most = bulge.depth_mm.hi
+        if "perforation" in self.kinds and hole.torn > 0:
+            most = max(most, hole.depth_mm.hi * (hole.twist.hi - 1))
+        return most

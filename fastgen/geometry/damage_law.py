@@ -86,11 +86,26 @@ def reach_mm(damage: Damage) -> tuple[float, float, float]:
     return u, v, v if form.along_edge else FADE_END_MM
 
 
+def outward_mm(damage: Damage) -> float:
+    """Return how far a damage moves sheet at most outward, in front of its place at rest."""
+    return -form_of(damage).span(damage)[0]
+
+
+def inward_mm(damage: Damage) -> float:
+    """Return how far a damage moves the outermost sheet at most inward."""
+    return form_of(damage).span(damage)[1]
+
+
+def largest_mm(damage: Damage) -> float:
+    """Return the largest displacement by a damage in either direction."""
+    return form_of(damage).largest(damage)
+
+
 def corners_mm(damage: Damage) -> NDArray[np.float64]:
     """Return the corners [8, 3] in mm of a box around a damage, before and after displacement."""
     u, v, inward = reach_mm(damage)
     depth = abs(damage.depth_mm) + 60.0
-    low, high = -depth, inward + max(damage.depth_mm, 0.0)
+    low, high = -depth, inward + inward_mm(damage)
     if form_of(damage).along_edge:
         low, high = -v, v + depth
     axes = np.array([damage.along, damage.across, damage.inward])
@@ -109,19 +124,26 @@ def variant(damages: tuple[Damage, ...]) -> str:
 def may_be_seen(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) -> bool:
     """Test whether a camera may see a damage from outside the container.
 
-    A dented sheet is hidden from behind its plane, an edge from behind both of its faces.
+    Sheet that a damage moves outward may be seen from everywhere, past the edge of its face.
 
     Args:
         damage: The damage.
         position_mm: Position of the camera, outside the container.
         beside: Damages of the scene; those that bulge outward may move this damage with them.
     """
-    if damage.depth_mm < 0:
-        return True
+    return outward_mm(damage) > 0 or faces(damage, position_mm, beside)
+
+
+def faces(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) -> bool:
+    """Test whether a camera is on the outer side of a damaged sheet, or of a face at its edge.
+
+    A dented sheet is hidden from behind its plane, an edge from behind both of its faces. The
+    arguments are those of may_be_seen.
+    """
     toward = np.array(position_mm) - np.array(damage.origin_mm)
     # the inward axis is a coordinate axis for a sheet, and lies between two for an edge
     outward = [-np.sign(c) * toward[i] for i, c in enumerate(damage.inward) if abs(c) > 0.1]
-    pushed_mm = sum(max(-other.depth_mm, 0.0) for other in beside)
+    pushed_mm = sum(map(outward_mm, beside))
     outside: bool = max(outward) > -SLACK_MM - pushed_mm
     return outside
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES
 from fastgen.geometry.damage_forms import form_of
-from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, may_be_seen
+from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, largest_mm, may_be_seen
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
 from fastgen.labels.visibility import Shot, float_boxes, visibility
@@ -52,9 +52,13 @@ def damage_objects(shot: Shot) -> list[Object]:
 
 
 def severity_mm(damage: Damage) -> float:
-    """Return the nominal depth of a displacement, or the length of a hole or scrape, in mm."""
+    """Return the largest displacement by a damage, or the length of a hole or scrape, in mm.
+
+    It is that of the damage by itself. Forms with rounded folds do not reach their nominal depth,
+    and flattened corrugation adds to it.
+    """
     cut = form_of(damage).outline or form_of(damage).marked
-    return damage.size_mm[0] if cut else abs(damage.depth_mm)
+    return damage.size_mm[0] if cut else round(largest_mm(damage), 2)
 
 
 def _alone(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.geometry.damage_law import inward_mm
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.geometry.prepared_scene import Member
 from fastgen.render.blocks import MAX_BOXES
@@ -156,7 +157,7 @@ def _solid_mm(member: Member) -> Array | None:
     None for a container with holes, or with too deep dents.
     """
     damages = member.prepared.scene.damages
-    skin_mm = _SKIN_MM + sum(max(damage.depth_mm, 0.0) for damage in damages)
+    skin_mm = _SKIN_MM + sum(map(inward_mm, damages))
     half = member.box.half_mm - skin_mm
     if half.min() <= 0 or any(damage.kind == "perforation" for damage in damages):
         return None

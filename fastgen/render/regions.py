@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.geometry.damage_law import inward_mm, outward_mm
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.scene import Damage
 from fastgen.scene.limits import NEAR_M
@@ -193,7 +194,7 @@ def box_corners(
         Corners [8, 3], mm.
     """
     low, high = bounds_mm
-    inward = sum(max(damage.depth_mm, 0.0) for damage in damages) - (high - low).min()
-    bulge = max(inward, sum(max(-damage.depth_mm, 0.0) for damage in damages))
+    inward = sum(map(inward_mm, damages)) - (high - low).min()
+    bulge = max(inward, sum(map(outward_mm, damages)))
     corners: np.ndarray = low - bulge + UNIT_CUBE * (high - low + 2 * bulge)
     return corners

@@ -47,7 +47,7 @@ SHAPES: Mapping[tuple[str, str], tuple[Parameter, ...]] = {
     ),
     ("dented", "plain"): (
         _mm("half width of the crease"),
-        Parameter("depth of the sunken area, as a share of the depth", -FARTHEST, FARTHEST),
+        Parameter("depth of the sunken area, as a share of the depth", 0.0, 1.0),
         _mm("amplitude", -FARTHEST),
         _mm("wavelength"),
         _PHASE,

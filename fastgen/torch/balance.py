@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -14,7 +13,7 @@ from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
 from fastgen.generator import Generator
-from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, may_be_seen
+from fastgen.geometry.damage_law import amount_mm, faces, in_hole, is_marked
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Camera, Damage, Scene
 from fastgen.torch.plan import chosen_cameras
@@ -118,8 +117,7 @@ def _count_damages(
 ) -> None:
     for damage in scene.damages:
         # only the rim of a bulge shows from behind its face: too little to count
-        flat = replace(damage, depth_mm=abs(damage.depth_mm))
-        if not may_be_seen(flat, camera.position_mm):
+        if not faces(damage, camera.position_mm):
             continue
         if not _inside(view, np.array(damage.origin_mm)):
             continue

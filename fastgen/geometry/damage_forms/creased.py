@@ -4,9 +4,18 @@ The displacement is a pyramid with five uneven sides, and the corrugation is fla
 shaders/damage_creased.glsl is the GLSL twin.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import Array, Form, above_zero, half_size, lesser
+from fastgen.geometry.damage_forms.form import (
+    Array,
+    Form,
+    above_zero,
+    depth_span,
+    half_size,
+    lesser,
+)
 from fastgen.scene import Damage
 
 SIDES = 5
@@ -22,24 +31,61 @@ LEVEL_MM, DEEPEST_MM = 18.0, 48.0
 sheet that is flattened. Gear in front of the sheet moves like the crests of the sheet."""
 
 
-def _pyramid(damage: Damage, u: Array, v: Array) -> Array:
-    """Return the height [...] of the pyramid, 0..1, at u and v [...]."""
-    half_length, half_width = half_size(damage)
-    phase, softness = damage.shape[0], damage.shape[1 + SIDES]
-    x, y = u / half_length, v / half_width
+def _folded(shape: tuple[float, ...], x: Array, y: Array) -> Array:
+    """Return the height [...] of the pyramid at x and y [...] in half sizes, below 0 outside it."""
+    phase, softness = shape[0], shape[1 + SIDES]
     height = EDGE_STEEPNESS * lesser(1 - np.abs(x), 1 - np.abs(y), softness)
     for k in range(SIDES):
         angle = phase + 2 * np.pi * k / SIDES
-        side = 1 - (np.cos(angle) * x + np.sin(angle) * y) / damage.shape[1 + k]
+        side = 1 - (np.cos(angle) * x + np.sin(angle) * y) / shape[1 + k]
         height = lesser(height, side, softness)
-    return above_zero(height, softness)
+    return height
 
 
 def _creased(damage: Damage, u: Array, v: Array, w: Array) -> Array:
-    height = _pyramid(damage, u, v)
+    half_length, half_width = half_size(damage)
+    height = above_zero(
+        _folded(damage.shape, u / half_length, v / half_width), damage.shape[1 + SIDES]
+    )
     flattened = damage.shape[2 + SIDES] * np.minimum(height / FLATTENED_AT, 1.0)
     level = LEVEL_MM - np.clip(w, 0.0, DEEPEST_MM)
     return np.asarray(damage.depth_mm * height + flattened * level)
 
 
-CREASED = Form("concave", "creased", _creased, half_size)
+def _span(damage: Damage) -> tuple[float, float]:
+    low, high = depth_span(damage)
+    return low, high + damage.shape[2 + SIDES] * LEVEL_MM
+
+
+def _largest(damage: Damage) -> float:
+    """Evaluate the pyramid around its rounded apex; rounded folds lower it by up to nine tenths.
+
+    The displacement is linear in the height of the pyramid up to FLATTENED_AT, and from there on.
+    """
+    apex = _apex(damage.shape)
+    height = np.array([[min(FLATTENED_AT, apex)], [apex]])
+    flattened = damage.shape[2 + SIDES] * height / FLATTENED_AT
+    level = np.array([LEVEL_MM, LEVEL_MM - DEEPEST_MM])
+    moved = damage.depth_mm * height + np.minimum(flattened, damage.shape[2 + SIDES]) * level
+    return float(np.abs(moved).max())
+
+
+@lru_cache(256)
+def _apex(shape: tuple[float, ...]) -> float:
+    """Return the height of the rounded apex: at most 1, and 1 for sharp folds.
+
+    Three grids around the highest place so far find it within 0.2 %. It takes about 0.3 ms.
+    """
+    softness = shape[1 + SIDES]
+    # in every direction a side falls by 0.4 or more per half size, and folds round off `softness`
+    half = min(1.0, 2.5 * softness)
+    x = y = height = 0.0
+    for width, count in ((half, 17), (half / 4, 13), (half / 16, 13)):
+        step = np.linspace(-width, width, count)
+        heights = _folded(shape, (x + step)[:, None], y + step)
+        i, j = divmod(int(heights.argmax()), count)
+        x, y, height = x + float(step[i]), y + float(step[j]), float(heights[i, j])
+    return float(above_zero(np.array(height), softness))
+
+
+CREASED = Form("concave", "creased", _creased, half_size, _span, _largest)

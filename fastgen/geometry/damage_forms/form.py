@@ -19,6 +19,16 @@ FADE_START_MM, FADE_END_MM = 260.0, 520.0
 wall."""
 
 
+def depth_span(damage: Damage) -> tuple[float, float]:
+    """Return 0 and the depth of a damage, the lower one first."""
+    return min(damage.depth_mm, 0.0), max(damage.depth_mm, 0.0)
+
+
+def full_depth(damage: Damage) -> float:
+    """Return the largest displacement of most forms, which reach their depth somewhere."""
+    return abs(damage.depth_mm)
+
+
 @dataclass(frozen=True)
 class Form:
     """One form of one kind of damage.
@@ -29,6 +39,9 @@ class Form:
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
         reach: Function of a damage to the distances along and across within which it acts.
+        span: Function of a damage to the lowest and the highest displacement of the outermost
+            sheet in mm, 0 included. They are bounds that some damages do not reach.
+        largest: Function of a damage to the largest magnitude of its displacement in mm.
         outline: Function of a damage and of u and v [...] to the distance [...] in mm outside its
             hole, negative within. None for forms without a hole.
         marked: Function of a damage and of u, v and w [...] to bool [...]: a form without
@@ -41,6 +54,8 @@ class Form:
     name: str
     amount: Callable[[Damage, Array, Array, Array], Array]
     reach: Callable[[Damage], tuple[float, float]]
+    span: Callable[[Damage], tuple[float, float]] = depth_span
+    largest: Callable[[Damage], float] = full_depth
     outline: Callable[[Damage, Array, Array], Array] | None = None
     marked: Callable[[Damage, Array, Array, Array], NDArray[np.bool_]] | None = None
     along_edge: bool = False

@@ -19,4 +19,11 @@ def _kinked(damage: Damage, u: Array, v: Array, w: Array) -> Array:
     return np.asarray(damage.depth_mm * above_zero(notch, softness) * bump(away))
 
 
-KINKED = Form("axis", "kinked", _kinked, half_size, along_edge=True)
+def _largest(damage: Damage) -> float:
+    """Return the displacement where the rounded tip of the notch is level."""
+    apex, softness = damage.shape
+    tip = above_zero(np.array(1 - softness * (1 - apex * apex) / 4), softness)
+    return abs(damage.depth_mm) * float(tip)
+
+
+KINKED = Form("axis", "kinked", _kinked, half_size, largest=_largest, along_edge=True)

@@ -10,15 +10,40 @@ import numpy as np
 from fastgen.geometry.damage_forms.form import Array, Form, above_zero, bump, half_size
 from fastgen.scene import Damage
 
+_PLACES = 129
+"""Places along a row at which its largest displacement is looked for."""
+
+
+def _profile(damage: Damage, u: Array, across: Array | float = 1.0) -> Array:
+    """Return how far the object reaches in at u [...], as a share of the depth."""
+    _, ramp_mm, wobble, wavelength_mm, phase, _ = damage.shape
+    half_length, _ = half_size(damage)
+    beyond = np.maximum(np.abs(u) - (half_length - ramp_mm), 0.0) / ramp_mm
+    uneven = (1 + wobble * np.sin(2 * np.pi * u / wavelength_mm + phase)) / (1 + wobble)
+    return np.asarray(np.maximum(uneven * across - beyond**2, 0.0))
+
 
 def _pressed(damage: Damage, u: Array, v: Array, w: Array) -> Array:
     """The object is a round bar along u; sheet that it reaches moves to its surface."""
-    softness_mm, ramp_mm, wobble, wavelength_mm, phase, give = damage.shape
-    half_length, half_width = half_size(damage)
-    beyond = np.maximum(np.abs(u) - (half_length - ramp_mm), 0.0) / ramp_mm
-    uneven = (1 + wobble * np.sin(2 * np.pi * u / wavelength_mm + phase)) / (1 + wobble)
-    object_mm = damage.depth_mm * np.maximum(uneven * bump(v / half_width) - beyond**2, 0.0)
+    softness_mm, *_, give = damage.shape
+    _, half_width = half_size(damage)
+    object_mm = damage.depth_mm * _profile(damage, u, bump(v / half_width))
     return give * above_zero(object_mm - np.maximum(w, 0.0), softness_mm)
 
 
-RIBS = Form("dented", "ribs", _pressed, half_size)
+def _largest(damage: Damage) -> float:
+    """Return the displacement where the bar reaches in farthest.
+
+    It does so near the crest of the unevenness that is nearest to the middle, or, if there is no
+    crest between the ends, elsewhere along the row.
+    """
+    softness_mm, _, _, wavelength_mm, phase, give = damage.shape
+    half_length, _ = half_size(damage)
+    turns = (0.5 * np.pi - phase) / (2 * np.pi)
+    crest = (turns - np.rint(turns)) * wavelength_mm
+    u = np.append(np.linspace(-half_length, half_length, _PLACES), crest)
+    object_mm = damage.depth_mm * _profile(damage, u).max()
+    return float(give * above_zero(object_mm, softness_mm))
+
+
+RIBS = Form("dented", "ribs", _pressed, half_size, largest=_largest)

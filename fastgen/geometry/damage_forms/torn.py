@@ -66,4 +66,9 @@ def _reach(damage: Damage) -> tuple[float, float]:
     return along + rim_mm, across + rim_mm
 
 
-TORN = Form("perforation", "torn", _torn, _reach, outside_mm)
+def _span(damage: Damage) -> tuple[float, float]:
+    lower_mm = damage.depth_mm * (1 - damage.shape[6])  # of the lower lip, at most
+    return min(damage.depth_mm, lower_mm, 0.0), max(damage.depth_mm, lower_mm, 0.0)
+
+
+TORN = Form("perforation", "torn", _torn, _reach, _span, outline=outside_mm)

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import moderngl
 
-from fastgen.geometry.damage_forms.creased import DEEPEST_MM
-from fastgen.geometry.damage_law import corners_mm
+from fastgen.geometry.damage_law import corners_mm, largest_mm, outward_mm
 from fastgen.light.sky_visibility import lobe_masks
 from fastgen.render.constants import LOBE_CELLS, REACH_MARGIN_MM
 from fastgen.render.draw_inputs import DrawInputs
@@ -60,7 +59,7 @@ class GeometryPass:
             # before the container: damaged surfaces behind a seal must not leave a rest position
             inputs.seals.draw("undamaged", inputs.seals.seen_from(inputs.eye_mm))
         # a dent may tilt a face into view that the rest mesh turns away
-        tilted = [d.face for d in damages if d.kind == "axis" or d.depth_mm < 0]
+        tilted = [d.face for d in damages if d.kind == "axis" or outward_mm(d) > 0]
         bent = {face for place in tilted for face in place.split(".")}
         container = inputs.container
         seen = container.seen_from(inputs.eye_mm, bent)
@@ -73,7 +72,7 @@ class GeometryPass:
             container.draw("damaged", touched)
         else:
             container.draw("undamaged", seen)
-        moved_mm = sum(abs(d.depth_mm) + DEEPEST_MM for d in damages)
+        moved_mm = sum(map(largest_mm, damages)) if regions.holes else 0.0
         self._programs["holed"].bind(textures)
         for region in regions.holes:
             samples.limit_inside(region)
