@@ -1,6 +1,7 @@
 """Sampled damages: kinds, forms, sizes and places."""
 
 import math
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -164,12 +165,83 @@ def test_scrapes_are_drawn_where_they_are_listed_alone_and_beside_dents():
     # of the kinds that are drawn, three in five bring none
     beside = drawn - 1.5 * moved
     assert abs(beside - 0.5 * moved) < 4 * math.sqrt(len(both))
-    bare = [d for _, d in damages_of(kinds=["dented", "scrape"], scrape={"beside": 1.0})]
-    scrapes = [d for d in bare if d.kind == "scrape"]
-    for dent in (d for d in bare if d.kind == "dented"):
-        reach = math.hypot(*dent.size_mm) / 2
-        distances = [math.dist(dent.origin_mm, s.origin_mm) for s in scrapes]
-        assert min(distances) <= reach + 1
+
+
+def test_a_scrape_beside_a_dent_lies_across_it_or_touches_it():
+    damage = {"probability": 1, "count": 1, "kinds": ["dented", "scrape"], "scrape": {"beside": 1}}
+    values = {"damage": damage, "markings": FEW_DECALS}
+    scenes = map(Generator(Config.from_values(values), seed=7).scene, range(80))
+    dented = [scene.damages for scene in scenes if scene.damages[0].kind == "dented"]
+    assert len(dented) > 20
+    for dent, scrape in dented:
+        assert scrape.kind == "scrape"
+        assert scrape.face == dent.face
+        one, other = corners_of(dent), corners_of(scrape)
+        gaps = one.min(axis=0) - other.max(axis=0), other.min(axis=0) - one.max(axis=0)
+        assert np.max(gaps) < 1
+
+
+def corners_of(damage):
+    """Return the corners [4, 3] of the rectangle of a damage."""
+    along, across = (
+        0.5 * extent * np.array(axis)
+        for extent, axis in zip(damage.size_mm, (damage.along, damage.across), strict=True)
+    )
+    sides = [along + across, along - across, across - along, -along - across]
+    return np.array(damage.origin_mm) + sides
+
+
+@pytest.mark.parametrize("turn_deg", [[-12, 12], [-180, 180], 90])
+@pytest.mark.parametrize("size", [{}, {"length_mm": 20000, "width_mm": [5, 20000]}])
+def test_scrapes_stay_within_the_frame_of_their_face(turn_deg, size):
+    scrape = {"beside": 1, "turn_deg": turn_deg, **size}
+    faces = ["front", "back", "door", "no_door", "roof"]
+    found = damages_of(kinds=["concave", "dented", "scrape"], faces=faces, scrape=scrape)
+    scrapes = [(container, d) for container, d in found if d.kind == "scrape"]
+    assert len(scrapes) > 200
+    for container, each in scrapes:
+        kind = KINDS[container.kind]
+        half = np.array([kind.length_mm, kind.width_mm, kind.height_mm]) / 2
+        away = np.abs(corners_of(each) - [0, 0, half[2]]).max(axis=0)
+        # posts and rails are 190 mm wide, and the sheet is 15 mm behind the castings
+        free = half - 190 - np.array([15, 15, 0])
+        on_face = np.abs(each.inward) < 0.5
+        assert (away <= free + 0.2)[on_face].all()
+        assert min(each.size_mm) > 1
+
+
+def yard(kinds, count, beside):
+    """Return the damages of all ten containers of two scenes, which can be drawn."""
+    values = {
+        "damage": {"probability": 1, "count": count, "kinds": kinds, "scrape": {"beside": beside}},
+        "placement": {"neighbours": 9, "damaged": 1},
+        "markings": FEW_DECALS,
+    }
+    generator = Generator(Config.from_values(values, Config.preset("yard")), seed=2)
+    for scene in (check_scene(generator.scene(index)) for index in (1, 4)):
+        assert len(scene.neighbours) == 9
+        yield [scene.damages, *(each.damages for each in scene.neighbours)]
+
+
+@pytest.mark.parametrize("kind", ALL_DAMAGE_CLASSES)
+def test_no_scene_has_more_damages_of_a_kind_than_masks_distinguish(kind):
+    for first, *others in yard([kind], 99, 0):
+        assert len(first) == 99
+        assert not any(others)
+    for found in yard([kind], 20, 0):
+        assert [len(damages) for damages in found] == [20] * 4 + [19] + [0] * 5
+
+
+@pytest.mark.parametrize("count", [20, 60, 99])
+def test_scrapes_beside_dents_are_left_out_before_listed_damages(count):
+    """With 20 damages of five kinds, the scrapes beside dents alone are too many."""
+    kinds = list(ALL_DAMAGE_CLASSES)
+    for both, alone in zip(yard(kinds, count, 1), yard(kinds, count, 0), strict=True):
+        counts = Counter(d.kind for damages in both for d in damages)
+        assert counts["scrape"] == 99
+        assert max(counts.values()) == 99
+        for more, fewer in zip(both, alone, strict=True):
+            assert more[: len(fewer)] == fewer
 
 
 def test_bulges_end_at_the_bottom_rail_where_the_configuration_says_so():

@@ -1,6 +1,8 @@
 """Sampling of container damages: kind, place, size and depth."""
 
 import math
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -13,16 +15,28 @@ from fastgen.sampling.damage_forms import (
     draw,
     draw_scrape,
     draw_wear,
+    turned,
 )
 from fastgen.sampling.streams import Streams
 from fastgen.scene import Damage, Vec3
 from fastgen.scene.limits import MAX_INSTANCES
+from fastgen.validation import Range
 
 _CASTING_MM = 350.0
 """Distance from the frame within which the rim of a hole near a casting ends."""
 
 _SHEET_MM = 15.0
 """Approximate depth of the sheet's outer flats behind the outermost plane of the castings."""
+
+
+_KINK_APEX = Range(-0.5, 0.5)
+"""Place of a kink's deepest point, in half lengths from its middle."""
+
+_KINK_SOFTNESS = Range(0.03, 0.15)
+"""Rounding of a kink's folds, as a share of its depth."""
+
+_KINKS_ABOVE = 0.25
+"""Share of the kinks in posts that are just below the upper casting; others are above the lower."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +75,10 @@ def sample_damages(
         streams: Function from the name of a property to its independent random generator.
 
     Returns:
-        Damages in the container frame; an empty tuple for an undamaged container.
+        Damages in the container frame, those of listed_kinds first; an empty tuple for an
+        undamaged container.
     """
-    if streams("damage.any").random() >= config.probability or not config.kinds:
-        return ()
-    low, high = config.count
-    count = int(streams("damage.count").integers(low, high + 1))
-    kinds = streams("damage.kinds").choice(config.kinds, size=count)
+    kinds = listed_kinds(config, streams)
     planes = _planes(size_mm)
     damages: list[Damage] = []
     beside: list[Damage] = []
@@ -77,13 +88,55 @@ def sample_damages(
             damages.append(_axis(config, size_mm, rng))
             continue
         plane = planes[str(rng.choice(config.faces))]
-        form = SHEET_FORMS[str(kind)](config, plane.face, plane.size, rng)
-        damages.append(_on_sheet(str(kind), form, plane, rng))
+        form = SHEET_FORMS[kind](config, plane.face, plane.size, rng)
+        damages.append(_on_sheet(kind, form, plane, rng))
         scraped = "scrape" in config.kinds and kind in ("concave", "dented")
         rng = streams(f"damage.{i}.scrape")
-        if scraped and rng.random() < config.scrape.beside and len(beside) + count < MAX_INSTANCES:
+        room = len(beside) + len(kinds) < MAX_INSTANCES
+        if scraped and rng.random() < config.scrape.beside and room:
             beside.append(_beside(damages[-1], config, plane, rng))
     return (*damages, *beside)
+
+
+def listed_kinds(config: DamageConfig, streams: Streams) -> list[str]:
+    """Draw the kinds of one container's damages, without the scrapes beside them.
+
+    The arguments are those of sample_damages, which returns these damages first and then the
+    scrapes.
+    """
+    if streams("damage.any").random() >= config.probability or not config.kinds:
+        return []
+    low, high = config.count
+    count = int(streams("damage.count").integers(low, high + 1))
+    return list(map(str, streams("damage.kinds").choice(config.kinds, size=count)))
+
+
+def within_limit(
+    carried: Sequence[tuple[Damage, ...]], listed: Sequence[int]
+) -> list[tuple[Damage, ...]]:
+    """Leave out damages of a kind that a scene has more of than masks can distinguish.
+
+    Scrapes beside other damages are left out first, then the last damages.
+
+    Args:
+        carried: Damages of each container of the scene.
+        listed: Number of each container's damages that are not scrapes beside others; these
+            damages come first.
+    """
+    places = [
+        (i >= listed[n], n, i) for n, damages in enumerate(carried) for i in range(len(damages))
+    ]
+    counts: Counter[str] = Counter()
+    kept = set()
+    for _, n, i in sorted(places):
+        kind = carried[n][i].kind
+        counts[kind] += 1
+        if counts[kind] <= MAX_INSTANCES:
+            kept.add((n, i))
+    return [
+        tuple(damage for i, damage in enumerate(damages) if (n, i) in kept)
+        for n, damages in enumerate(carried)
+    ]
 
 
 def _planes(size_mm: Vec3) -> dict[str, _Plane]:
@@ -125,9 +178,7 @@ def _vector(v: np.ndarray, digits: int = 6) -> Vec3:
 
 def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generator) -> Damage:
     """Place a damage at a random position of the sheet."""
-    cos, sin = (abs(f(math.radians(form.turn_deg))) for f in (math.cos, math.sin))
-    along, across = form.half_mm or (form.size_mm[0] / 2, form.size_mm[1] / 2)
-    half = (cos * along + sin * across, sin * along + cos * across)
+    half = turned(form.half_mm or (form.size_mm[0] / 2, form.size_mm[1] / 2), form.turn_deg)
     x, y = _place(plane, form, half, rng)
     return _placed(kind, form, plane, plane.corner + x * plane.right + y * plane.up)
 
@@ -135,7 +186,7 @@ def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generato
 def _beside(
     damage: Damage, config: DamageConfig, plane: _Plane, rng: np.random.Generator
 ) -> Damage:
-    """Sample a scrape across a damage or just beside it, whose centre is inside the frame."""
+    """Sample a scrape across a damage or just beside it, which is moved to within the frame."""
     form = draw_scrape(config, plane.face, plane.size, rng)
     shift = [0.5 * extent * float(rng.uniform(-1, 1)) for extent in damage.size_mm]
     moved = (
@@ -143,9 +194,10 @@ def _beside(
         + shift[0] * np.array(damage.along)
         + shift[1] * np.array(damage.across)
     )
+    half = turned((form.size_mm[0] / 2, form.size_mm[1] / 2), form.turn_deg)
     x, y = (
-        float(np.clip((moved - plane.corner) @ axis, FRAME_MM, side - FRAME_MM))
-        for axis, side in zip((plane.right, plane.up), plane.size, strict=True)
+        float(np.clip((moved - plane.corner) @ axis, FRAME_MM + reach, side - FRAME_MM - reach))
+        for axis, side, reach in zip((plane.right, plane.up), plane.size, half, strict=True)
     )
     return _placed("scrape", form, plane, plane.corner + x * plane.right + y * plane.up)
 
@@ -186,8 +238,7 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
     slack = (room - length) / 2
     at = float(rng.uniform(-slack, slack))
     if post:
-        # three in four are just above the lower casting
-        at = slack * (1.0 if rng.random() < 0.25 else -1.0)
+        at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
     damage = Damage(
         kind="axis",
         face=_edge_name(others, signs),
@@ -200,8 +251,7 @@ def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Dama
     )
     if not kinked:
         return damage
-    apex, softness = float(rng.uniform(-0.5, 0.5)), float(rng.uniform(0.03, 0.15))
-    shape = (round(apex, 3), round(softness, 4))
+    shape = (draw(rng, _KINK_APEX, digits=3), draw(rng, _KINK_SOFTNESS, digits=4))
     return replace(damage, form="kinked", shape=shape, **asdict(draw_wear(rng)))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fastgen.config.damage import DamageConfig
+from fastgen.geometry.damage_forms.creased import SIDES
 from fastgen.scene.limits import LOBES
 from fastgen.validation import Range
 
@@ -14,11 +15,59 @@ FRAME_MM = 190.0
 """Width of the posts and rails around a face, which sheet damages stay clear of."""
 
 STEEL = (0.42, 0.41, 0.39)
-_PRIMERS = ((0.26, 0.26, 0.27), (0.27, 0.09, 0.05))
+"""Linear albedo of bare steel."""
+
+_BARE, _BARE_SHARES = (STEEL, (0.26, 0.26, 0.27), (0.27, 0.09, 0.05)), (0.5, 0.3, 0.2)
+"""Linear albedo of bare places, steel and two primers, and how frequent each is."""
+
+_PAINT_LOSS = (0.0, 0.3, 0.7, 1.0)
+"""Values of `Wear.paint_loss`, all equally likely."""
+
+_FRESH, _FRESH_SHARES, _SCRAPE_FRESH_SHARES = (0.0, 0.5, 1.0), (0.5, 0.25, 0.25), (0.25, 0.25, 0.5)
+"""Values of `Wear.fresh`, and how frequent each is; scrapes are fresh more frequently."""
+
 _FOREIGN_PAINTS = (
     *((0.75, 0.75, 0.72), (0.04, 0.04, 0.05), (0.75, 0.5, 0.03), (0.45, 0.04, 0.03)),
     (0.05, 0.12, 0.35),
 )
+"""Linear albedo of the paints that other objects leave in scrapes."""
+
+
+_CREASED_SIDES = Range(0.3, 0.95)
+"""Distance of each side of a folded area from its middle, as a share of half its size."""
+
+_RIBS_SOFTNESS_MM = Range(1.0, 4.0)
+"""Length over which the edge of a rib mark is rounded."""
+
+_RIBS_RAMP_MM, _RIBS_RAMP = 60.0, 1 / 3
+"""Length over which a row of rib marks runs out, and its largest share of the row."""
+
+_RIBS_WAVELENGTH_MM = Range(300.0, 1200.0)
+"""Wavelength of the unevenness of rib marks."""
+
+_RIBS_GIVE = Range(0.8, 0.95)
+"""Displacement of a rib as a share of how far the object reached in; the rest sprang back."""
+
+_TEAR_BELLY, _TEAR_WEDGE = (0.5, 0.5), (0.4, 0.4)
+"""Beta distributions of a tear's share below its line and likeness to a wedge: mostly extremes."""
+
+_TEAR_LEAST_MM = 12.0
+"""Smallest width of a tear that is not a split."""
+
+_TEARS_WITH_ARM, _TEAR_ARM = 0.2, Range(0.4, 0.9)
+"""Share of such tears with a second slit, and its length as a share of the first."""
+
+_TEAR_TURNS_DEG, _TEAR_SPREAD_DEG, _SPLIT_SPREAD_DEG = (0.0, 90.0), 12.0, 2.0
+"""Tears run along a rail or follow a rib, with these standard deviations."""
+
+_SCRAPE_RAGGED = Range(0.1, 0.5)
+"""Raggedness of the ends of a scrape, as a share of its length."""
+
+_SCRAPE_WAVE_MM = Range(0.0, 12.0)
+"""Waviness of the scratches."""
+
+_SCRAPE_PAINT_LOSS = Range(0.5, 1.0)
+"""Share of the deepest scratches that is bare."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +113,14 @@ def draw(rng: np.random.Generator, values: Range, most: float = math.inf, digits
 def draw_wear(rng: np.random.Generator) -> Wear:
     """Draw a surface: some damages keep their paint, some are bright, some are rusty."""
     return Wear(
-        paint_loss=float(rng.choice([0.0, 0.3, 0.7, 1.0])),
-        fresh=float(rng.choice([0.0, 0.5, 1.0], p=[0.5, 0.25, 0.25])),
+        paint_loss=float(rng.choice(_PAINT_LOSS)),
+        fresh=float(rng.choice(_FRESH, p=_FRESH_SHARES)),
         bare_albedo=_bare(rng),
     )
 
 
 def _bare(rng: np.random.Generator) -> tuple[float, float, float]:
-    return (STEEL, *_PRIMERS)[int(rng.choice(3, p=[0.5, 0.3, 0.2]))]
+    return _BARE[int(rng.choice(len(_BARE), p=_BARE_SHARES))]
 
 
 def _angle(rng: np.random.Generator) -> float:
@@ -96,7 +145,7 @@ def _concave(config: DamageConfig, face: str, size: _Size, rng: np.random.Genera
         return form
     shape = (
         _angle(rng),
-        *(round(float(rng.uniform(0.3, 0.95)), 3) for _ in range(5)),
+        *(draw(rng, _CREASED_SIDES, digits=3) for _ in range(SIDES)),
         draw(rng, c.crease_softness, digits=4),
         draw(rng, c.flattened),
     )
@@ -127,12 +176,12 @@ def _rib_marks(config: DamageConfig, size: _Size, rng: np.random.Generator) -> S
     length = draw(rng, c.length_mm, size[0] - 2 * FRAME_MM)
     height = draw(rng, c.height_mm)
     shape = (
-        round(float(rng.uniform(1.0, 4.0)), 2),
-        round(min(60.0, length / 3), 2),
+        draw(rng, _RIBS_SOFTNESS_MM),
+        round(min(_RIBS_RAMP_MM, _RIBS_RAMP * length), 2),
         draw(rng, c.unevenness),
-        round(float(rng.uniform(300.0, 1200.0)), 1),
+        draw(rng, _RIBS_WAVELENGTH_MM, digits=1),
         _angle(rng),
-        round(float(rng.uniform(0.8, 0.95)), 3),
+        draw(rng, _RIBS_GIVE, digits=3),
     )
     depth, turn = draw(rng, c.depth_mm), draw(rng, c.turn_deg)
     return SheetForm((length, height), depth, shape, turn, name="ribs", wear=draw_wear(rng))
@@ -163,20 +212,20 @@ def _tear(config: DamageConfig, size: _Size, rng: np.random.Generator) -> SheetF
         width = draw(rng, c.split_gape_mm, length)
     else:
         length = draw(rng, c.tear_length_mm, min(size) / 2)
-        width = round(max(length / draw(rng, c.tear_aspect), 12.0), 2)
-    has_arm = not split and rng.random() < 0.2
-    arm = round(length * float(rng.uniform(0.4, 0.9)), 2) if has_arm else 0.0
+        width = round(max(length / draw(rng, c.tear_aspect), _TEAR_LEAST_MM), 2)
+    has_arm = not split and rng.random() < _TEARS_WITH_ARM
+    arm = round(length * _TEAR_ARM.draw(rng), 2) if has_arm else 0.0
     shape = (
         draw(rng, c.rim_mm),
-        round(float(rng.beta(0.5, 0.5)), 3),
-        round(float(rng.beta(0.4, 0.4)), 3),
+        round(float(rng.beta(*_TEAR_BELLY)), 3),
+        round(float(rng.beta(*_TEAR_WEDGE)), 3),
         draw(rng, c.teeth_mm),
         _angle(rng),
         arm,
         draw(rng, c.twist),
     )
-    # most tears follow a rib or run along a rail
-    turn = round(float(rng.choice([0.0, 90.0]) + rng.normal(0, 2 if split else 12)), 2)
+    spread = _SPLIT_SPREAD_DEG if split else _TEAR_SPREAD_DEG
+    turn = round(float(rng.choice(_TEAR_TURNS_DEG) + rng.normal(0, spread)), 2)
     half = (length / 2 + width / 2 + shape[0], max(width + shape[3], arm) + shape[0])
     depth = draw(rng, c.depth_mm)
     return SheetForm((length, width), depth, shape, turn, half, "torn", draw_wear(rng))
@@ -189,22 +238,28 @@ def draw_scrape(
     c = config.scrape
     length = draw(rng, c.length_mm, size[0] - 2 * FRAME_MM)
     width = draw(rng, c.width_mm, size[1] - 2 * FRAME_MM)
-    shape = (
-        draw(rng, c.pitch_mm),
-        draw(rng, c.density),
-        draw(rng, c.contact_mm),
-        round(float(rng.uniform(0.1, 0.5)) * length, 2),
-        _angle(rng),
-        round(float(rng.uniform(0.0, 12.0)), 2),
-    )
+    pitch, density, contact = (draw(rng, each) for each in (c.pitch_mm, c.density, c.contact_mm))
+    ragged, phase, wave = _SCRAPE_RAGGED.draw(rng), _angle(rng), draw(rng, _SCRAPE_WAVE_MM)
     foreign = rng.random() < c.paint
     paint = _FOREIGN_PAINTS[int(rng.integers(len(_FOREIGN_PAINTS)))]
     wear = Wear(
-        paint_loss=round(float(rng.uniform(0.5, 1.0)), 3),
-        fresh=1.0 if foreign else float(rng.choice([0.0, 0.5, 1.0], p=[0.25, 0.25, 0.5])),
+        paint_loss=draw(rng, _SCRAPE_PAINT_LOSS, digits=3),
+        fresh=1.0 if foreign else float(rng.choice(_FRESH, p=_SCRAPE_FRESH_SHARES)),
         bare_albedo=paint if foreign else _bare(rng),
     )
-    return SheetForm((length, width), 0.0, shape, draw(rng, c.turn_deg), wear=wear)
+    turn = draw(rng, c.turn_deg)
+    # a turned scrape may be too long for its face
+    extents = turned((length, width), turn)
+    fit = min(1.0, *((side - 2 * FRAME_MM) / e for side, e in zip(size, extents, strict=True)))
+    length, width = round(fit * length, 2), round(fit * width, 2)
+    shape = (pitch, density, contact, round(ragged * length, 2), phase, wave)
+    return SheetForm((length, width), 0.0, shape, turn, wear=wear)
+
+
+def turned(size: _Size, turn_deg: float) -> _Size:
+    """Return the width and height of an upright box around a turned rectangle."""
+    cos, sin = (abs(f(math.radians(turn_deg))) for f in (math.cos, math.sin))
+    return cos * size[0] + sin * size[1], sin * size[0] + cos * size[1]
 
 
 SheetSampler = Callable[[DamageConfig, str, _Size, np.random.Generator], SheetForm]

@@ -102,14 +102,17 @@ def sample_neighbours(
     theirs = of_neighbours(config)
 
     def neighbour(site: Site) -> Neighbour:
-        def own(name: str) -> np.random.Generator:
-            return streams(f"{site.name}.{name}")
-
+        own = streams_of(site, streams)
         alike = own("same_paint").random() < config.placement.same_paint
         color = first.surface.paint.name if alike else None
         return Neighbour(site.pose, **sample_contents(theirs, site.kind, own, color)._asdict())
 
     return tuple(map(neighbour, sites))
+
+
+def streams_of(site: Site, streams: Streams) -> Streams:
+    """Return the streams of the neighbour at a site."""
+    return lambda name: streams(f"{site.name}.{name}")
 
 
 def sample_ground(

@@ -6,6 +6,7 @@ draws therefore leave all other properties of a scene unchanged.
 
 import hashlib
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
@@ -18,9 +19,16 @@ from fastgen.config.config import Config, SpreaderConfig
 from fastgen.config.fields import linear_color
 from fastgen.errors import ConfigError
 from fastgen.light.hdri import hours_of, illuminance_of
-from fastgen.sampling.contents import sample_contents
+from fastgen.sampling.contents import of_neighbours, sample_contents
+from fastgen.sampling.damage import listed_kinds, within_limit
 from fastgen.sampling.lamps import sample_lamps
-from fastgen.sampling.neighbours import sample_ground, sample_neighbours, sample_surroundings
+from fastgen.sampling.neighbours import (
+    Surroundings,
+    sample_ground,
+    sample_neighbours,
+    sample_surroundings,
+    streams_of,
+)
 from fastgen.sampling.sensor import sample_lens, sample_moment, sample_sensor, sample_weather
 from fastgen.sampling.streams import Streams, weighted_choice
 from fastgen.scene import (
@@ -30,6 +38,7 @@ from fastgen.scene import (
     Spreader,
     Vec3,
 )
+from fastgen.scene.limits import MAX_INSTANCES
 from fastgen.validation import check_weights, nearest
 
 SPLITS = ("train", "val", "test")
@@ -95,7 +104,26 @@ def sample_scene(config: Config, seed: int, index: int, environments: Mapping[st
         weather=weather,
     )
     absent = streams("absent").random() < config.container.absent
-    return without_container(scene) if absent else scene
+    return without_container(scene) if absent else _distinguishable(config, scene, around, streams)
+
+
+def _distinguishable(config: Config, scene: Scene, around: Surroundings, streams: Streams) -> Scene:
+    """Return a scene without the damages that masks could not distinguish."""
+    carried = [scene.damages, *(each.damages for each in scene.neighbours)]
+    counts = Counter(damage.kind for damages in carried for damage in damages)
+    if max(counts.values(), default=0) <= MAX_INSTANCES:
+        return scene
+    theirs = of_neighbours(config).damage
+    drawn = [(config.damage, streams)]
+    drawn += [(theirs, streams_of(site, streams)) for site in around.sites]
+    listed = [len(listed_kinds(damage, own)) for damage, own in drawn]
+    first, *others = within_limit(carried, listed)
+    neighbours = zip(scene.neighbours, others, strict=True)
+    return replace(
+        scene,
+        damages=first,
+        neighbours=tuple(replace(each, damages=damages) for each, damages in neighbours),
+    )
 
 
 def without_container(scene: Scene) -> Scene:
