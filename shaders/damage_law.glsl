@@ -35,7 +35,7 @@ int next_damage_near(int i, int end, vec3 p) {
 // Whether damage i, one of the first hole_count, tore p away.
 bool in_hole(int i, vec3 p) {
     vec3 q = damage_local(i, p);
-    float outside = i < perforation_plain_end ? outside_star(i, q.xy) : outside_tear(i, q.xy);
+    float outside = OUTSIDE_HOLE(i, q.xy);
     return outside < 0.0 && abs(q.z) < DAMAGE_FADE_START_MM;
 }
 
@@ -55,24 +55,15 @@ bool within_reach(int i, vec3 p) {
     return all(lessThan(abs(damage_local(i, p)), damage_reach[i].xyz + REACH_MARGIN_MM));
 }
 
-// Runs USE(i, field) for all damages of one form that may act on p. Each form has its own loop: one
-// loop with branches would cost the work of all forms per damage on llvmpipe, which executes both sides
-// of every branch.
+// Runs USE(i, field) for all damages of one form that may act on p. EACH_DAMAGE(USE) of damage.constants
+// has such a loop for each form: one loop with branches would cost the work of all forms per damage on
+// llvmpipe, which executes both sides of every branch.
 #define EACH_NEAR(FROM, END, FIELD, USE)                      \
     for (int i = next_damage_near(FROM, END, p); i < END;     \
          i = next_damage_near(i + 1, END, p)) {               \
         DamageField field = FIELD(i, damage_local(i, p));     \
         USE(i, field);                                        \
     }
-#define EACH_DAMAGE(USE)                                                        \
-    EACH_NEAR(0, perforation_plain_end, star_field, USE)                        \
-    EACH_NEAR(perforation_plain_end, perforation_torn_end, torn_field, USE)     \
-    EACH_NEAR(perforation_torn_end, dented_plain_end, fold_field, USE)          \
-    EACH_NEAR(dented_plain_end, dented_ribs_end, ribs_field, USE)               \
-    EACH_NEAR(dented_ribs_end, concave_plain_end, bow_field, USE)               \
-    EACH_NEAR(concave_plain_end, concave_creased_end, creased_field, USE)       \
-    EACH_NEAR(concave_creased_end, axis_plain_end, edge_field, USE)             \
-    EACH_NEAR(axis_plain_end, axis_kinked_end, kinked_field, USE)
 
 vec3 deformed(vec3 p) {
     vec3 moved = p;
@@ -110,7 +101,7 @@ DamageSample damage_at(vec3 p) {
     }
     EACH_DAMAGE(SAMPLE)
     if (length(moved) < damage_threshold_mm) d.value = 0u;
-    for (int i = next_damage_near(axis_kinked_end, scrape_plain_end, p); i < scrape_plain_end;
+    for (int i = next_damage_near(FIRST_SCRAPE, scrape_plain_end, p); i < scrape_plain_end;
          i = next_damage_near(i + 1, scrape_plain_end, p)) {
         vec3 q = damage_local(i, p);
         bool here = scraped(i, q);

@@ -1,5 +1,5 @@
 // DamageField torn_field(int i, vec3 q): lips of torn sheet, at local coordinates q.
-// float outside_tear(int i, vec2 q): about the distance from its hole in mm, negative within.
+// float outside_torn(int i, vec2 q): about the distance from its hole in mm, negative within.
 // Twin of fastgen/geometry/damage_forms/torn.py.
 
 #include "units.constants"
@@ -16,7 +16,7 @@ float ragged(float height, float u, float phase) {
                            0.6 * sin(2.0 * PI * u / TORN_SHORT_TEETH_MM + 2.3 * phase + 2.0 * irregular));
 }
 
-float outside_tear(int i, vec2 q) {
+float outside_torn(int i, vec2 q) {
     vec4 shape = damage_shape[3 * i];      // Rim, belly, wedge, teeth.
     vec4 more = damage_shape[3 * i + 1];   // Phase, second slit, twist.
     float half_length = damage_along[i].w;
@@ -37,7 +37,7 @@ float outside_tear(int i, vec2 q) {
     return min(outside, arm + (more.y < 1.0 ? ANYWHERE_MM : 0.0));
 }
 
-// Displacement at q, without the fade. outside: outside_tear(i, q).
+// Displacement at q, without the fade. outside: outside_torn(i, q).
 float torn_amount(int i, vec2 q, float outside) {
     float rim = clamp(1.0 - outside / damage_shape[3 * i].x, 0.0, 1.0);
     float upward = q.y / (abs(q.y) + damage_across[i].w);
@@ -47,12 +47,12 @@ float torn_amount(int i, vec2 q, float outside) {
 
 DamageField torn_field(int i, vec3 q) {
     float fade = sheet_fade(q.z);
-    float outside = outside_tear(i, q.xy);
+    float outside = outside_torn(i, q.xy);
     float amount = torn_amount(i, q.xy, outside);
     vec2 right = q.xy + vec2(1.0, 0.0);
     vec2 up = q.xy + vec2(0.0, 1.0);
-    vec2 slope = vec2(torn_amount(i, right, outside_tear(i, right)),
-                      torn_amount(i, up, outside_tear(i, up)));
+    vec2 slope = vec2(torn_amount(i, right, outside_torn(i, right)),
+                      torn_amount(i, up, outside_torn(i, up)));
     float edge = clamp(1.0 - outside / min(0.35 * damage_shape[3 * i].x, 25.0), 0.0, 1.0);
     return DamageField(fade * amount, fade * vec3(slope - amount, 0.0), edge * step(0.5, fade));
 }

@@ -1,11 +1,13 @@
 """Every form of damage, with random parameters over all that a scene may have."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.geometry.damage_forms import FORMS
 from fastgen.geometry.damage_law import (
     amount_mm,
     in_hole,
@@ -17,8 +19,10 @@ from fastgen.geometry.damage_law import (
 )
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.damage import severity_mm
+from fastgen.render.constants import constants_text
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
+from fastgen.render.variant import ShaderVariant
 from tests.glsl import blocks, run
 from tests.random_damages import AXES, FORM_NAMES, points_around, random_damage
 
@@ -31,7 +35,7 @@ vec4 f(vec4 x) {
 #define PICK(i, field) if (i == number) changed.x = field.amount
     EACH_DAMAGE(PICK)
     changed.y = float(number < hole_count && in_hole(number, p));
-    changed.z = float(number >= axis_kinked_end && scraped(number, damage_local(number, p)));
+    changed.z = float(number >= FIRST_SCRAPE && scraped(number, damage_local(number, p)));
     return changed;
 }
 """
@@ -42,6 +46,21 @@ vec4 f(vec4 x) {
 def gl():
     with open_context() as made:
         yield made
+
+
+def test_the_shaders_loop_over_the_forms_in_their_order():
+    """Damages of a form lie between the end of the form before and its own."""
+    text = constants_text("damage", ShaderVariant())
+    (each,) = re.findall(r"#define EACH_DAMAGE\(USE\) (.*)", text)
+    loops = re.findall(r"EACH_NEAR\((\w+), (\w+), (\w+)_field, USE\)", each)
+    moving = [form for form in FORMS if form.kind != "scrape"]
+    assert [name for _, _, name in loops] == [form.glsl for form in moving]
+    ends = [f"{form.kind}_{form.name}_end" for form in moving]
+    assert [loop[:2] for loop in loops] == list(zip(["0", *ends[:-1]], ends, strict=True))
+    assert f"#define FIRST_SCRAPE {ends[-1]}\n" in text
+    # loops over holes begin at 0, and scrapes follow all forms that move the sheet
+    assert [bool(form.outline) for form in FORMS] == [True] * 2 + [False] * 7
+    assert [form for form in FORMS if form.marked] == [FORMS[-1]]
 
 
 def displacements(damage, low, high, count):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from fastgen.camera import tone_curve
 from fastgen.classes import SPREADER_ID
 from fastgen.decals.artwork import ART_SIZE
-from fastgen.geometry.damage_forms import creased, form, scraped, torn
+from fastgen.geometry.damage_forms import FORMS, creased, form, scraped, torn
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.light import environment
@@ -211,6 +211,24 @@ def _ground(v: ShaderVariant) -> Defines:
     }
 
 
+def _damage_loops() -> Defines:
+    """Return macros over all forms of damage; damages are sorted in the order of FORMS."""
+    ends = [f"{each.kind}_{each.name}_end" for each in FORMS]
+    moving = [
+        f"EACH_NEAR({first}, {end}, {each.glsl}_field, USE)"
+        for each, first, end in zip(FORMS, ["0", *ends], ends, strict=False)
+        if each.marked is None
+    ]
+    holes = [(f"outside_{each.glsl}(i, q)", end)
+             for each, end in zip(FORMS, ends, strict=True) if each.outline]  # fmt: skip
+    outside = "".join(f"(i) < {end} ? {distance} : " for distance, end in holes[:-1])
+    return {
+        "EACH_DAMAGE(USE)": " ".join(moving),
+        "OUTSIDE_HOLE(i, q)": f"({outside}{holes[-1][0]})",
+        "FIRST_SCRAPE": ends[len(moving) - 1],
+    }
+
+
 CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
     "variant": _variant,
     "pixel_list": _lists,
@@ -253,6 +271,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "TORN_LONG_TEETH_MM": f"{torn.TEETH_MM[0]:.1f}",
         "TORN_SHORT_TEETH_MM": f"{torn.TEETH_MM[1]:.1f}",
         "TORN_ARM_GAPE": f"{torn.ARM_GAPE:g}",
+        **_damage_loops(),
     },
     "ground": _ground,
     "inside": lambda _: {

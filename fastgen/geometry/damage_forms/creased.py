@@ -88,4 +88,4 @@ def _apex(shape: tuple[float, ...]) -> float:
     return float(above_zero(np.array(height), softness))
 
 
-CREASED = Form("concave", "creased", _creased, half_size, _span, _largest)
+CREASED = Form("concave", "creased", "creased", _creased, half_size, _span, _largest)

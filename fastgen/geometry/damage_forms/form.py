@@ -36,6 +36,7 @@ class Form:
     Attributes:
         kind: One of classes.ALL_DAMAGE_CLASSES.
         name: Value of `Damage.form`.
+        glsl: Name in the shaders: `GLSL_field` is its displacement, and `outside_GLSL` its outline.
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
         reach: Function of a damage to the distances along and across within which it acts.
@@ -52,6 +53,7 @@ class Form:
 
     kind: str
     name: str
+    glsl: str
     amount: Callable[[Damage, Array, Array, Array], Array]
     reach: Callable[[Damage], tuple[float, float]]
     span: Callable[[Damage], tuple[float, float]] = depth_span

@@ -26,4 +26,4 @@ def _largest(damage: Damage) -> float:
     return abs(damage.depth_mm) * float(tip)
 
 
-KINKED = Form("axis", "kinked", _kinked, half_size, largest=_largest, along_edge=True)
+KINKED = Form("axis", "kinked", "kinked", _kinked, half_size, largest=_largest, along_edge=True)

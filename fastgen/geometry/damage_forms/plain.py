@@ -75,7 +75,7 @@ def _star_reach(damage: Damage) -> tuple[float, float]:
     return reach, reach
 
 
-STAR = Form("perforation", "plain", _star, _star_reach, outline=_outside_star)
-FOLD = Form("dented", "plain", _fold, _fold_reach)
-BOW = Form("concave", "plain", _bow, half_size)
-EDGE = Form("axis", "plain", _edge, half_size, along_edge=True)
+STAR = Form("perforation", "plain", "star", _star, _star_reach, outline=_outside_star)
+FOLD = Form("dented", "plain", "fold", _fold, _fold_reach)
+BOW = Form("concave", "plain", "bow", _bow, half_size)
+EDGE = Form("axis", "plain", "edge", _edge, half_size, along_edge=True)

@@ -46,4 +46,4 @@ def _largest(damage: Damage) -> float:
     return float(give * above_zero(object_mm, softness_mm))
 
 
-RIBS = Form("dented", "ribs", _pressed, half_size, largest=_largest)
+RIBS = Form("dented", "ribs", "ribs", _pressed, half_size, largest=_largest)

@@ -26,4 +26,4 @@ def _marked(damage: Damage, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
     return np.asarray((outside < 0) & (w < contact_mm) & (w > -PROUD_MM))
 
 
-SCRAPED = Form("scrape", "plain", _unmoved, half_size, marked=_marked)
+SCRAPED = Form("scrape", "plain", "scraped", _unmoved, half_size, marked=_marked)

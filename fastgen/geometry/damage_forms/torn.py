@@ -71,4 +71,4 @@ def _span(damage: Damage) -> tuple[float, float]:
     return min(damage.depth_mm, lower_mm, 0.0), max(damage.depth_mm, lower_mm, 0.0)
 
 
-TORN = Form("perforation", "torn", _torn, _reach, _span, outline=outside_mm)
+TORN = Form("perforation", "torn", "torn", _torn, _reach, _span, outline=outside_mm)
