@@ -9,8 +9,8 @@ import simplejpeg
 from PIL import Image
 from pycocotools import mask as coco_mask
 
-from fastgen.classes import DETECTION_CLASSES
-from fastgen.config.config import LabelConfig
+from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
+from fastgen.config.config import Config, LabelConfig
 from fastgen.files import images as encode
 from fastgen.formats import coco, damage, yolo
 from fastgen.formats.format import assemble
@@ -166,6 +166,34 @@ def test_an_empty_image_has_files_but_no_annotations(generators):
         name: name == "bop" for name in known_formats()
     }
     assert record["facts"]["bop"]["gt"] == []
+
+
+@pytest.mark.parametrize("extra", ["scrape", "limited_quantity"])
+def test_categories_include_those_of_scenes_that_the_configuration_does_not_draw(generators, extra):
+    """Scenes keep their scrapes or marks when another generator draws them."""
+    values = {
+        "scrape": {"damage": {"probability": 1, "count": 9, "kinds": ["scrape"]}},
+        "limited_quantity": {"markings": {"marks": {"limited_quantity": 1}}},
+    }[extra]
+    scene = Generator(Config.from_values(values), seed=5).scene(0)
+    usual = Config()
+    generator = generators(usual, seed=2, size=(320, 320))
+    samples = [generator.render(scene=scene, camera=name) for name in ("A", "B")]
+    name = "damage" if extra == "scrape" else "imdg"
+    form = known_formats()[name]
+    records = [assemble(item_of(sample), [form])[1] for sample in samples]
+
+    def categories(records):
+        files = dict(form.dataset_files("train", lambda: iter(records), usual))
+        return json.loads("".join(files[f"{name}/coco_train.json"]))["categories"]
+
+    used = {item["category_id"] for record in records for item in record["facts"][name]}
+    assert form.classes.index(extra) + 1 in used
+    listed = categories(records)
+    assert [each["id"] for each in listed] == list(range(1, len(form.classes) + 1))
+    assert [each["name"] for each in listed] == list(form.classes)
+    plain = SEGMENTATION_CLASSES if extra == "scrape" else DETECTION_CLASSES
+    assert [each["name"] for each in categories([])] == list(plain)
 
 
 def test_records_survive_json(samples):

@@ -124,6 +124,7 @@ def has_annotations(text: bytes, annotations: list[dict[str, Any]]) -> bool:
 def file_text(
     description: str,
     categories: Sequence[dict[str, Any]],
+    usual: int,
     records: Callable[[], Iterable[dict[str, Any]]],
     facts: str,
 ) -> Iterator[str]:
@@ -131,7 +132,9 @@ def file_text(
 
     Args:
         description: Description of the dataset.
-        categories: The file's categories.
+        categories: Categories in the order of their ids.
+        usual: Number of categories that the file lists. If it has an annotation of a later one, it
+            lists all: scenes made by hand may carry what the configuration does not draw.
         records: Returns the images' records; each call starts from the beginning.
         facts: Name of the format whose facts are the annotations.
     """
@@ -145,8 +148,7 @@ def file_text(
         "url": "",
         "date_created": "",
     }
-    yield f'{{"info":{_json(info)},"licenses":[{_json(_LICENSE)}],'
-    yield f'"categories":{_json(categories)},"images":['
+    yield f'{{"info":{_json(info)},"licenses":[{_json(_LICENSE)}],"images":['
     for number, record in enumerate(records(), start=1):
         width, height = record["size"]
         image = {
@@ -162,8 +164,11 @@ def file_text(
     for number, record in enumerate(records(), start=1):
         for item in record["facts"][facts]:
             count += 1
+            if item["category_id"] > usual:
+                usual = len(categories)
             yield ("," if count > 1 else "") + _json({"id": count, "image_id": number, **item})
-    yield "]}"
+    # behind the annotations, which decide about them
+    yield f'],"categories":{_json(categories[:usual])}}}'
 
 
 def _json(value: Any) -> str:

@@ -44,7 +44,7 @@ class _Container(Format):
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Corner castings of synthetic shipping containers, and the containers' poses"
-        text = coco.file_text(words, CATEGORIES, records, self.name)
+        text = coco.file_text(words, CATEGORIES, len(CATEGORIES), records, self.name)
         yield f"container/coco_{split}.json", text
 
 

@@ -91,9 +91,11 @@ class _Damage(Format):
         words = "Synthetic shipping containers with damage masks"
         categories = [
             {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
-            for i, name in enumerate(config.damage.segmentation_classes)
+            for i, name in enumerate(self.classes)
         ]
-        yield f"damage/coco_{split}.json", coco.file_text(words, categories, records, self.name)
+        usual = len(config.damage.segmentation_classes)
+        text = coco.file_text(words, categories, usual, records, self.name)
+        yield f"damage/coco_{split}.json", text
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         size = picture.shape[1::-1]

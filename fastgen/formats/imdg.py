@@ -60,8 +60,9 @@ class _Imdg(Format):
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         words = "Synthetic shipping containers with dangerous-goods markers and identifiers"
         classes = config.markings.detection_classes
-        categories = [{"id": i + 1, "name": name} for i, name in enumerate(classes)]
-        yield f"imdg/coco_{split}.json", coco.file_text(words, categories, records, self.name)
+        categories = [{"id": i + 1, "name": name} for i, name in enumerate(self.classes)]
+        text = coco.file_text(words, categories, len(classes), records, self.name)
+        yield f"imdg/coco_{split}.json", text
         if split == SPLITS[0]:
             names = "".join(f"  {i}: {name}\n" for i, name in enumerate(classes))
             # without the key `path`, trainers take folders relative to this file
