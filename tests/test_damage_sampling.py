@@ -86,8 +86,8 @@ def test_scrapes_that_would_reach_the_opposite_wall_are_refused():
     (first, *_) = scene.damages
     deep = replace(first, shape=(*first.shape[:2], 201.0, *first.shape[3:]))
     words = (
-        r"scene.damages\[0\].shape\[2\]: 201.0 is out of range; give a depth behind the face up to "
-        r"which the sheet is scraped in mm of 0.001 to 200"
+        r"scene.damages\[0\].shape\[2\] \(depth behind the face up to which the sheet is scraped "
+        r"in mm\): 201.0 is out of range; give 0.001 to 200"
     )
     with pytest.raises(ConfigError, match=words):
         check_scene(replace(scene, damages=(deep,)))

@@ -107,7 +107,7 @@ def test_bad_arguments_of_a_render_are_named(generator, arguments, words):
         (
             "damages",
             {"form": "plain", "shape": (1.0,)},
-            r"damages\[0\].shape: a concave of form plain has 0 numbers, not 1",
+            r"damages\[0\].shape: 1 number, but kind concave, form plain has none",
         ),
         ("damages", {"size_mm": (9.0, -1.0)}, r"damages\[0\].size_mm\[1\]: -1.0 is out of range"),
         ("damages", {"along": (0.0, 0.0, 0.0)}, r"damages\[0\].along, across, inward: these"),

@@ -150,11 +150,15 @@ def shaped(full, kind, form, shape):
 def test_every_number_of_a_damage_is_checked(full, kind, form):
     middle = [0.5 * (each.low + min(each.high, 100.0)) for each in SHAPES[kind, form]]
     check_scene(shaped(full, kind, form, middle))
-    with pytest.raises(ConfigError, match=rf"^scene.damages\[0\].shape: a {kind} of form {form}"):
+    with pytest.raises(ConfigError, match=r"^scene.damages\[0\].shape: ") as caught:
         check_scene(shaped(full, kind, form, [*middle, 1.0]))
+    given = "1 number, but" if not middle else f"{len(middle) + 1} numbers, but"
+    assert f"{given} kind {kind}, form {form} has " in str(caught.value)
+    # the error lists what the numbers are
+    assert all(parameter.name in str(caught.value) for parameter in SHAPES[kind, form])
     for i, each in enumerate(SHAPES[kind, form]):
         for value in (each.low - 1e-3, each.high * 1.01 + 1e-3, math.nan):
-            with pytest.raises(ConfigError, match=rf"^scene.damages\[0\].shape\[{i}\]: "):
+            with pytest.raises(ConfigError, match=rf"^scene.damages\[0\].shape\[{i}\][: ]"):
                 check_scene(shaped(full, kind, form, [*middle[:i], value, *middle[i + 1 :]]))
 
 

@@ -170,13 +170,15 @@ def _check_damage(damage: Damage, path: str) -> None:
     check_known(f"{path}.form", damage.form, forms)
     wanted = SHAPES[damage.kind, damage.form]
     if len(damage.shape) != len(wanted):
+        given = f"{len(damage.shape)} number{'s' * (len(damage.shape) != 1)}"
+        numbers = f"{len(wanted)} ({'; '.join(each.name for each in wanted)}); give these"
         raise ConfigError(
-            f"{path}.shape: a {damage.kind} of form {damage.form} has {len(wanted)} numbers, not "
-            f"{len(damage.shape)}"
+            f"{path}.shape: {given}, but kind {damage.kind}, form {damage.form} has "
+            f"{numbers if wanted else 'none; give an empty one'}"
         )
     for i, (value, parameter) in enumerate(zip(damage.shape, wanted, strict=True)):
         if not parameter.low <= value <= parameter.high:
             raise ConfigError(
-                f"{path}.shape[{i}]: {value!r} is out of range; give a {parameter.name} of "
+                f"{path}.shape[{i}] ({parameter.name}): {value!r} is out of range; give "
                 f"{parameter.low:g} to {parameter.high:g}"
             )
