@@ -82,7 +82,8 @@ struct DamageSample {
 
 void add_scar(inout Scar scar, int i, float wear) {
     wear *= damage_bare[i].w;
-    if (wear > scar.wear) scar = Scar(wear, damage_shape[3 * i + 2].w, damage_bare[i].rgb);
+    if (wear > scar.wear)
+        scar = Scar(wear, damage_shape[3 * i + 2].w, damage_bare[i].rgb, i >= FIRST_SCRAPE);
 }
 
 DamageSample damage_at(vec3 p) {

@@ -1,6 +1,6 @@
 // DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
 // NoiseSample streaks): decals over the albedo `paint` at a point of the atlas: albedo, coverage and
-// object id. footprint_mm: width of the lookup on the surface.
+// object id, and coverage by repairs. footprint_mm: width of the lookup on the surface.
 
 #include "decals.constants"
 #include "tone_curve.glsl"
@@ -15,6 +15,7 @@ struct DecalHit {
     vec3 albedo;
     float alpha;   // Covered share of the footprint, 0..1.
     uint id;       // Object at the exact point, 0 for none.
+    float patched;   // Share of the footprint under paint or tape of a repair, 0..1.
 };
 
 vec4 decal_texel(uint decal, int column) {
@@ -121,12 +122,13 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
         alpha *= 1.0 - ink.a * covered(coarse.value.w, 0.6, coarse.lost.w, 0.15);
     hit.albedo = mix(hit.albedo, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);
+    if (kind.x == DECAL_PATCH) hit.patched += alpha * (1.0 - hit.patched);
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
 DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
                    NoiseSample streaks) {
-    DecalHit hit = DecalHit(paint, 0.0, 0u);
+    DecalHit hit = DecalHit(paint, 0.0, 0u, 0.0);
     uvec4 cell = cell_at(zone, atlas_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;

@@ -68,13 +68,14 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar)
     albedo = bleached(albedo, bleach_share);
     roughness = mix(roughness, 0.8, 0.6 * bleach_share);
 #endif
-    float decal_alpha = 0.0;
+    float decal_alpha = 0.0, patched = 0.0;
 #if WITH_DECALS
     DecalHit decal = decals_at(zone, albedo, atlas_mm, footprint_mm, coarse, streaks);
     s.decal_id = decal.id;
 #if SHOWN_DECALS
     albedo = decal.albedo;
     decal_alpha = decal.alpha;
+    patched = decal.patched;
     roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
 #endif
 #endif
@@ -107,8 +108,9 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar)
     rusty = sticker * rust.all;
 #if WITH_DAMAGE
     // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and
-    // door gear in front of the sheet is not scarred.
-    float worn = scar.wear * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0);
+    // door gear in front of the sheet is not scarred. Repairs are painted over bent steel.
+    float worn = scar.wear * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0) *
+                 (scar.scraped ? 1.0 : 1.0 - patched);
     albedo = mix(albedo, mix(rust_albedo * 0.7, scar.albedo, scar.fresh), mix(0.5, 0.9, scar.fresh) * worn);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(worn), coarse.lost.y, 0.3) *
                        step(0.01, worn) * (1.0 - scar.fresh));

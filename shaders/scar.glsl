@@ -4,5 +4,6 @@ struct Scar {
     float wear;    // Share that has lost its paint, 0..1.
     float fresh;   // Share of it that has not rusted yet.
     vec3 albedo;   // Of the fresh share.
+    bool scraped;   // From a scrape, which is newer than repairs.
 };
-const Scar NO_SCAR = Scar(0.0, 0.0, vec3(0.0));
+const Scar NO_SCAR = Scar(0.0, 0.0, vec3(0.0), false);

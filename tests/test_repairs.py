@@ -4,13 +4,15 @@ import itertools
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from fastgen.config.config import Config
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.scene import Camera
+from fastgen.sampling.damage_spots import damage_spots
+from fastgen.scene import Camera, Decal, Spreader
 from fastgen.scene.faces import FACE_AXES
 from fastgen.scene.object_ids import object_ids
 from fastgen.srgb import DECODED
@@ -210,3 +212,38 @@ def test_a_patch_shows_its_colour_at_its_place_and_no_label(generators, quality)
             away = np.abs(DECODED[shown.image[row, column]] - patch.albedo).max(axis=1)
             assert abs((away < 0.03).mean() - share) < 0.02
         assert_same_labels(plain, shown)
+
+
+@pytest.mark.parametrize("kind", ["dented", "scrape"])
+def test_a_repair_covers_the_bare_steel_of_a_dent_but_no_scrape(generators, kind):
+    """The same damage without bare steel looks equal below the repair, and elsewhere different."""
+    drawn = {"probability": 1, "count": 1, "kinds": [kind], "faces": ["front"]}
+    values = {"damage": {**drawn, "dented": {"marks": {"probability": 0}}}}
+    generator = generators(Config.from_values(values), seed=3, size=(256, 256))
+    scene = generator.scene(0)
+    (damage,) = scene.damages
+    (spot,) = damage_spots(mesh_of(scene), scene.damages)
+    patch = Decal(
+        "sticker", "", "front", spot.center_mm, (300.0, 4000.0), art="patch",
+        albedo=(0.5, 0.02, 0.02),
+    )  # fmt: skip
+    x, y, z = damage.origin_mm
+    camera = Camera("C", (x, y - 2500.0, z), damage.origin_mm, 35.0)
+    bare, painted = (
+        replace(
+            scene, damages=(replace(damage, paint_loss=loss, fresh=1.0),), decals=(patch,),
+            cameras=(camera,), spreader=Spreader(),
+        )
+        for loss in (1.0, 0.0)
+    )  # fmt: skip
+    one, other = (generator.render(scene=each).image.astype(int) for each in (bare, painted))
+    worn = np.abs(one - other).max(axis=-1) > 8
+    red = (other[..., 0] > 2 * other[..., 1:].max(axis=-1)).astype(np.uint8)
+    square = np.ones((9, 9), np.uint8)
+    below, away = cv2.erode(red, square) > 0, cv2.dilate(red, square) == 0
+    assert below.sum() > 1000
+    assert (worn & away).sum() > 40
+    if kind == "scrape":
+        assert (worn & below).sum() > 40
+    else:
+        assert not (worn & below).any()
