@@ -1,4 +1,4 @@
-"""Damages with random parameters over all that a scene may have, for tests of every form."""
+"""Damages with random parameters from the ranges that scenes allow, for tests of every form."""
 
 import numpy as np
 
@@ -44,7 +44,7 @@ def _drawn(rng, low, high):
 
 
 def points_around(rng, damage, count):
-    """Return points in and around the reach, most of them near its limits.
+    """Return points in and around the reach, mostly near its limits.
 
     They are given as local coordinates [N, 3] and as positions [N, 3].
     """

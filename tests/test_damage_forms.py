@@ -1,4 +1,4 @@
-"""Every form of damage, with random parameters over all that a scene may have."""
+"""Every form of damage, with random parameters from the ranges that scenes allow."""
 
 import re
 from dataclasses import replace
@@ -66,7 +66,7 @@ def test_the_shaders_loop_over_the_forms_in_their_order():
 def displacements(damage, low, high, count):
     """Return the displacement [2, N, N] on a grid between local points [2], and u and v [N].
 
-    The first is of the outermost sheet, the second of sheet behind all corrugation.
+    The first layer is the outermost sheet, the second lies behind all corrugation.
     """
     u, v = (np.linspace(*ends, count) for ends in zip(low, high, strict=True))
     w = np.array([0.0, 60.0])[:, None, None]

@@ -234,7 +234,7 @@ def test_no_scene_has_more_damages_of_a_kind_than_masks_distinguish(kind):
 
 @pytest.mark.parametrize("count", [20, 60, 99])
 def test_scrapes_beside_dents_are_left_out_before_listed_damages(count):
-    """With 20 damages of five kinds, the scrapes beside dents alone are too many."""
+    """Scrapes beside dents exceed the limit with 20 damages, and listed damages with 60."""
     kinds = list(ALL_DAMAGE_CLASSES)
     for both, alone in zip(yard(kinds, count, 1), yard(kinds, count, 0), strict=True):
         counts = Counter(d.kind for damages in both for d in damages)

@@ -54,8 +54,8 @@ def damage_objects(shot: Shot) -> list[Object]:
 def severity_mm(damage: Damage) -> float:
     """Return the largest displacement by a damage, or the length of a hole or scrape, in mm.
 
-    It is that of the damage by itself. Forms with rounded folds do not reach their nominal depth,
-    and flattened corrugation adds to it.
+    Other damages at the same place do not count. Forms with rounded folds do not reach their
+    nominal depth, and flattened corrugation adds to the displacement.
     """
     cut = form_of(damage).outline or form_of(damage).marked
     return damage.size_mm[0] if cut else round(largest_mm(damage), 2)

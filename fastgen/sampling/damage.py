@@ -114,9 +114,9 @@ def listed_kinds(config: DamageConfig, streams: Streams) -> list[str]:
 def within_limit(
     carried: Sequence[tuple[Damage, ...]], listed: Sequence[int]
 ) -> list[tuple[Damage, ...]]:
-    """Leave out damages of a kind that a scene has more of than masks can distinguish.
+    """Limit the damages of each kind to the number that masks can distinguish.
 
-    Scrapes beside other damages are left out first, then the last damages.
+    Scrapes beside other damages are dropped first, then damages at the end of the list.
 
     Args:
         carried: Damages of each container of the scene.

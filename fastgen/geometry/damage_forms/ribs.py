@@ -34,8 +34,8 @@ def _pressed(damage: Damage, u: Array, v: Array, w: Array) -> Array:
 def _largest(damage: Damage) -> float:
     """Return the displacement where the bar reaches in farthest.
 
-    It does so near the crest of the unevenness that is nearest to the middle, or, if there is no
-    crest between the ends, elsewhere along the row.
+    This is near the crest of the unevenness closest to the middle of the row. A row without a crest
+    is searched at evenly spaced places.
     """
     softness_mm, _, _, wavelength_mm, phase, give = damage.shape
     half_length, _ = half_size(damage)

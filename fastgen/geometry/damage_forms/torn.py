@@ -66,9 +66,25 @@ def _reach(damage: Damage) -> tuple[float, float]:
     return along + rim_mm, across + rim_mm
 
 
+_PLACES = 33
+"""Places across the lower lip between which its displacement is bounded."""
+
+
 def _span(damage: Damage) -> tuple[float, float]:
-    lower_mm = damage.depth_mm * (1 - damage.shape[6])  # of the lower lip, at most
-    return min(damage.depth_mm, lower_mm, 0.0), max(damage.depth_mm, lower_mm, 0.0)
+    """Bound the displacement of the lower lip, which `twist` above 1 turns around.
+
+    Between two places below the slit, the lip bends at most as at the nearer one, and turns around
+    at most as at the farther one.
+    """
+    rim_mm, belly, _, jag_mm, *_, twist = damage.shape
+    _, half_gape = half_size(damage)
+    edge_mm = 2 * half_gape * belly + jag_mm
+    below = np.linspace(0.0, edge_mm + rim_mm, _PLACES)
+    rim = 1 - np.maximum(below[:-1] - edge_mm, 0.0) / rim_mm
+    lower = 0.5 + 0.5 * below[1:] / (below[1:] + half_gape)
+    least = min(float((rim**2 * (1 - twist * lower)).min()), 0.0)
+    upper_mm, lower_mm = damage.depth_mm, damage.depth_mm * least
+    return min(upper_mm, lower_mm), max(upper_mm, lower_mm)
 
 
 TORN = Form("perforation", "torn", "torn", _torn, _reach, _span, outline=outside_mm)
