@@ -1,8 +1,62 @@
 """Errors that a user can act on: they name the file, field or value and say what to do."""
 
+import reprlib
+from typing import Any
+
+_LONGEST = 4000
+"""Most characters of a message."""
+
+_LONGEST_NAME = 80
+"""Most characters of a name or key."""
+
+
+def one_line(text: str) -> str:
+    """Return a message that is safe to print: one line, with escaped control characters.
+
+    Control characters in names of files and keys could change colors, move the cursor or reverse
+    the direction of writing. The middle of a very long message is left out.
+    """
+    words = " ".join(text.split())
+    if len(words) > _LONGEST:
+        words = f"{words[: 3 * _LONGEST // 4]} ... {words[-_LONGEST // 4 :]}"
+    if words.isprintable():
+        return words
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in words)
+
+
+def shown(value: Any) -> str:
+    """Return a value as short text for a message; control characters are escaped."""
+    return _short.repr(value)
+
+
+def shown_name(name: object) -> str:
+    """Return a name or key as it is, or quoted and cut if it is long or not printable."""
+    text = str(name)
+    return text if text.isprintable() and len(text) <= _LONGEST_NAME else shown(text)
+
+
+class _Short(reprlib.Repr):
+    """`reprlib.Repr` that also accepts integers with more digits than Python converts to text."""
+
+    def repr_int(self, x: int, level: int) -> str:
+        try:
+            return super().repr_int(x, level)
+        except ValueError:
+            return f"an integer of {x.bit_length()} bits"
+
+
+_short = _Short()
+
 
 class FastgenError(Exception):
-    """Base of all errors for bad input or a missing capability of the machine."""
+    """Base of all errors for bad input or a missing capability of the machine.
+
+    Args:
+        message: What is wrong, where, and what to do; made safe to print with `one_line`.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 class ConfigError(FastgenError, ValueError):

@@ -12,7 +12,6 @@ import difflib
 import functools
 import math
 import numbers
-import reprlib
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -20,7 +19,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, shown, shown_name
 
 if typing.TYPE_CHECKING:
     from pydantic import TypeAdapter
@@ -32,7 +31,8 @@ _PAIR = "[lowest, highest]"
 _NUMBER = "[number]"
 """Tags in the location of pydantic's errors, for the two ways to write a range."""
 
-_short = reprlib.repr
+_MOST_CHOICES = 60
+"""Most names that a message lists."""
 
 
 class Range(NamedTuple):
@@ -96,7 +96,9 @@ class Bounds(NamedTuple):
             instead = f", or write [{lo - 360:g}, {hi:g}]" if full_turn else ""
             words = f"the lowest value {lo:g} is above the highest {hi:g}; swap them{instead}"
             raise PydanticCustomError("words", "{words}", {"words": words})
-        return make((lo, hi))
+        return make(
+            (lo + 0, hi + 0)
+        )  # -0.0 becomes 0.0: a range from 0.0 down to -0.0 cannot be drawn
 
 
 class OneOf(NamedTuple):
@@ -125,10 +127,15 @@ class Matching(NamedTuple):
 
 
 class _Strict:
-    """Accepts only values of the type itself; pydantic would convert 1 to True."""
+    """Accepts only booleans, Python's and NumPy's; pydantic would convert 1 to True."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
-        return typing.cast("CoreSchema", {**handler(source), "strict": True})
+        from pydantic_core import core_schema
+
+        strict = typing.cast("CoreSchema", {**handler(source), "strict": True})
+        return core_schema.no_info_before_validator_function(
+            lambda value: bool(value) if isinstance(value, np.bool_) else value, strict
+        )
 
 
 def _refusing(kind: str, schema: "CoreSchema", **context: Any) -> "CoreSchema":
@@ -153,17 +160,19 @@ Share = Annotated[float, UNIT]
 def nearest(word: Any, choices: Iterable[str]) -> str:
     """Return the hint ' (did you mean X?)' for a mistyped word, or the list of choices."""
     names = sorted(choices)
-    alike = [name for name in names if name.casefold() == str(word).casefold()]
-    close = alike or difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
+    text = word if isinstance(word, str) else shown(word)
+    alike = [name for name in names if name.casefold() == text.casefold()]
+    close = alike or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
     if close:
         return f" (did you mean {close[0]}?)"
-    return f" (choose from {', '.join(names)})"
+    more = f" and {len(names) - _MOST_CHOICES} more" if len(names) > _MOST_CHOICES else ""
+    return f" (choose from {', '.join(names[:_MOST_CHOICES])}{more})"
 
 
 def check_known(name: str, value: Any, choices: Collection[str]) -> None:
     """Raise ConfigError, starting with `name`, unless `value` is one of `choices`."""
     if not isinstance(value, str) or value not in choices:
-        raise ConfigError(f"{name}: {_short(value)} is unknown{nearest(value, choices)}")
+        raise ConfigError(f"{name}: {shown(value)} is unknown{nearest(value, choices)}")
 
 
 def check_weights(
@@ -191,7 +200,7 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
         return int(value)
     too_large = is_number and value > most
     wanted = f"{least} to {most}" if too_large or most < 2**63 - 1 else f"{least} or more"
-    raise ConfigError(f"{name}: {_short(value)} is not a whole number of {wanted}")
+    raise ConfigError(f"{name}: {shown(value)} is not a whole number of {wanted}")
 
 
 def to_plain(value: Any) -> Any:
@@ -227,12 +236,17 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
     return made
 
 
-def check_fields(value: Any, cls: type, path: str) -> None:
-    """Raise ConfigError unless `value` is an instance of `cls` whose fields fit their types.
+def check_fields(value: Any, cls: type[T], path: str) -> T:
+    """Return a copy of an instance of `cls` whose fields fit their types.
 
-    Unlike `from_plain` this converts nothing: a list is not accepted as a tuple.
+    Numbers and texts of other types, such as NumPy's, are Python's in the copy. Unlike `from_plain`
+    this converts nothing else: a list is not accepted as a tuple.
+
+    Raises:
+        ConfigError: naming the field that does not fit.
     """
-    _validated(cls, value, path, strict=True)
+    copy: T = _validated(cls, value, path, strict=True)
+    return copy
 
 
 def annotation(kind: type[T], hint: Any) -> T | None:
@@ -304,7 +318,7 @@ def _in_words(cls: type, errors: "list[ErrorDetails]", root: str) -> ConfigError
         loc = (*loc, "[key]")
     is_key = loc[-1:] == ("[key]",)
     path = _path(root, loc[:-2] if is_key else loc)
-    got = f"got {_short(value)}"
+    got = f"got {shown(value)}"
     match kind:
         case "value_error":  # from __post_init__; its message begins with the field
             return ConfigError(f"{path}.{context['error']}" if path else str(context["error"]))
@@ -321,9 +335,9 @@ def _in_words(cls: type, errors: "list[ErrorDetails]", root: str) -> ConfigError
         case "too_long":
             words = f"expected at most {context['max_length']} values, got {len(value)}"
         case "too_short":
-            words = f"{_short(value)} is empty; give at least one"
+            words = f"{shown(value)} is empty; give at least one"
         case "tuple_type":
-            instead = f"; write [{value!r}]" if isinstance(value, str) else ""
+            instead = f"; write [{shown(value)}]" if isinstance(value, str) else ""
             words = f"expected a {'tuple' if isinstance(value, list) else 'list'}, {got}{instead}"
         case "dict_type":
             words = f"expected a mapping, {got}"
@@ -337,13 +351,13 @@ def _in_words(cls: type, errors: "list[ErrorDetails]", root: str) -> ConfigError
         case "number" if not _is_number(value):
             words = f"expected a number, {got}{_unquoted(value)}"
         case "number" if not context["bounds"].lo <= value <= context["bounds"].hi:
-            words = f"{_short(value)} is out of range; give {context['bounds'].words}"
+            words = f"{shown(value)} is out of range; give {context['bounds'].words}"
         case "number":
             words = f"expected a whole number, {got}"
         case "choice":
-            words = f"{_short(value)} is unknown{nearest(value, context['choices'])}"
+            words = f"{shown(value)} is unknown{nearest(value, context['choices'])}"
         case "text" if isinstance(value, str):
-            words = f"{_short(value)} {context['otherwise']}"
+            words = f"{shown(value)} {context['otherwise']}"
         case _ if is_key:
             words = f"expected a name, {got}; put it in quotes"
         case "text" | "string_type":
@@ -359,7 +373,8 @@ def _path(root: str, loc: tuple[int | str, ...]) -> str:
     for step in loc:
         if step in (_PAIR, _NUMBER):
             break
-        path += f"[{step}]" if isinstance(step, int) else f".{step}" if path else step
+        name = f"[{step}]" if isinstance(step, int) else shown_name(step)
+        path += f".{name}" if path and isinstance(step, str) else name
     return path
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
-from fastgen.cli.main import main
+from fastgen.cli.main import _parser, main
 from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 from fastgen.preview import preview
 from fastgen.render.variant import LAYERS
@@ -91,6 +91,74 @@ def test_a_malformed_command_line_gets_one_clear_line_and_code_2(arguments, caps
     error = capsys.readouterr().err
     assert error.startswith("fastgen: ")
     assert error.count("\n") == 1
+
+
+def options_with_values():
+    """Yield command and option for each option that takes a value."""
+    (subparsers,) = (a for a in _parser()._actions if isinstance(a.choices, dict))
+    for command, parser in subparsers.choices.items():
+        for action in parser._actions:
+            if action.option_strings and action.nargs != 0:
+                yield from ((command, option) for option in action.option_strings)
+
+
+ODD_VALUES = [
+    (command, option, value)
+    for command, option in options_with_values()
+    for value in ("--", "9" * 5000 + "x")
+    if value == "--" or option not in ("--ray", "-o", "--camera", "--hdri")  # these take any text
+]
+
+
+@pytest.mark.parametrize(("command", "option", "value"), ODD_VALUES)
+def test_odd_values_of_every_option_get_one_clear_line_and_code_2(
+    command, option, value, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    required = {"--images": "1", "--index": "0", "-o": "x.zip"}  # and so nothing is rendered
+    needed = {"generate": ["--images"], "show": ["--index", "-o"], "export": ["--index", "-o"]}
+    given = [f"{name}={required[name]}" for name in needed.get(command, []) if name != option]
+    places = [] if command in ("config", "show", "export") else ["none/there"]
+    try:
+        code = main([command, *places, *given, f"{option}={value}"])
+    except SystemExit as stop:
+        code = stop.code
+    assert code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("fastgen: ")
+    assert error.count("\n") == 1
+    assert len(error) < 5000
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_options_with_values_are_found():
+    found = set(options_with_values())
+    assert {("generate", "--seed"), ("show", "-o"), ("fit", "--budget")} <= found
+    assert len(found) > 40
+
+
+@pytest.mark.parametrize("failure", [KeyError("a\x1b[31m"), RecursionError(), AssertionError("x")])
+def test_a_bug_has_a_code_of_its_own(failure, monkeypatch, capsys):
+    """1 stands for faults of a dataset, which a script may want to repair."""
+
+    def fails(_):
+        raise failure
+
+    monkeypatch.setattr("fastgen.cli.dataset_commands.examine", fails)
+    assert main(["verify", "x"]) == 70
+    error = capsys.readouterr().err
+    assert "this is a bug in fastgen: please report it" in error.splitlines()[-1]
+    assert "Traceback" in error
+    assert "\x1b" not in error
+
+
+def test_running_out_of_memory_is_no_bug(monkeypatch, capsys):
+    def fails(_):
+        raise MemoryError
+
+    monkeypatch.setattr("fastgen.cli.dataset_commands.examine", fails)
+    assert main(["verify", "x"]) == 2
+    assert capsys.readouterr().err.startswith("fastgen: out of memory")
 
 
 def test_show_writes_the_layer_that_it_is_asked_for(tmp_path, generators):

@@ -20,8 +20,24 @@ from fastgen.validation import Bounds, annotation
 from tests.plain import FEW_DECALS
 
 NASTY: tuple[typing.Any, ...] = (
-    *(math.nan, math.inf, -math.inf, 1e300, 10**400, -1, 0, 0.5, None, True, "", "x", "#+1+2+3"),
-    *([], [[]], [None], ["a", "b"], [1, 2, 3], [2, 1], [math.nan, 1], [1, math.inf], [-1e9, 1e9]),
+    *(
+        math.nan,
+        math.inf,
+        -math.inf,
+        1e300,
+        10**400,
+        -1,
+        0,
+        -0.0,
+        0.5,
+        None,
+        True,
+        "",
+        "x",
+        "#+1+2+3",
+    ),
+    *([], [[]], [None], ["a", "b"], [1, 2, 3], [2, 1], [0, -0.0], [math.nan, 1], [1, math.inf]),
+    [-1e9, 1e9],
     *({}, {"": 1}, {1: 2}, {"a": None}, {"a": {}}, {"front": math.nan}),
 )
 

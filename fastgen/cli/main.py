@@ -2,8 +2,9 @@
 
 import argparse
 import signal
+import traceback
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import fastgen
 from fastgen.cli.config_command import add_config_command
@@ -12,16 +13,19 @@ from fastgen.cli.fit_command import add_fit
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
 from fastgen.dataset.console import drop_unprinted, mend_streams, say, tell
-from fastgen.errors import FastgenError
+from fastgen.errors import FastgenError, one_line
 from fastgen.render import doctor
+
+_BUG = 70
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        The exit code: 0 for success, 1 if faults were found, 2 for bad input, 130 after Ctrl-C, 143
-        after SIGTERM.
+        The exit code: 0 for success, 1 if faults were found, 2 for bad input or a machine that
+        cannot do what is needed, 70 (EX_SOFTWARE of sysexits.h) for a bug of fastgen, 130 after
+        Ctrl-C, 143 after SIGTERM.
     """
     mend_streams()
     try:
@@ -44,14 +48,20 @@ def _run(arguments: Sequence[str] | None) -> int:
         return 128 + signal.SIGPIPE  # the reader of our output, such as head, has exited
     except OSError as error:
         return _refused(f"{error.filename or 'system'}: {error.strerror or error}")
+    except MemoryError:
+        return _refused("out of memory; use fewer workers or a smaller size")
     except KeyboardInterrupt as stop:
         say(STOPPED)
         return 128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT)
+    except Exception as error:
+        say("".join(traceback.format_exception(error)).rstrip())
+        say(one_line(f"fastgen: {error!r} (this is a bug in fastgen: please report it)"))
+        return _BUG
     return code
 
 
 def _refused(words: str) -> int:
-    say(f"fastgen: {' '.join(words.split())}")
+    say(one_line(f"fastgen: {words}"))
     return 2
 
 
@@ -59,7 +69,13 @@ class _Parser(argparse.ArgumentParser):
     """Parser that reports an error in one line, as every other error."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(2, f"fastgen: {' '.join(message.split())}; see {self.prog} --help\n")
+        self.exit(2, one_line(f"fastgen: {message}; see {self.prog} --help") + "\n")
+
+    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
+        # argparse removes `--`, also from `--seed=--`, and passes [] on as the value
+        if action.option_strings and arg_strings == ["--"]:
+            raise argparse.ArgumentError(action, "'--' is not a value; give one")
+        return super()._get_values(action, arg_strings)
 
 
 def _parser() -> argparse.ArgumentParser:

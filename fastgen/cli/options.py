@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, shown
 from fastgen.render.gl import BACKENDS
 from fastgen.render.settings import QUALITY, RenderSettings
 
@@ -112,7 +112,7 @@ def render_settings(options: argparse.Namespace) -> RenderSettings:
 
 
 def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
-        raise ConfigError(f"size: {text!r} is not a size; write WIDTHxHEIGHT, as in 640x640")
+        raise ConfigError(f"size: {shown(text)} is not a size; write WIDTHxHEIGHT, as in 640x640")
     return int(match[1]), int(match[2])

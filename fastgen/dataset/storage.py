@@ -272,6 +272,8 @@ Storage = Folder | Remote
 def storage_of(out: str | Path) -> Storage:
     """Return the storage at a path or at an address with '://'; file:// gives a Folder."""
     text = str(out).removeprefix("file://")
+    if "\0" in text:
+        raise OutputError(f"{text}: contains a null character, which no path may; leave it out")
     return Remote(text) if "://" in text else Folder(Path(text))
 
 
