@@ -82,7 +82,7 @@ def export_glb(
         ConfigError: The texel is too small, the scene cannot be drawn, or it has no container.
         OutputError: The file cannot be written.
     """
-    check_scene(scene)
+    scene = check_scene(scene)
     if not (scene.container.present or scene.neighbours or scene.ground):
         raise ConfigError(
             f"scene {scene.index}: has no container to export; take another, or set "

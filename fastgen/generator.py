@@ -95,7 +95,7 @@ class Generator:
         )
         # the cameras of a scene are usually rendered one after the other
         self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
-        self._given: PreparedScene | None = None
+        self._given: tuple[Scene, PreparedScene] | None = None
         self.gpu = GpuSession(
             partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
@@ -185,7 +185,7 @@ class Generator:
             ContextError: There is no OpenGL.
         """
         if labels is not None:
-            check_fields(labels, LabelConfig, "labels")
+            labels = check_fields(labels, LabelConfig, "labels")
         check_known("layer", layer, LAYERS)
         prepared, camera = self._chosen(index, camera, scene)
         scene, view = prepared.scene, view_of(camera, self.size)
@@ -316,17 +316,17 @@ class Generator:
             scene = self.scene(index)
         prepared = self._prepared(scene)
         if camera is None or isinstance(camera, str):
-            return prepared, find_camera(scene, camera)
-        return prepared, check_camera(camera, scene)
+            return prepared, find_camera(prepared.scene, camera)
+        return prepared, check_camera(camera, prepared.scene)
 
     def _prepared(self, scene: Scene) -> PreparedScene:
         """Return the geometry of a scene; check and prepare it once for all its cameras."""
         sampled, given = self._sampled, self._given  # another thread may replace them
         if sampled is not None and scene is sampled[1].scene:
             return sampled[1]
-        if given is None or scene is not given.scene:
-            self._given = given = PreparedScene(check_scene(scene))
-        return given
+        if given is None or scene is not given[0]:
+            self._given = given = scene, PreparedScene(check_scene(scene))
+        return given[1]
 
 
 def _sha256(path: Path) -> str:

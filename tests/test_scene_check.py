@@ -2,9 +2,12 @@
 
 import dataclasses
 import math
+from collections import Counter
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
+import orjson
 import pytest
 
 from fastgen import Config, Generator
@@ -84,7 +87,7 @@ def test_sampled_scenes_pass():
         generator = Generator(config, seed=5, size=SIZE)
         for index in range(20):
             scene = generator.scene(index)
-            assert check_scene(scene) is scene
+            assert check_scene(scene) == scene
             assert check_scene(Scene.from_json(scene.to_json())) == scene
 
 
@@ -99,6 +102,59 @@ def test_every_invalid_leaf_is_named(full, value):
         with pytest.raises(ConfigError) as caught:
             check_scene(spoilt(full, path, value))
         assert str(caught.value).startswith(f"{name(path)}: "), path
+
+
+class Text(str):
+    """Text of another class than str."""
+
+
+def foreign(value):
+    """Return equal values of other types, by a name; integers that are meant as floats count."""
+    if isinstance(value, bool):
+        return {"bool_": np.bool_(value)}
+    if isinstance(value, int):
+        return {kind.__name__: kind(value) for kind in (np.int64, np.int16, np.uint64)}
+    if isinstance(value, float):
+        exact = [kind for kind in (np.float32, np.float16) if float(kind(value)) == value]
+        made = {kind.__name__: kind(value) for kind in (np.float64, np.longdouble, *exact)}
+        return made | {"array": np.array(value), "Fraction": Fraction(value)}
+    return {"str_": np.str_(value), "Text": Text(value)}
+
+
+def types_in(part):
+    """Return the types of all scalars in the plain form of a scene."""
+    return {type(held(part, path)) for path in leaves(part)}
+
+
+def test_numbers_of_other_types_are_drawn_and_written_as_pythons(full):
+    """A scene is changed with NumPy's numbers, for example from an optimizer or a data frame."""
+    plain, tried = orjson.dumps(check_scene(full)), Counter()
+    for path in leaves(full):
+        for kind, value in foreign(held(full, path)).items():
+            changed = spoilt(full, path, value)
+            drawn = check_scene(changed)
+            assert drawn == full, (path, kind)
+            assert types_in(drawn) <= {int, float, str, bool}, (path, kind)
+            assert orjson.dumps(drawn) == plain  # as in the files of a dataset
+            assert Scene.from_json(changed.to_json()) == full, (path, kind)
+            tried[kind] += 1
+    assert min(tried[kind] for kind in ("bool_", "int64", "float32", "array", "Text")) > 0
+
+
+def test_a_camera_with_numpy_numbers_is_drawn_as_one_with_pythons(full):
+    given = replace(full.cameras[0], position_mm=tuple(np.float32([0, -9000, 1000])))
+    assert {type(value) for value in check_camera(given, full).position_mm} == {float}
+
+
+@pytest.mark.parametrize(
+    "value", [object(), b"x", {1}, np.zeros(2), 10**5000], ids=lambda value: type(value).__name__
+)
+def test_a_scene_with_unusable_values_is_not_written(full, value):
+    for path in (("seed",), ("environment", "yaw_deg"), ("decals", 0, "kind")):
+        with pytest.raises(ConfigError) as caught:
+            spoilt(full, path, value).to_json()
+        assert str(caught.value).startswith(f"{name(path)}: ")
+        assert len(str(caught.value)) < 200
 
 
 def test_every_missing_or_foreign_part_is_named(full):
@@ -182,7 +238,7 @@ def test_an_unknown_form_of_damage_is_named(full):
 
 def test_a_camera_passed_separately_is_checked_too(full):
     camera = Camera("c", (0, -9000, 1000), (0, 0, 1000), 20)
-    assert check_camera(camera, full) is camera
+    assert check_camera(camera, full) == camera
     assert view_of(camera, SIZE).size == SIZE
     with pytest.raises(ConfigError, match=r"^camera.lens.coefficients\[0\]: nan is out of range"):
         check_camera(replace(camera, lens=Lens("fisheye", (math.nan, 0, 0, 0))), full)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fastgen.decals.artwork import art_layers, glyph_tiles
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box
 from fastgen.scene.damage_shapes import SHAPES
@@ -26,7 +26,7 @@ _ART_KINDS = ("marker", "sticker", "triangle", "emblem")
 
 
 def check_scene(scene: Any) -> Scene:
-    """Return `scene` itself if it can be drawn.
+    """Return a copy of a scene that can be drawn, with NumPy's numbers as Python's.
 
     Every field is checked against its type and bounds, then against limits that involve several
     fields.
@@ -39,7 +39,28 @@ def check_scene(scene: Any) -> Scene:
             f"scene: {type(scene).__name__} is not a Scene; take one from Generator.scene or "
             "Scene.from_json"
         )
-    check_fields(scene, Scene, "scene")
+    checked = check_fields(scene, Scene, "scene")
+    _check_limits(checked)
+    return checked
+
+
+def check_camera(camera: Any, scene: Scene) -> Camera:
+    """Return a copy of a camera that sees the containers of a scene from outside.
+
+    NumPy's numbers are Python's in the copy.
+
+    Raises:
+        ConfigError: if not; the message starts with 'camera'.
+    """
+    if not isinstance(camera, Camera):
+        raise ConfigError(f"camera: {shown(camera)} is neither a Camera nor the name of one")
+    checked = check_fields(camera, Camera, "camera")
+    _check_camera(checked, "camera", scene)
+    return checked
+
+
+def _check_limits(scene: Scene) -> None:
+    """Check limits that involve several fields."""
     carried = scene.decals or scene.damages or scene.seals or scene.spreader.present
     if not scene.container.present and carried:
         raise ConfigError(
@@ -60,20 +81,6 @@ def check_scene(scene: Any) -> Scene:
     check_places(scene)
     for i, camera in enumerate(scene.cameras):
         _check_camera(camera, f"scene.cameras[{i}]", scene)
-    return scene
-
-
-def check_camera(camera: Any, scene: Scene) -> Camera:
-    """Return `camera` itself if it sees the containers of a scene from outside.
-
-    Raises:
-        ConfigError: if not; the message starts with 'camera'.
-    """
-    if not isinstance(camera, Camera):
-        raise ConfigError(f"camera: {camera!r} is neither a Camera nor the name of one")
-    check_fields(camera, Camera, "camera")
-    _check_camera(camera, "camera", scene)
-    return camera
 
 
 def _check_contents(carrier: Scene | Neighbour, path: str) -> None:

@@ -42,7 +42,7 @@ from fastgen.scene.limits import (
 )
 from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
-from fastgen.validation import Bounds, Flag, OneOf, Share, from_plain, to_plain
+from fastgen.validation import Bounds, Flag, OneOf, Share, check_fields, from_plain, to_plain
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue in the luminance; ITU-R BT.709-6, section 3.2."""
@@ -364,11 +364,18 @@ class Scene:
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
 
     def to_json(self) -> str:
-        """Return the scene as JSON text, which `from_json` reads back to an equal scene."""
-        return json.dumps(to_plain(self), indent=1)
+        """Return the scene as JSON text, which `from_json` reads back to an equal scene.
+
+        Raises:
+            ConfigError: naming a field whose value does not fit its type.
+        """
+        try:
+            return json.dumps(to_plain(self), indent=1)
+        except (TypeError, ValueError, RecursionError):  # not JSON's types: NumPy's, or no scene
+            return json.dumps(to_plain(check_fields(self, Scene, "scene")), indent=1)
 
     @staticmethod
-    def from_json(text: str) -> "Scene":
+    def from_json(text: str | bytes) -> "Scene":
         """Return the scene in the text of `to_json` or of a dataset's scene file.
 
         Raises:
