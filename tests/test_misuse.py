@@ -344,7 +344,7 @@ def test_show_takes_the_first_camera_of_a_rig(tmp_path):
         ("a: [1", "sequence (line 1, column 4): expected ',' or ']', but got '<stream end>' ("),
         ("a: \0", "special characters are not allowed at position 3"),
         ("surface: {rust_coverage: '1e-2'}", "write 0.01"),
-        ("day: 2026-99-99", "not a YAML file"),
+        ("day: 2026-99-99", "'2026-99-99' is not of the type timestamp (line 1, column 6)"),
         ("a: &a [*a]", "a: unknown key"),
     ],
 )

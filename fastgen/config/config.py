@@ -5,13 +5,11 @@ drawn from uniformly unless documented otherwise. Lengths are millimetres and an
 are sRGB hex codes, because people pick them on screens; scenes hold linear albedo.
 """
 
-import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-import yaml
 from annotated_types import MinLen
 
 from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
@@ -23,8 +21,8 @@ from fastgen.config.presets import PRESETS
 from fastgen.config.sensor import SensorConfig, WeatherConfig
 from fastgen.config.surface import SurfaceConfig
 from fastgen.config.surroundings import GroundConfig, PlacementConfig
-from fastgen.config.yaml_values import loaded
-from fastgen.errors import ConfigError
+from fastgen.config.yaml_values import loaded_file
+from fastgen.errors import ConfigError, shown
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.scene.limits import GAP_LIMITS_MM, ILLUMINANCE_LIMITS_LX
 from fastgen.validation import (
@@ -290,16 +288,10 @@ class Config:
         Raises:
             ConfigError: naming the file and the key or value that does not fit.
         """
-        try:
-            data = loaded(Path(path).read_text(encoding="utf-8"))
-        except (OSError, TypeError) as error:
-            words = error.strerror if isinstance(error, OSError) else "give a path"
-            raise ConfigError(f"{path}: cannot be read ({words})") from None
-        except (yaml.YAMLError, ValueError, RecursionError) as error:  # ValueError: invalid dates
-            raise ConfigError(f"{path}: not a YAML file ({' '.join(str(error).split())})") from None
+        data = loaded_file(path)
         if not isinstance(data, Mapping | None):
             raise ConfigError(
-                f"{path}: holds {reprlib.repr(data)}; give keys with their values, as in "
+                f"{path}: holds {shown(data)}; give keys with their values, as in "
                 "damage: {probability: 0.5}"
             )
         try:

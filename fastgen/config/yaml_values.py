@@ -1,10 +1,22 @@
 """Reading and writing of YAML and JSON text, with corrections to PyYAML."""
 
 import re
-import reprlib
+from pathlib import Path
 from typing import Any
 
 import yaml
+
+from fastgen.errors import ConfigError, shown
+
+LONGEST_FILE = 512 << 10
+"""Most bytes of a file. PyYAML reads about 100 kB per second, and a whole configuration has 40 kB.
+"""
+
+_MOST_VALUES = 200_000
+"""Most values of a file after its aliases are replaced, each of which may repeat many values."""
+
+_LONGEST_NUMBER = 1000
+"""Most characters of a number. Numbers to base 60 take quadratic time to read."""
 
 _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
     "tag:yaml.org,2002:float",
@@ -14,15 +26,45 @@ _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
 """Arguments of add_implicit_resolver that make PyYAML read 1e-05 as a number."""
 
 
+def loaded_file(path: str | Path) -> Any:
+    """Return the value of a YAML or JSON file.
+
+    Raises:
+        ConfigError: naming the file, and the line and column of a mistake.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(LONGEST_FILE + 1)  # also of files that have no end, such as /dev/zero
+    except (OSError, TypeError, ValueError) as error:  # ValueError: a null character
+        words = error.strerror if isinstance(error, OSError) else "give a path"
+        raise ConfigError(f"{path}: cannot be read ({words})") from None
+    if len(data) > LONGEST_FILE:
+        raise ConfigError(
+            f"{path}: is longer than {LONGEST_FILE} bytes; give a file with only the keys that "
+            "change"
+        )
+    try:
+        return loaded(data.decode("utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not a YAML file ({error})") from None
+
+
 def loaded(text: str) -> Any:
     """Return the value of a YAML or JSON text.
 
     Raises:
         yaml.YAMLError: naming the line and column of the mistake.
-        ValueError, RecursionError: from PyYAML itself, for example for an invalid date.
     """
     try:
-        return yaml.load(text, _Loader)
+        loader = _Loader(text)
+        try:
+            return loader.get_single_data()
+        except RecursionError:
+            mark = loader.get_mark()
+            raise yaml.MarkedYAMLError(None, None, "values are nested too deeply", mark) from None
+        except (ArithmeticError, ValueError):  # of PyYAML's scanner
+            words = "a character or version number is out of range"
+            raise yaml.MarkedYAMLError(None, None, words, loader.get_mark()) from None
     except yaml.YAMLError as error:
         bare = re.search(r"[\[{,:]\s*(#[0-9a-fA-F]{6})\b", text)
         hint = f"; put colors in quotes, as in '{bare[1]}'" if bare else ""
@@ -46,18 +88,38 @@ class _Loader(yaml.SafeLoader):
 
     It reads all JSON numbers, also 1e-05, which is text in YAML 1.1. It refuses octal and base-60
     numbers, which users rarely intend. It refuses repeated keys, where PyYAML ignores the first.
+    It refuses texts that take much longer to read than others of their length.
     """
+
+    def get_single_node(self) -> yaml.Node | None:
+        node: yaml.Node | None = super().get_single_node()
+        if node is not None and _count(node, {}) > _MOST_VALUES:
+            words = f"aliases repeat more than {_MOST_VALUES} values"
+            raise yaml.composer.ComposerError(None, None, words, node.start_mark)
+        return node
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except (yaml.YAMLError, RecursionError):
+            raise
+        except Exception:  # PyYAML's own types, such as !!bool and !!timestamp
+            words = f"{shown(node.value)} is not of the type {node.tag.rpartition(':')[2]}"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
 
     def construct_number(self, node: yaml.ScalarNode) -> float:
         whole = node.tag.endswith(":int")
+        if len(node.value) > _LONGEST_NUMBER:
+            words = f"{shown(node.value)} has more characters than a number may, {_LONGEST_NUMBER}"
+            raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
         try:
             number = self.construct_yaml_int(node) if whole else self.construct_yaml_float(node)
         except (ArithmeticError, IndexError, ValueError):
-            words = f"{reprlib.repr(node.value)} is not a number"
+            words = f"{shown(node.value)} is not a number"
             raise yaml.constructor.ConstructorError(None, None, words, node.start_mark) from None
         if number and (":" in node.value or (whole and re.match(r"[-+]?0[0-9_]", node.value))):
             words = (
-                f"YAML reads {reprlib.repr(node.value)} as {reprlib.repr(number)}; write that, or "
+                f"YAML reads {shown(node.value)} as {shown(number)}; write that, or "
                 "put it in quotes as a text"
             )
             raise yaml.constructor.ConstructorError(None, None, words, node.start_mark)
@@ -82,6 +144,20 @@ class _Loader(yaml.SafeLoader):
                 raise yaml.composer.ComposerError(None, None, words, key.start_mark)
             seen.add(name)
         return node
+
+
+def _count(node: yaml.Node, counts: dict[int, int]) -> int:
+    """Return the number of values in a node if each alias stands for all values it repeats.
+
+    `counts` holds the numbers that are known. A node that contains itself counts once.
+    """
+    if id(node) not in counts:
+        counts[id(node)] = 1
+        children = node.value if isinstance(node, yaml.CollectionNode) else ()
+        for child in children:
+            for each in child if isinstance(child, tuple) else (child,):
+                counts[id(node)] += _count(each, counts)
+    return counts[id(node)]
 
 
 class Dumper(yaml.SafeDumper):
