@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fastgen.dataset.job import Job, manifest_path, shard_of
+from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage
-from fastgen.errors import OutputError
+from fastgen.errors import OutputError, shown_name
 
 MANIFEST = "dataset.json"
 
@@ -93,8 +94,10 @@ def read_manifest(storage: Storage, shard: int) -> dict[str, Any] | None:
         text = storage.read(manifest_path(shard))
     except FileNotFoundError:
         return None
-    manifest = json.loads(text) if is_sealed(text) else {}
-    return manifest if manifest.get("shard") == shard else None
+    if not is_sealed(text) or unfit(text, Shard):
+        return None
+    manifest: dict[str, Any] = parsed_json(text)
+    return manifest if manifest["shard"] == shard else None
 
 
 def parsed(text: bytes) -> dict[str, Any] | None:
@@ -103,11 +106,13 @@ def parsed(text: bytes) -> dict[str, Any] | None:
     A finished dataset has the key "digest".
     """
     try:
-        content = json.loads(text)
-    except (ValueError, RecursionError):
+        content = parsed_json(text)
+    except ValueError:
         return None
-    intact = isinstance(content, dict) and ("digest" not in content or is_sealed(text))
-    return content if intact else None
+    if not isinstance(content, dict):
+        return None
+    damaged = "digest" in content and (not is_sealed(text) or unfit(text, Finished))
+    return None if damaged else content
 
 
 def without_manifest(storage: Storage, out: str) -> OutputError:
@@ -129,7 +134,7 @@ def _differ_message(job: Job, settings: Mapping[str, Any], found: Mapping[str, A
     if len(unlike) > _SHOWN:
         shown.append(f"and {len(unlike) - _SHOWN} more")
     if "version" in found and not _same(found["version"], settings["version"]):
-        how = f"install fastgen {found['version']} to resume"
+        how = f"install fastgen {shown_name(found['version'])} to resume"
     else:
         options = dict.fromkeys(each for name, *_ in unlike for each in _options(name))
         how = f"to resume, repeat the old {', '.join(options)}"

@@ -1,5 +1,6 @@
 """`fastgen verify --repair`: make damaged and missing files again, and nothing else."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ from fastgen.config.config import Config
 from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.generate import check_resumable, default_workers, generate
 from fastgen.dataset.job import Job
+from fastgen.dataset.manifest_types import Started, unfit
 from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
@@ -61,25 +63,23 @@ def _job(
     out: str, manifest: dict[str, Any], hdri_dir: str | Path | None, device_index: int | None
 ) -> Job:
     """Return the job that made the dataset."""
-    try:
-        return Job(
-            out=out,
-            images=manifest["images"],
-            config=Config.from_values(manifest["config"]),
-            seed=manifest["seed"],
-            cameras=tuple(manifest["cameras"]),
-            render=RenderSettings(
-                size=tuple(manifest["size"]),
-                quality=manifest["quality"],
-                backend=manifest.get("backend", "auto"),
-                device_index=device_index,
-                hdri_dir=hdri_dir,
-            ),
-            layout=manifest["format"],
-            also=tuple(name for name in manifest["formats"] if name not in SEAFRONT),
-            shard_scenes=manifest["shard_scenes"],
-        )
-    except KeyError as error:
-        raise OutputError(
-            f"{out}/{MANIFEST}: has no {error}; run generate again with the same settings"
-        ) from None
+    problem = unfit(json.dumps(manifest).encode(), Started)
+    if problem:
+        raise OutputError(f"{out}/{MANIFEST}: {problem}; run generate again with the same settings")
+    return Job(
+        out=out,
+        images=manifest["images"],
+        config=Config.from_values(manifest["config"]),
+        seed=manifest["seed"],
+        cameras=tuple(manifest["cameras"]),
+        render=RenderSettings(
+            size=tuple(manifest["size"]),
+            quality=manifest["quality"],
+            backend=manifest.get("backend", "auto"),
+            device_index=device_index,
+            hdri_dir=hdri_dir,
+        ),
+        layout=manifest["format"],
+        also=tuple(name for name in manifest["formats"] if name not in SEAFRONT),
+        shard_scenes=manifest["shard_scenes"],
+    )

@@ -1,7 +1,6 @@
 """`fastgen verify`: check that every file of a dataset is present, unchanged and consistent."""
 
 import contextlib
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ import simplejpeg
 
 from fastgen.dataset.dataset_json import MANIFEST, without_manifest
 from fastgen.dataset.job import manifest_path
+from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError
@@ -19,7 +19,8 @@ from fastgen.formats.format import Format, Read, Record
 from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
-from fastgen.validation import from_plain
+
+_AGAIN = "run generate again with the same settings"
 
 
 @dataclass(frozen=True)
@@ -47,16 +48,18 @@ def examine(out: str) -> Findings:
     storage = storage_of(out)
     try:
         text = storage.read(MANIFEST)
-        manifest = json.loads(text)
+        manifest = parsed_json(text)
         manifest["config"], manifest["shard_scenes"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, KeyError, TypeError):
         raise without_manifest(storage, out) from None
     if "digest" not in manifest:
         unfinished = f"{MANIFEST}: the dataset is not finished; run generate again"
         return Findings([unfinished], manifest=manifest)
     if not is_sealed(text):
-        again = "run generate again with the same settings"
-        return Findings([f"{MANIFEST}: was changed after it was written; {again}"])
+        return Findings([f"{MANIFEST}: was changed after it was written; {_AGAIN}"])
+    problem = unfit(text, Finished)
+    if problem:
+        return Findings([f"{MANIFEST}: {problem}; {_AGAIN}"])
     faults = [
         f"scene {each['scene']} is missing: it failed ({each['error']})"
         for each in manifest["failed"]
@@ -66,11 +69,15 @@ def examine(out: str) -> Findings:
     shards = []
     unlisted: set[int] = set()  # shards whose files are not known
     for number, hashed in manifest["shards"].items():
-        data = _intact(storage, present, manifest_path(int(number)), None, hashed, faults)
+        path = manifest_path(int(number))
+        data = _intact(storage, present, path, None, hashed, faults)
+        if data is not None and (problem := unfit(data, Shard)):
+            faults.append(f"{path}: {problem}")
+            data = None
         if data is None:
             unlisted.add(int(number))
         else:
-            shards.append(json.loads(data))
+            shards.append(parsed_json(data))
     broken = {manifest_path(number) for number in unlisted}
     listed = [manifest["files"], *(shard["files"] for shard in shards)]
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
@@ -183,6 +190,6 @@ def _check_image(record: Record, read: Read) -> Iterator[str]:
 def _check_scene(record: Record, read: Read) -> Iterator[str]:
     path = f"scenes/{record['split']}/{record['stem']}.json"
     try:
-        from_plain(Scene, json.loads(read(path))["scene"], "scene")
+        Scene.from_json(read(path))
     except FastgenError as error:
         yield f"{path}: {error}"

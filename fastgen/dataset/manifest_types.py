@@ -1,0 +1,118 @@
+"""Types of the values in dataset.json and in the manifests of shards, checked as they are read.
+
+Both files contain a hash of themselves, but a program that can edit one can also seal it again.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+from annotated_types import Ge, MinLen
+
+from fastgen.dataset.job import LAYOUTS
+from fastgen.errors import shown, shown_name
+from fastgen.sampling.scene import SPLITS
+from fastgen.validation import Matching, OneOf
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+_Count = Annotated[int, Ge(0)]
+_Number = Annotated[int, Ge(1)]
+_Entries = dict[str, tuple[_Count, str]]
+"""Size and SHA-256 of files by their path."""
+
+
+@dataclass(frozen=True)
+class _Failure:
+    scene: _Count
+    seed: _Count
+    error: str
+
+
+@dataclass(frozen=True)
+class Started:
+    """Values of dataset.json in a dataset that is not finished."""
+
+    version: str
+    format: Annotated[str, OneOf(LAYOUTS)]
+    formats: tuple[str, ...]
+    seed: _Count
+    size: tuple[_Number, _Number]
+    quality: str
+    cameras: Annotated[tuple[str, ...], MinLen(1)]
+    environments: dict[str, Any]
+    shard_scenes: _Number
+    config: dict[str, Any]
+    images: _Number
+
+
+@dataclass(frozen=True)
+class Finished(Started):
+    """Values of dataset.json in a finished dataset."""
+
+    backend: str
+    renderer: str
+    counts: dict[str, dict[str, _Count]]
+    failed: tuple[_Failure, ...]
+    files: _Entries
+    shards: dict[Annotated[str, Matching("[0-9]{1,12}", "is not a number")], str]
+    digest: str
+
+
+@dataclass(frozen=True)
+class _Record:
+    stem: str
+    split: Annotated[str, OneOf(SPLITS)]
+    size: tuple[_Number, _Number]
+    facts: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Values of a shard's manifest."""
+
+    shard: _Count
+    settings: str
+    backend: str
+    renderer: str
+    images: tuple[str, ...]
+    failed: tuple[_Failure, ...]
+    files: _Entries
+    records: tuple[_Record, ...]
+    digest: str
+
+
+def parsed_json(text: bytes | str) -> Any:
+    """Return the value of a JSON text.
+
+    Raises:
+        ValueError: It is not JSON, or nested so deeply that other code could not handle it.
+    """
+    from pydantic_core import from_json
+
+    return from_json(text)
+
+
+def unfit(text: bytes, cls: type) -> str:
+    """Return what does not fit the class in a JSON text, naming the field; "" if all fits."""
+    from pydantic import ValidationError
+
+    try:
+        _reader(cls).validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = ".".join(map(shown_name, first["loc"]))
+        if first["type"] == "missing":
+            return f"{path}: is missing"
+        reason = f" ({first['msg']})" if first["msg"] else ""  # types of ours have no message
+        return f"{path}: {shown(first['input'])} does not fit{reason}"
+    return ""
+
+
+@functools.cache
+def _reader(cls: type) -> "TypeAdapter[Any]":
+    from pydantic import ConfigDict, TypeAdapter, with_config
+
+    # a later version may add keys
+    return TypeAdapter(with_config(ConfigDict(extra="ignore", strict=True))(cls))
