@@ -195,6 +195,7 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
     Raises:
         ConfigError: otherwise; the message starts with `name`.
     """
+    value = value.item() if isinstance(value, np.generic) else value  # float16 ends at 65504
     is_number = _is_number(value)
     if is_number and least <= value <= most and value == int(value):
         return int(value)

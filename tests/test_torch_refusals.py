@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+import torch
 
 from fastgen import Config
 from fastgen.errors import ConfigError
@@ -194,6 +195,68 @@ def test_an_invalid_state_is_refused_and_changes_nothing(change, words):
     with pytest.raises(ConfigError, match=words):
         loader.load_state_dict({**state, "epoch": 7, **change})
     assert loader.state_dict() == state
+
+
+def places(value, path=()):
+    """Yield the path of every value of a state, also of those that hold others."""
+    yield path
+    items = value.items() if isinstance(value, dict) else ()
+    for step, item in enumerate(value) if isinstance(value, list) else items:
+        yield from places(item, (*path, step))
+
+
+def with_value(state, path, value):
+    """Return a copy of a state with another value at one place."""
+    if not path:
+        return value
+    copy = state.copy()
+    copy[path[0]] = with_value(state[path[0]], path[1:], value)
+    return copy
+
+
+def endless():
+    made = []
+    made.append(made)
+    return made
+
+
+FOREIGN = {
+    "tensor": torch.zeros(3),
+    "number": torch.tensor(1),
+    "array": np.zeros(3),
+    "scalar": np.array(0.5),
+    "half": np.float16(0.1),
+    "bytes": b"x",
+    "set": {1},
+    "complex": 1j,
+    "long": 10**5000,
+    "endless": endless(),
+    "mapping": {"0": torch.zeros(3), 1: 2},
+    "digits": {"9" * 5000: "x"},
+    "superscript": {"\u00b2": "x"},
+    "many": dict.fromkeys(map(str, range(1000)), "x"),
+}
+
+
+@pytest.mark.parametrize("value", FOREIGN.values(), ids=FOREIGN)
+def test_a_foreign_value_anywhere_in_a_state_is_refused_and_changes_nothing(value):
+    """Programs that store states may turn their numbers into tensors or arrays."""
+    called = []
+
+    def taught(epoch):
+        called.append(epoch)
+        return {"damage": {"probability": 0.5}}
+
+    loader = Loader(dataset(curriculum=taught))
+    state = json.loads(json.dumps(loader.state_dict()))
+    paths = [path for i, path in enumerate(places(state)) if len(path) < 3 or i % 5 == 0]
+    assert len(paths) > 60
+    for path in paths:
+        with pytest.raises(ConfigError, match=r"^state[.:]") as caught:
+            loader.load_state_dict(with_value(state, path, value))
+        assert len(str(caught.value)) < 300, path
+    assert loader.state_dict() == state
+    assert len(called) < 100  # not once for each epoch that a state names
 
 
 @pytest.mark.parametrize("position", ["a", 1.5, None])

@@ -33,6 +33,9 @@ from fastgen.validation import whole
 MAX_LENGTH = EPOCH_SCENES // 100
 """Most images in an epoch. A split with 1 % of the scenes still fits before the next epoch."""
 
+MOST_DIGESTS = 3
+"""Most epochs whose curriculum `ContainerDataset.description` describes."""
+
 
 class ContainerDataset(Dataset[Item]):
     """Map-style dataset whose items are rendered on access, with the same bytes in every process.

@@ -1,13 +1,15 @@
 """Loader: a DataLoader that divides positions among ranks and resumes at the next sample."""
 
+import json
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 from torch.utils.data import DataLoader, Sampler
 
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, shown
 from fastgen.sampling.scene import stream
-from fastgen.torch.datasets import ContainerDataset, ContainerStream
+from fastgen.torch.datasets import MOST_DIGESTS, ContainerDataset, ContainerStream
 from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.validation import whole
 
@@ -139,17 +141,15 @@ class Loader:
             ConfigError: The state belongs to a loader with other samples; the message names what
                 differs.
         """
-        if not isinstance(state, Mapping) or not isinstance(state.get("made", {}), Mapping):
-            raise ConfigError(f"state: {state!r} is not what state_dict returned")
+        if not isinstance(state, Mapping):
+            raise ConfigError(f"state: {shown(state)} is not what state_dict returned")
         for key in ("epoch", "position", "made"):
             if key not in state:
                 raise ConfigError(f"state: has no {key!r}; give what state_dict returned")
         epoch = whole("state.epoch", state["epoch"], 0, MAX_EPOCH)
         most = 2**62 if self._length is None else self._length
-        made, ours = state["made"], self.state_dict()["made"]
-        taught = made.get("curriculum")
-        if isinstance(taught, Mapping) and all(str(each).isdecimal() for each in taught):
-            ours["curriculum"] = self._items.curriculum_digests([int(each) for each in taught])
+        made, ours = _plain(state["made"]), self.state_dict()["made"]
+        ours["curriculum"] = self._items.curriculum_digests(_epochs(made.get("curriculum")))
         for key, value in ours.items():
             if made.get(key) != value:
                 raise ConfigError(
@@ -186,3 +186,28 @@ class Loader:
         assert self._length is not None
         items = len(range(start + self._part[0], self._length, self._part[1]))
         return items // self.batch_size if self.drop_last else -(-items // self.batch_size)
+
+
+def _plain(made: Any) -> dict[str, Any]:
+    """Return the description in a state as JSON values.
+
+    Raises:
+        ConfigError: It is no mapping, or holds tensors or other values that JSON does not have.
+    """
+    try:
+        plain = json.loads(json.dumps(made))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ConfigError(
+            f"state.made: is not what state_dict returned ({error}); give its values unchanged"
+        ) from None
+    if not isinstance(plain, dict):
+        raise ConfigError(f"state.made: {shown(made)} is not what state_dict returned")
+    return plain
+
+
+def _epochs(curriculum: Any) -> list[int]:
+    """Return the epochs of the curriculum's digests in a state; none if it has no such digests."""
+    known = isinstance(curriculum, dict) and len(curriculum) <= MOST_DIGESTS
+    if not known or not all(re.fullmatch("[0-9]{1,20}", epoch) for epoch in curriculum):
+        return []
+    return [int(epoch) for epoch in curriculum]
