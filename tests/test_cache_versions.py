@@ -53,8 +53,18 @@ def summary(entries):
 def summaries(tmp_path_factory):
     """The summary of new entries of each producer."""
     folder = tmp_path_factory.mktemp("cache")
+    original = disk_cache.cached
+
+    def checked(name, *arguments, **options):
+        """Every producer names a layout, and what it makes has it; otherwise no entry ever hits."""
+        arrays = original(name, *arguments, **options)
+        layout = options["layout"] if "layout" in options else arguments[4]
+        assert disk_cache.fits(arrays, layout), name
+        return arrays
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(disk_cache, "default_folder", lambda: folder)
+        patch.setattr(disk_cache, "cached", checked)
         reflectance.dfg_table.__wrapped__()
         noise.noise_tiles.__wrapped__()
         artwork.art_levels()

@@ -1,14 +1,16 @@
 """Disk cache: mapped entries, damage, trimming and unusable folders."""
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from fastgen.files import disk_cache
-from fastgen.files.disk_cache import cached, read, write
+from fastgen.files.disk_cache import cached, fits, read, write
 
-ARRAYS = {
+ARRAYS: dict[str, NDArray[Any]] = {
     "halves": np.linspace(0, 1, 70, dtype=np.float16).reshape(2, 5, 7),
     "bytes": np.arange(5, dtype=np.uint8),
     "none": np.zeros((0, 3)),
@@ -80,6 +82,88 @@ def test_a_damaged_entry_is_made_again(tmp_path, damage):
     assert read(entry) is None
     assert_equal(cached("kind", 1, "a", lambda: ARRAYS, tmp_path), ARRAYS)
     assert entry.read_bytes() == whole
+
+
+LAYOUT = {
+    "halves": "float16 A 5 B",
+    "bytes": "unsigned 5",
+    "none": "float64 N 3",
+    "wide": "int64 D 3",
+}
+"""The layout of ARRAYS."""
+
+
+def test_arrays_with_the_layout_are_read(tmp_path):
+    cached("kind", 1, "a", lambda: ARRAYS, tmp_path, LAYOUT)
+    assert_equal(cached("kind", 1, "a", never, tmp_path, LAYOUT), ARRAYS)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"halves": ARRAYS["halves"].astype(np.float32)},
+        {"halves": ARRAYS["halves"].astype(">f2")},
+        {"halves": ARRAYS["halves"][:, :4]},
+        {"halves": ARRAYS["halves"].reshape(-1)},
+        {"halves": ARRAYS["halves"][..., None]},
+        {"bytes": ARRAYS["bytes"].astype(np.int8)},
+        {"bytes": ARRAYS["bytes"].astype("S1")},
+        {"bytes": ARRAYS["bytes"][:4]},
+        {"none": np.zeros((0, 4))},
+        {"none": np.zeros(0)},
+        {"none": np.zeros((0, 3), complex)},
+        {"wide": ARRAYS["wide"].T},
+        {"more": np.zeros(1)},
+        {"bytes": None},
+    ],
+    ids=lambda changes: " ".join(f"{k} {getattr(v, 'dtype', '')}" for k, v in changes.items()),
+)
+def test_a_whole_entry_with_another_layout_counts_as_missing(tmp_path, changes):
+    """Its checksum is right: another program, or another version of ours, wrote it."""
+    cached("kind", 1, "a", lambda: ARRAYS, tmp_path, LAYOUT)
+    (entry,) = tmp_path.iterdir()
+    entry.unlink()
+    arrays = {name: array for name, array in {**ARRAYS, **changes}.items() if array is not None}
+    write(entry, arrays)
+    assert read(entry) is not None
+    made = cached("kind", 1, "a", lambda: ARRAYS, tmp_path, LAYOUT)
+    assert_equal(made, ARRAYS)
+    assert_equal(cached("kind", 1, "a", never, tmp_path, LAYOUT), ARRAYS)
+
+
+def test_arrays_with_a_shared_axis_must_agree_on_its_size():
+    layout = {"a": "float64 V 3", "b": "float64 V"}
+    assert fits({"a": np.zeros((4, 3)), "b": np.zeros(4)}, layout)
+    assert not fits({"a": np.zeros((4, 3)), "b": np.zeros(5)}, layout)
+    assert not fits({"b": np.zeros(4), "a": np.zeros((4, 3))}, layout)
+
+
+def pipe(place):
+    os.mkfifo(place)
+
+
+def dangling(place):
+    place.symlink_to(place.with_name("nowhere"))
+
+
+def device(place):
+    place.symlink_to("/dev/zero")
+
+
+def folder(place):
+    place.mkdir()
+
+
+@pytest.mark.parametrize("special", [pipe, dangling, device, folder])
+@pytest.mark.parametrize("suffix", [".npy", ".lock"])
+def test_special_files_in_the_place_of_an_entry_count_as_missing(tmp_path, special, suffix):
+    cached("kind", 1, "a", lambda: ARRAYS, tmp_path)
+    (entry,) = tmp_path.iterdir()
+    entry.unlink()
+    special(entry.with_suffix(suffix))
+    assert_equal(cached("kind", 1, "a", lambda: ARRAYS, tmp_path), ARRAYS)
+    if special is not folder or suffix == ".lock":
+        assert_equal(cached("kind", 1, "a", never, tmp_path), ARRAYS)
 
 
 def test_every_part_of_the_key_counts(tmp_path, monkeypatch):

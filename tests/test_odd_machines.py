@@ -8,6 +8,7 @@ import sys
 from collections import namedtuple
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fastgen.dataset.dataset_json import shard_numbers
@@ -16,9 +17,10 @@ from fastgen.dataset.storage import Folder
 from fastgen.dataset.workers import in_words
 from fastgen.decals import artwork
 from fastgen.errors import AssetError
-from fastgen.files import disk_cache
+from fastgen.files import cache_folder, disk_cache
 from fastgen.render.contexts.shader_cache import spare_full_disk
 from fastgen.resources import asset_path
+from tests.folders import content
 
 Disk = namedtuple("Disk", "f_bavail f_frsize")
 
@@ -42,15 +44,117 @@ def test_mesas_shader_cache_is_off_on_a_nearly_full_disk(
     assert os.environ.get("MESA_SHADER_CACHE_DISABLE") == switched
 
 
-def test_a_user_without_a_home_caches_in_the_temporary_folder(monkeypatch, tmp_path):
+def without_home(patch, _):
     def no_home():
         raise RuntimeError("Could not determine home directory.")
 
+    patch.setattr(Path, "home", no_home)
+
+
+def with_unwritable_home(patch, folder):
+    """docker run --user gives the home /, which only root can write; tests may run as root."""
+    (folder / "file").write_text("")
+    patch.setenv("HOME", str(folder / "file"))
+
+
+def with_unwritable_xdg(patch, folder):
+    (folder / "file").write_text("")
+    patch.setenv("XDG_CACHE_HOME", str(folder / "file"))
+
+
+def with_read_only_home(patch, folder):
+    patch.setenv("HOME", str(folder))
+    access = os.access
+    cache = folder / ".cache" / "fastgen"
+    patch.setattr(os, "access", lambda path, mode: path != cache and access(path, mode))
+
+
+HOMES = [without_home, with_unwritable_home, with_unwritable_xdg, with_read_only_home]
+
+
+@pytest.fixture
+def temporary(monkeypatch, tmp_path):
+    """The directory for temporary files of this test, and a user whose folder is not known yet."""
+    cache_folder._usable.cache_clear()
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setattr(Path, "home", no_home)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert disk_cache.default_folder().parent == tmp_path
-    assert str(os.getuid()) in disk_cache.default_folder().name
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    yield folder
+    cache_folder._usable.cache_clear()
+
+
+@pytest.mark.parametrize("home", HOMES)
+def test_a_user_without_a_usable_home_caches_in_the_temporary_folder(
+    home, temporary, monkeypatch, tmp_path, capsys
+):
+    home(monkeypatch, tmp_path)
+    found = disk_cache.default_folder()
+    assert found == temporary / f"fastgen-{os.getuid()}"
+    assert found.stat().st_mode & 0o777 == 0o700
+    first = disk_cache.cached("kind", 1, "a", lambda: {"x": np.arange(3)})
+    second = disk_cache.cached("kind", 1, "a", lambda: pytest.fail("it was stored"))
+    assert first["x"].tolist() == second["x"].tolist()
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert said.err.startswith("fastgen: ")
+    assert str(found) in said.err
+
+
+def of_another_user(folder, patch):
+    folder.mkdir(mode=0o700)
+    real = folder.stat().st_uid
+    patch.setattr(os, "getuid", lambda: real + 1)
+    folder.rename(folder.with_name(f"fastgen-{real + 1}"))
+
+
+def linked(folder, _):
+    folder.with_name("theirs").mkdir(mode=0o700)
+    folder.symlink_to(folder.with_name("theirs"))
+
+
+def of_mode(mode):
+    def make(folder, _):
+        folder.mkdir()
+        folder.chmod(mode)
+
+    return make
+
+
+def a_file(folder, _):
+    folder.write_text("")
+
+
+@pytest.mark.parametrize("home", HOMES)
+@pytest.mark.parametrize(
+    "make",
+    [of_another_user, linked, a_file, *map(of_mode, (0o777, 0o770, 0o702, 0o755, 0o1700))],
+)
+def test_a_temporary_folder_that_others_can_change_is_not_used(
+    make, home, temporary, monkeypatch, tmp_path, capsys
+):
+    make(temporary / f"fastgen-{os.getuid()}", monkeypatch)
+    home(monkeypatch, tmp_path)
+    before = content(temporary)
+    for _ in range(2):
+        assert disk_cache.default_folder() is None
+        made = disk_cache.cached("kind", 1, "a", lambda: {"x": np.arange(3)})
+        assert made["x"].tolist() == [0, 1, 2]
+        assert not made["x"].flags.writeable
+    assert content(temporary) == before
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "set XDG_CACHE_HOME to a folder of your own" in said
+
+
+def test_a_usable_home_is_used_without_a_word(temporary, monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert disk_cache.default_folder() == tmp_path / ".cache" / "fastgen"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert disk_cache.default_folder() == tmp_path / "xdg" / "fastgen"
+    assert not list(temporary.iterdir())
+    assert capsys.readouterr().err == ""
 
 
 def test_art_is_read_from_a_folder_whose_name_is_not_utf8(tmp_path):

@@ -190,7 +190,12 @@ def art_levels() -> list[NDArray[np.uint8]]:
         levels = zip(*map(mip_levels, images), strict=True)
         return {f"level{i}": level for i, level in enumerate([images, *map(np.stack, levels)])}
 
-    return list(disk_cache.cached("art", VERSION, digest.hexdigest(), make).values())
+    sizes = [ART_SIZE >> i for i in range(ART_SIZE.bit_length())]
+    layout = {
+        f"level{i}": f"uint8 {len(_art_paths())} {size} {size} 4" for i, size in enumerate(sizes)
+    }
+    stored = disk_cache.cached("art", VERSION, digest.hexdigest(), make, layout=layout)
+    return list(stored.values())
 
 
 def _art_paths() -> list[Path]:

@@ -10,7 +10,6 @@ import hashlib
 import importlib.metadata
 import mmap
 import os
-import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
+from fastgen.files.cache_folder import default_folder
 
 LIMIT_BYTES = 4 << 30
 """Largest size of a folder, about 240 environments; the least recently read entries go first."""
@@ -37,20 +37,12 @@ _OLD_FORMAT = (f"*-{_HEX}.npz", f"{_HEX}-[0-9]*.npz")
 
 Arrays = dict[str, NDArray[Any]]
 
+Layout = Mapping[str, str]
+"""Type and shape of arrays by name, in order, such as "float32 V 3".
 
-def default_folder() -> Path:
-    """Return $XDG_CACHE_HOME/fastgen or ~/.cache/fastgen.
-
-    A user without a home directory gets a folder in the directory for temporary files.
-    """
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    # the XDG base directory specification says to ignore relative paths
-    if os.path.isabs(base):
-        return Path(base) / "fastgen"
-    try:
-        return Path.home() / ".cache" / "fastgen"
-    except RuntimeError:
-        return Path(tempfile.gettempdir()) / f"fastgen-{os.getuid()}"
+The type is a dtype or "unsigned". An axis is a number, or a name that stands for one size in all
+arrays.
+"""
 
 
 def cached(
@@ -59,11 +51,13 @@ def cached(
     inputs: object,
     make: Callable[[], Mapping[str, NDArray[Any]]],
     folder: Path | None = None,
+    layout: Layout | None = None,
 ) -> Arrays:
     """Return the arrays of an entry, and make and store them if the entry is missing or damaged.
 
-    If several processes need a missing entry, one makes it and the others wait. Without a writable
-    folder, every process makes it.
+    An entry whose arrays do not have the layout counts as missing. If several processes need a
+    missing entry, one makes it and the others wait. Without a writable folder, every process makes
+    it.
 
     Args:
         name: Name of the producer, unique in the package.
@@ -71,36 +65,67 @@ def cached(
         inputs: Everything else that the arrays depend on; its `repr` is part of the key.
         make: Returns the arrays by name.
         folder: Folder of the entries, by default `default_folder()`.
+        layout: Type and shape of each array.
 
     Returns:
         Read-only arrays by name, mapped from the file where possible.
     """
     key = hashlib.sha256(f"{version} {_LIBRARIES} {inputs!r}".encode()).hexdigest()
-    entry = (folder or default_folder()) / f"{name}-{key[:32]}.npy"
-    arrays = read(entry)
-    if arrays is None:
-        with _alone(entry):
-            arrays = read(entry)
-            if arrays is None:
-                made = dict(make())
-                write(entry, made)
-                arrays = read(entry) or made  # the mapped pages are shared, the made ones are not
+    folder = folder or default_folder()
+    arrays = _found(folder / f"{name}-{key[:32]}.npy", make, layout) if folder else dict(make())
     for array in arrays.values():
         array.flags.writeable = False
     return arrays
 
 
-def read(entry: Path) -> Arrays | None:
-    """Return the arrays of an entry by name; None if it is missing or damaged."""
+def _found(
+    entry: Path, make: Callable[[], Mapping[str, NDArray[Any]]], layout: Layout | None
+) -> Arrays:
+    """Return the arrays of an entry; make and store them if it is missing, damaged or different."""
+    arrays = read(entry, layout)
+    if arrays is None:
+        with _alone(entry):
+            arrays = read(entry, layout)
+            if arrays is None:
+                made = dict(make())
+                write(entry, made)
+                # the mapped pages are shared, the made ones are not
+                arrays = read(entry, layout) or made
+    return arrays
+
+
+def fits(arrays: Mapping[str, NDArray[Any]], layout: Layout) -> bool:
+    """Return whether arrays have the names, types and shapes of a layout."""
+    if list(arrays) != list(layout):
+        return False
+    sizes: dict[str, int] = {}
+    for name, wanted in layout.items():
+        kind, *axes = wanted.split()
+        dtype, shape = arrays[name].dtype, arrays[name].shape
+        alike = dtype.kind == "u" if kind == "unsigned" else dtype == np.dtype(kind)
+        if not alike or len(axes) != len(shape):
+            return False
+        for axis, size in zip(axes, shape, strict=True):
+            if size != (int(axis) if axis.isdecimal() else sizes.setdefault(axis, size)):
+                return False
+    return True
+
+
+def read(entry: Path, layout: Layout | None = None) -> Arrays | None:
+    """Return the arrays of an entry by name; None if it is missing, damaged or unlike `layout`."""
     try:
+        if not entry.is_file():  # opening a named pipe would block
+            return None
         record = _mapped(entry)
         if record[_CHECKSUM][0] != _checksum(record):
             return None
+        names = [name for name in record.dtype.names or () if name != _CHECKSUM]
+        arrays = {name: record[name][0, ...] for name in names}
+        if layout is not None and not fits(arrays, layout):
+            return None
         with contextlib.suppress(OSError):  # _trim needs the time, which few file systems record
             os.utime(entry)
-        return {
-            name: record[name][0, ...] for name in record.dtype.names or () if name != _CHECKSUM
-        }
+        return arrays
     except Exception:  # a file can be damaged in many ways
         return None
 
@@ -151,7 +176,9 @@ def _alone(entry: Path) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         with contextlib.suppress(OSError):
             entry.parent.mkdir(parents=True, exist_ok=True)
-            file = held.enter_context(mark.open("ab"))
+            # opening a named pipe would block
+            handle = os.open(mark, os.O_WRONLY | os.O_CREAT | os.O_NONBLOCK, 0o666)
+            file = held.enter_context(open(handle, "wb"))
             held.callback(mark.unlink, missing_ok=True)
             fcntl.flock(file, fcntl.LOCK_EX)
         yield

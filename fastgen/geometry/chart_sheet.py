@@ -9,6 +9,17 @@ from numpy.typing import NDArray
 
 VERSION = 1  # raise when the stored arrays change
 
+LAYOUT = {
+    "triangles": "int64 T",
+    "corners_mm": "float64 T 3 2",
+    "lowest_mm": "float64 2 T",
+    "highest_mm": "float64 2 T",
+    "to_weights": "float64 T 2 3",
+    "candidates": "int32 C M",
+    "shape": "int64 2",
+}
+"""Layout of the fields of a ChartSheet in the disk cache."""
+
 _CELL_MM = 120.0
 
 

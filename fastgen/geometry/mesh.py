@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.errors import ConfigError
 from fastgen.files import disk_cache
+from fastgen.geometry.chart_sheet import LAYOUT as SHEET_LAYOUT
 from fastgen.geometry.chart_sheet import VERSION as SHEET_VERSION
 from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
@@ -161,7 +162,8 @@ class Mesh:
             return vars(self._sheet(number))
 
         inputs = self._atlas_digest, number
-        return ChartSheet(**disk_cache.cached("sheet", SHEET_VERSION, inputs, make))
+        stored = disk_cache.cached("sheet", SHEET_VERSION, inputs, make, layout=SHEET_LAYOUT)
+        return ChartSheet(**stored)
 
     def chart_index(self, name: str) -> int:
         """Return the index of a chart.
@@ -232,7 +234,10 @@ class Mesh:
             low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
             return {"low": low, "high": high}
 
-        bounds = disk_cache.cached("triangle-bounds", VERSION, self.shape_digest, found)
+        layout = dict.fromkeys(("low", "high"), f"float32 {len(self.triangles)} 3")
+        bounds = disk_cache.cached(
+            "triangle-bounds", VERSION, self.shape_digest, found, layout=layout
+        )
         return bounds["low"], bounds["high"]
 
     @cached_property
@@ -258,7 +263,10 @@ class Mesh:
 
             return {"hull": np.asarray(ConvexHull(self.points_mm).vertices, np.int64)}
 
-        return disk_cache.cached("hull", VERSION, self.shape_digest, found)["hull"]
+        stored = disk_cache.cached(
+            "hull", VERSION, self.shape_digest, found, layout={"hull": "int64 K"}
+        )
+        return stored["hull"]
 
     @cached_property
     def rim(self) -> NDArray[np.int64]:

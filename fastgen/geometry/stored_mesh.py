@@ -9,6 +9,15 @@ from numpy.typing import NDArray
 from fastgen.files import disk_cache
 from fastgen.geometry.mesh import Chart, Mesh, Zone
 
+_LAYOUT = {
+    "positions_mm": "float32 V 3",
+    "normals": "float32 V 3",
+    "atlas_mm": "float32 V 2",
+    "zone": "unsigned V",
+    "triangles": "uint32 T 3",
+    "about": "uint8 N",
+}
+
 _ARRAYS = ("positions_mm", "normals", "atlas_mm", "zone", "triangles")
 
 
@@ -21,7 +30,7 @@ def stored(name: str, version: int, inputs: object, build: Callable[[], Mesh]) -
         inputs: Everything else that the mesh depends on.
         build: Returns the mesh.
     """
-    arrays = disk_cache.cached(name, version, inputs, lambda: _packed(build()))
+    arrays = disk_cache.cached(name, version, inputs, lambda: _packed(build()), layout=_LAYOUT)
     about = json.loads(arrays["about"].tobytes())
     return Mesh(
         **{key: arrays[key] for key in _ARRAYS},

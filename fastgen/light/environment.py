@@ -184,6 +184,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
             key,
             lambda: _packed(prefilter_environment(path.stem, load_radiance(path))),
             folder,
+            _LAYOUT,
         ),
     )
     if light.mean_luminance > _BRIGHTEST:
@@ -199,18 +200,30 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
     return light
 
 
+_LAYOUT = {
+    "specular": f"float16 {len(ROUGHNESS_LEVELS)} {SPECULAR_SIZE} {SPECULAR_SIZE} 3",
+    "irradiance": f"float16 {IRRADIANCE_SIZE} {IRRADIANCE_SIZE} 3",
+    "background": "uint32 B B",
+    "luminance": f"float32 {_LUMINANCE_WIDTH // 2} {_LUMINANCE_WIDTH}",
+    "lights": "float64 L 7",
+}
+"""Layout of an environment in the disk cache; see `_packed`."""
+
+
 def _packed(light: EnvironmentLight) -> disk_cache.Arrays:
     return {
         "specular": light.specular.astype(np.float16),
         "irradiance": light.irradiance.astype(np.float16),
         "background": light.background,
         "luminance": light.luminance,
-        "lights": np.array([[*each.direction, *each.light, each.radius] for each in light.lights]),
+        "lights": np.array(
+            [[*each.direction, *each.light, each.radius] for each in light.lights]
+        ).reshape(-1, 7),
     }
 
 
 def _unpacked(name: str, arrays: disk_cache.Arrays) -> EnvironmentLight:
-    rows = arrays["lights"].reshape(-1, 7).tolist()
+    rows = arrays["lights"].tolist()
     lights = tuple(
         DirectionalLight((x, y, z), (r, g, b), radius) for x, y, z, r, g, b, radius in rows
     )

@@ -162,12 +162,21 @@ def form_factors(
         VERSION,
         digest.hexdigest(),
         lambda: _packed(_computed(spreader, body, box, points, toward, hidden)),
+        layout=_layout(len(points)),
     )
     own, below = (
         Links(**{field.name: arrays[f"{kind}_{field.name}"] for field in fields(Links)})
         for kind in ("own", "below")
     )
     return FormFactors(own, below, arrays["known"])
+
+
+def _layout(points: int) -> disk_cache.Layout:
+    links = {"receiver": "int64 R", "start": "int64 R", "emitter": "int64 K", "weight": "float32 K"}
+    layout = {"known": f"float32 {points}"}
+    for kind in ("own", "below"):  # each has axes of its own
+        layout |= {f"{kind}_{name}": f"{kind_of}_{kind}" for name, kind_of in links.items()}
+    return layout
 
 
 def _packed(factors: FormFactors) -> disk_cache.Arrays:

@@ -47,7 +47,10 @@ def dfg_table(size: int = 32) -> NDArray[np.float32]:
         float32 [size, size, 2], read-only. Row r is at roughness (r + 0.5) / size, column c at n.v
         (c + 0.5) / size. These are texel centres for OpenGL's linear sampling with clamping.
     """
-    found = disk_cache.cached("dfg", VERSION, size, lambda: {"table": _integrated(size)})
+    layout = {"table": f"float32 {size} {size} 2"}
+    found = disk_cache.cached(
+        "dfg", VERSION, size, lambda: {"table": _integrated(size)}, layout=layout
+    )
     return found["table"]
 
 

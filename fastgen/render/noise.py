@@ -156,9 +156,15 @@ def noise_tiles() -> NoiseTiles:
     Returns:
         Both layers with their mip levels.
     """
-    arrays = disk_cache.cached("noise", VERSION, _SEED, _baked)
+    arrays = disk_cache.cached("noise", VERSION, _SEED, _baked, layout=_layout())
     levels = tuple(arrays[f"level{i}"] for i in range(len(arrays) - 1))
     return NoiseTiles(levels, float((levels[0][1, ..., 0] > 0).mean()), arrays["lost_deviation"])
+
+
+def _layout() -> disk_cache.Layout:
+    sizes = [NOISE_SIZE >> i for i in range(NOISE_SIZE.bit_length())]
+    levels = {f"level{i}": f"uint8 2 {size} {size} 4" for i, size in enumerate(sizes)}
+    return {"lost_deviation": f"float32 2 {len(sizes)} 4", **levels}
 
 
 def _baked() -> dict[str, NDArray[Any]]:

@@ -20,6 +20,7 @@ from fastgen.light.indirect_light import Cells, FormFactors, form_factors
 from fastgen.light.occluders import core_of, map_matrix
 from fastgen.light.sky_visibility import (
     DIRECTIONS,
+    VERTEX_BYTES,
     Array,
     Directions,
     Sky,
@@ -54,6 +55,18 @@ Paints = tuple[tuple[float, float, float], ...]
 
 _CAPACITY = 128
 _LIT_CAPACITY = 18  # a scene needs one per container and one for the spreader, for each camera
+
+
+def _layout(vertices: int) -> disk_cache.Layout:
+    """Return the layout of a SkyVisibility in the disk cache."""
+    return {
+        "kind": f"unsigned {vertices}",
+        "rows": f"uint8 K {VERTEX_BYTES}",
+        "normals": "float32 N 3",
+        "normal": "unsigned K",
+        "cones": "uint8 C 3",
+        "cone": "unsigned K",
+    }
 
 
 def probe_points(mesh: Mesh, inset_limit_mm: float = _INSET_LIMIT_MM) -> Array:
@@ -211,7 +224,10 @@ class SkyVisibilityProbe:
 
         shapes = [mesh.shape_digest if mesh else "" for mesh in key]
         inputs = self._driver, shapes
-        return SkyVisibility(**disk_cache.cached("sky-visibility", VERSION, inputs, make))
+        stored = disk_cache.cached(
+            "sky-visibility", VERSION, inputs, make, layout=_layout(len(normals))
+        )
+        return SkyVisibility(**stored)
 
     def _of_spreader(self, spreader: Mesh, container: Mesh) -> NDArray[np.uint8]:
         points = _spreader_points(spreader)
@@ -241,6 +257,7 @@ class SkyVisibilityProbe:
             VERSION,
             inputs,
             lambda: {"bits": np.packbits(self._visible(bodies, points_mm, size), axis=1)},
+            layout={"bits": f"uint8 {len(points_mm)} {-(-DIRECTIONS // 8)}"},
         )
         return found["bits"]
 
