@@ -4,6 +4,8 @@ import itertools
 import multiprocessing
 import os
 import re
+import subprocess
+import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
 
@@ -12,6 +14,7 @@ import pytest
 
 from fastgen.errors import ConfigError, ContextError
 from fastgen.render import doctor, gl
+from fastgen.render.contexts import driver_variables
 from fastgen.render.contexts.egl import EGL_PACKAGES, EglDevice
 from tests.backends import BACKENDS, needs_osmesa
 
@@ -230,20 +233,78 @@ def test_doctor_reports_on_both_backends():
     assert re.search(works_here if "osmesa" in BACKENDS else missing, osmesa)
 
 
-def test_doctor_says_what_fails_on_an_old_driver(monkeypatch):
-    monkeypatch.setenv("MESA_GL_VERSION_OVERRIDE", "4.1")
-    words, works = doctor.report()
-    assert not works
-    assert words.count("FAIL") == 2
-    assert words.count("OpenGL 4.4 core") >= 2
+@pytest.fixture
+def plain_environment(monkeypatch):
+    """An environment without variables that change the driver."""
+    for name in driver_variables._NAMES:
+        monkeypatch.delenv(name, raising=False)
 
 
-def test_doctor_names_the_packages_if_egl_finds_no_driver(monkeypatch):
-    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
-    egl, osmesa = doctor.diagnose()
+CHANGES = {
+    "an old version": {"MESA_GL_VERSION_OVERRIDE": "4.1"},
+    "an old language": {"MESA_GLSL_VERSION_OVERRIDE": "130"},
+    "a new version with an old language": {
+        "MESA_GL_VERSION_OVERRIDE": "4.5",
+        "MESA_GLSL_VERSION_OVERRIDE": "330",
+    },
+    "no extension": {"MESA_EXTENSION_OVERRIDE": "-GL_ARB_clear_texture"},
+    "no driver": {"GALLIUM_DRIVER": "none"},
+    "an old driver": {"GALLIUM_DRIVER": "softpipe"},
+    "no folder of EGL": {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"},
+    "no file of EGL": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"},
+    "no folder of drivers": {"LIBGL_DRIVERS_PATH": "/nonexistent"},
+}
+"""Variables that make the installed driver of EGL fail."""
+
+
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+def test_variables_that_change_the_driver_are_named(plain_environment, monkeypatch, changes):
+    for name, value in changes.items():
+        monkeypatch.setenv(name, value)
+    egl, *_, osmesa = doctor.diagnose()
     assert not egl.works
-    assert f"apt-get install {EGL_PACKAGES}" in egl.words
-    assert osmesa.works == ("osmesa" in BACKENDS)
+    for finding in (egl, osmesa):
+        if not finding.works and "libosmesa6" not in finding.words:
+            for name, value in changes.items():
+                assert f"{name}='{value}'" in finding.words
+            assert f"unset {'them' if len(changes) > 1 else 'it'}" in finding.words
+            assert "apt-get" not in finding.words
+            assert "update" not in finding.words
+
+
+@pytest.mark.parametrize("backend", ["auto", "osmesa"])
+@pytest.mark.parametrize(
+    "name", ["MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE", "GALLIUM_DRIVER"]
+)
+def test_such_variables_do_not_end_the_process(name, backend, tmp_path):
+    """OSMesa crashes with unknown drivers and old languages, and nothing is printed."""
+    values = {"MESA_GL_VERSION_OVERRIDE": "3.0", "MESA_GLSL_VERSION_OVERRIDE": "130"}
+    environment = {**os.environ, name: values.get(name, "none")}
+    command = [sys.executable, "-m", "fastgen", "show", "--index", "0", "--size", "64x64"]
+    command += ["--backend", backend, "-o", str(tmp_path / "x.png")]
+    done = subprocess.run(command, env=environment, capture_output=True, check=False, text=True)
+    assert done.returncode == 2
+    assert re.search(f"^fastgen: .*{name}=.* in the environment", done.stderr, re.MULTILINE)
+
+
+def test_a_variable_that_does_no_harm_is_not_named(plain_environment, monkeypatch):
+    monkeypatch.setenv("LIBGL_ALWAYS_SOFTWARE", "1")
+    monkeypatch.setenv("EGL_PLATFORM", "")
+    words, works = doctor.report()
+    assert works
+    assert "LIBGL_ALWAYS_SOFTWARE" not in words
+    assert driver_variables.advice("x") == (
+        "LIBGL_ALWAYS_SOFTWARE='1' in the environment changes the driver; unset it"
+    )
+
+
+def test_the_packages_are_named_if_egl_finds_no_driver(plain_environment, monkeypatch):
+    def none(*_):
+        raise ContextError("eglInitialize failed: EGL_NOT_INITIALIZED")
+
+    monkeypatch.setattr(gl.Egl, "create", none)
+    with pytest.raises(ContextError, match=f"apt-get install {EGL_PACKAGES}"):
+        gl.open_context("egl")
 
 
 def three_devices():

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastgen.errors import FastgenError
+from fastgen.render.contexts.driver_variables import advice
 from fastgen.render.gl import egl_devices, open_context
 
 _START_S = 60.0
@@ -80,16 +81,20 @@ def _isolated(attempt: Callable[..., Any], *arguments: Any) -> tuple[bool, Any]:
         if receiver.poll(_TIMEOUT_S):
             answer: tuple[bool, Any] = receiver.recv()
             return answer
-        return False, f"no answer within {_TIMEOUT_S:g} s: the driver hangs"
+        return False, _with_advice(f"no answer within {_TIMEOUT_S:g} s: the driver hangs")
     except EOFError:
         process.join()
         code = process.exitcode or 0
         ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-        return False, f"the driver crashed ({ended})"
+        return False, _with_advice(f"the driver crashed ({ended})")
     finally:
         process.kill()
         process.join()
         receiver.close()
+
+
+def _with_advice(words: str) -> str:
+    return "; ".join(filter(None, (words, advice(""))))
 
 
 def _answer(sender: Any, attempt: Callable[..., Any], arguments: tuple[Any, ...]) -> None:

@@ -4,6 +4,7 @@ Mesa removed OSMesa in version 25.1. The software device of EGL replaces it ther
 """
 
 import ctypes
+import re
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -11,6 +12,7 @@ import moderngl
 
 from fastgen.errors import ConfigError, ContextError
 from fastgen.render.contexts import gl_forks
+from fastgen.render.contexts.driver_variables import advice
 from fastgen.render.contexts.egl import EGL_PACKAGES, Egl, EglContext, EglDevice
 from fastgen.render.contexts.native_context import NativeContext
 from fastgen.render.contexts.osmesa import OSMesaContext
@@ -21,6 +23,9 @@ BACKENDS = ("auto", "egl", "osmesa")
 
 MIN_VERSION = 440
 """Version that has glClearTexSubImage: OpenGL 4.4 core."""
+
+_LEAST_SHADING = (4, 40)
+_SHADING_LANGUAGE_VERSION = 0x8B8C  # OpenGL 4.4 core, table 23.56
 
 
 class GLContext:
@@ -47,13 +52,25 @@ class GLContext:
             )
         except (ValueError, moderngl.Error) as error:  # an old version, a missing function
             native.release()
-            raise ContextError(f"{backend}: OpenGL 4.4 core is needed ({error})") from None
+            raise ContextError(
+                f"{backend}: OpenGL 4.4 core is needed ({error}); "
+                f"{advice('update the graphics driver')}"
+            ) from None
         self.backend = backend
         self.renderer: str = self.ctx.info["GL_RENDERER"]
         self.vendor: str = self.ctx.info["GL_VENDOR"]
         self.version: str = self.ctx.info["GL_VERSION"]
         self.software = is_software(self.renderer)
         self._native = native
+        language = self.function("glGetString", ctypes.c_char_p, ctypes.c_uint)
+        shading = (language(_SHADING_LANGUAGE_VERSION) or b"").decode(errors="replace")
+        found = re.match(r"([0-9]+)\.([0-9]+)", shading)
+        if not found or (int(found[1]), int(found[2])) < _LEAST_SHADING:
+            self.release()
+            raise ContextError(
+                f"{backend}: GLSL 4.40 is needed, but this driver has {shading or 'none'}; "
+                f"{advice('update the graphics driver')}"
+            )
 
     def function(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         """Return an OpenGL function as a ctypes function, which releases the GIL.
@@ -70,7 +87,9 @@ class GLContext:
         """
         address = self._native.load_opengl_function(name)
         if not address:
-            raise ContextError(f"{self.renderer}: this driver has no {name}; update Mesa")
+            raise ContextError(
+                f"{self.renderer}: this driver has no {name}; {advice('update Mesa')}"
+            )
         return ctypes.CFUNCTYPE(result, *arguments)(address)
 
     def make_current(self) -> None:
@@ -114,7 +133,8 @@ def open_context(backend: str = "auto", device_index: int | None = None) -> GLCo
             device that works, hardware before software.
 
     Raises:
-        ContextError: Nothing works; the message names the packages to install.
+        ContextError: Nothing works; the message names variables of the environment that change the
+            driver, or the packages to install.
         ConfigError: Unknown backend, or a device index for OSMesa.
     """
     check_known("backend", backend, BACKENDS)
@@ -175,7 +195,7 @@ def _open_egl(device_index: int | None) -> GLContext:
             return GLContext(EglContext(egl, device), "egl")
         except ContextError as error:
             failures.append(f"{where}: {error}")
+    install = f"for Mesa's software driver on Debian or Ubuntu: apt-get install {EGL_PACKAGES}"
     raise ContextError(
-        f"egl: no context with OpenGL 4.4 core ({', '.join(failures)}); "
-        f"for Mesa's software driver on Debian or Ubuntu: apt-get install {EGL_PACKAGES}"
+        f"egl: no context with OpenGL 4.4 core ({', '.join(failures)}); {advice(install)}"
     )

@@ -5,6 +5,7 @@ import os
 
 from fastgen.errors import ContextError
 from fastgen.render.contexts import gl_forks
+from fastgen.render.contexts.driver_variables import advice, check_osmesa
 from fastgen.render.contexts.egl import EGL_LIBRARY
 from fastgen.render.contexts.native_context import NativeContext
 
@@ -34,6 +35,7 @@ class OSMesaContext(NativeContext):
     def __init__(self) -> None:
         if not gl_forks.usable("osmesa"):
             raise ContextError(f"osmesa: {gl_forks.REASON}")
+        check_osmesa()
         gl_forks.opened("osmesa", software=True)
         self._library = _osmesa_library()
         # OSMesa requires a buffer to bind a context; nothing is drawn to this one
@@ -45,9 +47,7 @@ class OSMesaContext(NativeContext):
             if handle:
                 break
         else:
-            raise ContextError(
-                "osmesa: this version of Mesa has no OpenGL 4.4 core context; update it"
-            )
+            raise ContextError(f"osmesa: no OpenGL 4.4 core context; {advice('update Mesa')}")
         super().__init__("osmesa", handle)
 
     def load_opengl_function(self, name: str) -> int:
