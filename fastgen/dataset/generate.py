@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from fastgen.cpus import usable_cpus
 from fastgen.dataset import workers
 from fastgen.dataset.console import say
 from fastgen.dataset.dataset_json import MANIFEST, existing, read_manifest, shard_numbers, unsealed
@@ -30,8 +31,8 @@ See `run_here`; reports are those of `shards.Report`.
 
 
 def default_workers() -> int:
-    """Return the number of CPU cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    """Return the number of CPUs that this process may use, by affinity and quotas of cgroups."""
+    return usable_cpus()
 
 
 def generate(

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import fastgen
+from fastgen.cpus import usable_cpus
 from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.generate import Runner
 from fastgen.dataset.job import Job, Task
@@ -92,7 +93,7 @@ def _joined(address: str | None, count: int | None) -> bool:
     options: dict[str, Any] = {"address": address}
     if address is None:
         # 'local' never joins a cluster that happens to run here
-        options = {"address": "local", "num_cpus": count or len(os.sched_getaffinity(0))}
+        options = {"address": "local", "num_cpus": count or usable_cpus()}
         options |= {"include_dashboard": False, "object_store_memory": _STORE_BYTES}
     elif address != "auto":
         _probe(address)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from os import cpu_count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from fastgen.config.config import Config
 from fastgen.config.yaml_values import Dumper
+from fastgen.cpus import usable_cpus
 from fastgen.fit.boxes import BoxHeights, camera_distances
 from fastgen.fit.frames import light_class, light_shares, linear_frames
 from fastgen.fit.gap import Gap, gap
@@ -102,7 +102,7 @@ def propose(
     values: dict[str, Any] = {}
     reasons: dict[str, str] = {}
     notes: list[str] = []
-    with ThreadPoolExecutor(cpu_count()) as workers:
+    with ThreadPoolExecutor(usable_cpus()) as workers:
         real = np.array(list(workers.map(lambda each: measured(each.pixels), photographs)))
     say(f"{len(photographs)} photographs measured; rendering the preset")
     ours = _pictures(preset, effort, seed)

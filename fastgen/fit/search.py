@@ -12,13 +12,13 @@ thousands of trials and its local ones do not average over noise.
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from os import cpu_count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.config.sensor import SensorConfig
+from fastgen.cpus import usable_cpus
 from fastgen.errors import ConfigError
 from fastgen.fit.frames import LinearFrame, statistics_of_frames
 from fastgen.fit.gap import gap
@@ -95,7 +95,7 @@ def search(
     }
     strategy = cma.CMAEvolutionStrategy(start, _FIRST_STEP, options)
     best, done = start, 0
-    with ThreadPoolExecutor(cpu_count()) as workers:
+    with ThreadPoolExecutor(usable_cpus()) as workers:
         smallest = objective(start, workers)
         while done < trials:
             points = strategy.ask()

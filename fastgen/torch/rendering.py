@@ -7,6 +7,7 @@ from typing import Any
 from torch.utils.data import get_worker_info
 
 from fastgen.config.config import Config
+from fastgen.cpus import usable_cpus
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 
@@ -31,7 +32,7 @@ class LocalGenerator:
         """Return the Generator of this process and thread."""
         if getattr(self._local, "process", None) != os.getpid():
             worker = get_worker_info()
-            if worker is not None and worker.num_workers >= len(os.sched_getaffinity(0)):
+            if worker is not None and worker.num_workers >= usable_cpus():
                 # one process per core is faster than llvmpipe's threads
                 os.environ.setdefault("LP_NUM_THREADS", "0")
             self._local.generator = Generator.of(*self._arguments)
