@@ -5,20 +5,25 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fastgen.dataset import settings
 from fastgen.dataset.dataset_json import shard_numbers
+from fastgen.dataset.job import Job
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.storage import Folder
 from fastgen.dataset.workers import in_words
 from fastgen.decals import artwork
 from fastgen.errors import AssetError
 from fastgen.files import cache_folder, disk_cache
+from fastgen.light.hdri import bundled_hdris
 from fastgen.render.contexts.shader_cache import spare_full_disk
+from fastgen.render.settings import RenderSettings
 from fastgen.resources import asset_path
 from tests.folders import content
 
@@ -220,3 +225,39 @@ def test_a_full_stderr_keeps_the_exit_code_but_a_full_stdout_fails(tmp_path):
     assert told.stderr.decode().splitlines() == [
         "fastgen: standard output: No space left on device"
     ]
+
+
+@pytest.mark.parametrize(("seconds", "lines"), [(2.0, 7), (0.01, 0)])
+def test_loading_many_hdris_shows_progress_only_if_it_takes_long(
+    monkeypatch, tmp_path, capsys, seconds, lines
+):
+    clock = [0.0]
+    loaded = []
+
+    def load(path):
+        loaded.append(path)
+        clock[0] += seconds
+
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(settings, "load_environment", load)
+    for number in range(48):
+        shutil.copy(bundled_hdris()["sky"], tmp_path / f"sky{number}.exr")
+    job = Job("x", 2, render=RenderSettings((64, 64), hdri_dir=tmp_path))
+    settings.settled(job, 1)
+    assert len(set(loaded)) == 48
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == lines
+    assert all("/48 HDRIs, " in line for line in said)
+    assert not said or "48/48 HDRIs" in said[-1]
+
+
+def test_a_broken_hdri_is_reported_below_the_progress(monkeypatch, tmp_path, capsys):
+    clock = iter(range(0, 100_000, 20))
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    for name in ("a", "b"):
+        shutil.copy(bundled_hdris()["sky"], tmp_path / f"{name}.exr")
+    (tmp_path / "c.exr").write_bytes(b"broken")
+    job = Job("x", 2, render=RenderSettings((64, 64), hdri_dir=tmp_path))
+    with pytest.raises(AssetError, match=r"c\.exr"):
+        settings.settled(job, 1)
+    assert "2/3 HDRIs" in capsys.readouterr().err.splitlines()[-1]

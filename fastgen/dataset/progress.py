@@ -1,4 +1,4 @@
-"""Progress line with images per second and time left: live on a terminal, now and then in a log."""
+"""Progress line with rate and time left: live on a terminal, now and then in a log."""
 
 import os
 import sys
@@ -11,17 +11,22 @@ _LOG_S = 15.0
 
 
 class Progress:
-    """Counts images toward a total and shows the count.
+    """Counts images or other things toward a total and shows the count.
 
     Args:
         total: Number of images when all is done.
         done: Number of images that exist already.
         stream: Where to write; by default standard error.
+        unit: What is counted.
     """
 
-    def __init__(self, total: int, done: int = 0, stream: TextIO | None = None) -> None:
+    def __init__(
+        self, total: int, done: int = 0, stream: TextIO | None = None, unit: str = "images"
+    ) -> None:
         self._total, self._done, self._first = total, done, done
         self._stream = stream or sys.stderr
+        self._unit = unit
+        self._drawn = False
         self._began = self._shown = time.monotonic()
         self._live = self._stream.isatty()
 
@@ -47,13 +52,19 @@ class Progress:
         if self._live:
             self._show("\n")
 
+    def close_if_drawn(self) -> None:
+        """Draw the last state if an earlier one was drawn; short work leaves no trace."""
+        if self._drawn:
+            self.close()
+
     def _draw(self) -> None:
+        self._drawn = True
         rate = self.made / max(time.monotonic() - self._began, 1e-9)
         left_s = int((self._total - self._done) / rate) if rate > 0 else 0
         filled = _BAR * self._done // max(self._total, 1)
         bar = "#" * filled + "." * (_BAR - filled)
         line = (
-            f"[{bar}] {self._done}/{self._total} images, {rate:.1f}/s, "
+            f"[{bar}] {self._done}/{self._total} {self._unit}, {rate:.1f}/s, "
             f"{left_s // 60}:{left_s % 60:02d} left"
         )
         self._show(f"\r{line}\x1b[K" if self._live else f"{line}\n")

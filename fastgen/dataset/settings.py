@@ -1,12 +1,15 @@
 """Checks of a job before it runs, and its settings as dataset.json stores them."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 from fastgen.config.config import Config, SplitConfig
 from fastgen.dataset.dataset_json import unsealed
 from fastgen.dataset.job import LAYOUTS, Job
+from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest
 from fastgen.errors import ConfigError
 from fastgen.formats.registry import formats_of
@@ -89,13 +92,27 @@ def _check(job: Job, worker_count: int) -> None:
             )
 
 
+def _load_all(hdris: Sequence[Path]) -> None:
+    """Load the light of all HDRIs: this reports a broken file now, and fills the cache.
+
+    The first time takes seconds for each HDRI.
+    """
+    progress = Progress(len(hdris), unit="HDRIs")
+    try:
+        for path in hdris:
+            load_environment(path)
+            progress.add(1)
+    finally:
+        progress.close_if_drawn()
+
+
 def _settings(job: Job) -> dict[str, Any]:
     from fastgen import __version__
 
     generator = job.generator()  # checks seed and lenses without opening GL
     generator.scene(0)  # some values are refused only by sampling: before anything is written
-    for path in find_hdris(job.render.hdri_dir) if job.render.hdri_dir else ():
-        load_environment(path)  # reports a broken file now, and caches the light for the workers
+    if job.render.hdri_dir:
+        _load_all(find_hdris(job.render.hdri_dir))
     settings = {
         "version": __version__,
         "format": job.layout,
