@@ -14,7 +14,7 @@ def one_line(text: str) -> str:
     """Return a message that is safe to print: one line, with escaped control characters.
 
     Control characters in names of files and keys could change colors, move the cursor or reverse
-    the direction of writing. The middle of a very long message is left out.
+    the direction of writing. A very long message loses its middle.
     """
     words = " ".join(text.split())
     if len(words) > _LONGEST:
@@ -31,7 +31,7 @@ def shown(value: Any) -> str:
 
 def shown_name(name: object) -> str:
     """Return a name or key as it is, or quoted and cut if it is long or not printable."""
-    text = str(name)
+    text = name if isinstance(name, str) else shown(name)
     return text if text.isprintable() and len(text) <= _LONGEST_NAME else shown(text)
 
 

@@ -20,7 +20,7 @@ class Machine:
         self.mounts, self.groups = ["23 28 0:21 / /proc rw - proc proc rw"], ["1:name=systemd:/"]
 
     def mount(self, kind, name, root="/", options="rw"):
-        """Mount a hierarchy, `root` of which is visible; return its folder."""
+        """Mount the part of a hierarchy below `root`; return the folder."""
         place = self.folder / name
         place.mkdir(parents=True)
         shown = str(place).replace(" ", "\\040")

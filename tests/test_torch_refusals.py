@@ -198,7 +198,7 @@ def test_an_invalid_state_is_refused_and_changes_nothing(change, words):
 
 
 def places(value, path=()):
-    """Yield the path of every value of a state, also of those that hold others."""
+    """Yield the path of every value in a state, and of every mapping and list."""
     yield path
     items = value.items() if isinstance(value, dict) else ()
     for step, item in enumerate(value) if isinstance(value, list) else items:

@@ -23,9 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Returns:
-        The exit code: 0 for success, 1 if faults were found, 2 for bad input or a machine that
-        cannot do what is needed, 70 (EX_SOFTWARE of sysexits.h) for a bug of fastgen, 130 after
-        Ctrl-C, 143 after SIGTERM.
+        The exit code: 0 for success, 1 if faults were found, 2 for bad input or an unsuitable
+        machine, 130 after Ctrl-C, 143 after SIGTERM. A bug of fastgen gives 70, which is
+        EX_SOFTWARE of sysexits.h.
     """
     mend_streams()
     try:

@@ -13,7 +13,7 @@ LONGEST_FILE = 512 << 10
 """
 
 _MOST_VALUES = 200_000
-"""Most values of a file after its aliases are replaced, each of which may repeat many values."""
+"""Most values of a file after each alias is replaced by the values that it repeats."""
 
 _LONGEST_NUMBER = 1000
 """Most characters of a number. Numbers to base 60 take quadratic time to read."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _Count = Annotated[int, Ge(0)]
 _Number = Annotated[int, Ge(1)]
 _Entries = dict[str, tuple[_Count, str]]
-"""Size and SHA-256 of files by their path."""
+"""Size and SHA-256 of each file, by path."""
 
 
 @dataclass(frozen=True)

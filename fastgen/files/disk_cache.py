@@ -38,7 +38,7 @@ _OLD_FORMAT = (f"*-{_HEX}.npz", f"{_HEX}-[0-9]*.npz")
 Arrays = dict[str, NDArray[Any]]
 
 Layout = Mapping[str, str]
-"""Type and shape of arrays by name, in order, such as "float32 V 3".
+"""Type and shape of each array by name, such as "float32 V 3". The order counts.
 
 The type is a dtype or "unsigned". An axis is a number, or a name that stands for one size in all
 arrays.

@@ -192,7 +192,8 @@ def _plain(made: Any) -> dict[str, Any]:
     """Return the description in a state as JSON values.
 
     Raises:
-        ConfigError: It is no mapping, or holds tensors or other values that JSON does not have.
+        ConfigError: The description is not a mapping, or has values without a form in JSON, such as
+            tensors.
     """
     try:
         plain = json.loads(json.dumps(made))

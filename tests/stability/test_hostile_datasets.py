@@ -39,7 +39,7 @@ def made(tmp_path_factory):
 
 
 def readers(made):
-    """Yield name and call of what reads a dataset."""
+    """Yield the name of each reader of a dataset, and a function that reads."""
     out, job, settings = made
     storage = Folder(out)
     yield "stats", lambda: report(out)

@@ -25,7 +25,7 @@ def assert_printable(text):
 
 
 def refusals(text, folder):
-    """Yield what refuses a text, where it is a key, a value or the name of a file."""
+    """Yield functions that each refuse a text: as a key, as a value or as the name of a file."""
     yield lambda: Config.from_values({text: 1})
     yield lambda: Config.from_values({"damage": {text: 1}})
     yield lambda: Config.from_values({"cameras": {text: {}}})

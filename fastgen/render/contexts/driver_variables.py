@@ -1,7 +1,7 @@
 """Variables of the environment that replace or restrict the OpenGL driver.
 
-Mesa reads them, or libglvnd, which finds drivers for EGL. A value that is left over from an
-experiment makes a driver fail as if it were not installed.
+Mesa reads them, or libglvnd, which finds drivers for EGL. With a wrong value an installed driver
+fails as if it were missing.
 """
 
 import os
