@@ -1,6 +1,5 @@
 """Generator: the public way from (config, seed, index) to a labelled Sample."""
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,7 @@ from fastgen.labels.visibility import Shot
 from fastgen.light.container_map import ContainerMap, container_map_path, load_container_map
 from fastgen.light.environment import EnvironmentLight, load_environment
 from fastgen.light.exposure import airlight
-from fastgen.light.hdri import bundled_hdris, bundled_weights, hdris_by_name
+from fastgen.light.hdri import bundled_hdris, bundled_weights, content_hash, hdris_by_name
 from fastgen.preload import preload
 from fastgen.render.cuda import CudaFrame, cuda_reason
 from fastgen.render.gl import open_context
@@ -130,9 +129,9 @@ class Generator:
         record: dict[str, dict[str, Any]] = {}
         for name, weight in self._weights.items():
             path = self._hdris[name]
-            record[name] = {"sha256": _sha256(path), "weight": weight}
-            if container_map_path(path).is_file():
-                record[name]["containers"] = _sha256(container_map_path(path))
+            record[name] = {"sha256": content_hash(path), "weight": weight}
+            if container_map_path(path).exists():
+                record[name]["containers"] = content_hash(container_map_path(path))
         return record
 
     def container_map(self, environment: str) -> ContainerMap | None:
@@ -327,10 +326,6 @@ class Generator:
         if given is None or scene is not given[0]:
             self._given = given = scene, PreparedScene(check_scene(scene))
         return given[1]
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:

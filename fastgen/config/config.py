@@ -282,7 +282,7 @@ class Config:
         file leaves out.
 
         Args:
-            path: YAML or JSON file.
+            path: YAML or JSON file of at most yaml_values.LONGEST_FILE bytes.
             base: Values of everything that the file leaves out; None stands for preset seafront.
 
         Raises:

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from fastgen.errors import ConfigError, shown
+from fastgen.files.plain_file import read_plain
 
 LONGEST_FILE = 512 << 10
 """Most bytes of a file. PyYAML reads about 100 kB per second, and a whole configuration has 40 kB.
@@ -33,16 +34,10 @@ def loaded_file(path: str | Path) -> Any:
         ConfigError: naming the file, and the line and column of a mistake.
     """
     try:
-        with Path(path).open("rb") as file:
-            data = file.read(LONGEST_FILE + 1)  # also of files that have no end, such as /dev/zero
+        data = read_plain(Path(path), LONGEST_FILE)
     except (OSError, TypeError, ValueError) as error:  # ValueError: a null character
         words = error.strerror if isinstance(error, OSError) else "give a path"
         raise ConfigError(f"{path}: cannot be read ({words})") from None
-    if len(data) > LONGEST_FILE:
-        raise ConfigError(
-            f"{path}: is longer than {LONGEST_FILE} bytes; give a file with only the keys that "
-            "change"
-        )
     try:
         return loaded(data.decode("utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
 from fastgen.files.cache_folder import default_folder
+from fastgen.files.plain_file import open_lock, open_plain
 
 LIMIT_BYTES = 4 << 30
 """Largest size of a folder, about 240 environments; the least recently read entries go first."""
@@ -114,8 +115,6 @@ def fits(arrays: Mapping[str, NDArray[Any]], layout: Layout) -> bool:
 def read(entry: Path, layout: Layout | None = None) -> Arrays | None:
     """Return the arrays of an entry by name; None if it is missing, damaged or unlike `layout`."""
     try:
-        if not entry.is_file():  # opening a named pipe would block
-            return None
         record = _mapped(entry)
         if record[_CHECKSUM][0] != _checksum(record):
             return None
@@ -154,6 +153,7 @@ def unload(array: NDArray[Any]) -> None:
 
 
 def _mapped(entry: Path) -> NDArray[np.void]:
+    open_plain(entry, LIMIT_BYTES).close()
     try:
         return np.asarray(np.load(entry, mmap_mode="r", allow_pickle=False))
     except OSError:  # some network file systems cannot map files
@@ -176,9 +176,7 @@ def _alone(entry: Path) -> Iterator[None]:
     with contextlib.ExitStack() as held:
         with contextlib.suppress(OSError):
             entry.parent.mkdir(parents=True, exist_ok=True)
-            # opening a named pipe would block
-            handle = os.open(mark, os.O_WRONLY | os.O_CREAT | os.O_NONBLOCK, 0o666)
-            file = held.enter_context(open(handle, "wb"))
+            file = held.enter_context(open_lock(mark))
             held.callback(mark.unlink, missing_ok=True)
             fcntl.flock(file, fcntl.LOCK_EX)
         yield
@@ -198,7 +196,7 @@ def _trim(folder: Path) -> None:
             with contextlib.suppress(FileNotFoundError):
                 if left.stat().st_mtime < yesterday:
                     left.unlink()
-    found = [(entry, entry.stat()) for entry in folder.glob("*.npy")]
+    found = [(entry, entry.lstat()) for entry in folder.glob("*.npy")]
     spare = sum(about.st_size for _, about in found) - LIMIT_BYTES
     for entry, about in sorted(found, key=lambda one: one[1].st_mtime):
         if spare <= 0:

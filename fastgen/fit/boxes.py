@@ -9,6 +9,7 @@ import numpy as np
 
 from fastgen.config.config import Config
 from fastgen.errors import AssetError
+from fastgen.files.plain_file import read_plain
 from fastgen.fit.photographs import Photograph
 from fastgen.scene.container_kinds import KINDS
 
@@ -23,6 +24,8 @@ _OUTSIDE = 0.05
 
 _LEAST_HEIGHT = 0.02
 """Height of the smallest boxes that say something about the distance of a camera."""
+
+_LARGEST_FILE = 1 << 30
 
 _QUANTILES = (10, 90)
 _SIDES = ("front", "back", "door", "no_door")
@@ -45,7 +48,7 @@ def read_box_heights(folder: Path, photographs: Sequence[Photograph]) -> list[fl
             found.setdefault(name, []).append(ends)
     for photograph in photographs:
         path = photograph.path.with_suffix(".txt")
-        if path.is_file():
+        if path.exists():
             found.setdefault(photograph.path.name, []).extend(_yolo(path))
     largest = (max(boxes, key=lambda ends: ends[1] - ends[0]) for boxes in found.values() if boxes)
     return [
@@ -86,7 +89,7 @@ def _coco(
     path: Path, photographs: Sequence[Photograph]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_plain(path, _LARGEST_FILE))
         if not isinstance(data, dict) or "annotations" not in data:
             return  # some other JSON file
         images = {each["id"]: each for each in data["images"]}
@@ -105,7 +108,7 @@ def _coco(
 
 def _yolo(path: Path) -> Iterator[tuple[float, float]]:
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_plain(path, _LARGEST_FILE).decode().splitlines()
     except (OSError, ValueError) as error:
         raise AssetError(f"{path}: not a YOLO file of boxes ({error}); move it away") from None
     for number, line in enumerate(lines, 1):

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from fastgen.errors import AssetError
 from fastgen.files.images import decode
+from fastgen.files.plain_file import read_plain
 from fastgen.fit.statistics import Pixels, scaled
 
 _TYPES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
 _SMALLEST = 64
+_LARGEST_FILE = 1 << 30
 
 
 class Photograph(NamedTuple):
@@ -55,9 +57,10 @@ def read_photographs(folder: Path, longest: int) -> list[Photograph]:
 
 def _read(path: Path, longest: int) -> Photograph:
     try:
-        pixels = _as_rgb(decode(path.read_bytes()))
+        pixels = _as_rgb(decode(read_plain(path, _LARGEST_FILE)))
     except (OSError, ValueError) as error:
-        raise AssetError(f"{path}: cannot be read as a picture ({error}); remove it") from None
+        words = error.strerror if isinstance(error, OSError) else error
+        raise AssetError(f"{path}: cannot be read as a picture ({words}); remove it") from None
     height, width = pixels.shape[:2]
     if min(height, width) < _SMALLEST:
         raise AssetError(

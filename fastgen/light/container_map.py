@@ -6,6 +6,7 @@ values number the containers from 1; 0 is everything else. The bundled ports hav
 assets/build_panoramas.py renders from the same model as the panorama.
 """
 
+import struct
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,8 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.errors import AssetError
+from fastgen.files.plain_file import read_plain
 from fastgen.light.environment import to_map_frame
-from fastgen.light.hdri import MAX_WIDTH, MIN_WIDTH
+from fastgen.light.hdri import LARGEST_FILE, MAX_WIDTH, MIN_WIDTH
+
+_PNG_START = struct.Struct(">8s8xIIBB")
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_GREY_16 = [16, 0]
+"""Start of a PNG: signature, width, height, bits and color type (W3C, PNG, sections 5 and 11.2).
+It is checked first, because a decoder allocates whatever size the file claims."""
 
 POINTS = 64
 """Directions per container in ContainerMap.points."""
@@ -80,17 +88,24 @@ def load_container_map(hdri: Path) -> ContainerMap | None:
         AssetError: The file is not a 16-bit grey PNG that is twice as wide as high.
     """
     path = container_map_path(hdri)
-    if not path.is_file():
+    try:
+        data = read_plain(path, LARGEST_FILE)
+    except FileNotFoundError:
         return None
-    numbers = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if numbers is None or numbers.dtype != np.uint16 or numbers.ndim != 2:
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
+    start = data[: _PNG_START.size].ljust(_PNG_START.size, b"\0")
+    signature, width, height, *kind = _PNG_START.unpack(start)
+    if signature != _PNG_SIGNATURE or kind != _GREY_16:
         raise AssetError(f"{path}: a container map must be a grey PNG of 16 bits")
-    height, width = numbers.shape
     if width != 2 * height or not MIN_WIDTH <= width <= MAX_WIDTH:
         raise AssetError(
             f"{path}: {width}x{height} texels; a container map must be twice as wide as high, and "
             f"{MIN_WIDTH} to {MAX_WIDTH} wide"
         )
+    numbers = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if numbers is None or numbers.shape != (height, width):
+        raise AssetError(f"{path}: a damaged PNG")
     used = np.flatnonzero(numbers.any(axis=1))
     first, limit = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
     rows = np.zeros((limit - first + 2, width), np.uint16)

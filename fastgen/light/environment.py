@@ -6,7 +6,6 @@ above: radiance(direction) = map(Rz(-yaw) direction).
 """
 
 import functools
-import hashlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from fastgen.errors import AssetError
 from fastgen.files import disk_cache
 from fastgen.light import octahedral, prefilter, rgb9e5
 from fastgen.light.directional_lights import DirectionalLight, extract_lights
-from fastgen.light.hdri import HALF_MAX, load_radiance
+from fastgen.light.hdri import HALF_MAX, content_hash, load_radiance
 from fastgen.scene import REC_709
 
 VERSION = 1  # raise when the stored arrays change
@@ -170,11 +169,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
         AssetError: The file cannot be used, see `load_radiance`, or is too dark or too bright.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            key = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise AssetError(f"{path}: cannot read this HDRI: {error.strerror}") from None
+    key = content_hash(path)
     folder = None if cache_dir is None else Path(cache_dir)
     light = _unpacked(
         path.stem,

@@ -1,5 +1,6 @@
 """HDRI files: bundled and user-supplied environments, and their radiance as arrays."""
 
+import hashlib
 import json
 import re
 from functools import lru_cache
@@ -12,11 +13,15 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen.errors import AssetError
+from fastgen.files.plain_file import open_plain
 from fastgen.resources import asset_path
 from fastgen.scene.limits import OVERCAST_LX
 
 HALF_MAX = 65504.0
 """Largest finite value of IEEE 754 binary16, the format of the maps on a GPU."""
+
+LARGEST_FILE = 4 << 30
+"""Largest size of an HDRI file in bytes; float32 RGBA of MAX_WIDTH without compression has half."""
 
 MIN_WIDTH, MAX_WIDTH = 256, 16384
 """Smallest and largest width of an HDRI in texels."""
@@ -142,6 +147,20 @@ def illuminance_of(name: str) -> float:
 def _index() -> dict[str, dict[str, Any]]:
     index = json.loads(asset_path("hdri", "index.json").read_text(encoding="utf-8"))
     return dict(sorted(index.items()))
+
+
+def content_hash(path: Path) -> str:
+    """Return the SHA-256 of an HDRI file, or of its container map, in hexadecimal.
+
+    Raises:
+        AssetError: The file cannot be read, is not a regular file, or has more than LARGEST_FILE
+            bytes.
+    """
+    try:
+        with open_plain(path, LARGEST_FILE) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
 
 
 def load_radiance(path: str | Path) -> NDArray[np.float32]:

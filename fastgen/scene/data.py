@@ -28,6 +28,7 @@ from fastgen.scene.limits import (
     GROUNDS,
     HASPS,
     ILLUMINANCE_LIMITS_LX,
+    LONGEST_JSON,
     LOWEST_GROUND_MM,
     MAX_DAMAGES,
     MAX_DECALS,
@@ -378,9 +379,14 @@ class Scene:
     def from_json(text: str | bytes) -> "Scene":
         """Return the scene in the text of `to_json` or of a dataset's scene file.
 
+        Args:
+            text: JSON of at most LONGEST_JSON characters.
+
         Raises:
             ConfigError: naming the field that is missing or does not fit.
         """
+        if len(text) > LONGEST_JSON:
+            raise ConfigError(f"scene: has {len(text):,} characters; give at most {LONGEST_JSON:,}")
         try:
             data = json.loads(text)
         except (ValueError, TypeError, RecursionError) as error:

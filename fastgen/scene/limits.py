@@ -86,6 +86,9 @@ ILLUMINANCE_LIMITS_LX = (1e-3, 2e5)
 MAX_LAMPS = 2
 """Lamps of a scene; more would leave no directional lights of the environment."""
 
+LONGEST_JSON = 64 << 20
+"""Most characters of a scene as JSON; MAX_DECALS decals need about a tenth."""
+
 WHOLE = Bounds(0, 2**63 - 1)
 """Bounds of seeds and indices."""
 
