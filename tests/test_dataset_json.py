@@ -179,7 +179,7 @@ def test_pipes_and_folders_in_place_of_files_are_reported_and_repaired(dataset, 
     image.mkdir()
     assert main(["verify", str(copy)]) == 1
     said = capsys.readouterr().out
-    assert f"{empty}: is not a regular file" in said
+    assert f"{empty}: cannot be read (it is a named pipe, not a regular file)" in said
     assert f"{image.relative_to(copy)}: missing" in said
     assert main(["verify", str(copy), "--repair", "--workers", "1"]) == 0
     assert content(copy) == content(dataset)

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.dataset.storage import Folder
 from fastgen.errors import OutputError
 from fastgen.files.images import decode
 from fastgen.formats.format import Format
@@ -47,7 +48,7 @@ def contact_sheet(
     for image_path in chosen:
         try:
             tiles.append(_tile(out, image_path, formats))
-        except (cv2.error, OSError, ValueError, IndexError):
+        except (cv2.error, OSError, OutputError, ValueError, IndexError):
             raise OutputError(
                 f"{image_path}: the image or one of its label files is damaged; "
                 f"run fastgen verify {out} --repair"
@@ -62,10 +63,11 @@ def contact_sheet(
 
 
 def _tile(out: Path, path: Path, formats: Sequence[Format]) -> NDArray[np.uint8]:
-    image = decode(path.read_bytes())
+    storage = Folder(out)
+    image = decode(storage.read(path.relative_to(out).as_posix()))
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
     tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     for each in reversed(formats):
-        each.draw(tile, lambda name: (out / name).read_bytes(), f"{path.parent.name}/{path.stem}")
+        each.draw(tile, storage.read, f"{path.parent.name}/{path.stem}")
     return tile

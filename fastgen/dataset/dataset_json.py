@@ -11,7 +11,7 @@ from typing import Any
 from fastgen.dataset.job import Job, manifest_path, shard_of
 from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import is_sealed
-from fastgen.dataset.storage import Storage
+from fastgen.dataset.storage import Storage, UnreadableError
 from fastgen.errors import OutputError, shown_name
 
 MANIFEST = "dataset.json"
@@ -89,11 +89,18 @@ def shard_numbers(storage: Storage) -> list[int]:
 
 
 def read_manifest(storage: Storage, shard: int) -> dict[str, Any] | None:
-    """Return a shard's manifest, or None if it is missing, changed, or another shard's."""
+    """Return a shard's manifest, or None if it has to be made again.
+
+    It is then missing, unreadable, changed, another shard's, or not as fastgen writes it.
+    """
     try:
-        text = storage.read(manifest_path(shard))
-    except FileNotFoundError:
+        return shard_manifest(storage.read(manifest_path(shard)), shard)
+    except (FileNotFoundError, UnreadableError):
         return None
+
+
+def shard_manifest(text: bytes, shard: int) -> dict[str, Any] | None:
+    """Return the content of a shard's manifest, or None as `read_manifest` does."""
     if not is_sealed(text) or unfit(text, Shard):
         return None
     manifest: dict[str, Any] = parsed_json(text)

@@ -1,18 +1,18 @@
 """Last step of a run: files that cover whole splits, the contact sheet, and dataset.json."""
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from fastgen.dataset.console import say
 from fastgen.dataset.contact_sheet import contact_sheet
-from fastgen.dataset.dataset_json import MANIFEST, unsealed
+from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
 from fastgen.dataset.job import Job, manifest_path
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
+from fastgen.errors import OutputError
 from fastgen.files.images import encode_picture
 from fastgen.formats.format import Format, Record
 from fastgen.formats.registry import formats_of
@@ -34,9 +34,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     images: list[tuple[str, str]] = []
     counts = {split: _count(formats, []) for split in SPLITS}
     for shard in range(job.shard_count):
-        data = storage.read(manifest_path(shard))
-        shards[str(shard)] = digest(data)
-        manifest = json.loads(data)
+        shards[str(shard)], manifest = _manifest(job, storage, shard)
         made_by = {name: manifest[name] for name in MADE_BY}
         if made_by not in makers:
             makers.append(made_by)
@@ -91,10 +89,20 @@ def _count(formats: Iterable[Format], records: list[Record]) -> Counter[str]:
     return found
 
 
+def _manifest(job: Job, storage: Storage, shard: int) -> tuple[str, dict[str, Any]]:
+    """Return the content hash and the content of a shard's manifest."""
+    path = manifest_path(shard)
+    text = storage.read(path)
+    manifest = shard_manifest(text, shard)
+    if manifest is None:
+        raise OutputError(f"{job.out}: {path} was changed during the run; run generate again")
+    return digest(text), manifest
+
+
 def _records(job: Job, storage: Storage, split: str) -> Callable[[], Iterator[Record]]:
     def through() -> Iterator[Record]:
         for shard in range(job.shard_count):
-            manifest = json.loads(storage.read(manifest_path(shard)))
+            _, manifest = _manifest(job, storage, shard)
             yield from (record for record in manifest["records"] if record["split"] == split)
 
     return through

@@ -7,10 +7,13 @@ import functools
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from annotated_types import Ge, MinLen
+from annotated_types import Ge, Le, MinLen
 
 from fastgen.dataset.job import LAYOUTS
 from fastgen.errors import shown, shown_name
+from fastgen.files.inner_path import INNER_PATH
+from fastgen.formats.registry import known_formats
+from fastgen.render.settings import MAX_SIZE
 from fastgen.sampling.scene import SPLITS
 from fastgen.validation import Matching, OneOf
 
@@ -19,7 +22,10 @@ if TYPE_CHECKING:
 
 _Count = Annotated[int, Ge(0)]
 _Number = Annotated[int, Ge(1)]
-_Entries = dict[str, tuple[_Count, str]]
+_Side = Annotated[int, Ge(1), Le(MAX_SIZE)]
+_Entries = dict[
+    Annotated[str, Matching(INNER_PATH, "is not a path inside the dataset")], tuple[_Count, str]
+]
 """Size and SHA-256 of each file, by path."""
 
 
@@ -36,9 +42,9 @@ class Started:
 
     version: str
     format: Annotated[str, OneOf(LAYOUTS)]
-    formats: tuple[str, ...]
+    formats: tuple[Annotated[str, OneOf(tuple(known_formats()))], ...]
     seed: _Count
-    size: tuple[_Number, _Number]
+    size: tuple[_Side, _Side]
     quality: str
     cameras: Annotated[tuple[str, ...], MinLen(1)]
     environments: dict[str, Any]
@@ -62,9 +68,9 @@ class Finished(Started):
 
 @dataclass(frozen=True)
 class _Record:
-    stem: str
+    stem: Annotated[str, Matching("[0-9]{6,}_[A-Za-z0-9_-]{1,64}", "is not the name of an image")]
     split: Annotated[str, OneOf(SPLITS)]
-    size: tuple[_Number, _Number]
+    size: tuple[_Side, _Side]
     facts: dict[str, Any]
 
 
@@ -105,7 +111,10 @@ def unfit(text: bytes, cls: type) -> str:
         path = ".".join(map(shown_name, first["loc"]))
         if first["type"] == "missing":
             return f"{path}: is missing"
-        reason = f" ({first['msg']})" if first["msg"] else ""  # types of ours have no message
+        ours = first.get("ctx", {}).get("otherwise")
+        if ours:
+            return f"{path}: {shown(first['input'])} {ours}"
+        reason = f" ({first['msg']})" if first["msg"] else ""
         return f"{path}: {shown(first['input'])} does not fit{reason}"
     return ""
 

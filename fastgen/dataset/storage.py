@@ -6,6 +6,7 @@ Paths in a storage are relative, with forward slashes.
 import contextlib
 import ctypes
 import fcntl
+import hashlib
 import os
 import shutil
 import uuid
@@ -15,6 +16,8 @@ from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
+from fastgen.files.inner_path import check_inner, place_inside
+from fastgen.files.plain_file import open_lock, open_plain, read_plain
 from fastgen.formats.format import Files, Same
 
 ASIDE = ".aside"
@@ -29,8 +32,19 @@ _BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
 """fsspec's protocols of object stores."""
 
 
+_LARGEST_READ, _LARGEST_HASHED = 4 << 30, 256 << 30
+"""Largest files in bytes. Tar files, which may be larger than memory, are only hashed."""
+
+_PIECE = 1 << 20
+"""Bytes that are hashed at a time."""
+
+
+class UnreadableError(OutputError):
+    """File of a dataset that exists and cannot be read, so that it has to be made again."""
+
+
 class Folder:
-    """A dataset in a folder of this machine."""
+    """A dataset in a folder of this machine. No path or link in one leads out of it."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -54,8 +68,8 @@ class Folder:
                     with open(places[path], "wb") as stream:
                         stream.write(content)
             _flush(aside)
-            for folder in {os.path.dirname(path) for path in files}:
-                (self.root / folder).mkdir(parents=True, exist_ok=True)
+            for path in {os.path.dirname(path): path for path in files}.values():
+                place_inside(self.root, path).parent.mkdir(parents=True, exist_ok=True)
             for path, place in places.items():
                 # rename(2) keeps both names if they are the same file; rmtree removes the old one
                 os.replace(place, f"{self.root}/{path}")
@@ -68,7 +82,7 @@ class Folder:
 
     def write(self, path: str, pieces: Iterable[bytes]) -> None:
         """Write one file: to a temporary name first, then flushed and renamed."""
-        target = self.root / path
+        target = place_inside(self.root, path)
         with _named(target, "written"):
             target.parent.mkdir(parents=True, exist_ok=True)
             with whole_file(target) as stream:
@@ -77,25 +91,40 @@ class Folder:
     def make_folders(self, paths: Iterable[str]) -> None:
         """Make these folders unless they exist."""
         for path in paths:
-            with _named(self.root / path, "written"):
-                (self.root / path).mkdir(parents=True, exist_ok=True)
+            folder = place_inside(self.root, path, follow=True)
+            with _named(folder, "written"):
+                folder.mkdir(parents=True, exist_ok=True)
 
     def read(self, path: str) -> bytes:
-        """Return the content of a file. Raises FileNotFoundError."""
-        place = self.root / path
-        with _named(place, "read"):
-            # reading a named pipe would block
-            if not (place.is_file() or place.is_dir()) and place.exists():
-                raise OutputError(f"{place}: is not a regular file")
-            return place.read_bytes()
+        """Return the content of a file.
+
+        Raises:
+            FileNotFoundError: It does not exist.
+            UnreadableError: It is not a regular file inside the dataset, has more than 4 GiB, or
+                cannot be read.
+        """
+        with _readable(self.root, path) as place:
+            return read_plain(place, _LARGEST_READ)
+
+    def content_hash(self, path: str) -> str:
+        """Return the SHA-256 of a file in hexadecimal, without keeping its content in memory.
+
+        Raises the errors of `read`.
+        """
+        with _readable(self.root, path) as place, open_plain(place, _LARGEST_HASHED) as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
 
     def remove(self, path: str) -> None:
         """Remove a file, or an empty folder with its name, if it exists."""
-        place = self.root / path
+        place = place_inside(self.root, path)
         with _named(place, "removed"), contextlib.suppress(NotADirectoryError):
             try:
                 place.unlink(missing_ok=True)
             except IsADirectoryError:
+                if os.listdir(place):
+                    raise OutputError(
+                        f"{place}: is a folder that is not empty; move it elsewhere"
+                    ) from None
                 place.rmdir()
 
     def sizes(self) -> dict[str, int]:
@@ -143,7 +172,7 @@ class Folder:
         """
         path = self.root / LOCK
         with _named(path, "written"):
-            stream = path.open("w")
+            stream = open_lock(path)
         with stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -224,6 +253,14 @@ class Remote:
             data: bytes = self._system.cat_file(self._path(path))
         return data
 
+    def content_hash(self, path: str) -> str:
+        """Return the SHA-256 of a file in hexadecimal, without keeping its content in memory."""
+        with self._named(path, "read"), self._system.open(self._path(path), "rb") as stream:
+            found = hashlib.sha256()
+            while piece := stream.read(_PIECE):
+                found.update(piece)
+        return found.hexdigest()
+
     def remove(self, path: str) -> None:
         """Remove a file if it exists."""
         with self._named(path, "removed"), contextlib.suppress(FileNotFoundError):
@@ -243,7 +280,7 @@ class Remote:
         """Return the names in the root or in a folder; none if the folder does not exist."""
         with self._named("", "listed"):
             self._system.invalidate_cache()
-            path = self._path(folder).rstrip("/")
+            path = self._path(folder) if folder else self._base.rstrip("/")
             try:
                 found: list[str] = self._system.ls(path, detail=False)
             except (FileNotFoundError, NotADirectoryError):
@@ -259,7 +296,7 @@ class Remote:
         yield
 
     def _path(self, path: str) -> str:
-        return f"{self._base.rstrip('/')}/{path}"
+        return f"{self._base.rstrip('/')}/{check_inner(path)}"
 
     def _named(self, path: str, action: str) -> contextlib.AbstractContextManager[None]:
         # each store has errors of its own
@@ -275,6 +312,21 @@ def storage_of(out: str | Path) -> Storage:
     if "\0" in text:
         raise OutputError(f"{text}: contains a null character, which no path may; leave it out")
     return Remote(text) if "://" in text else Folder(Path(text))
+
+
+@contextlib.contextmanager
+def _readable(root: Path, path: str) -> Iterator[Path]:
+    """Give the place of a file that is to be read; see `Folder.read` for the errors."""
+    try:
+        place = place_inside(root, path, follow=True)
+    except OutputError as error:
+        raise UnreadableError(str(error)) from None
+    try:
+        yield place
+    except (FileNotFoundError, NotADirectoryError):
+        raise FileNotFoundError(str(place)) from None
+    except OSError as error:
+        raise UnreadableError(f"{place}: cannot be read ({_words(error)})") from None
 
 
 @contextlib.contextmanager

@@ -9,10 +9,10 @@ from typing import Any
 
 import simplejpeg
 
-from fastgen.dataset.dataset_json import MANIFEST, without_manifest
+from fastgen.dataset.dataset_json import MANIFEST, read_manifest, without_manifest
 from fastgen.dataset.job import manifest_path
 from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
-from fastgen.dataset.seal import digest, is_sealed
+from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError
 from fastgen.formats.format import Format, Read, Record
@@ -69,19 +69,20 @@ def examine(out: str) -> Findings:
     shards = []
     unlisted: set[int] = set()  # shards whose files are not known
     for number, hashed in manifest["shards"].items():
-        path = manifest_path(int(number))
-        data = _intact(storage, present, path, None, hashed, faults)
-        if data is not None and (problem := unfit(data, Shard)):
-            faults.append(f"{path}: {problem}")
-            data = None
-        if data is None:
+        path, shard = manifest_path(int(number)), None
+        if _is_intact(storage, present, path, None, hashed, faults):
+            shard = read_manifest(storage, int(number))
+            if shard is None:
+                problem = unfit(storage.read(path), Shard) or "is another shard's"
+                faults.append(f"{path}: {problem}")
+        if shard is None:
             unlisted.add(int(number))
         else:
-            shards.append(parsed_json(data))
+            shards.append(shard)
     broken = {manifest_path(number) for number in unlisted}
     listed = [manifest["files"], *(shard["files"] for shard in shards)]
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
-        if _intact(storage, present, path, size, hashed, faults) is None:
+        if not _is_intact(storage, present, path, size, hashed, faults):
             broken.add(path)
     astray = (path for path in sorted(present) if _shard_by_name(path, manifest) not in unlisted)
     faults += [f"{path}: does not belong here" for path in astray]
@@ -94,37 +95,36 @@ def examine(out: str) -> Findings:
     return Findings(faults, broken, manifest)
 
 
-def _intact(
+def _is_intact(
     storage: Storage,
     present: dict[str, int],
     path: str,
     size: int | None,
     hashed: str,
     faults: list[str],
-) -> bytes | None:
-    """Return a file's content if it is as it was written, else None after adding a fault.
+) -> bool:
+    """Return whether a file is as it was written, and add a fault if it is not.
 
     The file is removed from `present`.
     """
     if path not in present:
         faults.append(f"{path}: missing")
-        return None
+        return False
     found = present.pop(path)
     if size is not None and found != size:
         faults.append(f"{path}: changed ({found} bytes, {size} were written)")
-        return None
+        return False
     try:
-        data = storage.read(path)
+        same = storage.content_hash(path) == hashed
     except OutputError as error:  # must not hide other faults
         faults.append(str(error))
-        return None
+        return False
     except FileNotFoundError:  # a dangling link
         faults.append(f"{path}: missing")
-        return None
-    if digest(data) != hashed:
+        return False
+    if not same:
         faults.append(f"{path}: changed")
-        return None
-    return data
+    return same
 
 
 def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
@@ -178,9 +178,12 @@ def _read_intact(storage: Storage, broken: set[str], path: str) -> bytes:
 def _check_image(record: Record, read: Read) -> Iterator[str]:
     path = f"images/{record['split']}/{record['stem']}.jpg"
     width, height = record["size"]
+    data = read(path)
     try:
+        # before decoding, because the decoder allocates whatever size the file claims
+        complete = simplejpeg.decode_jpeg_header(data)[:2] == (height, width)
         # strict: otherwise the missing part of a truncated file becomes grey
-        complete = simplejpeg.decode_jpeg(read(path), strict=True).shape == (height, width, 3)
+        complete = complete and simplejpeg.decode_jpeg(data, strict=True).shape[2] == 3
     except ValueError:
         complete = False
     if not complete:

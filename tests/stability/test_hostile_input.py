@@ -71,7 +71,7 @@ def test_values_that_yaml_cannot_read_are_refused_with_their_place(value, words,
         (b"a: \xff", "not a YAML file ('utf-8' codec can't decode"),
         (f"? {'9' * 5000}\n: 1", "has more characters than a number may"),
         ("!!timestamp soon: 1", "'soon' is not of the type timestamp"),
-        ("#" * (LONGEST_FILE + 1), f"is longer than {LONGEST_FILE} bytes"),
+        ("#" * (LONGEST_FILE + 1), f"more than the limit of {LONGEST_FILE:,}"),
     ],
     ids=lambda part: str(part[:12]),
 )
