@@ -2,10 +2,11 @@
 
 import hashlib
 import json
+import os
 import re
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
@@ -13,7 +14,9 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from fastgen.errors import AssetError
+from fastgen.files.native_messages import without_native_messages
 from fastgen.files.plain_file import open_plain
+from fastgen.light.exr_layout import check_layout
 from fastgen.resources import asset_path
 from fastgen.scene.limits import OVERCAST_LX
 
@@ -180,9 +183,11 @@ def load_radiance(path: str | Path) -> NDArray[np.float32]:
     kind = path.suffix.lower()
     if kind not in (".exr", ".hdr"):
         raise AssetError(f"{path}: an HDRI must be an .exr or .hdr file")
-    if not path.is_file():
-        raise AssetError(f"{path}: no such file")
-    radiance = _read_exr(path) if kind == ".exr" else _read_hdr(path)
+    try:
+        with open_plain(path, LARGEST_FILE) as file:
+            radiance = _read_exr(path, file) if kind == ".exr" else _read_hdr(path, file)
+    except OSError as error:
+        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
     return _sanitized(radiance)
 
 
@@ -195,22 +200,17 @@ def _check_size(path: Path, width: int, height: int) -> None:
         raise AssetError(f"{path}: {width}x{height} texels; an HDRI must be twice as wide as high")
 
 
-def _read_exr(path: Path) -> NDArray[np.float32]:
+def _read_exr(path: Path, file: BinaryIO) -> NDArray[np.float32]:
     try:
-        # read only the header first, to decode no file of a wrong size
-        header = OpenEXR.File(str(path), header_only=True).header()
-        low, high = header["dataWindow"]
-        width, height = (int(n) for n in high - low + 1)
-    except Exception as error:  # any error of the decoder means a bad file
+        width, height = check_layout(file)
+    except ValueError as error:
         raise AssetError(f"{path}: not a readable OpenEXR file ({error})") from None
     _check_size(path, width, height)
     try:
-        # checked first, because the decoder prints to the terminal if a file is truncated
-        if not OpenEXR.InputFile(str(path)).isComplete():
-            raise ValueError("the file is truncated")
-        channels = OpenEXR.File(str(path), separate_channels=True).channels()
+        with without_native_messages():
+            channels = OpenEXR.File(str(path), separate_channels=True).channels()
         planes = {name: channel.pixels for name, channel in channels.items()}
-    except Exception as error:
+    except Exception as error:  # any error of the decoder means a bad file
         raise AssetError(f"{path}: damaged OpenEXR file ({error})") from None
     names = _color_channels(path, list(planes))
     radiance = np.empty((height, width, 3), np.float32)
@@ -236,20 +236,24 @@ def _color_channels(path: Path, names: list[str]) -> tuple[str, str, str]:
     raise AssetError(f"{path}: has channels {', '.join(names)}; an HDRI must have R, G and B")
 
 
-def _read_hdr(path: Path) -> NDArray[np.float32]:
-    with path.open("rb") as file:
-        head = file.read(4096)
+def _read_hdr(path: Path, file: BinaryIO) -> NDArray[np.float32]:
+    head = file.read(4096)
     # resolution string of the Radiance format (Reference Manual, picture format): rows from the
     # top, then columns from the left; OpenCV reads no other order
-    size = re.search(rb"\n\n-Y +(\d+) +\+X +(\d+)\n", head)
+    size = re.search(rb"\n\n-Y +(\d{1,9}) +\+X +(\d{1,9})\n", head)
     if not head.startswith(b"#?") or not size:
         raise AssetError(f"{path}: not a Radiance HDR picture with rows from the top (-Y, +X)")
     height, width = int(size[1]), int(size[2])
     _check_size(path, width, height)
+    # a line has 4 bytes and four channels in runs of at most 127 texels, or is not compressed
+    smallest = height * min(4 + 4 * 2 * -(-width // 127), 4 * width)
+    if os.fstat(file.fileno()).st_size - size.end() < smallest:
+        raise AssetError(f"{path}: damaged Radiance HDR picture (the file is truncated)")
     log_level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
-        bgr = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+        with without_native_messages():
+            bgr = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
     except cv2.error:
         bgr = None
     finally:
