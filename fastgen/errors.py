@@ -3,6 +3,8 @@
 import reprlib
 from typing import Any
 
+from fastgen.redaction import without_secrets
+
 _LONGEST = 4000
 """Most characters of a message."""
 
@@ -13,10 +15,11 @@ _LONGEST_NAME = 80
 def one_line(text: str) -> str:
     """Return a message that is safe to print: one line, with escaped control characters.
 
+    Passwords of addresses in it are replaced by ***.
     Control characters in names of files and keys could change colors, move the cursor or reverse
     the direction of writing. A very long message loses its middle.
     """
-    words = " ".join(text.split())
+    words = " ".join(without_secrets(text).split())
     if len(words) > _LONGEST:
         words = f"{words[: 3 * _LONGEST // 4]} ... {words[-_LONGEST // 4 :]}"
     if words.isprintable():

@@ -14,6 +14,7 @@ from fastgen.cli.options import (
     render_settings,
 )
 from fastgen.dataset import stats
+from fastgen.dataset.addresses import place_of
 from fastgen.dataset.console import tell
 from fastgen.dataset.finish import CONTACT_SHEET
 from fastgen.dataset.generate import generate
@@ -142,12 +143,11 @@ def add_verify(commands: Any) -> None:
 
 
 def _place(text: str) -> str:
-    """Return OUT without slashes at its end, which would appear twice in messages."""
-    scheme, colon, path = text.rpartition("://")
-    place = scheme + colon + (path.rstrip("/") or path[:1])
-    if not place:
+    """Return OUT without ~, and without slashes at its end, which would be twice in messages."""
+    if not text:
         raise argparse.ArgumentTypeError("is empty; give a folder or an address")
-    return place
+    scheme, colon, path = place_of(text).rpartition("://")
+    return scheme + colon + (path.rstrip("/") or path[:1])
 
 
 def _generate(options: argparse.Namespace) -> int:

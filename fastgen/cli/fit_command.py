@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fastgen.cli.options import add_seed
+from fastgen.cli.options import add_seed, output_file
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
 from fastgen.dataset.console import say, tell
@@ -29,7 +29,7 @@ def add_fit(commands: Any) -> None:
     command.add_argument(
         "-o",
         dest="file",
-        type=Path,
+        type=output_file,
         default=Path("port.yaml"),
         metavar="FILE.yaml",
         help="file to write, for --config with the same --preset; default: %(default)s",

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
-from fastgen.errors import ConfigError, shown
+from fastgen.dataset.addresses import place_of
+from fastgen.errors import ConfigError, OutputError, shown
 from fastgen.render.gl import BACKENDS
 from fastgen.render.settings import QUALITY, RenderSettings
 
@@ -92,6 +93,18 @@ def add_device(command: argparse._ActionsContainer, note: str = "") -> None:
         help=f"EGL device to render on, numbered as by `fastgen doctor`{note}; "
         "default: the first that works",
     )
+
+
+def output_file(text: str) -> Path:
+    """Return the file that an option -o names.
+
+    Raises:
+        OutputError: It is an address, or starts with ~ and there is no such user.
+    """
+    place = place_of(text)
+    if "://" in place:
+        raise OutputError(f"{text}: is an address; give a file of this machine")
+    return Path(place)
 
 
 def config_of(options: argparse.Namespace) -> Config:

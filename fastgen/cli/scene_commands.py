@@ -1,7 +1,6 @@
 """Commands about single scenes: show and export."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from fastgen.cli.options import (
@@ -10,6 +9,7 @@ from fastgen.cli.options import (
     add_render,
     add_seed,
     config_of,
+    output_file,
     render_settings,
 )
 from fastgen.errors import ConfigError
@@ -45,7 +45,7 @@ def add_show(commands: Any) -> None:
     command.add_argument(
         "-o",
         dest="file",
-        type=Path,
+        type=output_file,
         required=True,
         metavar="FILE.png",
         help="file to write, .png or .jpg",
@@ -75,7 +75,7 @@ def add_export(commands: Any) -> None:
         help="width of a texel of the textures in millimetres; default: %(default)g",
     )
     command.add_argument(
-        "-o", dest="file", type=Path, required=True, metavar="FILE.glb", help="file to write"
+        "-o", dest="file", type=output_file, required=True, metavar="FILE.glb", help="file to write"
     )
     add_config(command)
     add_render(command, quality=False)

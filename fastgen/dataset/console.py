@@ -6,6 +6,7 @@ import os
 import sys
 
 from fastgen.errors import OutputError
+from fastgen.redaction import without_secrets
 
 
 def mend_streams() -> None:
@@ -35,14 +36,14 @@ def drop_unprinted() -> None:
 
 
 def tell(words: str, end: str = "\n") -> None:
-    """Print to standard output and flush it.
+    """Print to standard output without passwords of addresses, and flush it.
 
     Raises:
         OutputError: The stream cannot be written, for example because a disk is full.
         BrokenPipeError: The reader of a pipe has exited.
     """
     try:
-        print(words, end=end, flush=True)
+        print(without_secrets(words), end=end, flush=True)
     except BrokenPipeError:
         raise
     except OSError as error:
@@ -50,6 +51,9 @@ def tell(words: str, end: str = "\n") -> None:
 
 
 def say(words: str) -> None:
-    """Print a line to standard error, or nothing if it cannot be written."""
+    """Print a line to standard error, without passwords of addresses.
+
+    Nothing is printed if it cannot be written.
+    """
     with contextlib.suppress(OSError):
-        print(words, file=sys.stderr)
+        print(without_secrets(words), file=sys.stderr)

@@ -17,6 +17,7 @@ from typing import Any
 
 import fastgen
 from fastgen.cpus import usable_cpus
+from fastgen.dataset.addresses import place_of
 from fastgen.dataset.dataset_json import MANIFEST
 from fastgen.dataset.generate import Runner
 from fastgen.dataset.job import Job, Task
@@ -123,7 +124,8 @@ def _probe(address: str) -> None:
 
 def _everywhere(job: Job) -> Job:
     """Return the job with absolute paths, which mean the same in every working directory."""
-    out = job.out if "://" in job.out else os.path.abspath(job.out)
+    place = place_of(job.out)
+    out = place if "://" in place else os.path.abspath(place)
     hdri_dir = job.render.hdri_dir and os.path.abspath(job.render.hdri_dir)
     return replace(job, out=out, render=replace(job.render, hdri_dir=hdri_dir))
 

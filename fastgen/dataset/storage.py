@@ -14,11 +14,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from fastgen.dataset.addresses import BUCKETS, place_of
 from fastgen.errors import FastgenError, OutputError
 from fastgen.files.atomic_file import ASIDE_FILES, whole_file
 from fastgen.files.inner_path import check_inner, place_inside
 from fastgen.files.plain_file import open_lock, open_plain, read_plain
 from fastgen.formats.format import Files, Same
+from fastgen.redaction import without_secrets
 
 ASIDE = ".aside"
 """Prefix of temporary folders, where files wait until all files of their shard are on the disk."""
@@ -27,9 +29,6 @@ LOCK = ".lock"
 
 _RECOVERED = "lost+found"
 """Folder that some file systems put into the root of a volume."""
-
-_BUCKETS = frozenset({"s3", "gs", "abfs", "oss", "oci"})
-"""fsspec's protocols of object stores."""
 
 
 _LARGEST_READ, _LARGEST_HASHED = 4 << 30, 256 << 30
@@ -212,7 +211,7 @@ class Remote:
         try:
             self._system, self._base = fsspec.core.url_to_fs(address)
         except Exception as error:  # each store has errors of its own
-            raise OutputError(f"{address}: {_words(error)}") from None
+            raise OutputError(without_secrets(f"{address}: {_words(error)}", address)) from None
 
     @property
     def lives_here(self) -> bool:
@@ -226,7 +225,7 @@ class Remote:
         A bucket needs no folders, and making one would create a bucket from a mistyped name.
         """
         protocol = self._system.protocol
-        return not _BUCKETS.isdisjoint({protocol} if isinstance(protocol, str) else protocol)
+        return not BUCKETS.isdisjoint({protocol} if isinstance(protocol, str) else protocol)
 
     def commit(self, files: Files, name: str) -> None:
         """Write one file after the other. `name` is not used."""
@@ -307,11 +306,13 @@ Storage = Folder | Remote
 
 
 def storage_of(out: str | Path) -> Storage:
-    """Return the storage at a path or at an address with '://'; file:// gives a Folder."""
-    text = str(out).removeprefix("file://")
-    if "\0" in text:
-        raise OutputError(f"{text}: contains a null character, which no path may; leave it out")
-    return Remote(text) if "://" in text else Folder(Path(text))
+    """Return the storage at a path or at an address with '://'; file:// gives a Folder.
+
+    Raises:
+        OutputError: There can be none; see `place_of`.
+    """
+    place = place_of(out)
+    return Remote(place) if "://" in place else Folder(Path(place))
 
 
 @contextlib.contextmanager
@@ -342,7 +343,8 @@ def _named(place: Path | str, action: str, errors: type[Exception] = OSError) ->
     except errors as error:
         if action == "read" and isinstance(error, FileNotFoundError | NotADirectoryError):
             raise FileNotFoundError(str(place)) from None
-        raise OutputError(f"{place}: cannot be {action} ({_words(error)})") from None
+        words = f"{place}: cannot be {action} ({_words(error)})"
+        raise OutputError(without_secrets(words, str(place))) from None
 
 
 def _words(error: Exception) -> str:
