@@ -1,5 +1,8 @@
 """Files that block, never end or are far too large, wherever a file of somebody else is read."""
 
+import struct
+import zlib
+
 import numpy as np
 import pytest
 
@@ -106,6 +109,34 @@ def test_a_special_file_as_lock_of_a_cache_entry_stops_nothing(tmp_path, kind):
     disk_cache.cached("kind", 1, "a", lambda: arrays, lock.parent)
     assert (lock.parent / entry.name).read_bytes() == entry.read_bytes()
     assert not victim.exists()
+
+
+def png_of(width, height, bits, color_type):
+    """Return a PNG that claims this size and has almost no data."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, bits, color_type, 0, 0, 0)
+    chunks = (head, b"IDAT" + zlib.compress(bytes(1000)), b"IEND")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+        for chunk in chunks
+    )
+
+
+@pytest.mark.parametrize("side", [20_000, 60_000, 2**31 - 1])
+def test_a_photograph_that_claims_too_many_pixels_is_refused_by_name(tmp_path, side):
+    (tmp_path / "quay.png").write_bytes(png_of(side, side, 8, 2))
+    with pytest.raises(AssetError, match=r"quay\.png: cannot be read as a picture \("):
+        read_photographs(tmp_path, 640)
+
+
+@pytest.mark.parametrize("side", [20_000, 60_000, 2**30])
+def test_a_container_map_that_claims_too_many_texels_is_refused_by_name(tmp_path, side):
+    path = container_map_path(tmp_path / "sky.exr")
+    path.write_bytes(png_of(2 * side - 1, side, 16, 0))
+    with pytest.raises(AssetError, match=r"sky\.containers\.png: .* texels"):
+        load_container_map(tmp_path / "sky.exr")
+    path.write_bytes(png_of(512, 256, 16, 0))
+    with pytest.raises(AssetError, match=r"sky\.containers\.png: a damaged PNG"):
+        load_container_map(tmp_path / "sky.exr")
 
 
 @pytest.mark.parametrize("kind", KINDS)
