@@ -6,7 +6,7 @@
 Prints CPU ms and thousands of pixels of each pass by camera, measured in one process. Each time is
 the fastest of `repeats` draws, averaged over the scenes. CPU time of the process is hardly affected
 by other load on the machine. The timer waits for each pass to finish, which does not happen in a
-real frame. A 2x2 block that `draft` shades once counts as one pixel.
+real frame.
 
 On a GPU, times come from the GPU's own clock and pixels are not counted, because reading a list
 back makes it slow from then on.

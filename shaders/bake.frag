@@ -24,7 +24,11 @@ void main() {
 #if WITH_DAMAGE
     scar = damage_at(rest_mm).scar;
 #endif
-    Material m = surface_at(zone, atlas_mm, texel_mm, scar).material;
+    DecalHit decal = NO_DECAL;
+#if WITH_DECALS
+    decal = worn_decals(zone, atlas_mm, texel_mm);
+#endif
+    Material m = surface_at(zone, atlas_mm, texel_mm, scar, decal).material;
     out_albedo = vec4(srgb_encode(m.albedo), 1.0);
     out_surface = vec4(1.0, m.roughness, m.metallic, 1.0);
 }

@@ -3,13 +3,11 @@
 // pixel whose centre sees a surface. shade.comp overwrites labels near decals and damages.
 // The lists replace branches: Mesa's CPU driver llvmpipe executes both sides of every branch.
 #version 430 core
-#include "coarse.constants"
 #include "labels.constants"
 #include "pixel_list.constants"
 #include "samples.constants"
 #include "variant.constants"
 #include "scene.block"
-#include "view.block"
 #include "damage.block"
 #include "surface_id.glsl"
 #include "zone_id.glsl"
@@ -28,12 +26,19 @@ layout(local_size_x = LIST_GROUP) in;
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
 
 #if DAMAGED
-// 2 near a hole, 1 near another damage, else 0.
-int damage_near(vec3 rest_mm) {
-    int near = 0;
+// 2 where samples of the pixel see a hole, 1 near another damage, else 0. Only pixels that see a hole are
+// shaded as such: the class filters the material differently, and its use near holes would tell where
+// they are.
+int damage_near(vec3 rest_mm, ivec2 middle) {
+    int near = 0, samples = 0;
     for (int i = next_damage_near(0, damage_count, rest_mm); i < damage_count;
          i = next_damage_near(i + 1, damage_count, rest_mm))
-        if (within_reach(i, rest_mm)) near = max(near, i < hole_count ? 2 : 1);
+        if (within_reach(i, rest_mm)) {
+            near = 1;
+            samples = i < hole_count ? FILTER_SAMPLES : samples;
+        }
+    for (int i = 0; i < samples; ++i)
+        if (hole_at(rest_at(middle + FILTER_OFFSET[i])) >= 0) near = 2;
     return near;
 }
 #endif
@@ -57,23 +62,25 @@ void write_labels(ivec2 pixel, uint key, float depth) {
     imageStore(depth_image, pixel, vec4(depth));
 }
 
-#if COARSE
-// Adds each pixel of a 2x2 block whose bit is set to a list, one entry per pixel.
+#if SAMPLES_PER_AXIS == 1
+// Offset of a bit's pixel in a 2x2 block.
+ivec2 in_block(int bit) { return ivec2(bit & 1, bit >> 1); }
+
+// Adds each pixel of a 2x2 block whose bit is set to a list.
 void list_each(uint list, ivec2 block, uint bits) {
     if (bits == 0u) return;
     uint at = listed(list, bitCount(bits));
     for (int i = 0; i < 4; ++i)
-        if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_group(i), 1u);
+        if ((bits & 1u << i) != 0u) list_entries[at++] = list_entry(block + in_block(i));
 }
 
-// 2x2 coarse shading (Vaidyanathan et al. 2014, Coarse Pixel Shading): pixels of a 2x2 block that see
-// the same facet are shaded once, unless a decal or damage is near.
+// One invocation classifies a 2x2 block, so that four gathers read it and each list grows once.
 void main() {
     ivec2 in_region = 2 * in_turn((region.zw + 1) / 2);
     if (in_region.y >= region.w) return;
     ivec2 block = region.xy + in_region;
     vec2 middle = vec2(block + 1) / vec2(textureSize(surface_ids, 0));
-    // The swizzle .wzxy reorders the texels of textureGather as in_group counts them.
+    // The swizzle .wzxy reorders the texels of textureGather as in_block counts them.
     uvec4 key = textureGather(surface_ids, middle).wzxy;
     vec4 atlas_x = textureGather(atlas_positions, middle, 0).wzxy;
     vec4 atlas_y = textureGather(atlas_positions, middle, 1).wzxy;
@@ -84,45 +91,25 @@ void main() {
 #endif
     uint plain = 0u, decals = 0u, damaged = 0u, holed = 0u;   // One bit per pixel and class.
     for (int i = 0; i < 4; ++i) {
-        ivec2 pixel = block + in_group(i);
-        bool outside = any(greaterThanEqual(pixel - region.xy, region.zw));
-        if (outside) key[i] = 0u;
-        uint bit = 1u << i;
-        if (key[i] == 0u) continue;
+        ivec2 pixel = block + in_block(i);
+        if (any(greaterThanEqual(pixel - region.xy, region.zw)) || key[i] == 0u) continue;
         write_labels(pixel, key[i], depth[i]);
+        uint bit = 1u << i;
 #if DAMAGED
-        int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]));
+        int near = damage_near(vec3(rest_mm[0][i], rest_mm[1][i], rest_mm[2][i]), center_texel(pixel));
         if (near > 1) holed |= bit;
         if (near == 1) damaged |= bit;
-        if (near > 0) bit = 0u;
+        if (near > 0) continue;
 #endif
         if (near_decals(id_zone(key[i]), vec2(atlas_x[i], atlas_y[i]))) decals |= bit;
         else plain |= bit;
     }
+    list_each(LIST_PLAIN, block, plain);
     list_each(LIST_DECAL, block, decals);
 #if DAMAGED
     list_each(LIST_DAMAGED, block, damaged);
     list_each(LIST_HOLED, block, holed);
 #endif
-    uint groups[4];
-    uint count = 0u;
-    for (int i = 0; i < 4; ++i) {
-        // Parallel facets share a surface id. A large step in atlas position shows that a hidden
-        // surface lies between two pixels.
-        float most_mm = COARSE_STEP_PX * 1000.0 * pixel_angle * depth[i];
-        uint group = 0u;
-        for (int j = i; j < 4; ++j) {
-            float step_mm = max(abs(atlas_x[j] - atlas_x[i]), abs(atlas_y[j] - atlas_y[i]));
-            if (key[j] == key[i] && step_mm < most_mm) group |= 1u << j;
-        }
-        groups[i] = (plain & 1u << i) != 0u ? group & plain : 0u;
-        plain &= ~groups[i];
-        count += groups[i] != 0u ? 1u : 0u;
-    }
-    if (count == 0u) return;
-    uint at = listed(LIST_COARSE, count);
-    for (int i = 0; i < 4; ++i)
-        if (groups[i] != 0u) list_entries[at++] = list_entry(block, groups[i]);
 }
 #else
 void main() {
@@ -147,23 +134,17 @@ void main() {
     uint part[3] = uint[3](key, first, last);
     ivec2 part_at[3] = ivec2[3](middle, first_at, last_at);
     bool decal = false;
-    for (int i = 0; i < (SAMPLES_PER_AXIS > 1 ? 3 : 1); ++i)
+    for (int i = 0; i < 3; ++i)
         decal = decal || (part[i] != 0u && near_decals(id_zone(part[i]),
                                                        texelFetch(atlas_positions, part_at[i], 0).xy));
     if (key != 0u) write_labels(pixel, key, texelFetch(surface_depths, middle, 0).r);
     uint list = key == 0u ? NO_LIST : decal ? LIST_DECAL : LIST_PLAIN;
-#if SAMPLES_PER_AXIS > 1
     if (mixed) list = decal ? LIST_MIXED_DECAL : LIST_MIXED;
-#endif
 #if DAMAGED
-    int near = key != 0u ? damage_near(rest_at(middle)) : 0;
-#if SAMPLES_PER_AXIS > 1
+    int near = key != 0u ? damage_near(rest_at(middle), middle) : 0;
     if (near > 0) list = mixed ? LIST_MIXED_DAMAGED : LIST_DAMAGED;
-#else
-    if (near > 0) list = LIST_DAMAGED;
-#endif
     if (near > 1) list = LIST_HOLED;
 #endif
-    if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel, 1u);
+    if (list != NO_LIST) list_entries[listed(list, 1u)] = list_entry(pixel);
 }
 #endif

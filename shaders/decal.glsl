@@ -1,6 +1,5 @@
-// DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
-// NoiseSample streaks): decals over the albedo `paint` at a point of the atlas: albedo, coverage and
-// object id, and coverage by repairs. footprint_mm: width of the lookup on the surface.
+// DecalHit decals_at(uint zone, vec2 atlas_mm, float footprint_mm, NoiseSample coarse, NoiseSample streaks):
+// decals at a point of the atlas. footprint_mm: width of the lookup on the surface.
 
 #include "decals.constants"
 #include "tone_curve.glsl"
@@ -12,11 +11,12 @@ uniform sampler2DArray art;         // Markers, stickers, emblems: sRGB, straigh
 uniform sampler2DArray glyph_tiles; // R: signed distance, 0.5 on the outline. G: ink coverage.
 
 struct DecalHit {
-    vec3 albedo;
+    vec3 ink;      // Albedo of the decals times `alpha`.
     float alpha;   // Covered share of the footprint, 0..1.
     uint id;       // Object at the exact point, 0 for none.
     float patched;   // Share of the footprint under paint or tape of a repair, 0..1.
 };
+const DecalHit NO_DECAL = DecalHit(vec3(0.0), 0.0, 0u, 0.0);
 
 vec4 decal_texel(uint decal, int column) {
     return texelFetch(decal_table, ivec2(column, int(decal) - 1), 0);
@@ -120,15 +120,14 @@ void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm
     // Painted decals wear off in flakes.
     if (kind.x != DECAL_MARKER && kind.x != DECAL_STICKER && kind.x != DECAL_TRIANGLE)
         alpha *= 1.0 - ink.a * covered(coarse.value.w, 0.6, coarse.lost.w, 0.15);
-    hit.albedo = mix(hit.albedo, albedo, alpha);
+    hit.ink = mix(hit.ink, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);
     if (kind.x == DECAL_PATCH) hit.patched += alpha * (1.0 - hit.patched);
     if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
 }
 
-DecalHit decals_at(uint zone, vec3 paint, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
-                   NoiseSample streaks) {
-    DecalHit hit = DecalHit(paint, 0.0, 0u, 0.0);
+DecalHit decals_at(uint zone, vec2 atlas_mm, float footprint_mm, NoiseSample coarse, NoiseSample streaks) {
+    DecalHit hit = NO_DECAL;
     uvec4 cell = cell_at(zone, atlas_mm);
     int i = 0;
     uint decal = cell.x & 0xffffu;

@@ -1,6 +1,7 @@
-// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar): material of a
-// point after all layers. footprint_mm: Width of the lookup on the surface. The layers follow section
+// SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar, DecalHit decal): material
+// of a point after all layers. footprint_mm: Width of the lookup on the surface. The layers follow section
 // 3.2 of the SeaFront paper. Colours and blend weights here are artistic choices.
+// DecalHit worn_decals(uint zone, vec2 atlas_mm, float footprint_mm): decals at a point, weathered.
 
 #include "reflectance.constants"
 #include "variant.constants"
@@ -32,12 +33,29 @@ const float SCRAPE_STAIN = 4.0;
 
 struct SurfacePoint {
     Material material;
-    uint decal_id;
     vec3 outward;   // Outward axis of a panel's face, or 0; see zone.glsl.
     float printed;   // Share of the footprint that shows a decal.
 };
 
-SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar) {
+vec2 noise_position(vec2 atlas_mm, int code) { return upright(atlas_mm, code) + noise_offset_mm; }
+
+NoiseSample coarse_noise(vec2 noise_mm, int code, float footprint_mm) {
+    float squeeze = (code & ZONE_LEVEL) == 0 ? RUST_SQUEEZE : 1.0;
+    return read_without_period(0, vec2(noise_mm.x, squeeze * noise_mm.y), rust_tile_mm, footprint_mm);
+}
+
+NoiseSample streak_noise(vec2 noise_mm, float footprint_mm) {
+    return read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
+}
+
+DecalHit worn_decals(uint zone, vec2 atlas_mm, float footprint_mm) {
+    int code = int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x);
+    vec2 noise_mm = noise_position(atlas_mm, code);
+    return decals_at(zone, atlas_mm, footprint_mm, coarse_noise(noise_mm, code, footprint_mm),
+                     streak_noise(noise_mm, footprint_mm));
+}
+
+SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar, DecalHit decal) {
     vec4 rect = texelFetch(zone_table, ivec2(int(zone), 0), 0);
     vec4 part = texelFetch(zone_table, ivec2(int(zone), 1), 0);
     int code = int(part.x);
@@ -47,15 +65,13 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar)
 
     ZonePoint z = zone_point(rect, texelFetch(zone_table, ivec2(int(zone), 2), 0), code, atlas_mm,
                              footprint_mm);
-    vec2 noise_mm = upright(atlas_mm, code) + noise_offset_mm;
-    vec2 coarse_mm = vec2(noise_mm.x, mix(1.0, RUST_SQUEEZE, z.steep) * noise_mm.y);
-    NoiseSample coarse = read_without_period(0, coarse_mm, rust_tile_mm, footprint_mm);
-    NoiseSample streaks = read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
+    vec2 noise_mm = noise_position(atlas_mm, code);
+    NoiseSample coarse = coarse_noise(noise_mm, code, footprint_mm);
+    NoiseSample streaks = streak_noise(noise_mm, footprint_mm);
     NoiseSample columns = read_noise(1, vec2(noise_mm.x, COLUMN_SQUEEZE * noise_mm.y), wear_tile_mm,
                                      footprint_mm);
 
     SurfacePoint s;
-    s.decal_id = 0u;
     s.outward = part.yzw;
     vec3 albedo = base.rgb;
     float roughness = base.a;
@@ -69,15 +85,11 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar)
     roughness = mix(roughness, 0.8, 0.6 * bleach_share);
 #endif
     float decal_alpha = 0.0, patched = 0.0;
-#if WITH_DECALS
-    DecalHit decal = decals_at(zone, albedo, atlas_mm, footprint_mm, coarse, streaks);
-    s.decal_id = decal.id;
-#if SHOWN_DECALS
-    albedo = decal.albedo;
+#if WITH_DECALS && SHOWN_DECALS
+    albedo = decal.ink + (1.0 - decal.alpha) * albedo;
     decal_alpha = decal.alpha;
     patched = decal.patched;
     roughness = mix(roughness, 0.45, 0.6 * decal_alpha);
-#endif
 #endif
 #if SHOWN_AGEING
     albedo *= 1.0 - 0.85 * trait.z * ageing(z, coarse.value.x);

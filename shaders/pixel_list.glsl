@@ -1,6 +1,6 @@
 // uint listed(uint list, uint count): index of the first of `count` new entries of a list.
 // uint pixels_listed(): length of the list that this program shades.
-// uint listed_at(uint at): entry `at` of the same list.
+// ivec2 listed_pixel(uint at): pixel at entry `at` of the same list.
 // There is one unordered list per pixel class. Compute shaders work through a list without idle lanes.
 // Fragment shaders run on blocks of pixels, and an edge fills few pixels of a block.
 
@@ -22,16 +22,11 @@ uint listed(uint list, uint count) {
     return list_start(list) + at;
 }
 
-// group: One bit per pixel of the 2x2 block that begins at `pixel`, row by row.
-uint list_entry(ivec2 pixel, uint group) { return uint(pixel.x) | uint(pixel.y) << 14 | group << 28; }
+uint list_entry(ivec2 pixel) { return uint(pixel.x) | uint(pixel.y) << 16; }
 
 uint pixels_listed() { return list_heads[LIST_HEADER * LIST + 3u]; }
 
-uint listed_at(uint at) { return list_entries[list_start(LIST) + at]; }
-
-ivec2 listed_pixel(uint entry) { return ivec2(entry & 0x3fffu, entry >> 14 & 0x3fffu); }
-
-uint listed_group(uint entry) { return entry >> 28; }
-
-// Offset of a bit's pixel in the 2x2 block.
-ivec2 in_group(int bit) { return ivec2(bit & 1, bit >> 1); }
+ivec2 listed_pixel(uint at) {
+    uint entry = list_entries[list_start(LIST) + at];
+    return ivec2(entry & 0xffffu, entry >> 16);
+}

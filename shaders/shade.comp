@@ -7,7 +7,6 @@
 #include "samples.constants"
 #include "variant.constants"
 #include "zones.constants"
-#include "coarse_shading.glsl"
 #include "display_color.glsl"
 #include "output_images.glsl"
 #include "pixel_list.glsl"
@@ -22,16 +21,7 @@ layout(local_size_x = LIST_GROUP) in;
 
 void main() {
     if (gl_GlobalInvocationID.x >= pixels_listed()) return;
-    uint entry = listed_at(gl_GlobalInvocationID.x);
-    ivec2 pixel = listed_pixel(entry);
-#if WITH_COARSE
-    uint group = listed_group(entry);
-    int first = findLSB(group);
-    ivec2 block = pixel;
-    pixel += in_group(first);
-    coarse_offset = in_group(findMSB(group)) - in_group(first);
-    coarse_pixels = float(bitCount(group));
-#endif
+    ivec2 pixel = listed_pixel(gl_GlobalInvocationID.x);
 #if WITH_MIXED
     vec2 center = vec2(pixel) + 0.5;
     ivec2 middle = center_texel(pixel);
@@ -130,12 +120,7 @@ void main() {
 #else
     uvec4 shown = uvec4(packUnorm4x8(vec4(color, s.cover)));
 #endif
-#if WITH_COARSE
-    for (int i = 0; i < 4; ++i)
-        if ((group & 1u << i) != 0u) imageStore(color_image, block + in_group(i), shown);
-#else
     imageStore(color_image, pixel, shown);
-#endif
     // For other classes classify.comp has written labels and depth.
 #if OVER
     if (!at_body) return;   // What lies behind has its labels already.

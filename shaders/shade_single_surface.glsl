@@ -11,7 +11,7 @@
 Shaded shade_single_surface(ivec2 pixel) {
     ivec2 middle = center_texel(pixel);
     uint key = surface_id_at(middle);
-    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5 + 0.5 * vec2(coarse_offset)));
+    vec3 view = -normalize(view_ray(vec2(pixel) + 0.5));
     ZoneSample p = zone_sample(middle, key, view);
 #if LOOKUPS > 1
     // The surface is nearly flat between the centre sample and two other near samples, so the atlas

@@ -5,7 +5,6 @@
 #include "variant.constants"
 #include "scene.block"
 #include "view.block"
-#include "coarse_shading.glsl"
 #include "layer_color.glsl"
 #include "sample_lattice.glsl"
 #include "sky_visibility_at.glsl"
@@ -35,8 +34,8 @@ vec3 zone_color(ZoneSample p, ivec2 sample_at, uint key, vec3 view) {
     float overhead = above.a * sky.lacks_indirect * max(p.surface.outward.z, 0.0);
     sky.occluder_albedo = mix(sky.occluder_albedo, above.rgb, overhead);
     vec4 light_seen = vec4(0.0);
-    float depth = coarse_mean(surface_depths, sample_at).r;
-    vec2 position = sample_position(sample_at) + 0.5 * vec2(coarse_offset);
+    float depth = texelFetch(surface_depths, sample_at, 0).r;
+    vec2 position = sample_position(sample_at);
     vec3 from_eye = depth * view_ray(position);
 #if TRACED
     sky.traced = traced_light_at(position, key, from_eye, normal);

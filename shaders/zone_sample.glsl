@@ -7,7 +7,6 @@
 #include "variant.constants"
 #include "scene.block"
 #include "view.block"
-#include "coarse_shading.glsl"
 #include "surface_id.glsl"
 #include "zone_id.glsl"
 #include "visibility_buffer.glsl"
@@ -19,10 +18,11 @@
 
 struct ZoneSample {
     SurfacePoint surface;
+    DecalHit decal;
     uint id;              // Value in the id image, not a surface id.
     uint damage;          // Value in the damage mask.
     float depth;          // In m along the optical axis.
-    float footprint_mm;   // Width of a material lookup on the surface.
+    float footprint_mm;   // Width of a lookup of the material layers on the surface.
     Scar scar;            // See DamageSample.
 #if WITH_DAMAGE
     mat3 bend;            // See DamageSample.
@@ -30,11 +30,11 @@ struct ZoneSample {
 };
 
 ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
-    vec2 atlas_mm = coarse_mean(atlas_positions, sample_at).xy;
+    vec2 atlas_mm = texelFetch(atlas_positions, sample_at, 0).xy;
     vec3 normal = id_normal(key);
     ZoneSample p;
     p.damage = uint(undamaged_value);
-    p.depth = coarse_mean(surface_depths, sample_at).r;
+    p.depth = texelFetch(surface_depths, sample_at, 0).r;
     p.scar = NO_SCAR;
 #if WITH_DAMAGE
     DamageSample d = damage_at(rest_at(sample_at));
@@ -45,10 +45,13 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
 #endif
     float facing = dot(normal, view);
     // Geometric mean of the footprint's two axes on the surface.
-    p.footprint_mm = sqrt(coarse_pixels) * LOOKUP_PX * p.depth * pixel_angle * 1000.0 *
-                     inversesqrt(max(facing, 0.05));
-    p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar);
-    p.id = p.surface.decal_id != 0u ? p.surface.decal_id : zone_id(id_zone(key));
+    p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
+    p.decal = NO_DECAL;
+#if WITH_DECALS
+    p.decal = worn_decals(id_zone(key), atlas_mm, p.footprint_mm * (DECAL_PX / LOOKUP_PX));
+#endif
+    p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar, p.decal);
+    p.id = p.decal.id != 0u ? p.decal.id : zone_id(id_zone(key));
     if (p.id == SPREADER_ID) p.damage = 0u;
     return p;
 }

@@ -80,7 +80,6 @@ def test_shading_is_standard_glsl(programs, quality):
                     chosen.lookups,
                     layer,
                     traced=chosen.traced and layer == "all",
-                    coarse=chosen.coarse,
                     radiance=radiance,
                 )
                 add_all(programs, variant)

@@ -31,14 +31,8 @@ def drawn(values, quality, scenes=2):
 def listed(lists):
     """Return how often each pixel occurs in the lists, [H, W]."""
     count = np.zeros(SIZE[::-1], int)
-    for name, entries in lists.items():
-        x, y, group = entries & 0x3FFF, entries >> 14 & 0x3FFF, entries >> 28
-        assert (group > 0).all()
-        if name != "coarse":
-            assert (group == 1).all()
-        for bit in range(4):
-            chosen = (group >> bit & 1) == 1
-            np.add.at(count, (y[chosen] + (bit >> 1), x[chosen] + (bit & 1)), 1)
+    for entries in lists.values():
+        np.add.at(count, (entries >> 16, entries & 0xFFFF), 1)
     return count
 
 

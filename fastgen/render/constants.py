@@ -70,10 +70,6 @@ INSIDE_ALBEDO = {"wood": (0.22, 0.14, 0.08), "primer": (0.30, 0.31, 0.29)}
 _INSIDE_LIGHT = 0.1
 """Share of the light outside that reaches the interior through a hole; an artistic choice."""
 
-_COARSE_STEP_PX = 4.0
-"""Largest distance on the sheet, in pixel widths, between pixels that are shaded together. Larger
-steps are surfaces at a grazing angle, or two surfaces with a gap between them."""
-
 _SKY_DEPTH = 1 - 2**-18
 """Clip-space depth of the background over w: below 1 because clipping may round, and behind
 everything nearer than 198 m."""
@@ -120,7 +116,6 @@ def _variant(v: ShaderVariant) -> Defines:
         "HOLED": int(v.damage == "holed"),
         "LIGHTS": v.lights,
         "TRACED": int(v.traced),
-        "COARSE": int(v.coarse),
         "RADIANCE": int(v.radiance),
         "OVER": int(v.over),
     }
@@ -154,13 +149,15 @@ def _samples(v: ShaderVariant) -> Defines:
 
 
 def _lookups(v: ShaderVariant) -> Defines:
-    # decals are filtered analytically and dominate the cost, so a second lookup gains little there
-    count = 1 if v.lookups == 2 and "DECALS" in v.traits else v.lookups
     spread = SampleLattice(v.samples_per_axis).spread
-    places = [f"{spread * x:.8f}, {spread * y:.8f}" for x, y in LOOKUP_PLACES[count]]
+    places = [f"{spread * x:.8f}, {spread * y:.8f}" for x, y in LOOKUP_PLACES[v.lookups]]
+    # decals are filtered analytically, so two lookups share one evaluation of them
+    decals_each = v.lookups > 2
     return {
-        "LOOKUPS": count,
-        "LOOKUP_PX": LOOKUP_PX[count] * spread,
+        "LOOKUPS": v.lookups,
+        "LOOKUP_PX": LOOKUP_PX[v.lookups] * spread,
+        "DECALS_EACH_LOOKUP": int(decals_each),
+        "DECAL_PX": LOOKUP_PX[v.lookups if decals_each else 1] * spread,
         "LOOKUP_PLACE": _Array("vec2", places),
         # surfaces beyond these numbers look like the rest of their pixel
         "MAX_PARTS": 3,
@@ -308,7 +305,6 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "TONE_SHOULDER": tone_curve.SHOULDER,
         "TONE_DESATURATION": tone_curve.DESATURATION,
     },
-    "coarse": lambda _: {"COARSE_STEP_PX": _COARSE_STEP_PX},
     "bake": lambda _: {"GUTTER_STEPS": GUTTER_STEPS},
 }
 """Groups of constants by name: from a variant to GLSL macros and their text."""

@@ -80,6 +80,7 @@ class DrawInputs:
         lit: Light at the vertices of container and spreader.
         regions: Where the passes have work.
         targets: Where the image goes.
+        coarse_ground: Shade the ground plane at half the resolution.
         variant: What all shaders of the image have in common.
         textures: Textures by sampler name. A pass adds what it writes for later passes.
     """
@@ -92,6 +93,7 @@ class DrawInputs:
     lit: tuple[LitMesh, ...]
     regions: Regions
     targets: ImageTargets
+    coarse_ground: bool
     variant: ShaderVariant
     textures: dict[str, moderngl.Texture | moderngl.TextureArray]
 

@@ -234,6 +234,7 @@ class Renderer:
             lit=lit,
             regions=regions_of(view, prepared, damages),
             targets=targets,
+            coarse_ground=self._quality.coarse_ground,
             variant=ShaderVariant(
                 samples_per_axis=per_axis,
                 lookups=self._quality.lookups,
@@ -241,7 +242,6 @@ class Renderer:
                 damage=damage,
                 lights=shader_lights(ambient.lights),
                 traced=light.sky_rays is not None and options.layer == "all",
-                coarse=self._quality.coarse and per_axis == 1,
                 radiance=options.radiance,
                 without=self._without,
                 over=options.over,

@@ -22,19 +22,18 @@ class Quality(NamedTuple):
         lookups: Lookups of the material layers per pixel: 1, 2 or 25.
         traced: Compute light with rays at points of the image instead of at mesh vertices alone.
         shadow_detail: Shadow map resolution along each axis, as a fraction of the full resolution.
-        coarse: Shade the pixels of a 2x2 block once where they lie on the same facet (Vaidyanathan
-            et al. 2014, "Coarse Pixel Shading"). Needs samples_per_axis = 1.
+        coarse_ground: Shade the ground plane, which has no labels, at half the resolution.
     """
 
     samples_per_axis: int
     lookups: int
     traced: bool = False
     shadow_detail: float = 1.0
-    coarse: bool = False
+    coarse_ground: bool = False
 
 
 QUALITY = {
-    "draft": Quality(1, 1, shadow_detail=0.4, coarse=True),
+    "draft": Quality(1, 1, shadow_detail=0.4, coarse_ground=True),
     "balanced": Quality(3, 2),
     "fine": Quality(5, 25),
     "high": Quality(5, 25, traced=True),
@@ -47,12 +46,12 @@ class RenderSettings:
 
     Attributes:
         size: (width, height) in pixels, 64 to 4096 each.
-        quality: A key of QUALITY. `draft` takes one sample per pixel and uses 2x2 coarse shading
-            and a coarser shadow map; `balanced` takes 9 samples per pixel; `fine` takes 25 and
-            evaluates the material at each; `high` also computes light with rays, which Embree
-            casts on the CPU on every backend. `fine` and `high` take 9 samples in images above
-            about one megapixel or 1638 rows. All except `draft` take 4 in images above 2730 rows
-            on drivers whose textures end at 16384 texels, such as Mesa's.
+        quality: A key of QUALITY. `draft` takes one sample per pixel, a coarser shadow map
+            and the ground at half the resolution; `balanced` takes 9 samples per pixel; `fine`
+            takes 25 and evaluates the material at each; `high` also computes light with rays, which
+            Embree casts on the CPU on every backend. `fine` and `high` take 9 samples in images
+            above about one megapixel or 1638 rows. All except `draft` take 4 in images above 2730
+            rows on drivers whose textures end at 16384 texels, such as Mesa's.
         backend: "auto", "egl" or "osmesa".
         device_index: EGL device to draw with, numbered as by `fastgen doctor`. None takes the
             first device that works.

@@ -14,7 +14,6 @@ DAMAGE_VARIANTS = ("undamaged", "damaged", "holed")
 PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
     "plain": (),
     "decal": ("DECALS",),
-    "coarse": ("COARSE",),
     "mixed": ("MIXED",),
     "mixed_decal": ("MIXED", "DECALS"),
     "damaged": ("DECALS", "DAMAGE"),
@@ -22,10 +21,10 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
 }
 """Classes of pixels that see more than sky, with the traits of each: MIXED pixels filter several
-surfaces; DECALS, DAMAGE and HOLES may lie near; COARSE pixels share the shading of a 2x2 block.
-Each class has its list, see classify.comp."""
+surfaces; DECALS, DAMAGE and HOLES may lie near. Each class has its list, see classify.comp. A class
+may add terms but must not filter differently, or the image would tell what is labelled."""
 
-PIXEL_TRAITS = ("MIXED", "DECALS", "COARSE", "DAMAGE", "HOLES")
+PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,6 @@ class ShaderVariant:
         damage: One of DAMAGE_VARIANTS.
         lights: Directional lights that the program can shade: 0, 1 or MAX_LIGHTS.
         traced: Read indirect light that rays found instead of the vertices' light.
-        coarse: Classify pixels for 2x2 coarse shading.
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
         without: Material layers of LAYERS to leave out.
         over: Draw over an image that already shows what lies behind, not over the sky.
@@ -81,7 +79,6 @@ class ShaderVariant:
     damage: str = "undamaged"
     lights: int = 0
     traced: bool = False
-    coarse: bool = False
     radiance: bool = False
     without: tuple[str, ...] = ()
     over: bool = False
@@ -95,5 +92,5 @@ class ShaderVariant:
 
 def listed_classes(samples_per_axis: int) -> tuple[str, ...]:
     """Return the pixel classes of images with so many samples, in the order of their lists."""
-    unused = ("mixed",) if samples_per_axis == 1 else ("coarse",)
-    return tuple(name for name in PIXEL_CLASSES if not name.startswith(unused))
+    several = samples_per_axis > 1
+    return tuple(name for name in PIXEL_CLASSES if several or not name.startswith("mixed"))

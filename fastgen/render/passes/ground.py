@@ -179,7 +179,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
     )
     steps = []
     props = plan.props.variant
-    if inputs.variant.coarse and variant.layer == "all":
+    if inputs.coarse_ground and variant.layer == "all":
         for each in plan.plane:
             shrunk = replace(variant, ground=replace(each.variant, coarse=True))
             steps.append(_Step("ground.frag", shrunk, each.tiles))

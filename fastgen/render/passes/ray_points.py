@@ -104,7 +104,6 @@ class RayPass:
             traced=False,
             lights=0,
             lookups=1,
-            coarse=False,
             radiance=False,
             pixel_class="decal" if damage == "undamaged" else "damaged",
         )

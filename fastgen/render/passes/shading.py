@@ -52,7 +52,7 @@ class ShadingPass:
         )
         program = self._programs.get(("classify.comp",), variant)
         program.bind(inputs.textures)
-        side = 2 if variant.coarse else 1
+        side = 2 if variant.samples_per_axis == 1 else 1  # a shader invocation takes a block
         for region in regions:
             program["region"] = region
             across, down = (-(-length // side) for length in region[2:])
@@ -72,8 +72,6 @@ class ShadingPass:
 
 def _occurs(name: str, variant: ShaderVariant) -> bool:
     """Return whether an image of a variant can have pixels of a class."""
-    if name in ("plain", "coarse"):
-        return variant.coarse == (name == "coarse")
     traits = PIXEL_CLASSES[name]
     if "HOLES" in traits:
         return variant.damage == "holed"
