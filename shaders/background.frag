@@ -1,6 +1,7 @@
 // Fragment stage of the background without lens distortion.
 // Reads the environment map at the interpolated coordinates. Writes display colour and coverage 0.
 #version 430 core
+#include "samples.constants"
 #include "view.block"
 #include "display_color.glsl"
 
@@ -11,6 +12,10 @@ in vec2 map_uv;
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    vec3 radiance = textureLod(environment_map, map_uv, 0.0).rgb;
-    out_color = vec4(display_color(exposure * radiance), 0.0);
+    // The coordinates are linear on each face of the octahedron.
+    mat2 pixel = mat2(dFdx(map_uv), dFdy(map_uv));
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < SKY_SAMPLES; ++i)
+        sum += textureLod(environment_map, map_uv + pixel * SKY_PLACE[i], 0.0).rgb;
+    out_color = vec4(display_color(exposure / float(SKY_SAMPLES) * sum), 0.0);
 }

@@ -1,9 +1,10 @@
-// vec3 background(vec3 direction): radiance of the environment from a direction of any length.
+// vec3 background(vec3 ray): mean radiance of the environment over the pixel around a view ray.
 // vec3 diffuse_radiance(vec3 normal): irradiance / pi of the whole environment on a surface.
 // vec3 prefiltered(vec3 direction, float roughness): its radiance, filtered by a GGX lobe.
 // Directions are in the world frame. fastgen/light/prefilter.py makes the maps.
 
 #include "environment.constants"
+#include "samples.constants"
 #include "scene.block"
 #include "view.block"
 #include "octahedral.glsl"
@@ -37,7 +38,14 @@ vec3 diffuse_radiance(vec3 normal) {
     return textureLod(irradiance_map, uv, 0.0).rgb;
 }
 
-vec3 background(vec3 direction) {
+vec3 background_at(vec3 direction) {
     vec2 uv = bordered(octahedral(to_environment(direction).yzx), background_size);
     return textureLod(environment_map, uv, 0.0).rgb;
+}
+
+vec3 background(vec3 ray) {
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < SKY_SAMPLES; ++i)
+        sum += background_at(ray + SKY_PLACE[i].x * ray_right + SKY_PLACE[i].y * ray_down);
+    return sum / float(SKY_SAMPLES);
 }

@@ -40,7 +40,9 @@ def displayed(radiance):
 # ahead, almost straight up and down, and across the map's seams; little container in view
 @pytest.mark.parametrize("toward", [(1, 0.2, 0.1), (0, 0.01, 1), (-1, -1, -0.3), (0.02, 1, -3)])
 @pytest.mark.parametrize("roll_deg", [0.0, 37.0])
-def test_the_sky_is_the_environment_along_each_pixels_ray(generator, toward, roll_deg):
+def test_the_sky_is_the_mean_of_the_environment_along_four_rays_of_each_pixel(
+    generator, toward, roll_deg
+):
     scene = generator.scene(2)
     eye = np.array([9000.0, 7000.0, 1500.0])
     camera = replace(
@@ -51,16 +53,19 @@ def test_the_sky_is_the_environment_along_each_pixels_ray(generator, toward, rol
         roll_deg=roll_deg,
     )
     sample = generator.render(scene=scene, camera=camera)
-    _, rays = view_of(camera, generator.size).rays()
+    width, height = generator.size
+    _, rays = view_of(camera, (2 * width, 2 * height)).rays()
     yaw = np.deg2rad(scene.environment.yaw_deg)
     turn = np.array([[np.cos(yaw), np.sin(yaw), 0], [-np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     light = load_environment(bundled_hdris()[scene.environment.name])
     directions = (rays @ turn.T).reshape(-1, 3)
     radiance = sample_octahedral(unpacked(light.background), levelled(directions))
-    radiance = radiance.reshape(rays.shape)
+    radiance = radiance.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
     expected = displayed(generator.exposure(scene, camera) * radiance)
     # pixels next to the container are mixed
     sky = cv2.erode((sample.ids == 0).astype(np.uint8), np.ones((5, 5))) > 0
     assert sky.mean() > 0.3
-    # the map on the GPU has nine bits per channel
-    assert np.abs(sample.image[sky] - expected[sky]).max() < 2.5
+    # the map on the GPU has nine bits per channel, and the step to the next pixel is that of a quad
+    apart = np.abs(sample.image[sky] - expected[sky])
+    assert (apart > 2.5).mean() < 0.002
+    assert apart.max() < 6

@@ -22,7 +22,7 @@ from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
 from fastgen.render import glyph_runs, rust
 from fastgen.render.blocks import MAX_BOXES
 from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_tiles
-from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SampleLattice
+from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SKY_PLACES, SampleLattice
 from fastgen.render.variant import (
     LAYERS,
     PIXEL_TRAITS,
@@ -136,10 +136,13 @@ def _lists(v: ShaderVariant) -> Defines:
 
 def _samples(v: ShaderVariant) -> Defines:
     lattice = SampleLattice(v.samples_per_axis)
+    sky = SKY_PLACES[1 if v.samples_per_axis == 1 else 2]
     return {
         "SAMPLES_PER_AXIS": v.samples_per_axis,
         "SAMPLE_SLANT": lattice.slant,
         "SAMPLE_PAD": lattice.pad,
+        "SKY_SAMPLES": len(sky),
+        "SKY_PLACE": _Array("vec2", [f"{x}, {y}" for x, y in sky]),
         "FILTER_STEP": lattice.step,
         "FILTER_NEAR": lattice.near,
         "FILTER_SAMPLES": len(lattice.filter),

@@ -32,6 +32,15 @@ LOOKUP_PLACES = {
 }
 """Position of each lookup in pixels from the pixel's centre, for pixels that see one surface."""
 
+SKY_PLACES = {
+    1: ((-0.25, -0.25), (0.25, 0.25)),
+    2: tuple(itertools.product((-0.25, 0.25), repeat=2)),
+}
+"""Position of each lookup of the background in pixels from the pixel's centre: for images with one
+sample per pixel, and with more. With one lookup, lamps and windows between pixel centres flicker
+as the camera moves. A smaller map of the mean of its texels would need one lookup, but bilinear
+filtering widens lamps by a pixel."""
+
 _PER_AXIS = (5, 3, 2, 1)
 """Supported numbers of samples along each axis of a pixel."""
 
