@@ -67,7 +67,7 @@ def summaries(tmp_path_factory):
         patch.setattr(disk_cache, "cached", checked)
         reflectance.dfg_table.__wrapped__()
         noise.noise_tiles.__wrapped__()
-        artwork.art_levels()
+        artwork.art_levels.__wrapped__()
         ambient = environment.load_environment(bundled_hdris()["night_2"])
         body = container.build_container("20")
         body.prepare(damages=True)

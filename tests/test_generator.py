@@ -6,6 +6,7 @@ import multiprocessing
 import pickle
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -17,6 +18,7 @@ from fastgen.config.config import Config, LabelConfig
 from fastgen.errors import AssetError, ConfigError
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
+from fastgen.resources import asset_path, shader_path
 from fastgen.scene import Camera, Scene
 from fastgen.scene.faces import SHEET_FACES
 from tests.backends import BACKENDS
@@ -348,3 +350,20 @@ def test_an_interrupted_render_does_not_affect_later_ones(monkeypatch):
         np.testing.assert_array_equal(sample.ids, wanted.ids)
         assert sample.objects == wanted.objects
     assert stopped == 2
+
+
+def test_later_generators_read_no_shader_or_artwork_again(monkeypatch):
+    """Examples and tests open many generators in one process."""
+    read, usual = [], Path.open
+
+    def recorded(path, *arguments, **settings):
+        read.append(path)
+        return usual(path, *arguments, **settings)
+
+    monkeypatch.setattr(Path, "open", recorded)
+    for _ in range(2):
+        read.clear()
+        with Generator(seed=5, size=(64, 64), quality="draft") as generator:
+            generator.render(0, "A")
+    folders = (shader_path(), asset_path("markers"), asset_path("stickers"), asset_path("fonts"))
+    assert not [path for path in read if any(map(path.is_relative_to, folders))]

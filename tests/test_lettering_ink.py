@@ -62,7 +62,7 @@ def seen_ink(text, footprint_mm):
     from_middle = points - np.array(lettering.size_mm) / 2
     tiles, _ = glyph_tiles()
     with open_context() as gl:
-        texels = np.ascontiguousarray(np.stack([tiles, glyph_coverage(tiles)], axis=-1))
+        texels = np.ascontiguousarray(np.stack([tiles, glyph_coverage()], axis=-1))
         array = gl.ctx.texture_array((64, 64, len(tiles)), 2, texels.tobytes(), alignment=1)
         array.build_mipmaps()
         array.filter = (gl.ctx.LINEAR_MIPMAP_LINEAR, gl.ctx.LINEAR)

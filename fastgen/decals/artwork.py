@@ -172,11 +172,12 @@ def art_images() -> NDArray[np.uint8]:
     return np.ascontiguousarray(images[..., [2, 1, 0, 3]])
 
 
-def art_levels() -> list[NDArray[np.uint8]]:
+@lru_cache(maxsize=1)
+def art_levels() -> tuple[NDArray[np.uint8], ...]:
     """Return `art_images` and its mip levels, from the disk cache if possible.
 
     Returns:
-        uint8 [K, N, N, 4] for N = ART_SIZE, ART_SIZE / 2, ... 1.
+        Read-only uint8 [K, N, N, 4] for N = ART_SIZE, ART_SIZE / 2, ... 1.
 
     Raises:
         AssetError: A file is missing or broken.
@@ -195,7 +196,7 @@ def art_levels() -> list[NDArray[np.uint8]]:
         f"level{i}": f"uint8 {len(_art_paths())} {size} {size} 4" for i, size in enumerate(sizes)
     }
     stored = disk_cache.cached("art", VERSION, digest.hexdigest(), make, layout=layout)
-    return list(stored.values())
+    return tuple(stored.values())
 
 
 def _art_paths() -> list[Path]:
@@ -270,18 +271,21 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
     return np.ascontiguousarray(tiles[: data["tiles"]]), MappingProxyType(fonts)
 
 
-def glyph_coverage(tiles: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the share of ink in each texel of signed-distance tiles.
+@lru_cache(maxsize=1)
+def glyph_coverage() -> NDArray[np.uint8]:
+    """Return the share of ink in each texel of `glyph_tiles`.
 
     Mip levels of coverage keep the ink of thin strokes, which mip levels of distances lose.
 
-    Args:
-        tiles: uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE] from `glyph_tiles`.
-
     Returns:
-        Coverage, uint8 of the same shape, 255 for full ink.
+        Read-only coverage, uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], 255 for full ink.
+
+    Raises:
+        AssetError: A file is missing or broken.
     """
-    return np.stack([_ink(tile) for tile in tiles])
+    coverage = np.stack([_ink(tile) for tile in glyph_tiles()[0]])
+    coverage.flags.writeable = False  # all callers share it
+    return coverage
 
 
 def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:

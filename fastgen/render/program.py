@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 
 import moderngl
 
@@ -21,6 +22,7 @@ Textures = Mapping[str, moderngl.Texture | moderngl.TextureArray]
 """Textures by the name of the sampler that reads them."""
 
 
+@cache  # the programs of one renderer include some files a hundred times
 def shader_text(name: str) -> str:
     """Return the text of a shader file that ships with the package.
 
