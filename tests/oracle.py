@@ -1,6 +1,7 @@
 """Reference results from a slow, simple method: Embree rays through pixel centres, and numpy."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import trimesh
@@ -12,7 +13,7 @@ from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.seals import scene_seals
 from fastgen.geometry.spreader import build_spreader
-from fastgen.scene import Decal, Scene
+from fastgen.scene import Damage, Decal, Scene
 
 _MOST_LAYERS = 12
 
@@ -48,6 +49,15 @@ class Hits:
         return self.triangle >= 0
 
 
+@lru_cache(4)  # tests look at one container through several cameras
+def body_of(mesh: Mesh, damages: tuple[Damage, ...]) -> tuple[np.ndarray, RayMeshIntersector]:
+    """Return the vertices [V, 3] of a damaged mesh in mm, and its ray caster in metres."""
+    moved = damage_law.deform(damages, mesh.positions_mm.astype(np.float64))
+    # Embree computes in float32, so it gets metres around the origin
+    body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
+    return moved, body
+
+
 def cast(
     mesh: Mesh, view: View, scene: Scene | None = None, pixels: np.ndarray | None = None
 ) -> Hits:
@@ -60,9 +70,7 @@ def cast(
     damages = scene.damages if scene else ()
     rest = mesh.positions_mm.astype(np.float64)
     tears = ~np.array([is_gear(chart) for chart in mesh.charts])[mesh.chart[mesh.triangles[:, 0]]]
-    moved = damage_law.deform(damages, rest)
-    # Embree computes in float32, so it gets metres around the origin
-    body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
+    moved, body = body_of(mesh, damages)
     start, rays = view.rays(pixels)
     shape = rays.shape[:-1]
     rays = rays.reshape(-1, 3)
@@ -146,8 +154,7 @@ def first_hits(
     mesh: Mesh, view: View, start: np.ndarray, rays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangle that each ray [N, 3] hits first, -1 for none, and its depth in metres."""
-    positions = mesh.positions_mm.astype(np.float64)
-    body = RayMeshIntersector(trimesh.Trimesh(positions * 1e-3, mesh.triangles, process=False))
+    positions, body = body_of(mesh, ())
     triangle = body.intersects_first(np.tile(start * 1e-3, (len(rays), 1)), rays)
     hit = triangle >= 0
     distance, *_ = _meet(positions[mesh.triangles[triangle[hit]]], start, rays[hit])

@@ -1,6 +1,7 @@
 """Amodal boxes and visible fractions compared with rays through a larger image."""
 
 import dataclasses
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -35,24 +36,43 @@ def unbounded(view):
     )
 
 
-def all_hits(mesh, triangles, view, damages):
-    """Return ray index, rest point and atlas point of every hit of pixel rays with `triangles`."""
+@lru_cache(12)  # the cameras of a scene follow each other in `samples`
+def body_of(scene, chart):
+    """Return the corners [T, 3, 3] of a container's triangles, and their Embree scene.
+
+    Args:
+        scene: The container's scene.
+        chart: Name of the chart whose triangles count; None for the whole container.
+
+    Returns:
+        Corners before damage and after it in mm, on the atlas in mm, and the ray caster.
+    """
+    mesh = PreparedScene(scene).container
+    part = mesh.triangles
+    if chart is not None:
+        part = part[mesh.chart[part[:, 0]] == mesh.chart_index(chart)]
     rest = mesh.positions_mm.astype(np.float64)
-    moved = damage_law.deform(damages, rest)
-    part = mesh.triangles[triangles]
+    moved = damage_law.deform(scene.damages, rest)
     body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, part, process=False))
+    return rest[part], moved[part], mesh.atlas_mm[part].astype(np.float64), body
+
+
+def all_hits(scene, chart, view):
+    """Return ray index, rest point and atlas point of every hit of pixel rays with a chart."""
+    rest, moved, atlas, body = body_of(scene, chart)
     start, rays = view.rays()
     rays = rays.reshape(-1, 3)
     starts = np.broadcast_to(start * 1e-3, rays.shape)
     found, ray = body.intersects_id(starts, rays, multiple_hits=True, max_hits=60)
-    corners = part[found]
-    _, b, c, _ = oracle._meet(moved[corners], start, rays[ray])
-    atlas = mesh.atlas_mm[corners].astype(np.float64)
-    return ray, oracle._between(rest[corners], b, c), oracle._between(atlas, b, c)
+    _, b, c, _ = oracle._meet(moved[found], start, rays[ray])
+    return ray, oracle._between(rest[found], b, c), oracle._between(atlas[found], b, c)
 
 
-def dense(decal, mesh, damages):
+@lru_cache(64)
+def dense(scene, item_id):
     """Return world points all over a decal after damage, mostly along its edge."""
+    decal = decal_of(scene, item_id)
+    mesh = PreparedScene(scene).container
     coarse, fine = np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 6001)
     points = [np.stack(np.meshgrid(coarse, coarse), axis=-1).reshape(-1, 2)]
     for side in (-0.5, 0.5):
@@ -63,7 +83,7 @@ def dense(decal, mesh, damages):
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     sheet = points @ turn.T + np.array(decal.center_mm)
     sheet = sheet[oracle.inside(decal, sheet)]
-    return damage_law.deform(damages, mesh.sheet_to_surface(decal.face, sheet)[0])
+    return damage_law.deform(scene.damages, mesh.sheet_to_surface(decal.face, sheet)[0])
 
 
 def near(count, truth):
@@ -111,8 +131,7 @@ def test_decal_coverage_matches_rays(samples):
             decal = decal_of(sample.scene, item.id)
             number = mesh.chart_index(decal.face)
             if number not in hits:
-                part = np.flatnonzero(mesh.chart[mesh.triangles[:, 0]] == number)
-                hits[number] = all_hits(mesh, part, view, sample.scene.damages)
+                hits[number] = all_hits(sample.scene, decal.face, view)
             ray, _, atlas = hits[number]
             on = oracle.inside(decal, atlas - mesh.charts[number].rect_mm[:2])
             covered = np.zeros(view.size[::-1], bool)
@@ -130,7 +149,7 @@ def test_decal_coverage_matches_rays(samples):
                 seen += 1
                 cut += item.truncated
             if item.amodal_bbox:
-                points = dense(decal, mesh, sample.scene.damages)
+                points = dense(sample.scene, item.id)
                 pixels, depth = sample.view.project(points)
                 if depth.min() > 0.2:
                     truth = np.concatenate([pixels.min(axis=0), pixels.max(axis=0)])
@@ -145,10 +164,8 @@ def test_damage_coverage_matches_rays(generator, samples):
     seen = 0
     threshold = generator.config.damage.mask_threshold_mm
     for sample in samples:
-        mesh = PreparedScene(sample.scene).container
         view = unbounded(sample.view)
-        everything = np.arange(len(mesh.triangles))
-        ray, rest, _ = all_hits(mesh, everything, view, sample.scene.damages)
+        ray, rest, _ = all_hits(sample.scene, None, view)
         hurt = [item for item in sample.objects if item.class_name in DAMAGE_CLASSES]
         for item, damage in zip(hurt, sample.scene.damages, strict=True):
             assert item.class_name == damage.kind
@@ -239,15 +256,12 @@ def test_casting_keypoint_visibility_matches_rays(samples):
     for sample in samples:
         mesh = PreparedScene(sample.scene).container
         low, high = mesh.bounds_mm
-        moved = damage_law.deform(sample.scene.damages, mesh.positions_mm)
-        body = RayMeshIntersector(trimesh.Trimesh(moved * 1e-3, mesh.triangles, process=False))
+        _, body = oracle.body_of(mesh, sample.scene.damages)
         eye = sample.view.position_m
         held = sample.scene.spreader
         if held.present:
             mesh_of = build_spreader(sample.scene.container.kind, held.flippers_down, held.gap_mm)
-            held = RayMeshIntersector(
-                trimesh.Trimesh(mesh_of.positions_mm * 1e-3, mesh_of.triangles, process=False)
-            )
+            _, held = oracle.body_of(mesh_of, ())
         else:
             held = None
         for number, (x, y, flag) in enumerate(sample.objects[0].keypoints):
