@@ -22,7 +22,7 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
 }
 """Classes of pixels that see more than sky, with the traits of each: MIXED pixels filter several
 surfaces; DECALS, DAMAGE and HOLES may lie near. Each class has its list, see classify.comp. A class
-may add terms but must not filter differently, or the image would tell what is labelled."""
+may add terms but must not filter differently, or the image would reveal its labels."""
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 
