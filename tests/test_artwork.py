@@ -15,6 +15,7 @@ from fastgen.decals.artwork import (
     art_images,
     art_layers,
     brands,
+    glyph_levels,
     glyph_tiles,
     marker_prints,
     mip_levels,
@@ -231,9 +232,10 @@ def test_mip_levels_average_linear_light_and_not_srgb_codes():
     assert (levels[1][0, 0, :3] == 200).all()
 
 
-def test_the_gpu_samples_the_computed_mip_levels():
+@pytest.mark.parametrize("channels", [2, 4])
+def test_the_gpu_samples_the_given_mip_levels(channels):
     rng = np.random.default_rng(4)
-    images = rng.integers(0, 256, (3, 8, 8, 4), np.uint8)
+    levels = [rng.integers(0, 256, (3, side, side, channels), np.uint8) for side in (8, 4, 2, 1)]
     code = """
     #version 430
     layout(local_size_x = 1) in;
@@ -245,12 +247,29 @@ def test_the_gpu_samples_the_computed_mip_levels():
         found[level] = textureLod(art, vec3(corner, 2.0), float(level));
     }
     """
-    levels = zip(*map(mip_levels, images), strict=True)
     with open_context() as gl:
-        levelled_texture(gl, [images, *map(np.stack, levels)]).use(0)
+        levelled_texture(gl, levels).use(0)
         found = gl.ctx.buffer(reserve=4 * 16)
         found.bind_to_storage_buffer(0)
         gl.ctx.compute_shader(code).run(4)
         corners = np.frombuffer(found.read(), np.float32).reshape(4, 4) * 255
-    wanted = [images[2], *mip_levels(images[2])]
-    assert np.abs(corners - [level[0, 0] for level in wanted]).max() < 0.5
+    wanted = [level[2, 0, 0] for level in levels]
+    assert np.abs(corners[:, :channels] - wanted).max() < 0.5
+
+
+def test_glyph_levels_are_averages_of_the_tiles():
+    """Rounding adds up to one step to each level."""
+    first, *others = glyph_levels()
+    np.testing.assert_array_equal(first[..., 0], glyph_tiles()[0])
+    assert first[..., 1].min() == 0
+    assert first[..., 1].max() == 255
+    # a texel half way inside an outline is half full of ink
+    inked, distance = first[..., 1] / 255, first[..., 0].astype(int) - 127.5
+    assert inked[distance > 40].min() == 1
+    assert inked[distance < -40].max() == 0
+    assert inked[np.abs(distance) < 1].mean() == pytest.approx(0.5, abs=0.05)
+    assert [level.shape[1:] for level in others] == [(n, n, 2) for n in (32, 16, 8, 4, 2, 1)]
+    for number, level in enumerate(others, 1):
+        side = level.shape[1]
+        mean = first.reshape(-1, side, 64 // side, side, 64 // side, 2).mean(axis=(2, 4))
+        assert np.abs(level - mean).max() <= number

@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.decals.artwork import glyph_coverage, glyph_tiles
+from fastgen.decals.artwork import glyph_levels, glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.render.gl import open_context
 from fastgen.render.glyph_runs import glyph_run
+from fastgen.render.textures import levelled_texture
 from tests.glsl import blocks, run
 
 CAP_MM = 100.0
@@ -60,13 +61,8 @@ def seen_ink(text, footprint_mm):
     made, parts_per_mm = glyph_run(lettering)
     table[0, : len(made)] = made
     from_middle = points - np.array(lettering.size_mm) / 2
-    tiles, _ = glyph_tiles()
     with open_context() as gl:
-        texels = np.ascontiguousarray(np.stack([tiles, glyph_coverage()], axis=-1))
-        array = gl.ctx.texture_array((64, 64, len(tiles)), 2, texels.tobytes(), alignment=1)
-        array.build_mipmaps()
-        array.filter = (gl.ctx.LINEAR_MIPMAP_LINEAR, gl.ctx.LINEAR)
-        array.repeat_x = array.repeat_y = False
+        array = levelled_texture(gl, glyph_levels())
         placed = gl.ctx.texture((256, 1), 4, table.tobytes(), dtype="f4")
         placed.filter = (gl.ctx.NEAREST, gl.ctx.NEAREST)
         held = blocks(gl)

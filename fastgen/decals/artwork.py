@@ -272,20 +272,32 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
 
 
 @lru_cache(maxsize=1)
-def glyph_coverage() -> NDArray[np.uint8]:
-    """Return the share of ink in each texel of `glyph_tiles`.
+def glyph_levels() -> tuple[NDArray[np.uint8], ...]:
+    """Return the distances and the coverage of `glyph_tiles`, and their mip levels.
 
-    Mip levels of coverage keep the ink of thin strokes, which mip levels of distances lose.
+    Coverage is the share of ink in a texel, 255 for full ink. Its mip levels keep the ink of thin
+    strokes, which mip levels of distances lose.
 
     Returns:
-        Read-only coverage, uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], 255 for full ink.
+        Read-only uint8 [G, N, N, 2] for N = GLYPH_TILE_SIZE, GLYPH_TILE_SIZE / 2, ... 1, with the
+        distance in channel 0 and the coverage in channel 1.
 
     Raises:
         AssetError: A file is missing or broken.
     """
-    coverage = np.stack([_ink(tile) for tile in glyph_tiles()[0]])
-    coverage.flags.writeable = False  # all callers share it
-    return coverage
+    tiles, _ = glyph_tiles()
+    levels = [np.stack([tiles, np.stack([_ink(tile) for tile in tiles])], axis=-1)]
+    while levels[-1].shape[1] > 1:
+        # Mesa rounds rows and columns up one after the other, too
+        rows = _rounded_mean(levels[-1][:, :, ::2], levels[-1][:, :, 1::2])
+        levels.append(_rounded_mean(rows[:, ::2], rows[:, 1::2]))
+    for level in levels:
+        level.flags.writeable = False  # all callers share them
+    return tuple(levels)
+
+
+def _rounded_mean(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return ((a.astype(np.uint16) + b + 1) >> 1).astype(np.uint8)
 
 
 def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -12,6 +12,8 @@ from fastgen.render.gl_enums import (
     GL_FLOAT,
     GL_RED,
     GL_RED_INTEGER,
+    GL_RG,
+    GL_RG8,
     GL_RGBA,
     GL_RGBA8,
     GL_TEXTURE_2D_ARRAY,
@@ -22,34 +24,30 @@ from fastgen.render.noise import noise_tiles
 
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
+_BYTES = {2: (GL_RG8, GL_RG), 4: (GL_RGBA8, GL_RGBA)}
+"""How OpenGL stores texels of bytes and how the data lays them out, by the number of channels."""
+
 
 def levelled_texture(gl: GLContext, levels: Sequence[np.ndarray]) -> moderngl.TextureArray:
     """Return a texture array with given mip levels, clamped at the borders.
 
     Args:
         gl: Current context.
-        levels: uint8 [K, N, N, 4], each half as wide as the one before.
+        levels: uint8 [K, N, N, C], C being 2 or 4, each half as wide as the one before.
     """
-    count, side = levels[0].shape[:2]
-    texture = gl.ctx.texture_array((1, 1, 1), 4)
+    count, side, _, channels = levels[0].shape
+    stored_as, layout = _BYTES[channels]
+    # this call also says that the rows of the data are not padded
+    texture = gl.ctx.texture_array((1, 1, 1), channels, alignment=1)
     texture.use()
     # allocates all levels once; drivers copy a texture that grows level by level
     allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
-    allocate(GL_TEXTURE_2D_ARRAY, len(levels), GL_RGBA8, side, side, count)
+    allocate(GL_TEXTURE_2D_ARRAY, len(levels), stored_as, side, side, count)
     fill = gl.function("glTexSubImage3D", None, _ENUM, *(_INT,) * 7, _ENUM, _ENUM, ctypes.c_void_p)
     for level, texels in enumerate(map(np.ascontiguousarray, levels)):
         size = (texels.shape[2], texels.shape[1], count)
         address = texels.ctypes.data
-        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, GL_RGBA, GL_UNSIGNED_BYTE, address)
-    return _clamped(texture)
-
-
-def mipmapped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
-    """uint8 [K, H, W, C] as a mip-mapped texture array, clamped at the borders."""
-    count, height, width, channels = images.shape
-    data = np.ascontiguousarray(images).tobytes()
-    texture = ctx.texture_array((width, height, count), channels, data, alignment=1)
-    texture.build_mipmaps()
+        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, layout, GL_UNSIGNED_BYTE, address)
     return _clamped(texture)
 
 
