@@ -34,6 +34,7 @@ class Exported:
         self.outside = bodies[0]
         self.whole = trimesh.util.concatenate(bodies)
         self.visual = self.parts["container"].visual
+        self._hits = {}
 
     def rays(self, name):
         """Return the origin [3] and pixel ray directions [H * W, 3] of the glTF camera."""
@@ -49,6 +50,12 @@ class Exported:
 
     def first_hits(self, name, body):
         """Return triangle of `body` (-1 for none) and depth along the view axis, [H * W] each."""
+        key = name, id(body)
+        if key not in self._hits:
+            self._hits[key] = self._cast(name, body)
+        return self._hits[key]
+
+    def _cast(self, name, body):
         origin, rays = self.rays(name)
         origins = np.tile(origin, (len(rays), 1))
         lengths = np.linalg.norm(rays, axis=1, keepdims=True)

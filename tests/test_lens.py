@@ -157,7 +157,7 @@ def test_amodal_boxes_bound_dense_points_to_a_tenth_of_a_pixel(seen):
                 a, b = (damage_law.deform(damages, end) for end in (a, b))
                 points = (a + share * (b - a)).reshape(-1, 3)
             elif item.text or item.class_name[1:2].isdigit():
-                points = dense(decal_of(sample.scene, item.id), mesh, damages)
+                points = dense(sample.scene, item.id)
             else:
                 continue
             pixels, depth = sample.view.project(points)
@@ -189,8 +189,7 @@ def test_visible_fractions_equal_ray_casts_over_a_larger_image(seen):
             decal = decal_of(sample.scene, item.id)
             number = mesh.chart_index(decal.face)
             if number not in hits:
-                part = np.flatnonzero(mesh.chart[mesh.triangles[:, 0]] == number)
-                hits[number] = all_hits(mesh, part, whole, sample.scene.damages)
+                hits[number] = all_hits(sample.scene, decal.face, whole)
             ray, _, atlas = hits[number]
             on = oracle.inside(decal, atlas - mesh.charts[number].rect_mm[:2])
             fraction = item.area / len(np.unique(ray[on]))

@@ -52,7 +52,7 @@ def check(sample):
 def test_300_markers_each_have_their_label(generators):
     values = {"probability": 1, "kinds": ["axis"], "count": [3, 3]}
     config = Config.from_values({"damage": values, "container": {"kinds": {"45HC": 1}}})
-    generator = generators(config, seed=4, size=(1600, 500))
+    generator = generators(config, seed=4, size=(800, 250))
     scene = replace(
         bare(generator),
         decals=markers(300, 60, 200, MARKER_CLASSES),

@@ -66,9 +66,9 @@ def test_ids_do_not_depend_on_antialiasing():
             frames.append(generator.render(index=1, camera="Cr"))
     for other in frames[1:]:
         assert (frames[0].ids != other.ids).mean() < 2e-4
-        # the pictures differ only at edges
+        # the pictures differ only at edges, and by one step where the sky is filtered more finely
         difference = np.abs(frames[0].image.astype(int) - other.image.astype(int))
-        assert np.median(difference) == 0
+        assert np.median(difference) <= 1
         assert difference.mean() < 6
 
 

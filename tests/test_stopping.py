@@ -103,11 +103,11 @@ def test_workers_whose_parent_was_killed_end_silently(tmp_path):
 
 def test_a_run_stopped_by_sigterm_can_be_resumed(tmp_path):
     out = tmp_path / "out"
-    process = begun(out, "40")
+    process = begun(out, "16")
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=300)
     before = signal.getsignal(signal.SIGTERM)
-    assert main(["generate", str(out), *ARGUMENTS, "--images", "40"]) == 0
+    assert main(["generate", str(out), *ARGUMENTS, "--images", "16"]) == 0
     assert signal.getsignal(signal.SIGTERM) == before
     assert main(["verify", str(out)]) == 0
 
