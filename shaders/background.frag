@@ -12,8 +12,8 @@ in vec2 map_uv;
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    // The coordinates are linear on each face of the octahedron. Lookups beyond its edge are off by less
-    // than a quarter of a pixel.
+    // The coordinates are linear on each face of the octahedron. Lookups beyond the edge of a face are
+    // off by less than a quarter of a pixel.
     mat2 pixel = mat2(dFdx(map_uv), dFdy(map_uv));
     vec3 sum = vec3(0.0);
     for (int i = 0; i < SKY_SAMPLES; ++i)

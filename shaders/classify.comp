@@ -26,8 +26,8 @@ layout(local_size_x = LIST_GROUP) in;
 uniform ivec4 region;   // Corner x, y, width and height in pixels.
 
 #if DAMAGED
-// 2 where samples of the pixel see a hole, 1 near another damage, else 0. Pixels beside a hole are not in
-// the class of holes, because its material is filtered differently, which would reveal the hole.
+// 2 where samples of the pixel see a hole, 1 near any damage, else 0. The class of holes filters the
+// material differently. Pixels beside a hole are not in it, because this would reveal the hole.
 int damage_near(vec3 rest_mm, ivec2 middle) {
     int near = 0, samples = 0;
     for (int i = next_damage_near(0, damage_count, rest_mm); i < damage_count;

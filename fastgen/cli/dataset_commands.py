@@ -143,7 +143,7 @@ def add_verify(commands: Any) -> None:
 
 
 def _place(text: str) -> str:
-    """Return OUT without ~, and without slashes at its end, which would be twice in messages."""
+    """Return OUT with ~ expanded and without trailing slashes, which messages would repeat."""
     if not text:
         raise argparse.ArgumentTypeError("is empty; give a folder or an address")
     scheme, colon, path = place_of(text).rpartition("://")

@@ -96,7 +96,7 @@ def add_device(command: argparse._ActionsContainer, note: str = "") -> None:
 
 
 def output_file(text: str) -> Path:
-    """Return the file that an option -o names.
+    """Return the path given with the option -o.
 
     Raises:
         OutputError: It is an address, or starts with ~ and there is no such user.

@@ -17,7 +17,7 @@ _MOST_VALUES = 200_000
 """Most values of a file after each alias is replaced by the values that it repeats."""
 
 _LONGEST_NUMBER = 1000
-"""Most characters of a number. Numbers to base 60 take quadratic time to read."""
+"""Most characters of a number. Base-60 numbers take quadratic time to read."""
 
 _JSON_FLOATS: tuple[str, re.Pattern[str], list[str]] = (
     "tag:yaml.org,2002:float",
@@ -83,7 +83,7 @@ class _Loader(yaml.SafeLoader):
 
     It reads all JSON numbers, also 1e-05, which is text in YAML 1.1. It refuses octal and base-60
     numbers, which users rarely intend. It refuses repeated keys, where PyYAML ignores the first.
-    It refuses texts that take much longer to read than others of their length.
+    It refuses texts that take much longer to read than usual for their length.
     """
 
     def get_single_node(self) -> yaml.Node | None:
@@ -144,7 +144,7 @@ class _Loader(yaml.SafeLoader):
 def _count(node: yaml.Node, counts: dict[int, int]) -> int:
     """Return the number of values in a node if each alias stands for all values it repeats.
 
-    `counts` holds the numbers that are known. A node that contains itself counts once.
+    `counts` caches results by the id of the node. A node that contains itself counts once.
     """
     if id(node) not in counts:
         counts[id(node)] = 1

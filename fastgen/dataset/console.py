@@ -36,7 +36,7 @@ def drop_unprinted() -> None:
 
 
 def tell(words: str, end: str = "\n") -> None:
-    """Print to standard output without passwords of addresses, and flush it.
+    """Print to standard output, with passwords in addresses hidden, and flush it.
 
     Raises:
         OutputError: The stream cannot be written, for example because a disk is full.
@@ -51,9 +51,9 @@ def tell(words: str, end: str = "\n") -> None:
 
 
 def say(words: str) -> None:
-    """Print a line to standard error, without passwords of addresses.
+    """Print a line to standard error, with passwords in addresses hidden.
 
-    Nothing is printed if it cannot be written.
+    Nothing happens if the stream cannot be written.
     """
     with contextlib.suppress(OSError):
         print(without_secrets(words), file=sys.stderr)

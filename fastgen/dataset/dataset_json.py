@@ -91,7 +91,7 @@ def shard_numbers(storage: Storage) -> list[int]:
 def read_manifest(storage: Storage, shard: int) -> dict[str, Any] | None:
     """Return a shard's manifest, or None if it has to be made again.
 
-    It is then missing, unreadable, changed, another shard's, or not as fastgen writes it.
+    None means missing, unreadable, changed, of another shard, or not in fastgen's format.
     """
     try:
         return shard_manifest(storage.read(manifest_path(shard)), shard)

@@ -1,6 +1,6 @@
 """Types of the values in dataset.json and in the manifests of shards, checked as they are read.
 
-Both files contain a hash of themselves, but a program that can edit one can also seal it again.
+Both files contain a hash of themselves, but whoever edits a file can also update its hash.
 """
 
 import functools

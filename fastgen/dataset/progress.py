@@ -53,7 +53,7 @@ class Progress:
             self._show("\n")
 
     def close_if_drawn(self) -> None:
-        """Draw the last state if an earlier one was drawn; short work leaves no trace."""
+        """Draw the last state if an earlier one was drawn, so that short work prints nothing."""
         if self._drawn:
             self.close()
 

@@ -39,11 +39,11 @@ _PIECE = 1 << 20
 
 
 class UnreadableError(OutputError):
-    """File of a dataset that exists and cannot be read, so that it has to be made again."""
+    """File of a dataset that exists but cannot be read, so that it has to be made again."""
 
 
 class Folder:
-    """A dataset in a folder of this machine. No path or link in one leads out of it."""
+    """A dataset in a folder of this machine. Paths and links that lead out of it are refused."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -309,7 +309,7 @@ def storage_of(out: str | Path) -> Storage:
     """Return the storage at a path or at an address with '://'; file:// gives a Folder.
 
     Raises:
-        OutputError: There can be none; see `place_of`.
+        OutputError: `out` is neither a path nor an address; see `place_of`.
     """
     place = place_of(out)
     return Remote(place) if "://" in place else Folder(Path(place))
@@ -317,7 +317,7 @@ def storage_of(out: str | Path) -> Storage:
 
 @contextlib.contextmanager
 def _readable(root: Path, path: str) -> Iterator[Path]:
-    """Give the place of a file that is to be read; see `Folder.read` for the errors."""
+    """Yield the path of a file that is to be read; see `Folder.read` for the errors."""
     try:
         place = place_inside(root, path, follow=True)
     except OutputError as error:

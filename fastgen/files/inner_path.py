@@ -25,7 +25,7 @@ def check_inner(path: str) -> str:
     """Return `path` if it stays inside its dataset.
 
     Raises:
-        OutputError: It does not.
+        OutputError: It leads outside, or is not a path that fastgen writes.
     """
     if not is_inner(path):
         raise OutputError(f"{path!r}: is not a path inside the dataset; fastgen never wrote it")
@@ -33,7 +33,7 @@ def check_inner(path: str) -> str:
 
 
 def place_inside(root: Path, path: str, follow: bool = False) -> Path:
-    """Return the place of a path in the folder `root`.
+    """Return `root` joined with a path that stays inside it.
 
     Args:
         root: Folder of the dataset; it may be a link itself.

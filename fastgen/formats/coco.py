@@ -133,8 +133,9 @@ def file_text(
     Args:
         description: Description of the dataset.
         categories: Categories in the order of their ids.
-        usual: Number of categories that the file lists. If it has an annotation of a later one, it
-            lists all: scenes made by hand may carry what the configuration does not draw.
+        usual: Number of categories that the file lists, from the first. If an annotation has a
+            later category, the file lists all: scenes made by hand may contain objects that the
+            configuration does not draw.
         records: Returns the images' records; each call starts from the beginning.
         facts: Name of the format whose facts are the annotations.
     """
@@ -167,7 +168,7 @@ def file_text(
             if item["category_id"] > usual:
                 usual = len(categories)
             yield ("," if count > 1 else "") + _json({"id": count, "image_id": number, **item})
-    # behind the annotations, which decide about them
+    # after the annotations, which determine how many categories are listed
     yield f'],"categories":{_json(categories[:usual])}}}'
 
 

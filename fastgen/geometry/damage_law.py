@@ -87,12 +87,12 @@ def reach_mm(damage: Damage) -> tuple[float, float, float]:
 
 
 def outward_mm(damage: Damage) -> float:
-    """Return how far a damage moves sheet at most outward, in front of its place at rest."""
+    """Return an upper bound of the outward displacement by a damage, 0 or more."""
     return -form_of(damage).span(damage)[0]
 
 
 def inward_mm(damage: Damage) -> float:
-    """Return how far a damage moves the outermost sheet at most inward."""
+    """Return an upper bound of the inward displacement of the outermost sheet, 0 or more."""
     return form_of(damage).span(damage)[1]
 
 
@@ -124,7 +124,7 @@ def variant(damages: tuple[Damage, ...]) -> str:
 def may_be_seen(damage: Damage, position_mm: Vec3, beside: tuple[Damage, ...] = ()) -> bool:
     """Test whether a camera may see a damage from outside the container.
 
-    Sheet that a damage moves outward may be seen from everywhere, past the edge of its face.
+    Sheet that is bent outward may be seen from anywhere, beyond the edge of its face.
 
     Args:
         damage: The damage.

@@ -38,8 +38,8 @@ SKY_PLACES = {
 }
 """Position of each lookup of the background in pixels from the pixel's centre: for images with one
 sample per pixel, and with more. With one lookup, lamps and windows between pixel centres flicker
-as the camera moves. A smaller map of the mean of its texels would need one lookup, but bilinear
-filtering widens lamps by a pixel."""
+as the camera moves. One lookup in a mip level would be cheaper, but its bilinear filter widens
+lamps by a pixel."""
 
 _PER_AXIS = (5, 3, 2, 1)
 """Supported numbers of samples along each axis of a pixel."""

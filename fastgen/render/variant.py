@@ -21,8 +21,8 @@ PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
     "holed": ("MIXED", "DECALS", "DAMAGE", "HOLES"),
 }
 """Classes of pixels that see more than sky, with the traits of each: MIXED pixels filter several
-surfaces; DECALS, DAMAGE and HOLES may lie near. Each class has its list, see classify.comp. A class
-may add terms but must not filter differently, or the image would reveal its labels."""
+surfaces; DECALS, DAMAGE and HOLES may lie near. Each class has its list, see classify.comp. DECALS
+and DAMAGE may add terms but must not change the filter, or the image would reveal its labels."""
 
 PIXEL_TRAITS = ("MIXED", "DECALS", "DAMAGE", "HOLES")
 

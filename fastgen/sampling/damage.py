@@ -186,7 +186,7 @@ def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generato
 def _beside(
     damage: Damage, config: DamageConfig, plane: _Plane, rng: np.random.Generator
 ) -> Damage:
-    """Sample a scrape across a damage or just beside it, which is moved to within the frame."""
+    """Sample a scrape across a damage or just beside it, and move it inside the frame."""
     form = draw_scrape(config, plane.face, plane.size, rng)
     shift = [0.5 * extent * float(rng.uniform(-1, 1)) for extent in damage.size_mm]
     moved = (

@@ -49,13 +49,13 @@ _RIBS_GIVE = Range(0.8, 0.95)
 """Displacement of a rib as a share of how far the object reached in; the rest sprang back."""
 
 _TEAR_BELLY, _TEAR_WEDGE = (0.5, 0.5), (0.4, 0.4)
-"""Beta distributions of a tear's share below its line and likeness to a wedge: mostly extremes."""
+"""Beta distributions of a tear's belly (share below its line) and wedge; extremes are likely."""
 
 _TEAR_LEAST_MM = 12.0
 """Smallest width of a tear that is not a split."""
 
 _TEARS_WITH_ARM, _TEAR_ARM = 0.2, Range(0.4, 0.9)
-"""Share of such tears with a second slit, and its length as a share of the first."""
+"""Share of tears, except splits, with a second slit; its length as a share of the first."""
 
 _TEAR_TURNS_DEG, _TEAR_SPREAD_DEG, _SPLIT_SPREAD_DEG = (0.0, 90.0), 12.0, 2.0
 """Tears run along a rail or follow a rib, with these standard deviations."""

@@ -372,7 +372,7 @@ class Scene:
         """
         try:
             return json.dumps(to_plain(self), indent=1)
-        except (TypeError, ValueError, RecursionError):  # not JSON's types: NumPy's, or no scene
+        except (TypeError, ValueError, RecursionError):  # not JSON's types, such as NumPy's
             return json.dumps(to_plain(check_fields(self, Scene, "scene")), indent=1)
 
     @staticmethod

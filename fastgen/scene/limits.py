@@ -65,7 +65,7 @@ stays below the radius, so the outline runs once around its centre."""
 
 MOST_CONTACT_MM = 200.0
 """Largest depth behind the face up to which a scrape marks the sheet. Corrugation is a quarter as
-deep, and a few times more would reach the opposite wall."""
+deep; a limit a few times larger would reach the opposite wall."""
 
 GAP_LIMITS_MM = (0.0, 200.0)
 """Distance between container and spreader; a wider gap would not look connected."""

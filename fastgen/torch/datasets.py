@@ -34,7 +34,7 @@ MAX_LENGTH = EPOCH_SCENES // 100
 """Most images in an epoch. A split with 1 % of the scenes still fits before the next epoch."""
 
 MOST_DIGESTS = 3
-"""Most epochs whose curriculum `ContainerDataset.description` describes."""
+"""Most epochs whose curriculum has a digest in `ContainerDataset.description`."""
 
 
 class ContainerDataset(Dataset[Item]):

@@ -58,9 +58,10 @@ def _span(damage: Damage) -> tuple[float, float]:
 
 
 def _largest(damage: Damage) -> float:
-    """Evaluate the pyramid around its rounded apex; rounded folds lower it by up to nine tenths.
+    """Return the largest displacement, evaluated at the rounded apex and at FLATTENED_AT.
 
-    The displacement is linear in the height of the pyramid up to FLATTENED_AT, and from there on.
+    The displacement is linear in the height of the pyramid below FLATTENED_AT and above it. Rounded
+    folds lower the apex by up to nine tenths.
     """
     apex = _apex(damage.shape)
     height = np.array([[min(FLATTENED_AT, apex)], [apex]])
@@ -74,7 +75,7 @@ def _largest(damage: Damage) -> float:
 def _apex(shape: tuple[float, ...]) -> float:
     """Return the height of the rounded apex: at most 1, and 1 for sharp folds.
 
-    Three grids around the highest place so far find it within 0.2 %. It takes about 0.3 ms.
+    Three grids, each finer and around the highest point so far, find it within 0.2 % in 0.3 ms.
     """
     softness = shape[1 + SIDES]
     # in every direction a side falls by 0.4 or more per half size, and folds round off `softness`

@@ -36,7 +36,8 @@ class Form:
     Attributes:
         kind: One of classes.ALL_DAMAGE_CLASSES.
         name: Value of `Damage.form`.
-        glsl: Name in the shaders: `GLSL_field` is its displacement, and `outside_GLSL` its outline.
+        glsl: Name in the shaders, such as "star" in `star_field` (its displacement) and
+            `outside_star` (its outline).
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
         reach: Function of a damage to the distances along and across within which it acts.

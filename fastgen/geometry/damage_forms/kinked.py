@@ -20,7 +20,7 @@ def _kinked(damage: Damage, u: Array, v: Array, w: Array) -> Array:
 
 
 def _largest(damage: Damage) -> float:
-    """Return the displacement where the rounded tip of the notch is level."""
+    """Return the displacement at the rounded tip of the notch, where its slope is 0."""
     apex, softness = damage.shape
     tip = above_zero(np.array(1 - softness * (1 - apex * apex) / 4), softness)
     return abs(damage.depth_mm) * float(tip)

@@ -61,7 +61,7 @@ def _reach(damage: Damage) -> tuple[float, float]:
     rim_mm, jag_mm, arm_mm = damage.shape[0], damage.shape[3], damage.shape[5]
     half_length, half_gape = half_size(damage)
     across = max(2 * half_gape + jag_mm, arm_mm)
-    # a second slit that is wider than the first is long protrudes behind its beginning
+    # a second slit that is wider than the first is long extends beyond the start of the first
     along = half_length + max(half_gape, (1 + ARM_GAPE) * half_gape - 2 * half_length)
     return along + rim_mm, across + rim_mm
 
@@ -71,10 +71,10 @@ _PLACES = 33
 
 
 def _span(damage: Damage) -> tuple[float, float]:
-    """Bound the displacement of the lower lip, which `twist` above 1 turns around.
+    """Return bounds of the displacement; a lower lip with `twist` above 1 may bend outward.
 
-    Between two places below the slit, the lip bends at most as at the nearer one, and turns around
-    at most as at the farther one.
+    Between two places below the slit, the lip bends no more than at the place nearer to the slit,
+    and its outward share is no larger than at the farther one.
     """
     rim_mm, belly, _, jag_mm, *_, twist = damage.shape
     _, half_gape = half_size(damage)
