@@ -1,4 +1,4 @@
-"""Guards of all tests against files that block or never end."""
+"""Guard of tests against files that block or never end."""
 
 import resource
 from pathlib import Path
@@ -11,7 +11,7 @@ _SPARE_BYTES = 4 << 30
 """Memory that a test may take in addition; reading without end fails before the machine is full."""
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def guarded():
     """End a test that waits, and refuse memory to one that reads without end."""
     before = resource.getrlimit(resource.RLIMIT_AS)

@@ -18,6 +18,8 @@ from fastgen.light.environment import load_environment
 from fastgen.scene import Scene
 from tests.stability.special_files import KINDS, put
 
+pytestmark = pytest.mark.usefixtures("guarded")
+
 ARGUMENTS = ["--images", "4", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 
 

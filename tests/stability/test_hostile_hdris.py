@@ -11,6 +11,8 @@ from fastgen.errors import AssetError
 from fastgen.light import hdri
 from fastgen.light.hdri import load_radiance
 
+pytestmark = pytest.mark.usefixtures("guarded")
+
 COMPRESSIONS = [
     *("NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB"),
     *("HTJ2K256", "HTJ2K32"),

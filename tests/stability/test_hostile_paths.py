@@ -14,6 +14,8 @@ from fastgen.formats.format import Same
 from tests.folders import content
 from tests.stability.special_files import KINDS, put
 
+pytestmark = pytest.mark.usefixtures("guarded")
+
 ARGUMENTS = ["--images", "4", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 SHARD = "shards/000000.json"
 
