@@ -96,9 +96,8 @@ class Bounds(NamedTuple):
             instead = f", or write [{lo - 360:g}, {hi:g}]" if full_turn else ""
             words = f"the lowest value {lo:g} is above the highest {hi:g}; swap them{instead}"
             raise PydanticCustomError("words", "{words}", {"words": words})
-        return make(
-            (lo + 0, hi + 0)
-        )  # -0.0 becomes 0.0: a range from 0.0 down to -0.0 cannot be drawn
+        # -0.0 becomes 0.0: a range from 0.0 down to -0.0 cannot be drawn
+        return make((lo + 0, hi + 0))
 
 
 class OneOf(NamedTuple):

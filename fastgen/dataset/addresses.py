@@ -45,15 +45,14 @@ def place_of(out: str | Path) -> str:
             f"{text}: is a path of Windows; give one of this system, such as /mnt/c/folder, or "
             f"./{text} for a folder with that name"
         )
-    if _MISTYPED.fullmatch(text):
-        text = _checked_address(text)
+    parts = _MISTYPED.fullmatch(text)
+    if parts:
+        text = _checked_address(text, parts)
     return text if "://" in text else _without_tilde(text)
 
 
-def _checked_address(text: str) -> str:
+def _checked_address(text: str, parts: re.Match[str]) -> str:
     """Return an address, the folder of a local one, or a path that only resembles an address."""
-    parts = _MISTYPED.fullmatch(text)
-    assert parts is not None
     protocol, mark, rest = parts["protocol"].lower(), parts["mark"], parts["rest"]
     path = text[parts.end("mark") :]
     if mark != "://":

@@ -34,9 +34,6 @@ _RECOVERED = "lost+found"
 _LARGEST_READ, _LARGEST_HASHED = 4 << 30, 256 << 30
 """Largest files in bytes. Tar files, which may be larger than memory, are only hashed."""
 
-_PIECE = 1 << 20
-"""Bytes that are hashed at a time."""
-
 
 class UnreadableError(OutputError):
     """File of a dataset that exists but cannot be read, so that it has to be made again."""
@@ -255,10 +252,7 @@ class Remote:
     def content_hash(self, path: str) -> str:
         """Return the SHA-256 of a file in hexadecimal, without keeping its content in memory."""
         with self._named(path, "read"), self._system.open(self._path(path), "rb") as stream:
-            found = hashlib.sha256()
-            while piece := stream.read(_PIECE):
-                found.update(piece)
-        return found.hexdigest()
+            return hashlib.file_digest(stream, "sha256").hexdigest()
 
     def remove(self, path: str) -> None:
         """Remove a file if it exists."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import simplejpeg
 
-from fastgen.dataset.dataset_json import MANIFEST, read_manifest, without_manifest
+from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, without_manifest
 from fastgen.dataset.job import manifest_path
 from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import is_sealed
@@ -71,9 +71,10 @@ def examine(out: str) -> Findings:
     for number, hashed in manifest["shards"].items():
         path, shard = manifest_path(int(number)), None
         if _is_intact(storage, present, path, None, hashed, faults):
-            shard = read_manifest(storage, int(number))
+            text = storage.read(path)
+            shard = shard_manifest(text, int(number))
             if shard is None:
-                problem = unfit(storage.read(path), Shard) or "is another shard's"
+                problem = unfit(text, Shard) or "is another shard's"
                 faults.append(f"{path}: {problem}")
         if shard is None:
             unlisted.add(int(number))

@@ -10,7 +10,7 @@ import numpy as np
 from fastgen.config.config import Config
 from fastgen.errors import AssetError
 from fastgen.files.plain_file import read_plain
-from fastgen.fit.photographs import Photograph
+from fastgen.fit.photographs import LARGEST_FILE, Photograph
 from fastgen.scene.container_kinds import KINDS
 
 BoxHeights = Sequence[float]
@@ -24,8 +24,6 @@ _OUTSIDE = 0.05
 
 _LEAST_HEIGHT = 0.02
 """Height of the smallest boxes that say something about the distance of a camera."""
-
-_LARGEST_FILE = 1 << 30
 
 _QUANTILES = (10, 90)
 _SIDES = ("front", "back", "door", "no_door")
@@ -89,7 +87,7 @@ def _coco(
     path: Path, photographs: Sequence[Photograph]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
     try:
-        data = json.loads(read_plain(path, _LARGEST_FILE))
+        data = json.loads(read_plain(path, LARGEST_FILE))
         if not isinstance(data, dict) or "annotations" not in data:
             return  # some other JSON file
         images = {each["id"]: each for each in data["images"]}
@@ -108,7 +106,7 @@ def _coco(
 
 def _yolo(path: Path) -> Iterator[tuple[float, float]]:
     try:
-        lines = read_plain(path, _LARGEST_FILE).decode().splitlines()
+        lines = read_plain(path, LARGEST_FILE).decode().splitlines()
     except (OSError, ValueError) as error:
         raise AssetError(f"{path}: not a YOLO file of boxes ({error}); move it away") from None
     for number, line in enumerate(lines, 1):

@@ -13,7 +13,9 @@ from fastgen.fit.statistics import Pixels, scaled
 
 _TYPES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
 _SMALLEST = 64
-_LARGEST_FILE = 1 << 30
+
+LARGEST_FILE = 1 << 30
+"""Largest size in bytes of a photograph, or of a file of boxes beside it."""
 
 
 class Photograph(NamedTuple):
@@ -57,7 +59,7 @@ def read_photographs(folder: Path, longest: int) -> list[Photograph]:
 
 def _read(path: Path, longest: int) -> Photograph:
     try:
-        pixels = _as_rgb(decode(read_plain(path, _LARGEST_FILE)))
+        pixels = _as_rgb(decode(read_plain(path, LARGEST_FILE)))
     except (OSError, ValueError) as error:
         words = error.strerror if isinstance(error, OSError) else error
         raise AssetError(f"{path}: cannot be read as a picture ({words}); remove it") from None

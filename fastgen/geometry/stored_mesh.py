@@ -18,7 +18,8 @@ _LAYOUT = {
     "about": "uint8 N",
 }
 
-_ARRAYS = ("positions_mm", "normals", "atlas_mm", "zone", "triangles")
+_ARRAYS = tuple(name for name in _LAYOUT if name != "about")
+"""Arrays that are fields of a Mesh; `about` holds its other fields."""
 
 
 def stored(name: str, version: int, inputs: object, build: Callable[[], Mesh]) -> Mesh:

@@ -1,9 +1,12 @@
 """HDRI files: bundled and user-supplied environments, and their radiance as arrays."""
 
+import contextlib
 import hashlib
+import io
 import json
 import os
 import re
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -159,9 +162,16 @@ def content_hash(path: Path) -> str:
         AssetError: The file cannot be read, is not a regular file, or has more than LARGEST_FILE
             bytes.
     """
+    with _opened(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[io.BufferedReader]:
+    """Open a file for reading; a failure to open or read it raises AssetError."""
     try:
         with open_plain(path, LARGEST_FILE) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            yield file
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
 
@@ -183,11 +193,8 @@ def load_radiance(path: str | Path) -> NDArray[np.float32]:
     kind = path.suffix.lower()
     if kind not in (".exr", ".hdr"):
         raise AssetError(f"{path}: an HDRI must be an .exr or .hdr file")
-    try:
-        with open_plain(path, LARGEST_FILE) as file:
-            radiance = _read_exr(path, file) if kind == ".exr" else _read_hdr(path, file)
-    except OSError as error:
-        raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
+    with _opened(path) as file:
+        radiance = _read_exr(path, file) if kind == ".exr" else _read_hdr(path, file)
     return _sanitized(radiance)
 
 

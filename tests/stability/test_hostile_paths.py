@@ -13,6 +13,7 @@ from fastgen.files.inner_path import is_inner
 from fastgen.formats.format import Same
 from tests.folders import content
 from tests.stability.special_files import KINDS, put
+from tests.stability.test_hostile_datasets import sealed
 
 pytestmark = pytest.mark.usefixtures("guarded")
 
@@ -55,7 +56,7 @@ def reseal(path, change):
     manifest = json.loads(path.read_bytes())
     manifest.pop("digest")
     change(manifest)
-    path.write_bytes(seal(json.dumps(manifest, indent=1).encode()))
+    path.write_bytes(sealed(manifest))
 
 
 def reseal_shard(out, change):
