@@ -57,8 +57,9 @@ class Object:
         polygon: Points x0, y0, x1, y1, ... along the projected outline of the whole object. Empty
             for the spreader, seals and damages, and for objects that are partly behind the camera.
         quad: Four corners of a decal x0, y0, x1, y1, ..., clockwise from the text's upper left or
-            the marker's left corner. Empty for other objects, and for decals that are partly behind
-            the camera.
+            the marker's left corner. They are those of the whole decal, also where it reaches
+            beyond its sheet and its polygon ends there. Empty for other objects, and for decals
+            that are partly behind the camera.
         reading: 'horizontal', or 'vertical' if the letters are below one another; '' without text.
         parts: Parts of an identifier in reading order; empty for other objects, and for decals that
             are partly behind the camera.

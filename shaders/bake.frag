@@ -26,7 +26,7 @@ void main() {
 #endif
     DecalHit decal = NO_DECAL;
 #if WITH_DECALS
-    decal = worn_decals(zone, atlas_mm, texel_mm);
+    decal = worn_decals(zone, atlas_mm, footprint_of(mat2(texel_mm), vec3(0.0)));
 #endif
     Material m = surface_at(zone, atlas_mm, texel_mm, scar, decal).material;
     out_albedo = vec4(srgb_encode(m.albedo), 1.0);

@@ -1,14 +1,15 @@
-// DecalHit decals_at(uint zone, vec2 atlas_mm, float footprint_mm, NoiseSample coarse, NoiseSample streaks):
-// decals at a point of the atlas. footprint_mm: width of the lookup on the surface.
+// DecalHit decals_at(int sheet, vec2 atlas_mm, Footprint pixel, NoiseSample coarse, NoiseSample streaks):
+// decals at a point of a sheet, averaged over a pixel. sheet: Its number, see sheet_number in zone.glsl.
 
 #include "decals.constants"
+#include "scene.block"
+#include "print_area.glsl"
+#include "text_coverage.glsl"
 #include "tone_curve.glsl"
 #include "worn_art.glsl"
 
 uniform sampler2D decal_table;      // One row per decal; see DecalTables in decal_tables.py.
-uniform sampler2D glyph_table;      // One texel per letter; see GlyphRun in glyph_runs.py.
-uniform sampler2DArray art;         // Markers, stickers, emblems: sRGB, straight alpha.
-uniform sampler2DArray glyph_tiles; // R: signed distance, 0.5 on the outline. G: ink coverage.
+uniform sampler2DArray art;         // Markers, stickers, emblems: linear light, premultiplied alpha.
 
 struct DecalHit {
     vec3 ink;      // Albedo of the decals times `alpha`.
@@ -16,126 +17,117 @@ struct DecalHit {
     uint id;       // Object at the exact point, 0 for none.
     float patched;   // Share of the footprint under paint or tape of a repair, 0..1.
 };
+const float DIAGONAL = 0.70710678;
+// Side of the decals, in pixels, that are no longer blended toward a box of their area.
+const float SHARP_FROM_PX = 4.0;
 const DecalHit NO_DECAL = DecalHit(vec3(0.0), 0.0, 0u, 0.0);
 
 vec4 decal_texel(uint decal, int column) {
     return texelFetch(decal_table, ivec2(column, int(decal) - 1), 0);
 }
 
-// Distance in mm to the nearest side of a box, positive inside.
-float inside_box(vec2 p, vec2 half_size) {
-    vec2 d = half_size - abs(p);
-    return min(d.x, d.y);
-}
-
 // Distance in mm to the nearest side of the triangle on the lower side of a box, positive inside.
-float inside_triangle(vec2 p, vec2 half_size) {
-    vec2 side = vec2(2.0 * half_size.y, half_size.x);   // Normal of the right side.
-    return min(half_size.y + p.y, dot(side, vec2(-abs(p.x), half_size.y - p.y)) / length(side));
+float inside_triangle(vec2 p, vec2 half_mm) {
+    vec2 side = vec2(2.0 * half_mm.y, half_mm.x);   // Normal of the right side.
+    return min(half_mm.y + p.y, dot(side, vec2(-abs(p.x), half_mm.y - p.y)) / length(side));
 }
 
-// Ink coverage of one glyph at d mm from its centre. The distance field gives sharp outlines nearby
-// (Green 2007, Improved Alpha-Tested Magnification for Vector Textures and Special Effects). Averaged
-// distances lose or gain ink once the footprint nears the width of a stroke, so mip-mapped coverage
-// takes over there.
-float glyph_ink(vec2 d, float layer, float cap_mm, float footprint_mm) {
-    float tile_mm = GLYPH_TILE_CAPS * cap_mm;
-    vec2 uv = d / tile_mm + 0.5;
-    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 0.0;
-    float lod = log2(footprint_mm * GLYPH_TILE_SIZE / tile_mm);
-    // Half a level finer, because bilinear filtering widens a texel by about half.
-    vec2 texel = textureLod(glyph_tiles, vec3(uv.x, 1.0 - uv.y, layer), max(lod - 0.5, 0.0)).rg;
-    float distance_mm = (texel.r - 0.5) * GLYPH_RANGE_CAPS * cap_mm;
-    float sharp = clamp(0.5 + distance_mm / footprint_mm, 0.0, 1.0);
-    return mix(sharp, texel.g, smoothstep(0.25, 1.25, lod));
-}
-
-vec4 glyph_texel(uint glyph) { return texelFetch(glyph_table, ivec2(glyph & 255u, glyph >> 8), 0); }
-
-// Ink coverage of a text at p mm from its middle. run: the fifth texel of the decal's row.
-float text_coverage(vec2 p, vec4 run, float footprint_mm) {
-    float cap_mm = run.x;
-    uint start = uint(run.y);
-    float along = run.w < 0.0 ? p.y : p.x;
-    float part = clamp(fma(along, abs(run.w), 0.5 * run.z), 0.0, run.z - 1.0);
-    uint reach = uint(glyph_texel(start + uint(part)).w);
-    uint g = start + reach / GLYPH_RANGE, end = start + reach % GLYPH_RANGE;
-    // Offset, layer and distance of the two nearest glyphs: a wide footprint may touch both.
-    vec4 first = vec4(1e9, 1e9, 0.0, 1e9);
-    vec4 second = first;
-    do {
-        vec4 glyph = glyph_texel(g);
-        vec2 d = p - glyph.xy;
-        vec4 found = vec4(d, glyph.z, g < end ? max(abs(d.x), abs(d.y)) : 1e9);
-        if (found.w < first.w) { second = first; first = found; }
-        else if (found.w < second.w) second = found;
-    } while (++g < end);
-    return min(glyph_ink(first.xy, first.z, cap_mm, footprint_mm) +
-               glyph_ink(second.xy, second.z, cap_mm, footprint_mm), 1.0);
-}
-
-// Distance in mm to the ragged line along which corners were torn off, positive on the decal.
-// torn: Shares of the half width and half height that are missing at left, right, top and bottom.
-float inside_tear(vec2 p, vec2 half_size, vec4 torn, NoiseSample coarse) {
+// Share of the footprint left of a decal whose corners were torn off along a ragged line.
+// torn: Shares of the half width and half height that are missing at left, right, top and bottom. small:
+// How far the whole decal counts instead of the point p, 0..1.
+float left_after_tear(vec2 p, vec2 half_size, vec4 torn, bool diamond, float small, float footprint_mm,
+                      NoiseSample coarse) {
     vec4 to_line = (1.0 - torn) * half_size.xxyy + vec4(p.x, -p.x, -p.y, p.y);
     to_line = mix(vec4(1e6), to_line, greaterThan(torn, vec4(0.0)));
-    return min(min(to_line.x, to_line.y), min(to_line.z, to_line.w)) +
-           (coarse.value.w - 0.5) * 0.12 * half_size.x;
+    float inside_mm = min(min(to_line.x, to_line.y), min(to_line.z, to_line.w)) +
+                      (coarse.value.w - 0.5) * 0.12 * half_size.x;
+    vec4 lost = max(torn - (coarse.value.w - 0.5) * 0.12, 0.0) * step(1e-6, torn);
+    vec2 rest = 1.0 - 0.5 * (lost.xz + lost.yw);
+    float whole = diamond ? 1.0 - 0.5 * dot(lost, lost) : rest.x * rest.y;
+    return mix(clamp(0.5 + inside_mm / footprint_mm, 0.0, 1.0), whole, small);
 }
 
-// Adds one decal on top of `hit`.
-void add_decal(inout DecalHit hit, uint decal, vec2 atlas_mm, float footprint_mm, NoiseSample coarse,
+// Adds one decal on top of `hit`. A decal ends at its sheet, also where its rectangle reaches farther.
+void add_decal(inout DecalHit hit, uint decal, int sheet, vec2 atlas_mm, Footprint pixel, NoiseSample coarse,
                NoiseSample streaks) {
+    vec4 about = decal_texel(decal, 3);
+    int kind = int(about.x) % DECAL_SHEET;
+    if (int(about.x) / DECAL_SHEET != sheet) return;
     vec4 place = decal_texel(decal, 1);
     vec4 turn = decal_texel(decal, 0);
+    mat2 axes = mat2(turn.x, turn.y, -turn.y, turn.x);   // Right and up of the decal.
     vec2 d = atlas_mm - place.xy;
-    vec2 p = vec2(dot(turn.xy, d), dot(turn.zw, d));
-    vec4 kind = decal_texel(decal, 3);
-    float inside_mm = kind.x == DECAL_MARKER
-        ? (place.z - abs(p.x) - abs(p.y)) * 0.70710678
-        : kind.x == DECAL_TRIANGLE ? inside_triangle(p, place.zw) : inside_box(p, place.zw);
-    if (inside_mm < -footprint_mm) return;
+    vec2 p = d * axes;
+    vec2 width_mm = box_widths(pixel, axes);
+    mat2 to_px = pixel.to_px * axes;
+    // A decal of about a pixel becomes a box that is parallel to the pixels.
+    float small = 1.0 - smoothstep(1.0, SHARP_FROM_PX, 2.0 * sqrt(place.z * place.w) / pixel.mean_mm);
+    float rectangle = mix(covered_box(p, place.zw, width_mm),
+                          covered_pixel(to_px * p, pixel_box(to_px, place.zw)), small);
+    float alpha = rectangle;
+    bool diamond = kind == DECAL_MARKER, triangle = kind == DECAL_TRIANGLE;
+    vec2 inside = place.zw - abs(p);
+    float inside_mm = min(inside.x, inside.y);
+    if (diamond) {
+        const mat2 diagonal = mat2(DIAGONAL, DIAGONAL, -DIAGONAL, DIAGONAL);
+        alpha = covered_box(p * diagonal, vec2(place.z * DIAGONAL), box_widths(pixel, axes * diagonal));
+        inside_mm = (place.z - abs(p.x) - abs(p.y)) * DIAGONAL;
+    } else if (triangle) {
+        inside_mm = inside_triangle(p, place.zw);
+        alpha = clamp(0.5 + inside_mm / pixel.mean_mm, 0.0, 1.0);
+    }
     vec4 ink = decal_texel(decal, 2);
-    float alpha = clamp(0.5 + inside_mm / footprint_mm, 0.0, 1.0);
     vec3 albedo = ink.rgb;
     vec2 uv = p / (2.0 * place.zw) + 0.5;
-    if (kind.x == DECAL_TEXT) {
-        alpha *= text_coverage(p, decal_texel(decal, 4), footprint_mm);
-    } else if (kind.x == DECAL_STRIPES) {
+    if (kind == DECAL_TEXT) {
+        // Letters have their own coverage. Only what they have below the baseline ends with the box.
+        vec2 inside_px = inside / width_mm;
+        alpha = clamp(2.0 + min(inside_px.x, inside_px.y), 0.0, 1.0);
+        if (alpha > 0.0) alpha *= text_coverage(p, decal_texel(decal, 4), width_mm);
+    } else if (kind == DECAL_STRIPES) {
         float period_mm = 4.0 * place.w;
         float wave = abs(fract((p.x + p.y) / period_mm) - 0.5) * period_mm - 0.25 * period_mm;
-        albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / footprint_mm, 0.0, 1.0));
-    } else if (kind.x != DECAL_PATCH) {
-        // Half a level finer, because trilinear filtering widens the footprint by about as much.
-        float lod = max(log2(footprint_mm * ART_SIZE / (2.0 * place.z)) - 0.5, 0.0);
-        vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, kind.z), lod);
-        if (kind.x == DECAL_STICKER || kind.x == DECAL_EMBLEM) alpha *= texel.a;
-        if (kind.x != DECAL_EMBLEM) {
-            float tear_mm = inside_tear(p, place.zw, decal_texel(decal, 4), coarse);
-            vec4 aged = worn_art(srgb_decode(texel.rgb), ink.rgb, ink.a, kind.w, coarse, streaks);
-            alpha *= aged.a * clamp(0.5 + tear_mm / footprint_mm, 0.0, 1.0);
+        albedo = mix(vec3(0.012), ink.rgb, clamp(0.5 + wave / pixel.mean_mm, 0.0, 1.0));
+    } else if (kind != DECAL_PATCH) {
+        float lod = log2(pixel.mean_mm * ART_SIZE * 0.5 * inversesqrt(place.z * place.w));
+        // Half a level finer, because trilinear filtering widens the footprint by about as much. Small
+        // artwork needs the width, or its light depends on where the pixels lie.
+        float sharper = 0.5 - 0.5 * smoothstep(5.0, 6.5, lod);
+        vec4 texel = textureLod(art, vec3(uv.x, 1.0 - uv.y, about.z), max(lod - sharper, 0.0));
+        // Outlines of markers and triangles are exact nearby. Farther away the artwork's own coverage,
+        // which is filtered as its light, keeps the balance of both.
+        float exact = diamond || triangle ? 1.0 - smoothstep(0.25, 1.25, lod) : 0.0;
+        alpha = mix(rectangle * texel.a, alpha, exact);
+        if (kind != DECAL_EMBLEM) {
+            vec4 aged = worn_art(texel.rgb / max(texel.a, 0.004), ink.rgb, ink.a, about.w, coarse, streaks);
+            alpha *= aged.a * left_after_tear(p, place.zw, decal_texel(decal, 4), diamond, small, pixel.mean_mm,
+                                              coarse);
             albedo = aged.rgb;
         }
     }
     // Painted decals wear off in flakes.
-    if (kind.x != DECAL_MARKER && kind.x != DECAL_STICKER && kind.x != DECAL_TRIANGLE)
+    if (!diamond && !triangle && kind != DECAL_STICKER)
         alpha *= 1.0 - ink.a * covered(coarse.value.w, 0.6, coarse.lost.w, 0.15);
+    alpha = min(alpha * seen_share(pixel, turn.zw), 1.0);
     hit.ink = mix(hit.ink, albedo, alpha);
     hit.alpha += alpha * (1.0 - hit.alpha);
-    if (kind.x == DECAL_PATCH) hit.patched += alpha * (1.0 - hit.patched);
-    if (inside_mm >= 0.0 && kind.y > 0.0) hit.id = uint(kind.y);
+    if (kind == DECAL_PATCH) hit.patched += alpha * (1.0 - hit.patched);
+    if (inside_mm >= 0.0 && about.y > 0.0) hit.id = uint(about.y);
 }
 
-DecalHit decals_at(uint zone, vec2 atlas_mm, float footprint_mm, NoiseSample coarse, NoiseSample streaks) {
+DecalHit decals_at(int sheet, vec2 atlas_mm, Footprint pixel, NoiseSample coarse, NoiseSample streaks) {
     DecalHit hit = NO_DECAL;
-    uvec4 cell = cell_at(zone, atlas_mm);
-    int i = 0;
-    uint decal = cell.x & 0xffffu;
+    int layer = 0;
     do {
-        if (decal != 0u) add_decal(hit, decal, atlas_mm, footprint_mm, coarse, streaks);
-        ++i;
-        uint pair = cell[(i & 7) >> 1];
-        decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;
-    } while (i < 8 && decal != 0u);
+        uvec4 cell = cell_at(sheet, atlas_mm, layer);
+        int i = 0;
+        uint decal = cell.x & 0xffffu;
+        do {
+            if (decal != 0u) add_decal(hit, decal, sheet, atlas_mm, pixel, coarse, streaks);
+            ++i;
+            uint pair = cell[(i & 7) >> 1];
+            decal = (i & 1) == 0 ? pair & 0xffffu : pair >> 16;
+        } while (i < 8 && decal != 0u);
+    } while (++layer < decal_layers);
     return hit;
 }

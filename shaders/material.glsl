@@ -1,7 +1,7 @@
 // SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar, DecalHit decal): material
 // of a point after all layers. footprint_mm: Width of the lookup on the surface. The layers follow section
 // 3.2 of the SeaFront paper. Colours and blend weights here are artistic choices.
-// DecalHit worn_decals(uint zone, vec2 atlas_mm, float footprint_mm): decals at a point, weathered.
+// DecalHit worn_decals(uint zone, vec2 atlas_mm, Footprint pixel): decals at a point, weathered.
 
 #include "reflectance.constants"
 #include "variant.constants"
@@ -48,11 +48,11 @@ NoiseSample streak_noise(vec2 noise_mm, float footprint_mm) {
     return read_noise(1, noise_mm + 3100.0, wear_tile_mm, footprint_mm);
 }
 
-DecalHit worn_decals(uint zone, vec2 atlas_mm, float footprint_mm) {
+DecalHit worn_decals(uint zone, vec2 atlas_mm, Footprint pixel) {
     int code = int(texelFetch(zone_table, ivec2(int(zone), 1), 0).x);
     vec2 noise_mm = noise_position(atlas_mm, code);
-    return decals_at(zone, atlas_mm, footprint_mm, coarse_noise(noise_mm, code, footprint_mm),
-                     streak_noise(noise_mm, footprint_mm));
+    return decals_at(sheet_number(code), atlas_mm, pixel, coarse_noise(noise_mm, code, pixel.mean_mm),
+                     streak_noise(noise_mm, pixel.mean_mm));
 }
 
 SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar, DecalHit decal) {

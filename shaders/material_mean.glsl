@@ -16,7 +16,7 @@ SurfacePoint empty_material_sum(SurfacePoint first) {
 void add_material(inout SurfacePoint sum, ZoneSample p, uint zone, vec2 atlas_mm, float count) {
     DecalHit decal = p.decal;
 #if WITH_DECALS && DECALS_EACH_LOOKUP
-    decal = worn_decals(zone, atlas_mm, p.footprint_mm);
+    decal = worn_decals(zone, atlas_mm, p.decal_pixel);
 #endif
     SurfacePoint s = surface_at(zone, atlas_mm, p.footprint_mm, p.scar, decal);
     sum.material.albedo += s.material.albedo / count;

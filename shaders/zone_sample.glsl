@@ -11,6 +11,7 @@
 #include "zone_id.glsl"
 #include "visibility_buffer.glsl"
 #include "material.glsl"
+#include "sheet_footprint.glsl"
 #if WITH_DAMAGE
 #include "damage_law.glsl"
 #include "rest_position.glsl"
@@ -24,6 +25,7 @@ struct ZoneSample {
     float depth;          // In m along the optical axis.
     float footprint_mm;   // Width of a lookup of the material layers on the surface.
     Scar scar;            // See DamageSample.
+    Footprint decal_pixel;   // A lookup of the decals on the sheet.
 #if WITH_DAMAGE
     mat3 bend;            // See DamageSample.
 #endif
@@ -48,7 +50,8 @@ ZoneSample zone_sample(ivec2 sample_at, uint key, vec3 view) {
     p.footprint_mm = LOOKUP_PX * p.depth * pixel_angle * 1000.0 * inversesqrt(max(facing, 0.05));
     p.decal = NO_DECAL;
 #if WITH_DECALS
-    p.decal = worn_decals(id_zone(key), atlas_mm, p.footprint_mm * (DECAL_PX / LOOKUP_PX));
+    p.decal_pixel = sheet_footprint(id_zone(key), normal, view, p.depth);
+    p.decal = worn_decals(id_zone(key), atlas_mm, p.decal_pixel);
 #endif
     p.surface = surface_at(id_zone(key), atlas_mm, p.footprint_mm, p.scar, p.decal);
     p.id = p.decal.id != 0u ? p.decal.id : zone_id(id_zone(key));

@@ -12,18 +12,22 @@ from PIL import Image, ImageDraw, ImageFont
 from fastgen.classes import MARKER_CLASSES
 from fastgen.decals.artwork import (
     ART_SIZE,
+    GLYPH_MOST_INK,
     art_images,
     art_layers,
     brands,
-    glyph_levels,
+    glyph_coverage,
+    glyph_sums,
     glyph_tiles,
     marker_prints,
     mip_levels,
+    premultiplied,
     stickers,
 )
 from fastgen.render.gl import open_context
 from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path
+from fastgen.srgb import encoded, linear
 
 HUES = {"red": 357, "orange": 25, "yellow": 48, "green": 156, "blue": 221}
 """Mean hue of each field colour in degrees; all its inks lie within HUE_RANGE."""
@@ -232,10 +236,10 @@ def test_mip_levels_average_linear_light_and_not_srgb_codes():
     assert (levels[1][0, 0, :3] == 200).all()
 
 
-@pytest.mark.parametrize("channels", [2, 4])
-def test_the_gpu_samples_the_given_mip_levels(channels):
+@pytest.mark.parametrize("srgb", [False, True])
+def test_the_gpu_samples_the_given_mip_levels(srgb):
     rng = np.random.default_rng(4)
-    levels = [rng.integers(0, 256, (3, side, side, channels), np.uint8) for side in (8, 4, 2, 1)]
+    levels = [rng.integers(0, 256, (3, side, side, 4), np.uint8) for side in (8, 4, 2, 1)]
     code = """
     #version 430
     layout(local_size_x = 1) in;
@@ -248,28 +252,37 @@ def test_the_gpu_samples_the_given_mip_levels(channels):
     }
     """
     with open_context() as gl:
-        levelled_texture(gl, levels).use(0)
+        levelled_texture(gl, levels, srgb).use(0)
         found = gl.ctx.buffer(reserve=4 * 16)
         found.bind_to_storage_buffer(0)
         gl.ctx.compute_shader(code).run(4)
-        corners = np.frombuffer(found.read(), np.float32).reshape(4, 4) * 255
+        corners = np.frombuffer(found.read(), np.float32).reshape(4, 4).copy()
+    if srgb:  # shaders read linear light
+        corners[:, :3] = encoded(corners[:, :3])
     wanted = [level[2, 0, 0] for level in levels]
-    assert np.abs(corners[:, :channels] - wanted).max() < 0.5
+    assert np.abs(255 * corners - wanted).max() < 0.5
 
 
-def test_glyph_levels_are_averages_of_the_tiles():
-    """Rounding adds up to one step to each level."""
-    first, *others = glyph_levels()
-    np.testing.assert_array_equal(first[..., 0], glyph_tiles()[0])
-    assert first[..., 1].min() == 0
-    assert first[..., 1].max() == 255
+def test_premultiplied_codes_are_those_of_light_times_alpha():
+    straight = np.array([[255, 128, 0, 128], [200, 10, 90, 255], [255, 255, 255, 0]], np.uint8)
+    light = np.vectorize(linear)(straight[:, :3] / 255) * straight[:, 3:] / 255
+    found = premultiplied(straight)
+    np.testing.assert_array_equal(found[:, 3], straight[:, 3])
+    np.testing.assert_allclose(found[:, :3], 255 * encoded(light), atol=0.6)
+
+
+def test_glyph_sums_give_the_ink_of_any_rectangle_of_a_tile():
+    tiles, _ = glyph_tiles()
+    ink = glyph_coverage() / 255
     # a texel half way inside an outline is half full of ink
-    inked, distance = first[..., 1] / 255, first[..., 0].astype(int) - 127.5
-    assert inked[distance > 40].min() == 1
-    assert inked[distance < -40].max() == 0
-    assert inked[np.abs(distance) < 1].mean() == pytest.approx(0.5, abs=0.05)
-    assert [level.shape[1:] for level in others] == [(n, n, 2) for n in (32, 16, 8, 4, 2, 1)]
-    for number, level in enumerate(others, 1):
-        side = level.shape[1]
-        mean = first.reshape(-1, side, 64 // side, side, 64 // side, 2).mean(axis=(2, 4))
-        assert np.abs(level - mean).max() <= number
+    distance = tiles.astype(int) - 127.5
+    assert ink[distance > 40].min() == 1
+    assert ink[distance < -40].max() == 0
+    assert ink[np.abs(distance) < 1].mean() == pytest.approx(0.5, abs=0.05)
+    sums = glyph_sums() * (GLYPH_MOST_INK / 65535)
+    assert ink.sum(axis=(1, 2)).max() < GLYPH_MOST_INK
+    for top, bottom, left, right in ((0, 63, 0, 63), (10, 40, 20, 50), (31, 32, 15, 60)):
+        found = sums[:, bottom, right] - sums[:, top, right] - sums[:, bottom, left]
+        found += sums[:, top, left]
+        wanted = ink[:, top + 1 : bottom + 1, left + 1 : right + 1].sum(axis=(1, 2))
+        np.testing.assert_allclose(found, wanted, atol=2 * GLYPH_MOST_INK / 65535)

@@ -13,7 +13,7 @@ from fastgen.render import noise, sky_visibility_probe
 from fastgen.render.gl import open_context
 
 TABLE = {
-    "art": (artwork, 5, 18.11144, 43.77011, 38.29309),
+    "art": (artwork, 6, 18.11144, 41.92986, 36.3485),
     "container": (container, 8, 12.77864, 33.35851, 30.57877),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),

@@ -85,7 +85,11 @@ def test_outlines_of_decals_lie_on_the_surface(scenes, turned_deg):
         turned = dataclasses.replace(scene, decals=tuple(decals))
         found = DecalSurface(turned, mesh).outlines_mm
         edges = Outlines.of(decals).points_mm()
+        assert len(edges) > 0
         for decal, edge, around in zip(decals, edges, found, strict=True):
+            *_, width, height = mesh.charts[mesh.chart_index(decal.face)].rect_mm
+            if (edge < 0).any() or (edge > (width, height)).any():
+                continue  # tests/test_decals_at_borders.py covers clipped outlines
             away = edge - decal.center_mm
             assert oracle.inside(decal, decal.center_mm + away * 0.999).all()
             assert not oracle.inside(decal, decal.center_mm + away * 1.001).any()

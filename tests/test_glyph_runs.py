@@ -1,8 +1,13 @@
-"""Letters that the shader tests at a point, compared with all whose tile contains the point."""
+"""Letters that the shader tests at a point, compared with all whose ink is near the point."""
 
 import numpy as np
 
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.artwork import (
+    GLYPH_EXTENT_STEPS,
+    GLYPH_TILE_SIZE,
+    glyph_coverage,
+    glyph_tiles,
+)
 from fastgen.decals.lettering import layout
 from fastgen.render.glyph_runs import glyph_run
 from fastgen.scene.limits import GLYPH_RANGE
@@ -31,6 +36,26 @@ def part_of(p, run):
     return np.clip(part, 0, count - 1).astype(int)
 
 
+def unpacked(codes):
+    """Return tile, half width and half height from the codes of letters [N]."""
+    rest, high = np.divmod(codes.astype(np.int64), GLYPH_EXTENT_STEPS)
+    return *np.divmod(rest, GLYPH_EXTENT_STEPS), high
+
+
+def test_the_extent_of_a_letter_holds_its_ink_closely():
+    _, fonts = glyph_tiles()
+    font = next(iter(fonts.values()))
+    texel = np.abs(np.arange(GLYPH_TILE_SIZE) + 0.5 - GLYPH_TILE_SIZE / 2) + 0.5
+    for char in "IWQ80,":
+        run = glyph_run(layout((char,), font, 100.0))
+        tile, *extent = (part[0] for part in unpacked(run.glyphs[:, 2]))
+        assert tile == font.glyphs[char].tile
+        ink = glyph_coverage()[tile] > 0
+        for axis, steps in enumerate(extent):
+            reach = texel[ink.any(axis=axis)].max() / GLYPH_TILE_SIZE
+            assert reach <= steps / GLYPH_EXTENT_STEPS <= reach + 0.01
+
+
 def test_a_part_lists_every_letter_that_reaches_into_it():
     font = next(iter(glyph_tiles()[1].values()))
     rng = np.random.default_rng(6)
@@ -43,7 +68,8 @@ def test_a_part_lists_every_letter_that_reaches_into_it():
         found = run.glyphs[:, :2]
         assert len(found) == len(centers)
         tiles = {g.tile for g in lettering.glyphs}
-        assert set(run.glyphs[:, 2].astype(int).tolist()) == tiles
+        tile, wide, high = unpacked(run.glyphs[:, 2])
+        assert set(tile.tolist()) == tiles
         # random points, also beyond the ends of the text, and points on the borders of parts
         reach = size / 2 + cap_mm
         points = rng.uniform(-reach, reach, (200, 2)).astype(np.float32)
@@ -51,7 +77,8 @@ def test_a_part_lists_every_letter_that_reaches_into_it():
         points[: len(borders), int(run.parts_per_mm < 0)] = borders
         first, end = np.divmod(run.glyphs[part_of(points, run), 3].astype(int), GLYPH_RANGE)
         side = boxes[0, 1, 0] - boxes[0, 0, 0]
-        held = (np.abs(points[:, None] - found) <= side / 2).all(axis=2)
+        reach = np.stack([wide, high], axis=1) / GLYPH_EXTENT_STEPS * side
+        held = (np.abs(points[:, None] - found) <= reach).all(axis=2)
         numbers = np.arange(len(found))
         named = (numbers >= first[:, None]) & (numbers < end[:, None])
         assert not (held & ~named).any(), (lines, cap_mm, vertical)

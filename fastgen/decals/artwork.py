@@ -19,13 +19,19 @@ from fastgen.files import disk_cache
 from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
 
-VERSION = 5  # raise when the stored arrays change
+VERSION = 6  # raise when the stored arrays change
 
 ART_SIZE = 256
 """Width and height of an artwork image, texels."""
 
 GLYPH_TILE_SIZE = 64
 """Width and height of a glyph tile, texels."""
+
+GLYPH_MOST_INK = GLYPH_TILE_SIZE**2 / 2
+"""Upper limit of the ink in a glyph tile, in full texels."""
+
+GLYPH_EXTENT_STEPS = 128
+"""Steps along a side of a glyph tile in which `glyph_extents` are given."""
 
 _INK_SAMPLES = 8
 """Samples per texel and axis from which ink coverage is computed."""
@@ -177,7 +183,8 @@ def art_levels() -> tuple[NDArray[np.uint8], ...]:
     """Return `art_images` and its mip levels, from the disk cache if possible.
 
     Returns:
-        Read-only uint8 [K, N, N, 4] for N = ART_SIZE, ART_SIZE / 2, ... 1.
+        Read-only uint8 [K, N, N, 4] for N = ART_SIZE, ART_SIZE / 2, ... 1: sRGB codes of linear
+        light times alpha, and alpha. Filters then keep the light of small artwork.
 
     Raises:
         AssetError: A file is missing or broken.
@@ -189,7 +196,8 @@ def art_levels() -> tuple[NDArray[np.uint8], ...]:
     def make() -> dict[str, NDArray[np.uint8]]:
         images = art_images()
         levels = zip(*map(mip_levels, images), strict=True)
-        return {f"level{i}": level for i, level in enumerate([images, *map(np.stack, levels)])}
+        whole = [images, *map(np.stack, levels)]
+        return {f"level{i}": premultiplied(level) for i, level in enumerate(whole)}
 
     sizes = [ART_SIZE >> i for i in range(ART_SIZE.bit_length())]
     layout = {
@@ -197,6 +205,13 @@ def art_levels() -> tuple[NDArray[np.uint8], ...]:
     }
     stored = disk_cache.cached("art", VERSION, digest.hexdigest(), make, layout=layout)
     return tuple(stored.values())
+
+
+def premultiplied(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return sRGB codes [..., 4] of linear light times alpha, for codes with straight alpha."""
+    light = DECODED[image[..., :3]] * (image[..., 3:] / np.float32(255))
+    codes = ENCODED[(light * (len(ENCODED) - 1) + 0.5).astype(np.uint16)]
+    return np.concatenate([codes, image[..., 3:]], axis=-1)
 
 
 def _art_paths() -> list[Path]:
@@ -272,32 +287,46 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
 
 
 @lru_cache(maxsize=1)
-def glyph_levels() -> tuple[NDArray[np.uint8], ...]:
-    """Return the distances and the coverage of `glyph_tiles`, and their mip levels.
-
-    Coverage is the share of ink in a texel, 255 for full ink. Its mip levels keep the ink of thin
-    strokes, which mip levels of distances lose.
+def glyph_coverage() -> NDArray[np.uint8]:
+    """Return the share of ink in each texel of `glyph_tiles`, read-only.
 
     Returns:
-        Read-only uint8 [G, N, N, 2] for N = GLYPH_TILE_SIZE, GLYPH_TILE_SIZE / 2, ... 1, with the
-        distance in channel 0 and the coverage in channel 1.
+        uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], 255 for full ink.
 
     Raises:
         AssetError: A file is missing or broken.
     """
-    tiles, _ = glyph_tiles()
-    levels = [np.stack([tiles, np.stack([_ink(tile) for tile in tiles])], axis=-1)]
-    while levels[-1].shape[1] > 1:
-        # Mesa rounds rows and columns up one after the other, too
-        rows = _rounded_mean(levels[-1][:, :, ::2], levels[-1][:, :, 1::2])
-        levels.append(_rounded_mean(rows[:, ::2], rows[:, 1::2]))
-    for level in levels:
-        level.flags.writeable = False  # all callers share them
-    return tuple(levels)
+    ink = np.stack([_ink(tile) for tile in glyph_tiles()[0]])
+    ink.flags.writeable = False  # all callers share it
+    return ink
 
 
-def _rounded_mean(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    return ((a.astype(np.uint16) + b + 1) >> 1).astype(np.uint8)
+@lru_cache(maxsize=1)
+def glyph_extents() -> NDArray[np.int64]:
+    """Return how far the ink of each glyph reaches from the middle of its tile.
+
+    Returns:
+        int64 [G, 2], half width and half height in GLYPH_EXTENT_STEPS per tile, rounded up.
+    """
+    ink = glyph_coverage() > 0
+    texel = np.abs(np.arange(GLYPH_TILE_SIZE) + 0.5 - GLYPH_TILE_SIZE / 2) + 0.5
+    reach = [(ink.any(axis=axis) * texel).max(axis=1) for axis in (1, 2)]
+    steps = GLYPH_EXTENT_STEPS / GLYPH_TILE_SIZE
+    return np.ceil(np.stack(reach, axis=1) * steps).astype(np.int64)
+
+
+@lru_cache(maxsize=1)
+def glyph_sums() -> NDArray[np.uint16]:
+    """Return summed-area tables of the ink of `glyph_tiles` (Crow 1984), read-only.
+
+    Returns:
+        uint16 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE]: the ink of the texels up to and including a
+        row and column, in units of GLYPH_MOST_INK / 65535 texels.
+    """
+    sums = (glyph_coverage() / 255).cumsum(axis=1).cumsum(axis=2)
+    found: NDArray[np.uint16] = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
+    found.flags.writeable = False  # all callers share it
+    return found
 
 
 def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:

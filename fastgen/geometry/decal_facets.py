@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fastgen.decals.lettering import PartBox
 from fastgen.geometry.damage_law import deform
-from fastgen.geometry.decal_outlines import Outlines
+from fastgen.geometry.decal_outlines import EDGE_POINTS, Outlines
 from fastgen.geometry.facets import Facets, clip, padded
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Decal, Scene
@@ -47,8 +47,8 @@ class _Pairs:
 class DecalSurface:
     """The labelled decals of a scene on the mesh of its container.
 
-    `facets` (polygons) and `outlines_mm` (float64 [N, points, 3]) are in mm in the container frame,
-    after damage. They are computed on first use and kept.
+    `facets` (polygons), `outlines_mm` (float64 [N, points, 3]) and `corners_mm` (float64 [N, 4, 3])
+    are in mm in the container frame, after damage. They are computed on first use and kept.
 
     Attributes:
         decals: The decals that have a class name, in scene order.
@@ -83,11 +83,16 @@ class DecalSurface:
 
     @cached_property
     def outlines_mm(self) -> Array:
-        """Outlines float64 [N, points, 3] of the decals after damage; see Outlines.points_mm."""
+        """Outlines float64 [N, points, 3] of the decals after damage, clipped to their sheets.
+
+        See Outlines.points_mm.
+        """
         if not self.decals:
             return np.zeros((0, 0, 3))
         mesh, pairs = self._mesh, self._pairs
         edges = self._outlines.points_mm()
+        for row in self._overhanging:
+            edges[row] = _clipped(edges[row], self._sheet_size_mm(row))
         crossed = np.flatnonzero((pairs.inside < 0).any(axis=(0, 1)))
         whose, triangle = pairs.whose[crossed], pairs.triangle[crossed]
         x, y = (along.take(whose, axis=0) for along in (edges[..., 0], edges[..., 1]))
@@ -111,6 +116,19 @@ class DecalSurface:
             off = lost & np.array([decal.face == face for decal in self.decals])[:, None]
             rest[off], _ = mesh.sheet_to_surface(face, edges[off])
         return deform(self._damages, rest)
+
+    @cached_property
+    def corners_mm(self) -> Array:
+        """Corners float64 [N, 4, 3] of the whole decals after damage, clockwise.
+
+        A corner beyond the sheet lies in the plane of the sheet's border.
+        """
+        corners = self.outlines_mm[:, ::EDGE_POINTS].copy()
+        whole = self._outlines.points_mm()[:, ::EDGE_POINTS] if len(self._overhanging) else corners
+        for row in self._overhanging:
+            rest, _ = self._mesh.sheet_to_surface(self.decals[row].face, whole[row])
+            corners[row] = deform(self._damages, rest)
+        return corners[:, ::-1]
 
     @cached_property
     def parts(self) -> list[tuple[int, PartBox]]:
@@ -146,6 +164,20 @@ class DecalSurface:
         return Outlines.of(self.decals)
 
     @cached_property
+    def _overhanging(self) -> list[int]:
+        """Indices of the decals that reach beyond their sheets."""
+        if not self.decals:
+            return []
+        reach = self._outlines.reach_mm()
+        sizes = np.array([self._sheet_size_mm(row) for row in range(len(self.decals))])
+        low, high = self._outlines.center_mm - reach, self._outlines.center_mm + reach
+        return np.flatnonzero((low < 0).any(axis=1) | (high > sizes).any(axis=1)).tolist()
+
+    def _sheet_size_mm(self, row: int) -> tuple[float, float]:
+        *_, width, height = self._mesh.charts[self._mesh.chart_index(self.decals[row].face)].rect_mm
+        return width, height
+
+    @cached_property
     def _pairs(self) -> _Pairs:
         outlines = self._outlines
         faces = {decal.face for decal in self.decals}
@@ -160,6 +192,21 @@ class DecalSurface:
         touches = np.flatnonzero((inside.max(axis=1) > 0).all(axis=0))
         sheet_mm, inside = sheet_mm.take(touches, axis=2), inside.take(touches, axis=2)
         return _Pairs(whose[touches], triangle[touches], sheet_mm, inside)
+
+
+def _clipped(outline: Array, size_mm: tuple[float, float]) -> Array:
+    """Return an outline [points, 2], clipped to a sheet, with the same number of points."""
+    cut = outline[None, ::EDGE_POINTS]
+    for axis, sign, offset in ((0, 1, 0), (0, -1, size_mm[0]), (1, 1, 0), (1, -1, size_mm[1])):
+        cut, _ = clip(cut, sign * cut[..., axis] + offset)
+        if not len(cut):
+            return np.clip(outline, 0, size_mm)
+    (corners,) = cut
+    corners = corners[(corners != np.roll(corners, 1, axis=0)).any(axis=1)]
+    share = np.diff(np.arange(len(corners) + 1) * len(outline) // len(corners))
+    sides = zip(corners, np.roll(corners, -1, axis=0), share.tolist(), strict=True)
+    points = [begin + np.arange(n)[:, None] / n * (end - begin) for begin, end, n in sides]
+    return np.concatenate(points)
 
 
 def _near(

@@ -18,6 +18,7 @@ from fastgen.geometry.chart_sheet import LAYOUT as SHEET_LAYOUT
 from fastgen.geometry.chart_sheet import VERSION as SHEET_VERSION
 from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
+from fastgen.geometry.sheet_folds import SheetFolds
 from fastgen.scene.faces import FACES, SHEET_FACES
 from fastgen.scene.limits import HASPS
 
@@ -150,6 +151,11 @@ class Mesh:
         """
         name = self.charts[number].name
         return self.panels[name] if name in SHEET_FACES else self._sheet(number)
+
+    @cached_property
+    def folds(self) -> Mapping[str, SheetFolds]:
+        """Slopes of those SHEET_FACES that the mesh has, by face."""
+        return {face: SheetFolds.of(self, face) for face in self.panels}
 
     def _sheet(self, number: int) -> ChartSheet:
         index = np.flatnonzero(self.chart[self.triangles[:, 0]] == number)

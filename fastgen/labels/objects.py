@@ -115,8 +115,8 @@ def _decals(shot: Shot) -> list[Object]:
     before = np.asarray((depth > 0).all(axis=1))
     edges = np.round(pixels, 2)
     outlines = edges.reshape(count, -1).tolist()
-    # the outline's corners, clockwise from the upper left in reading direction
-    quads = edges[:, ::EDGE_POINTS][:, ::-1].reshape(count, -1).tolist()
+    corners, _ = view.project(surface.corners_mm)
+    quads = np.round(corners, 2).reshape(count, -1).tolist()
     parts = _parts(surface, view)
     counts: dict[str, int] = {}
     objects = []

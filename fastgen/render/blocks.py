@@ -41,6 +41,9 @@ SCENE_BLOCK = Block(
         ("int", "container_id"),
         ("int", "first_seal_id"),
         ("int", "undamaged_value"),  # of the container in the damage image
+        ("int", "decal_layers"),  # see DecalTables
+        ("float", "decal_cell_mm"),
+        ("float", "decal_margin_mm"),
         ("vec4", "above"),  # albedo of the spreader above the container; 1 if there is one
     ),
 )

@@ -16,6 +16,7 @@ from fastgen.decals.artwork import ART_SIZE
 from fastgen.geometry.damage_forms import FORMS, creased, form, scraped, torn
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
+from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
 from fastgen.light import environment
 from fastgen.light.reflectance import DIELECTRIC_F0, DIELECTRIC_INDEX
 from fastgen.light.sky_visibility import LIGHT_STEPS, LIGHT_TIMES
@@ -30,11 +31,14 @@ from fastgen.render.variant import (
     listed_classes,
 )
 from fastgen.render.zone_codes import (
+    DECAL_SHEET,
     HOLE_ZONE,
     SEAL_ZONE,
+    SHEET_NUMBERS,
     SPREADER_ZONE,
     ZONE_GEAR,
     ZONE_LEVEL,
+    ZONE_SHEET,
     ZONE_SMALL,
     ZONE_TURN,
 )
@@ -154,13 +158,15 @@ def _samples(v: ShaderVariant) -> Defines:
 def _lookups(v: ShaderVariant) -> Defines:
     spread = SampleLattice(v.samples_per_axis).spread
     places = [f"{spread * x:.8f}, {spread * y:.8f}" for x, y in LOOKUP_PLACES[v.lookups]]
-    # decals are filtered analytically, so two lookups share one evaluation of them
+    # Decals are averaged over whole pixels, so two lookups share one evaluation of them. Boxes of
+    # one pixel, or of one sample's share of it, add up to the same at every place.
     decals_each = v.lookups > 2
+    per_axis = v.samples_per_axis if "MIXED" in v.traits else math.isqrt(v.lookups)
     return {
         "LOOKUPS": v.lookups,
         "LOOKUP_PX": LOOKUP_PX[v.lookups] * spread,
         "DECALS_EACH_LOOKUP": int(decals_each),
-        "DECAL_PX": LOOKUP_PX[v.lookups if decals_each else 1] * spread,
+        "DECAL_PX": 1 / per_axis if decals_each else 1.0,
         "LOOKUP_PLACE": _Array("vec2", places),
         # surfaces beyond these numbers look like the rest of their pixel
         "MAX_PARTS": 3,
@@ -257,6 +263,8 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "ZONE_GEAR": ZONE_GEAR,
         "ZONE_SMALL": ZONE_SMALL,
         "ZONE_LEVEL": ZONE_LEVEL,
+        "ZONE_SHEET": ZONE_SHEET,
+        "CORRUGATED_ALONG_Y": f"{SHEET_NUMBERS[CORRUGATED_ALONG_Y]}",
     },
     "damage": lambda _: {
         "DAMAGE_FADE_START_MM": f"{form.FADE_START_MM:.1f}",
@@ -279,11 +287,11 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         **{f"INSIDE_{name.upper()}": f"vec3{rgb}" for name, rgb in INSIDE_ALBEDO.items()},
     },
     "decals": lambda _: {
-        "DECAL_CELL_MM": f"{DECAL_CELL_MM:.1f}",
         "NEAR_CELL_MM": f"{NEAR_CELL_MM:.1f}",
         "ART_SIZE": f"{ART_SIZE:.1f}",
         **glyph_runs.DEFINES,
-        **{f"DECAL_{name.upper()}": f"{value:.1f}" for name, value in DECAL_KINDS.items()},
+        "DECAL_SHEET": DECAL_SHEET,
+        **{f"DECAL_{name.upper()}": f"{value}" for name, value in DECAL_KINDS.items()},
     },
     "noise": lambda _: {
         "NOISE_SIZE": f"{NOISE_SIZE:.1f}",

@@ -5,12 +5,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.artwork import GLYPH_TILE_SIZE
+from fastgen.decals.artwork import (
+    GLYPH_EXTENT_STEPS,
+    GLYPH_MOST_INK,
+    GLYPH_TILE_SIZE,
+    glyph_extents,
+)
 from fastgen.decals.lettering import TILE_CAPS, TILE_RANGE_CAPS, Lettering
 from fastgen.scene.limits import GLYPH_RANGE
 
 DEFINES = {
     "GLYPH_TILE_SIZE": f"{GLYPH_TILE_SIZE:.1f}",
+    "GLYPH_MOST_INK": f"{GLYPH_MOST_INK:.1f}",
+    "GLYPH_EXTENT_STEPS": f"{GLYPH_EXTENT_STEPS}u",
     "GLYPH_TILE_CAPS": f"{TILE_CAPS}",
     "GLYPH_RANGE_CAPS": f"{TILE_RANGE_CAPS}",
     "GLYPH_RANGE": f"{GLYPH_RANGE}u",
@@ -29,8 +36,9 @@ class GlyphRun(NamedTuple):
 
     Attributes:
         glyphs: float32 [G, 4], sorted along the longer side. Row i holds the centre (x, y) of
-            letter i in mm from the centre of the text, its tile, and first * GLYPH_RANGE + end.
-            Tiles of the letters from `first` up to, but not including, `end` reach into part i.
+            letter i in mm from the centre of the text, (tile * GLYPH_EXTENT_STEPS + half width) *
+            GLYPH_EXTENT_STEPS + half height, see glyph_extents, and first * GLYPH_RANGE + end. The
+            letters from `first` up to, but not including, `end` reach into part i.
         parts_per_mm: Parts per mm of the longer side; negative if that is the vertical side.
     """
 
@@ -60,8 +68,11 @@ def glyph_run(lettering: Lettering) -> GlyphRun:
     along = center_y if axis else center_x
     borders = length * (np.arange(count + 1) / count - 0.5)
     borders[[0, -1]] = -np.inf, np.inf
-    reach = (0.5 + _SLACK) * side
+    tile = rows[:, 4].astype(np.int64)
+    extents = glyph_extents()[tile]
+    reach = (extents[:, axis].max() / GLYPH_EXTENT_STEPS + _SLACK) * side
     first = np.searchsorted(along, borders[:-1] - reach)
     end = np.searchsorted(along, borders[1:] + reach, side="right")
-    glyphs = np.stack([center_x, center_y, rows[:, 4], first * GLYPH_RANGE + end], axis=1)
+    code = (tile * GLYPH_EXTENT_STEPS + extents[:, 0]) * GLYPH_EXTENT_STEPS + extents[:, 1]
+    glyphs = np.stack([center_x, center_y, code, first * GLYPH_RANGE + end], axis=1)
     return GlyphRun(glyphs.astype(np.float32), (-count if axis else count) / length)

@@ -11,11 +11,19 @@ from numpy.typing import NDArray
 
 from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Chart, Mesh, Zone
+from fastgen.geometry.sheet_folds import SheetFolds
 from fastgen.light.sky_visibility import open_sky
 from fastgen.render.clusters import Clusters
 from fastgen.render.rust import Flats, fold_row
 from fastgen.render.textures import data_texture
-from fastgen.render.zone_codes import ZONE_GEAR, ZONE_LEVEL, ZONE_SMALL, ZONE_TURN
+from fastgen.render.zone_codes import (
+    SHEET_NUMBERS,
+    ZONE_GEAR,
+    ZONE_LEVEL,
+    ZONE_SHEET,
+    ZONE_SMALL,
+    ZONE_TURN,
+)
 from fastgen.scene.faces import FACE_AXES, FACES
 
 _SLACK_MM = 120.0
@@ -101,7 +109,7 @@ class GpuMesh:
     @cached_property
     def zone_rows(self) -> NDArray[np.float32]:
         """The mesh's columns [3, zones, 4] of the zone table."""
-        return zone_rows(self.mesh.charts, self.mesh.zones, self.mesh.flats)
+        return zone_rows(self.mesh.charts, self.mesh.zones, self.mesh.flats, self.mesh.folds)
 
     def set_sky_visibility(self, values: NDArray[np.uint8]) -> None:
         """Set the sky visibility of the vertices; before, every vertex sees the whole sky.
@@ -152,7 +160,10 @@ class GpuMesh:
 
 
 def zone_rows(
-    charts: Sequence[Chart], zones: Sequence[Zone], flats: Flats | None = None
+    charts: Sequence[Chart],
+    zones: Sequence[Zone],
+    flats: Flats | None = None,
+    folds: Mapping[str, SheetFolds] | None = None,
 ) -> NDArray[np.float32]:
     """Return the columns [3, zones, 4] of the zone table for the zones of some charts.
 
@@ -160,6 +171,7 @@ def zone_rows(
         charts: The charts.
         zones: Their zones.
         flats: Outermost flats of each corrugated face, see Mesh.flats; None without any.
+        folds: Slopes of the sheets, see Mesh.folds; None without sheets.
     """
     of_zones = [charts[zone.chart] for zone in zones]
     rows = np.zeros((3, len(zones), 4), np.float32)
@@ -170,6 +182,7 @@ def zone_rows(
         + ZONE_GEAR * is_gear(chart)
         + ZONE_SMALL * zone.small
         + ZONE_LEVEL * zone.level
+        + ZONE_SHEET * SHEET_NUMBERS.get(chart.name, 0)
         for chart, zone in zip(of_zones, zones, strict=True)
     ]
     rows[1, :, 1:] = [
@@ -179,6 +192,8 @@ def zone_rows(
     rows[2, :, :3] = [
         fold_row(chart, zone, flats or {}) for chart, zone in zip(of_zones, zones, strict=True)
     ]
+    stretch = {name: fold.stretch for name, fold in (folds or {}).items()}
+    rows[2, :, 3] = [stretch.get(chart.name, 1.0) for chart in of_zones]
     return rows
 
 

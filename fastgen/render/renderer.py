@@ -22,6 +22,7 @@ from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
 from fastgen.light.ray_bodies import RayBodies
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
+from fastgen.render.decal_tables import scale_for
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
@@ -38,7 +39,7 @@ from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
 from fastgen.render.sample_lattice import fitting
 from fastgen.render.scene_lights import Around, SceneLights
-from fastgen.render.scene_resources import SceneResources
+from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes, ray_bodies
@@ -221,7 +222,8 @@ class Renderer:
             None if around is None else around[prepared],
         )
         seals = self._shapes.seals(prepared, lit[0])
-        self._set(SCENE_BLOCK, scene_values(prepared, len(light.background)))
+        decals = resources.decals(scale_for(prepared.container, view))
+        self._set(SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values})
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
             self._set(DAMAGE_BLOCK, damage_values(prepared, damages, threshold_mm, row))
@@ -247,7 +249,7 @@ class Renderer:
                 over=options.over,
             ),
             textures={
-                **self._material_textures(resources, container, spreader),
+                **self._material_textures(decals, container, spreader),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
                 "environment_map": self._lights.background(scene.environment.name),
@@ -334,8 +336,9 @@ class Renderer:
         if damage != "undamaged":
             values = damage_values(prepared, scene.damages, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
-        self._set(SCENE_BLOCK, scene_values(prepared, 0))
-        textures = self._material_textures(self._resources(prepared), mesh, None)
+        decals = self._resources(prepared).decals()
+        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        textures = self._material_textures(decals, mesh, None)
         program = bake_program(self._programs, damage)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
 
@@ -344,9 +347,10 @@ class Renderer:
         spreader = self._shapes.spreader(prepared)
         if spreader is None:
             return None
-        self._set(SCENE_BLOCK, scene_values(prepared, 0))
+        decals = self._resources(prepared).decals()
+        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         container = self._shapes.container(prepared)
-        textures = self._material_textures(self._resources(prepared), container, spreader)
+        textures = self._material_textures(decals, container, spreader)
         program = bake_program(self._programs, "undamaged")
         return bake_atlas(
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
@@ -354,7 +358,8 @@ class Renderer:
 
     def bake_ground(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None where it has none."""
-        self._set(SCENE_BLOCK, scene_values(prepared, 0))
+        decals = self._resources(prepared).decals()
+        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         return self._ground.bake(prepared.scene, self._tables, texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
@@ -367,11 +372,11 @@ class Renderer:
         )
 
     def _material_textures(
-        self, resources: SceneResources, mesh: GpuMesh, spreader: GpuMesh | None
+        self, decals: DecalTextures, mesh: GpuMesh, spreader: GpuMesh | None
     ) -> Textures:
         """Return the textures that the material layers read."""
         zones = self._shapes.zone_table(mesh, spreader)
-        return {**self._tables, "zone_table": zones, **resources.textures}
+        return {**self._tables, "zone_table": zones, **decals.textures}
 
     def _set(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
         """Fill a uniform block for the draws that follow, and bind it."""

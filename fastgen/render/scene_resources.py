@@ -3,19 +3,63 @@
 from collections.abc import Mapping
 
 import moderngl
+from numpy.typing import ArrayLike
 
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.render.decal_tables import pack_decals
+from fastgen.render.constants import DECAL_CELL_MM
+from fastgen.render.decal_tables import MARGIN_MM, pack_decals
 from fastgen.render.decals_near import decals_near
 from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.textures import data_texture
+
+
+class DecalTextures:
+    """Decals of one scene as shaders read them, for views of one scale.
+
+    Attributes:
+        textures: Tables of the decals by the names of their samplers.
+        values: Members of SCENE_BLOCK that describe the tables.
+
+    Args:
+        ctx: The context that draws.
+        prepared: The scene.
+        art_layers: Texture layer of each artwork, see decal_tables.pack_decals.
+        scale: See decal_tables.scale_for.
+    """
+
+    def __init__(
+        self,
+        ctx: moderngl.Context,
+        prepared: PreparedScene,
+        art_layers: Mapping[str, int],
+        scale: float,
+    ) -> None:
+        scene, mesh = prepared.scene, prepared.container
+        tables = pack_decals(scene.decals, prepared.numbers.decals, mesh, art_layers, scale)
+        margin_mm = scale * MARGIN_MM
+        near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm, margin_mm)
+        self.textures = {
+            "decal_grid": data_texture(ctx, tables.grid),
+            "decal_table": data_texture(ctx, tables.table),
+            "glyph_table": data_texture(ctx, tables.glyphs),
+            "decal_proximity": data_texture(ctx, near[..., None]),
+        }
+        self.values: Mapping[str, ArrayLike] = {
+            "decal_layers": tables.layers,
+            "decal_cell_mm": scale * DECAL_CELL_MM,
+            "decal_margin_mm": margin_mm,
+        }
+
+    def release(self) -> None:
+        """Free all GL objects."""
+        for texture in self.textures.values():
+            texture.release()
 
 
 class SceneResources:
     """Decal textures and material colours of one scene. Owned by the renderer, which releases them.
 
     Attributes:
-        textures: Tables of the decals by the names of their samplers.
         materials: Mean colours of the materials.
 
     Args:
@@ -30,18 +74,18 @@ class SceneResources:
         prepared: PreparedScene,
         art_layers: Mapping[str, int],
     ) -> None:
-        scene, mesh = prepared.scene, prepared.container
-        tables = pack_decals(scene.decals, prepared.numbers.decals, mesh, art_layers)
-        near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm)
+        self._ctx, self._prepared, self._art_layers = ctx, prepared, art_layers
         self.materials = SceneMaterials(prepared)
-        self.textures = {
-            "decal_grid": data_texture(ctx, tables.grid),
-            "decal_table": data_texture(ctx, tables.table),
-            "glyph_table": data_texture(ctx, tables.glyphs),
-            "decal_proximity": data_texture(ctx, near[..., None]),
-        }
+        self._decals = {1.0: DecalTextures(ctx, prepared, art_layers, 1.0)}
+
+    def decals(self, scale: float = 1.0) -> DecalTextures:
+        """Return the decals for views of one scale, see decal_tables.scale_for."""
+        if scale not in self._decals:
+            made = DecalTextures(self._ctx, self._prepared, self._art_layers, scale)
+            self._decals[scale] = made
+        return self._decals[scale]
 
     def release(self) -> None:
         """Free all GL objects."""
-        for texture in self.textures.values():
-            texture.release()
+        for decals in self._decals.values():
+            decals.release()

@@ -12,10 +12,9 @@ from fastgen.render.gl_enums import (
     GL_FLOAT,
     GL_RED,
     GL_RED_INTEGER,
-    GL_RG,
-    GL_RG8,
     GL_RGBA,
     GL_RGBA8,
+    GL_SRGB8_ALPHA8,
     GL_TEXTURE_2D_ARRAY,
     GL_UNSIGNED_BYTE,
     GL_UNSIGNED_INT,
@@ -24,31 +23,44 @@ from fastgen.render.noise import noise_tiles
 
 _INT, _ENUM = ctypes.c_int, ctypes.c_uint
 
-_BYTES = {2: (GL_RG8, GL_RG), 4: (GL_RGBA8, GL_RGBA)}
-"""How OpenGL stores texels of bytes and how the data lays them out, by the number of channels."""
 
-
-def levelled_texture(gl: GLContext, levels: Sequence[np.ndarray]) -> moderngl.TextureArray:
+def levelled_texture(
+    gl: GLContext, levels: Sequence[np.ndarray], srgb: bool = False
+) -> moderngl.TextureArray:
     """Return a texture array with given mip levels, clamped at the borders.
 
     Args:
         gl: Current context.
-        levels: uint8 [K, N, N, C], C being 2 or 4, each half as wide as the one before.
+        levels: uint8 [K, N, N, 4], each half as wide as the one before.
+        srgb: Colours are sRGB. Shaders then read linear light, filtered as such.
     """
-    count, side, _, channels = levels[0].shape
-    stored_as, layout = _BYTES[channels]
-    # this call also says that the rows of the data are not padded
-    texture = gl.ctx.texture_array((1, 1, 1), channels, alignment=1)
+    count, side = levels[0].shape[:2]
+    stored = GL_SRGB8_ALPHA8 if srgb else GL_RGBA8
+    texture = gl.ctx.texture_array((1, 1, 1), 4)
     texture.use()
     # allocates all levels once; drivers copy a texture that grows level by level
     allocate = gl.function("glTexStorage3D", None, _ENUM, _INT, _ENUM, *(_INT,) * 3)
-    allocate(GL_TEXTURE_2D_ARRAY, len(levels), stored_as, side, side, count)
+    allocate(GL_TEXTURE_2D_ARRAY, len(levels), stored, side, side, count)
     fill = gl.function("glTexSubImage3D", None, _ENUM, *(_INT,) * 7, _ENUM, _ENUM, ctypes.c_void_p)
     for level, texels in enumerate(map(np.ascontiguousarray, levels)):
         size = (texels.shape[2], texels.shape[1], count)
         address = texels.ctypes.data
-        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, layout, GL_UNSIGNED_BYTE, address)
+        fill(GL_TEXTURE_2D_ARRAY, level, 0, 0, 0, *size, GL_RGBA, GL_UNSIGNED_BYTE, address)
     return _clamped(texture)
+
+
+def clamped_array(ctx: moderngl.Context, images: np.ndarray) -> moderngl.TextureArray:
+    """Return uint8 or uint16 images [K, H, W] as a texture array of values from 0 to 1.
+
+    It is interpolated, clamped at the borders, and has no mip levels.
+    """
+    count, height, width = images.shape
+    data = np.ascontiguousarray(images).tobytes()
+    dtype = f"nu{images.itemsize}" if images.itemsize > 1 else "f1"
+    texture = ctx.texture_array((width, height, count), 1, data, alignment=1, dtype=dtype)
+    texture = _clamped(texture)
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    return texture
 
 
 def data_texture(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Texture:

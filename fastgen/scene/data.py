@@ -61,7 +61,7 @@ class Decal:
         kind: 'marker', 'text', 'sticker', 'triangle' or 'emblem'.
         class_name: Label class; '' for decals without a label.
         face: Face that it lies on.
-        center_mm: Centre in sheet coordinates.
+        center_mm: Centre in sheet coordinates. What reaches beyond the sheet is cut off.
         size_mm: Width and height of the drawn rectangle before its rotation. For a marker this is
             the square that stands on its corner, for a text the tight box around its ink. A
             triangle has its tip in the middle of the upper side.
