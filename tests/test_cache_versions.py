@@ -14,17 +14,17 @@ from fastgen.render.gl import open_context
 
 TABLE = {
     "art": (artwork, 6, 18.11144, 41.92986, 36.3485),
-    "container": (container, 8, 12.77864, 33.35851, 30.57877),
+    "container": (container, 9, 12.77836, 33.3579, 30.57862),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
     "form-factors": (indirect_light, 1, 11.68769, 47.98914, 44.6162),
-    "hull": (mesh, 1, 2.07944, 8.72313, 8.38517),
+    "hull": (mesh, 1, 2.07944, 8.72429, 8.38627),
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
-    "sheet": (chart_sheet, 1, 12.78655, 221.09347, 198.36237),
+    "sheet": (chart_sheet, 1, 12.78655, 221.09107, 198.36012),
     "sky-directions": (sky_visibility_probe, 1, 13.55746, 19.84805, 17.15882),
     "sky-visibility": (sky_visibility_probe, 1, 13.17265, 58.18403, 51.17683),
-    "spreader": (spreader, 4, 11.03602, 33.2031, 30.26433),
-    "triangle-bounds": (mesh, 1, 11.92992, 14.59246, 13.22904),
+    "spreader": (spreader, 5, 11.03602, 33.203, 30.26422),
+    "triangle-bounds": (mesh, 1, 11.92961, 14.59246, 13.22902),
 }
 """Producer: its module, its VERSION and the summary of its entries, see `summary`."""
 

@@ -34,7 +34,7 @@ from fastgen.geometry.unfold import assemble
 from fastgen.scene.container_kinds import KINDS, WallProfiles
 from fastgen.validation import check_known
 
-VERSION = 8  # raise when the stored arrays change
+VERSION = 9  # raise when the stored arrays change
 
 NOMINAL_PROFILES = WallProfiles()
 

@@ -20,6 +20,9 @@ CASTING_MM = (178.0, 162.0, 118.0)
 OVERLAP_MM = 5.0
 """Parts overlap by this much, so that no ray passes between them."""
 
+BESIDE_MM = 1.0
+"""Offset between parallel surfaces of parts that overlap. In one plane they would flicker."""
+
 FLOOR_MM = 145.0
 BASE_RAIL_TOP_MM = 162.0
 FRONT_SILL_TOP_MM = 120.0
@@ -45,7 +48,7 @@ class Layout:
         side_recess_mm: Inset e of the side walls' outermost flats.
         end_recess_mm: Inset d of the front end wall's outermost flats.
         roof_recess_mm: Depth of the roof's outermost flats below the castings' plane.
-        frame_recess_mm: Inset of posts and side rails.
+        frame_recess_mm: Inset of posts and top rails.
     """
 
     kind: ContainerKind
@@ -81,6 +84,11 @@ class Layout:
     def post_mm(self) -> float:
         """Insets d and e of the square front posts' inner faces, equal to their width."""
         return max(84.0, self.side_inner_mm, self.end_inner_mm)
+
+    @property
+    def bottom_rail_recess_mm(self) -> float:
+        """Inset e of the bottom rails, which overlap the posts."""
+        return self.frame_recess_mm + BESIDE_MM
 
     @property
     def rail_bottom_mm(self) -> float:

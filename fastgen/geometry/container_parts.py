@@ -6,6 +6,7 @@ import numpy as np
 
 from fastgen.geometry.container_layout import (
     BASE_RAIL_TOP_MM,
+    BESIDE_MM,
     CASTING_MM,
     DOOR_RING_MM,
     FLOOR_MM,
@@ -115,7 +116,7 @@ def _bottom_rails(layout: Layout, walls: dict[str, Panel]) -> list[Sheet]:
         return ~in_pocket & layout.outside_castings(points)
 
     for side, y_sign in (("front", -1), ("back", 1)):
-        outer = y_sign * (half_width - layout.frame_recess_mm)
+        outer = y_sign * (half_width - layout.bottom_rail_recess_mm)
         inner = y_sign * (half_width - layout.side_inner_mm)
         levels = breaks(RING_BOTTOM_MM, BASE_RAIL_TOP_MM, np.inf, (*FORK_Z_MM, high - OVERLAP_MM))
         outline = [(outer, z) for z in levels[::-1]] + [(inner, z) for z in levels]
@@ -163,9 +164,10 @@ def _door_beams(layout: Layout) -> list[Sheet]:
     top, bottom = layout.top - RING_TOP_MM, layout.top - DOOR_HEADER_MM
     header = [(inner, bottom), (inner, top), (lip, top), (lip, top - 22), (face, top - 22),
               (face, bottom), (inner, bottom)]  # fmt: skip
-    sill = [(inner, DOOR_SILL_MM), (face, DOOR_SILL_MM), (face, 32.0), (lip, 32.0),
-            (lip, RING_BOTTOM_MM), (inner, RING_BOTTOM_MM),
-            (inner, FLOOR_MM + OVERLAP_MM)]  # fmt: skip
+    sill_face, sill_inner = face - BESIDE_MM, inner - BESIDE_MM
+    sill = [(sill_inner, DOOR_SILL_MM), (sill_face, DOOR_SILL_MM), (sill_face, 32.0), (lip, 32.0),
+            (lip, RING_BOTTOM_MM), (sill_inner, RING_BOTTOM_MM),
+            (sill_inner, FLOOR_MM + OVERLAP_MM)]  # fmt: skip
     return [
         _beam("header.door", "door", header, stations),
         _beam("sill.door", "door", sill, _to_posts(stations, half_width - layout.door_post_mm[1])),
@@ -209,7 +211,7 @@ def base(layout: Layout) -> list[Sheet]:
     )
     sheets = [Sheet("underside", "underside", "underside", "underside", floor)]
     rows = breaks(-reach_y, reach_y, _FORK_CUT_MM)
-    outer = half_width - layout.frame_recess_mm
+    outer = half_width - layout.bottom_rail_recess_mm
     for i, center in enumerate(_fork_centers(layout)):
         sheets.append(
             Sheet(f"fork.{i}", "underside", "underside", "frame", _fork_lining(center, outer))

@@ -28,7 +28,7 @@ from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.limits import GAP_LIMITS_MM
 from fastgen.validation import check_known
 
-VERSION = 4  # raise when the stored arrays change
+VERSION = 5  # raise when the stored arrays change
 
 CABLE_TIER = TIERS.index("cables")
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastgen.geometry.container_castings import APERTURE_CENTER_MM
+from fastgen.geometry.container_layout import BESIDE_MM
 from fastgen.geometry.container_parts import ring
 from fastgen.geometry.unfold import Patch, Sheet, beside, box, prism, regular
 from fastgen.scene.container_kinds import ContainerKind
@@ -240,13 +241,13 @@ def _guide(
     arm = [(-20.0, 270.0), (gap + 10, 270), (gap + 10, 150), (-20, 150)]
     along = 1 - across
     corner = signs[along] * half[along]
-    widths = {"plate": (corner - signs[along] * 330.0, corner + signs[along] * 15.0)}
-    widths["arm"] = (corner - signs[along] * 180.0, corner - signs[along] * 40.0)
-    for part, profile in (("plate", straight), ("plate", splayed), ("arm", arm)):
+    ranges = ((330.0, 15.0), (330.0 - BESIDE_MM, 15.0 - BESIDE_MM), (180.0, -40.0))
+    for profile, (inside, outside) in zip((straight, splayed, arm), ranges, strict=True):
         outward, above = np.array(profile).T
         place = signs[across] * (half[across] + outward)
         height = hang.base + (above if lowered else 2 * _PIVOT_MM - above)
         # a prism's outline is in the axes that follow its own: y, z for x; z, x for y
         columns = (place, height) if along == 0 else (height, place)
         outline = ring(list(zip(*columns, strict=True)))
-        yield prism(outline, sorted(widths[part]), along, capped=(True, True))
+        width = sorted((corner - signs[along] * inside, corner + signs[along] * outside))
+        yield prism(outline, width, along, capped=(True, True))
