@@ -1,6 +1,7 @@
 """Labels of scenes with several containers, from rays at each container alone."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -8,6 +9,8 @@ from fastgen.camera.projection import View
 from fastgen.geometry.container import build_container
 from fastgen.scene import Pose, Scene, Spreader
 from tests import oracle
+
+_mesh_of = lru_cache(4)(build_container)  # equal meshes share one ray caster
 
 
 @dataclass
@@ -63,7 +66,7 @@ def truth(scene: Scene, view: View, threshold_mm: float, pixels: np.ndarray | No
     following = 1
     instances: dict[int, int] = {}
     for number, (own, pose) in enumerate(alone(scene)):
-        mesh = build_container(own.container.kind, own.container.profiles)
+        mesh = _mesh_of(own.container.kind, own.container.profiles)
         seen_from = view.in_frame(pose)
         hits = oracle.cast(mesh, seen_from, own, pixels)
         numbers = np.zeros(65536, np.int64)
