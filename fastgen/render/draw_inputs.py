@@ -9,12 +9,14 @@ import numpy as np
 
 from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import corners_mm
+from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.regions import Region, bands, box_corners, merged, region_of
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
+from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage
 from fastgen.scene.limits import MM
 
@@ -54,6 +56,14 @@ class Regions:
         return bands([*self.surfaces, *self.near_damage])
 
 
+def pixel_mm(mesh: Mesh, view: View) -> float:
+    """Return the width in mm of a pixel on the nearest part of a mesh's bounding box."""
+    low, high = mesh.bounds_mm
+    eye = view.position_m / MM
+    away = np.linalg.norm(np.clip(eye, low, high) - eye)
+    return float(away) / view.focal_px
+
+
 def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
     """Return where in an image container with seals, spreader and damages may be seen."""
     if not prepared.scene.container.present:
@@ -80,6 +90,7 @@ class DrawInputs:
         lit: Light at the vertices of container and spreader.
         regions: Where the passes have work.
         targets: Where the image goes.
+        samples: The visibility buffer, with as many samples as the variant says.
         coarse_ground: Shade the ground plane at half the resolution.
         variant: What all shaders of the image have in common.
         textures: Textures by sampler name. A pass adds what it writes for later passes.
@@ -93,6 +104,7 @@ class DrawInputs:
     lit: tuple[LitMesh, ...]
     regions: Regions
     targets: ImageTargets
+    samples: VisibilityBuffer
     coarse_ground: bool
     variant: ShaderVariant
     textures: dict[str, moderngl.Texture | moderngl.TextureArray]

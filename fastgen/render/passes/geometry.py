@@ -40,7 +40,7 @@ class GeometryPass:
 
     def run(self, inputs: DrawInputs) -> None:
         """Draw the meshes, and add the buffer's textures to `inputs.textures`."""
-        samples, damages = inputs.targets.samples, inputs.damages
+        samples, damages = inputs.samples, inputs.damages
         regions, damage = inputs.regions, inputs.variant.damage
         drawn = regions.drawn
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
