@@ -1,11 +1,12 @@
 """DrawInputs: what the passes over one image share."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import moderngl
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import corners_mm
@@ -13,7 +14,15 @@ from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
-from fastgen.render.regions import Region, bands, box_corners, merged, region_of
+from fastgen.render.regions import (
+    Region,
+    bands,
+    box_corners,
+    merged,
+    outside,
+    region_of,
+    within,
+)
 from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
@@ -44,11 +53,13 @@ class Regions:
             container has none.
         near_damage: Disjoint rectangles that damages may touch.
         holes: Disjoint rectangles that perforations may touch.
+        cables: Rectangles, outside all others, that show only the upper parts of a spreader.
     """
 
     surfaces: Sequence[Region | None]
     near_damage: Sequence[Region | None] = ()
     holes: Sequence[Region | None] = ()
+    cables: Sequence[Region | None] = ()
 
     @property
     def drawn(self) -> list[Region | None]:
@@ -64,8 +75,17 @@ def pixel_mm(mesh: Mesh, view: View) -> float:
     return float(away) / view.focal_px
 
 
-def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...]) -> Regions:
-    """Return where in an image container with seals, spreader and damages may be seen."""
+def regions_of(
+    view: View, prepared: PreparedScene, damages: tuple[Damage, ...], apart: bool
+) -> Regions:
+    """Return where in an image container with seals, spreader and damages may be seen.
+
+    Args:
+        view: Projection of the image.
+        prepared: The scene.
+        damages: Its damages that the view may show.
+        apart: Cables above the container have regions of their own.
+    """
     if not prepared.scene.container.present:
         return Regions(())
     touched = [region_of(view, corners_mm(item)) for item in damages]
@@ -74,8 +94,14 @@ def regions_of(view: View, prepared: PreparedScene, damages: tuple[Damage, ...])
     if prepared.spreader is not None:
         frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
         boxes = [np.concatenate([*boxes, frame]), *above]
-    surfaces = bands([region_of(view, box) for box in boxes])
-    return Regions(surfaces, merged(touched), merged(torn))
+    body, *others = (region_of(view, box) for box in boxes)
+    surfaces = bands([body, *others])
+    cables = others[-1] if apart and others else None
+    if body is None or cables is None:
+        return Regions(surfaces, merged(touched), merged(torn))
+    whole = (0, 0, *view.size)
+    thin = outside(within([cables], whole), [body])
+    return Regions(outside(within(surfaces, whole), thin), merged(touched), merged(torn), thin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +119,7 @@ class DrawInputs:
         samples: The visibility buffer, with as many samples as the variant says.
         coarse_ground: Shade the ground plane at half the resolution.
         variant: What all shaders of the image have in common.
+        lights: Values of the directional lights in the uniform block of the view.
         textures: Textures by sampler name. A pass adds what it writes for later passes.
     """
 
@@ -108,6 +135,18 @@ class DrawInputs:
     coarse_ground: bool
     variant: ShaderVariant
     textures: dict[str, moderngl.Texture | moderngl.TextureArray]
+    lights: dict[str, ArrayLike] = field(default_factory=dict)
+
+    def of_cables(self, samples: VisibilityBuffer) -> "DrawInputs":
+        """Return the inputs that draw the regions of the cables with another number of samples."""
+        return replace(
+            self,
+            damages=(),
+            regions=Regions(self.regions.cables),
+            samples=samples,
+            variant=replace(self.variant, samples_per_axis=samples.per_axis, damage="undamaged"),
+            textures=dict(self.textures),
+        )
 
     @property
     def eye_mm(self) -> tuple[float, float, float]:

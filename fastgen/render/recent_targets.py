@@ -26,10 +26,11 @@ class RecentTargets:
         # near and distant containers of one image may have different numbers of samples
         self._samples: ReleasingCache[VisibilityBuffer] = ReleasingCache(3)
 
-    def samples_per_axis(self, prepared: PreparedScene, view: View) -> int:
-        """Return the samples per pixel along each axis with which a container is drawn."""
-        most = self._quality.samples_for(pixel_mm(prepared.container, view))
-        return fitting(most, view.size, self._gl.ctx.info["GL_MAX_TEXTURE_SIZE"])
+    def samples_per_axis(self, prepared: PreparedScene, view: View) -> tuple[int, int]:
+        """Return the samples per pixel along each axis of a container and of cables above it."""
+        limit = self._gl.ctx.info["GL_MAX_TEXTURE_SIZE"]
+        near, thin = self._quality.samples_for(pixel_mm(prepared.container, view))
+        return fitting(near, view.size, limit), fitting(thin, view.size, limit)
 
     def image(self, size: tuple[int, int], radiance: bool) -> ImageTargets:
         """Return the targets of images of a size."""

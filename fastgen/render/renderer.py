@@ -163,12 +163,13 @@ class Renderer:
         options = DrawOptions(layer, radiance, over=several)
         around = self._lights.around(prepared, self._resources) if several else None
         inputs = self._inputs(prepared, view, options, around)
-        self._light(inputs, prepared.members[0], prepared, exposure)
+        first = prepared.members[0]
+        self._light(inputs, first, prepared, exposure)
         if not several:
             self._geometry.run(inputs)
             self._trace(inputs, prepared)
             self._background.run(inputs)
-            self._shade(inputs, normals)
+            self._shade(inputs, first, exposure, normals)
             return inputs.targets
         plan = self._ground.plan(prepared, view)
         self._background.run(inputs, plan)
@@ -182,17 +183,32 @@ class Renderer:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)
                 self._trace(inputs, member.prepared)
-                self._shade(inputs, normals)
+                self._shade(inputs, member, exposure, normals)
         return inputs.targets
 
-    def _shade(self, inputs: DrawInputs, normals: NDArray[np.float32] | None) -> None:
-        """Shade the surfaces in the visibility buffer, and write their normals if asked."""
+    def _shade(
+        self,
+        inputs: DrawInputs,
+        member: Member,
+        exposure: float,
+        normals: NDArray[np.float32] | None,
+    ) -> None:
+        """Shade the surfaces in the visibility buffer, and write their normals if asked.
+
+        The cables above the container, which may need more samples, are drawn here.
+        """
         if inputs.regions.surfaces:
             inputs.targets.bind_images(inputs.variant.over)
             self._shading.run(inputs)
         if normals is not None:
             found = self._normals.run(inputs)
             np.copyto(normals, found, where=found.any(axis=-1, keepdims=True))
+        if inputs.regions.cables:
+            _, per_axis = self._targets.samples_per_axis(member.prepared, inputs.view)
+            finer = inputs.of_cables(self._targets.samples(inputs.view.size, per_axis))
+            self._set_view(finer, member, exposure)
+            self._geometry.run_cables(finer)
+            self._shade(finer, member, exposure, normals)
 
     def _inputs(
         self,
@@ -205,7 +221,7 @@ class Renderer:
         scene, size, lens = prepared.scene, view.size, view.distortion is not None
         damages = seen_damages(scene.damages, tuple((view.position_m / MM).tolist()))
         damage = variant(damages)
-        per_axis = self._targets.samples_per_axis(prepared, view)
+        per_axis, of_cables = self._targets.samples_per_axis(prepared, view)
         samples = self._targets.samples(size, per_axis)
         environment = scene.environment
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
@@ -230,7 +246,7 @@ class Renderer:
             seals=seals,
             spreader=spreader,
             lit=lit,
-            regions=regions_of(view, prepared, damages),
+            regions=regions_of(view, prepared, damages, apart=per_axis < of_cables),
             targets=self._targets.image(size, options.radiance),
             samples=samples,
             coarse_ground=self._quality.coarse_ground,
@@ -269,11 +285,13 @@ class Renderer:
         shadow = self._lights.shadows.cast(member, whole, lights)
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
-        values = {
-            **view_values(scene, view, inputs.samples, exposure),
-            **light_values(lights, shadow, view.position_m),
-        }
-        self._set(VIEW_BLOCK, values)
+        inputs.lights.update(light_values(lights, shadow, view.position_m))
+        self._set_view(inputs, member, exposure)
+
+    def _set_view(self, inputs: DrawInputs, member: Member, exposure: float) -> None:
+        """Fill the uniform block of the view for the samples of `inputs`."""
+        values = view_values(member.prepared.scene, inputs.view, inputs.samples, exposure)
+        self._set(VIEW_BLOCK, {**values, **inputs.lights})
 
     def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""

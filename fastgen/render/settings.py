@@ -13,6 +13,9 @@ from fastgen.validation import check_known, whole
 MIN_SIZE, MAX_SIZE = 64, 4096
 """Limits of an image's width and height in pixels."""
 
+CABLE_PIXEL_MM = 40.0
+"""Width of a pixel beyond which one sample misses cables, which are 42 mm thick."""
+
 FAR_PIXEL_MM = 70.0
 """Width of a pixel beyond which one sample misses facets of walls and roofs, which are about 70 mm
 wide, and corrugation turns into moire."""
@@ -27,8 +30,9 @@ class Quality(NamedTuple):
         traced: Compute light with rays at points of the image instead of at mesh vertices alone.
         shadow_detail: Shadow map resolution along each axis, as a fraction of the full resolution.
         coarse_ground: Shade the ground plane, which has no labels, at half the resolution.
-        far_samples_per_axis: Least samples per pixel along each axis on distant containers, where a
-            pixel is wider than FAR_PIXEL_MM.
+        thin_samples_per_axis: Least samples per pixel along each axis where parts are about as thin
+            as pixels: on distant containers, where a pixel is wider than FAR_PIXEL_MM, and on
+            cables, where it is wider than CABLE_PIXEL_MM.
     """
 
     samples_per_axis: int
@@ -36,20 +40,23 @@ class Quality(NamedTuple):
     traced: bool = False
     shadow_detail: float = 1.0
     coarse_ground: bool = False
-    far_samples_per_axis: int = 1
+    thin_samples_per_axis: int = 1
 
-    def samples_for(self, pixel_mm: float) -> int:
-        """Return the samples per pixel along each axis on a container.
+    def samples_for(self, pixel_mm: float) -> tuple[int, int]:
+        """Return the samples per pixel along each axis on a container and on cables above it.
 
         Args:
             pixel_mm: Width of a pixel on the nearest part of the container.
         """
-        far = self.far_samples_per_axis if pixel_mm > FAR_PIXEL_MM else 1
-        return max(self.samples_per_axis, far)
+        thin = max(self.samples_per_axis, self.thin_samples_per_axis)
+        return (
+            thin if pixel_mm > FAR_PIXEL_MM else self.samples_per_axis,
+            thin if pixel_mm > CABLE_PIXEL_MM else self.samples_per_axis,
+        )
 
 
 QUALITY = {
-    "draft": Quality(1, 1, shadow_detail=0.4, coarse_ground=True, far_samples_per_axis=3),
+    "draft": Quality(1, 1, shadow_detail=0.4, coarse_ground=True, thin_samples_per_axis=3),
     "balanced": Quality(3, 2),
     "fine": Quality(5, 25),
     "high": Quality(5, 25, traced=True),
@@ -62,12 +69,13 @@ class RenderSettings:
 
     Attributes:
         size: (width, height) in pixels, 64 to 4096 each.
-        quality: A key of QUALITY. `draft` takes one sample per pixel, 9 on distant containers, a
-            coarser shadow map, and the ground at half the resolution; `balanced` takes 9 samples
-            per pixel; `fine` takes 25 and evaluates the material at each; `high` also computes
-            light with rays, which Embree casts on the CPU on every backend. `fine` and `high` take
-            9 samples in images above about one megapixel or 1638 rows. All except `draft` take 4 in
-            images above 2730 rows on drivers whose textures end at 16384 texels, such as Mesa's.
+        quality: A key of QUALITY. `draft` takes one sample per pixel, 9 on cables and distant
+            containers, a coarser shadow map, and the ground at half the resolution; `balanced`
+            takes 9 samples per pixel; `fine` takes 25 and evaluates the material at each; `high`
+            also computes light with rays, which Embree casts on the CPU on every backend. `fine`
+            and `high` take 9 samples in images above about one megapixel or 1638 rows. All except
+            `draft` take 4 in images above 2730 rows on drivers whose textures end at 16384 texels,
+            such as Mesa's.
         backend: "auto", "egl" or "osmesa".
         device_index: EGL device to draw with, numbered as by `fastgen doctor`. None takes the
             first device that works.
