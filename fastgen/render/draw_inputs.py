@@ -12,6 +12,7 @@ from fastgen.camera.projection import View
 from fastgen.geometry.damage_law import corners_mm
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
+from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
 from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.regions import (
@@ -27,7 +28,15 @@ from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage
+from fastgen.scene.faces import FACE_AXES
 from fastgen.scene.limits import MM
+
+_LEAST_FACING = 0.02
+"""Cosine between view and outward axis below which a face covers too few pixels to matter."""
+
+
+_LARGEST_BULGE_MM = 250.0
+"""Distance outside a container that damage hardly ever reaches."""
 
 
 class DrawOptions(NamedTuple):
@@ -75,6 +84,25 @@ def pixel_mm(mesh: Mesh, view: View) -> float:
     return float(away) / view.focal_px
 
 
+def wave_mm(mesh: Mesh, view: View) -> float:
+    """Return the largest width in mm of a pixel across the corrugation of walls and roof in view.
+
+    It is that in the middle of each of these faces; 0 if none is in view.
+    """
+    low, high = mesh.bounds_mm
+    eye = view.position_m / MM
+    widest = 0.0
+    for face in mesh.flats.keys() - {CORRUGATED_ALONG_Y}:
+        out, along = (np.array(axis) for axis in (FACE_AXES[face].out, FACE_AXES[face].right))
+        toward = eye - (low + high + out * (high - low)) / 2
+        away = np.linalg.norm(toward)
+        facing = float(toward @ out / away)
+        if facing > _LEAST_FACING:
+            slant = float(toward @ along / away) / facing
+            widest = max(widest, float(away / view.focal_px * np.hypot(1, slant)))
+    return widest
+
+
 def regions_of(
     view: View, prepared: PreparedScene, damages: tuple[Damage, ...], apart: bool
 ) -> Regions:
@@ -94,13 +122,16 @@ def regions_of(
     if prepared.spreader is not None:
         frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)
         boxes = [np.concatenate([*boxes, frame]), *above]
-    body, *others = (region_of(view, box) for box in boxes)
-    surfaces = bands([body, *others])
-    cables = others[-1] if apart and others else None
-    if body is None or cables is None:
+    surfaces = bands([region_of(view, box) for box in boxes])
+    if not apart or prepared.spreader is None:
         return Regions(surfaces, merged(touched), merged(torn))
+    # the regions of cables, and so the number of samples, must not depend on damage
+    low, high = prepared.container.bounds_mm
+    lowest, *_, upper = map(box_corners, prepared.spreader.tier_bounds_mm)
+    grown = box_corners((low - _LARGEST_BULGE_MM, high + _LARGEST_BULGE_MM))
     whole = (0, 0, *view.size)
-    thin = outside(within([cables], whole), [body])
+    body = region_of(view, np.concatenate([grown, lowest]))
+    thin = outside(within([region_of(view, upper)], whole), within([body, *touched], whole))
     return Regions(outside(within(surfaces, whole), thin), merged(touched), merged(torn), thin)
 
 

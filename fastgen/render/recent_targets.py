@@ -2,7 +2,7 @@
 
 from fastgen.camera.projection import View
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.render.draw_inputs import pixel_mm
+from fastgen.render.draw_inputs import pixel_mm, wave_mm
 from fastgen.render.gl import GLContext
 from fastgen.render.image_targets import ImageTargets
 from fastgen.render.recent_cache import ReleasingCache
@@ -29,7 +29,8 @@ class RecentTargets:
     def samples_per_axis(self, prepared: PreparedScene, view: View) -> tuple[int, int]:
         """Return the samples per pixel along each axis of a container and of cables above it."""
         limit = self._gl.ctx.info["GL_MAX_TEXTURE_SIZE"]
-        near, thin = self._quality.samples_for(pixel_mm(prepared.container, view))
+        mesh = prepared.container
+        near, thin = self._quality.samples_for(pixel_mm(mesh, view), wave_mm(mesh, view))
         return fitting(near, view.size, limit), fitting(thin, view.size, limit)
 
     def image(self, size: tuple[int, int], radiance: bool) -> ImageTargets:

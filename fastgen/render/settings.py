@@ -20,6 +20,13 @@ FAR_PIXEL_MM = 70.0
 """Width of a pixel beyond which one sample misses facets of walls and roofs, which are about 70 mm
 wide, and corrugation turns into moire."""
 
+HALF_WAVE_MM = 105.0
+"""Half a wave of a roof: where a pixel is wider across the corrugation, one sample shows moire."""
+
+SLANTED_PIXEL_MM = 25.0
+"""Width of a pixel on the nearest part of a container up to which moire of its slanted faces is
+accepted, because it would take long to draw so many pixels with more samples."""
+
 
 class Quality(NamedTuple):
     """Renderer settings of one quality preset.
@@ -42,16 +49,18 @@ class Quality(NamedTuple):
     coarse_ground: bool = False
     thin_samples_per_axis: int = 1
 
-    def samples_for(self, pixel_mm: float) -> tuple[int, int]:
+    def samples_for(self, pixel_mm: float, wave_mm: float) -> tuple[int, int]:
         """Return the samples per pixel along each axis on a container and on cables above it.
 
         Args:
             pixel_mm: Width of a pixel on the nearest part of the container.
+            wave_mm: Width of a pixel across the corrugation of a face in view.
         """
-        thin = max(self.samples_per_axis, self.thin_samples_per_axis)
+        usual, thin = self.samples_per_axis, max(self.samples_per_axis, self.thin_samples_per_axis)
+        minified = pixel_mm > SLANTED_PIXEL_MM and wave_mm > HALF_WAVE_MM
         return (
-            thin if pixel_mm > FAR_PIXEL_MM else self.samples_per_axis,
-            thin if pixel_mm > CABLE_PIXEL_MM else self.samples_per_axis,
+            thin if pixel_mm > FAR_PIXEL_MM or minified else usual,
+            thin if pixel_mm > CABLE_PIXEL_MM else usual,
         )
 
 

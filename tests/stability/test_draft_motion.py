@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -99,3 +99,20 @@ def test_a_distant_wall_has_no_beat_between_its_corrugation_and_the_pixels(draft
         assert np.std(slow[0] / slow[1]) < 0.03, away_m
         across = [each[inside].mean(axis=(1, 2)) for each in (image, true)]
         assert np.abs(across[0] - across[1]).mean() < 0.05 * across[1].mean(), away_m
+
+
+def test_a_roof_seen_along_its_length_has_no_rings(draft):
+    """Its waves are foreshortened to less than two pixels, while its walls have six a wave."""
+    scene = replace(draft.scene(1), damages=(), decals=(), seals=(), spreader=Spreader())
+    camera = replace(
+        scene.camera("A"),
+        position_mm=(-30e3, -4e3, 10e3),
+        target_mm=(0.0, 0.0, 2500.0),
+        focal_mm=60.0,
+    )
+    (image, seen), (true, _) = (make(draft, scene, camera) for make in (drawn, truth))
+    rows, columns = np.nonzero(binary_erosion(seen, np.ones((3, 3))))
+    top = rows < rows.min() + 12  # the roof is above the end wall
+    found, expected = (each[rows[top], columns[top]] for each in (image, true))
+    assert len(found) > 300
+    assert np.abs(found - expected).mean() < 0.3 * expected.mean()
