@@ -23,6 +23,10 @@ class SceneRenderer(Protocol):
     gpu: GpuSession
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of images in pixels."""
+
+    @property
     def environments(self) -> dict[str, float]:
         """Weight of each HDRI by name."""
 
@@ -59,7 +63,7 @@ def preload(generator: SceneRenderer, on_step: Callable[[], None]) -> None:
             on_step()
             shape = replace(scene, container=container, spreader=spreader, damages=())
             renderer.preload(PreparedScene(shape), lens, config.damage.probability > 0)
-        draws = _distinct_draws(renderer, _typical_scenes(generator, environments))
+        draws = _distinct_draws(renderer, _typical_scenes(generator, environments), generator.size)
     for shown, camera in draws:
         on_step()
         generator.render(scene=shown, camera=camera)
@@ -80,11 +84,13 @@ def _lamp_counts(config: LampsConfig) -> range:
     return range(config.count[1] + 1 if config.probability > 0 else 1)
 
 
-def _distinct_draws(renderer: Renderer, scenes: Iterable[Scene]) -> list[tuple[Scene, Camera]]:
+def _distinct_draws(
+    renderer: Renderer, scenes: Iterable[Scene], size: tuple[int, int]
+) -> list[tuple[Scene, Camera]]:
     """Return one scene and camera for each set of programs that draws need."""
     draws: dict[Hashable, tuple[Scene, Camera]] = {}
     for scene in scenes:
         prepared = PreparedScene(scene)
         for camera in scene.cameras:
-            draws.setdefault(renderer.programs_key(prepared, camera), (scene, camera))
+            draws.setdefault(renderer.programs_key(prepared, camera, size), (scene, camera))
     return list(draws.values())

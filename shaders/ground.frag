@@ -3,7 +3,7 @@
 // the image has half the resolution, and the colour is exposed radiance for ground_spread.frag.
 #version 430 core
 #include "ground.constants"
-#include "samples.constants"
+#include "lookups.constants"
 #include "units.constants"
 #include "variant.constants"
 #include "ground.block"
@@ -94,7 +94,7 @@ void main() {
     bool shows_props = tile_props().xy != uvec2(0u);
     if (GROUND_PLANE == 0 && !shows_props) discard;
 #endif
-#if GROUND_PROPS && SAMPLES_PER_AXIS > 1
+#if GROUND_PROPS && LOOKUPS > 1
     // Elsewhere the pattern of the plane is filtered already.
     int samples = shows_props ? 4 : 1;
     vec4 color = vec4(0.0);

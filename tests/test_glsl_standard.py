@@ -118,9 +118,7 @@ def test_all_other_shaders_are_standard_glsl(programs):
         ground = GroundVariant(
             kind, boxes=2, wet=wet, fades=wet, props=not coarse, shadows=coarse, coarse=coarse
         )
-        variant = ShaderVariant(
-            samples_per_axis=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground
-        )
+        variant = ShaderVariant(lookups=2 - coarse, lights=MAX_LIGHTS if wet else 1, ground=ground)
         programs.add(("rectangles.vert", "ground.frag"), variant)
         programs.add(("fullscreen.vert", "ground_bake.frag"), variant)
     lens = ShaderVariant(ground=GroundVariant(lens=True))

@@ -26,9 +26,9 @@ from fastgen.render.noise import NOISE_LEVELS, NOISE_SIZE, NORMAL_REACH, noise_t
 from fastgen.render.sample_lattice import LOOKUP_PLACES, LOOKUP_PX, SKY_PLACES, SampleLattice
 from fastgen.render.variant import (
     LAYERS,
+    PIXEL_CLASSES,
     PIXEL_TRAITS,
     ShaderVariant,
-    listed_classes,
 )
 from fastgen.render.zone_codes import (
     DECAL_SHEET,
@@ -126,12 +126,11 @@ def _variant(v: ShaderVariant) -> Defines:
 
 
 def _lists(v: ShaderVariant) -> Defines:
-    lists = listed_classes(v.samples_per_axis)
     return {
-        **{f"LIST_{name.upper()}": f"{i}u" for i, name in enumerate(lists)},
+        **{f"LIST_{name.upper()}": f"{i}u" for i, name in enumerate(PIXEL_CLASSES)},
         "LIST": f"LIST_{v.pixel_class.upper()}",
-        "NO_LIST": f"{len(lists)}u",
-        "LISTS": f"{len(lists)}u",
+        "NO_LIST": f"{len(PIXEL_CLASSES)}u",
+        "LISTS": f"{len(PIXEL_CLASSES)}u",
         "LIST_HEADER": f"{LIST_HEADER}u",
         "LIST_GROUP": f"{LIST_GROUP}u",
         "LIST_BINDING": LIST_BINDING,
@@ -140,7 +139,7 @@ def _lists(v: ShaderVariant) -> Defines:
 
 def _samples(v: ShaderVariant) -> Defines:
     lattice = SampleLattice(v.samples_per_axis)
-    sky = SKY_PLACES[1 if v.samples_per_axis == 1 else 2]
+    sky = SKY_PLACES[min(v.lookups, 2)]
     return {
         "SAMPLES_PER_AXIS": v.samples_per_axis,
         "SAMPLE_SLANT": lattice.slant,

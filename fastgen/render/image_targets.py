@@ -1,4 +1,4 @@
-"""Targets of one image size: the shaded image, and the visibility buffer behind it."""
+"""Targets of one image size: the shaded image, and the lists of its pixels."""
 
 import ctypes
 from typing import Any
@@ -13,28 +13,24 @@ from fastgen.render.gl import GLContext
 from fastgen.render.gl_enums import GL_DEPTH_ATTACHMENT, GL_FRAMEBUFFER, GL_R32UI, GL_TEXTURE_2D
 from fastgen.render.pixel_lists import PixelLists
 from fastgen.render.textures import FLOATS, NUMBERS, texture_clearing
-from fastgen.render.variant import listed_classes
+from fastgen.render.variant import PIXEL_CLASSES
 from fastgen.render.visibility_buffer import VisibilityBuffer
 
 
 class ImageTargets:
-    """Colour, labels and depth of an image, and the buffers that the passes work in.
+    """Colour, labels and depth of an image, and the lists that the passes work through.
 
     Attributes:
         size: (width, height) in pixels.
         radiance: The colour is exposed linear radiance in float32 instead of display colour.
-        samples: The visibility buffer.
         lists: Pixel lists of the compute passes.
         image: Framebuffer of colour, labels and depth.
     """
 
-    def __init__(
-        self, gl: GLContext, size: tuple[int, int], samples_per_axis: int, radiance: bool = False
-    ) -> None:
+    def __init__(self, gl: GLContext, size: tuple[int, int], radiance: bool = False) -> None:
         self.size = size
         self.radiance = radiance
         self._ctx = ctx = gl.ctx
-        self.samples = VisibilityBuffer(gl, size, samples_per_axis)
         self._image = [
             ctx.texture(size, 4, dtype="f4" if radiance else "f1"),
             ctx.texture(size, 1, dtype="u4"),
@@ -43,16 +39,17 @@ class ImageTargets:
         self.image = ctx.framebuffer(self._image)
         self._color = ctx.framebuffer(self._image[:1])
         self._normals: moderngl.Texture | None = None
-        self.lists = PixelLists(ctx, size, listed_classes(samples_per_axis))
+        self.lists = PixelLists(ctx, size, tuple(PIXEL_CLASSES))
         self._attach = gl.function(
             "glFramebufferTexture2D", None, *[ctypes.c_uint] * 4, ctypes.c_int
         )
         self._clear = texture_clearing(gl)
 
-    def begin(self, over: bool = False) -> bool:
+    def begin(self, samples: VisibilityBuffer, over: bool = False) -> bool:
         """Clear labels and depth, and bind the colour alone.
 
         Args:
+            samples: The visibility buffer of the surfaces.
             over: The whole image gets a background, before any surface is drawn.
 
         Returns:
@@ -62,10 +59,10 @@ class ImageTargets:
         self._clear(labels, (0, 0, *self.size), NUMBERS, 0)
         self._clear(depth, (0, 0, *self.size), FLOATS, np.inf)
         self._color.use()
-        if over or self.samples.per_axis > 1:
+        if over or samples.per_axis > 1:
             return False
         # moderngl requires attachments of one size; the depth of holed scenes has more rows
-        tested = self.samples.depth_buffer.glo
+        tested = samples.depth_buffer.glo
         self._attach(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, tested, 0)
         return True
 
@@ -136,6 +133,6 @@ class ImageTargets:
 
     def release(self) -> None:
         """Free all GL objects."""
-        items: list[Any] = [self.samples, self._color, self.image, *self._image, self.lists]
+        items: list[Any] = [self._color, self.image, *self._image, self.lists]
         for item in [*items, *filter(None, [self._normals])]:
             item.release()

@@ -125,6 +125,13 @@ def within(regions: Sequence[Region | None], other: Region) -> list[Region]:
     return found
 
 
+def around(regions: Sequence[Region]) -> Region:
+    """Return the smallest region that contains all given regions, at least one."""
+    left, top = (min(region[k] for region in regions) for k in (0, 1))
+    right, bottom = (max(region[k] + region[k + 2] for region in regions) for k in (0, 1))
+    return left, top, right - left, bottom - top
+
+
 def region_of(view: View, corners_mm: np.ndarray) -> Region | None:
     """Return the region that the convex hull of some points may cover.
 

@@ -37,7 +37,7 @@ from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.recent_cache import RecentCache, ReleasingCache
-from fastgen.render.sample_lattice import fitting
+from fastgen.render.recent_targets import RecentTargets
 from fastgen.render.scene_lights import Around, SceneLights
 from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
@@ -95,7 +95,7 @@ class Renderer:
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
         self._rays: ReleasingCache[RayPass] = ReleasingCache(2)
-        self._targets: ReleasingCache[ImageTargets] = ReleasingCache(2)
+        self._targets = RecentTargets(gl, quality)
         self._bodies: RecentCache[RayBodies] = RecentCache(_CONTAINERS)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights = SceneLights(gl, light, quality)
@@ -163,12 +163,13 @@ class Renderer:
         options = DrawOptions(layer, radiance, over=several)
         around = self._lights.around(prepared, self._resources) if several else None
         inputs = self._inputs(prepared, view, options, around)
-        self._light(inputs, prepared.members[0], prepared, exposure)
+        first = prepared.members[0]
+        self._light(inputs, first, prepared, exposure)
         if not several:
             self._geometry.run(inputs)
             self._trace(inputs, prepared)
             self._background.run(inputs)
-            self._shade(inputs, normals)
+            self._shade(inputs, first, exposure, normals)
             return inputs.targets
         plan = self._ground.plan(prepared, view)
         self._background.run(inputs, plan)
@@ -182,17 +183,32 @@ class Renderer:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)
                 self._trace(inputs, member.prepared)
-                self._shade(inputs, normals)
+                self._shade(inputs, member, exposure, normals)
         return inputs.targets
 
-    def _shade(self, inputs: DrawInputs, normals: NDArray[np.float32] | None) -> None:
-        """Shade the surfaces in the visibility buffer, and write their normals if asked."""
+    def _shade(
+        self,
+        inputs: DrawInputs,
+        member: Member,
+        exposure: float,
+        normals: NDArray[np.float32] | None,
+    ) -> None:
+        """Shade the surfaces in the visibility buffer, and write their normals if asked.
+
+        The cables above the container, which may need more samples, are drawn here.
+        """
         if inputs.regions.surfaces:
             inputs.targets.bind_images(inputs.variant.over)
             self._shading.run(inputs)
         if normals is not None:
             found = self._normals.run(inputs)
             np.copyto(normals, found, where=found.any(axis=-1, keepdims=True))
+        if inputs.regions.cables:
+            _, per_axis = self._targets.samples_per_axis(member.prepared, inputs.view)
+            finer = inputs.of_cables(self._targets.samples(inputs.view.size, per_axis))
+            self._set_view(finer, member, exposure)
+            self._geometry.run_cables(finer)
+            self._shade(finer, member, exposure, normals)
 
     def _inputs(
         self,
@@ -205,12 +221,8 @@ class Renderer:
         scene, size, lens = prepared.scene, view.size, view.distortion is not None
         damages = seen_damages(scene.damages, tuple((view.position_m / MM).tolist()))
         damage = variant(damages)
-        limit = self.ctx.info["GL_MAX_TEXTURE_SIZE"]
-        per_axis = fitting(self._quality.samples_per_axis, size, limit)
-        targets = self._targets.get(
-            (size, per_axis, options.radiance),
-            lambda: ImageTargets(self._gl, size, per_axis, options.radiance),
-        )
+        per_axis, of_cables = self._targets.samples_per_axis(prepared, view)
+        samples = self._targets.samples(size, per_axis)
         environment = scene.environment
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
         resources = self._resources(prepared)
@@ -225,7 +237,7 @@ class Renderer:
         decals = resources.decals(scale_for(prepared.container, view))
         self._set(SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values})
         if damage != "undamaged":
-            threshold_mm, row = self._mask_threshold_mm, targets.samples.inner_row
+            threshold_mm, row = self._mask_threshold_mm, samples.inner_row
             self._set(DAMAGE_BLOCK, damage_values(prepared, damages, threshold_mm, row))
         return DrawInputs(
             view=view,
@@ -234,8 +246,9 @@ class Renderer:
             seals=seals,
             spreader=spreader,
             lit=lit,
-            regions=regions_of(view, prepared, damages),
-            targets=targets,
+            regions=regions_of(view, prepared, damages, apart=per_axis < of_cables),
+            targets=self._targets.image(size, options.radiance),
+            samples=samples,
             coarse_ground=self._quality.coarse_ground,
             variant=ShaderVariant(
                 samples_per_axis=per_axis,
@@ -272,11 +285,13 @@ class Renderer:
         shadow = self._lights.shadows.cast(member, whole, lights)
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
-        values = {
-            **view_values(scene, view, inputs.targets.samples, exposure),
-            **light_values(lights, shadow, view.position_m),
-        }
-        self._set(VIEW_BLOCK, values)
+        inputs.lights.update(light_values(lights, shadow, view.position_m))
+        self._set_view(inputs, member, exposure)
+
+    def _set_view(self, inputs: DrawInputs, member: Member, exposure: float) -> None:
+        """Fill the uniform block of the view for the samples of `inputs`."""
+        values = view_values(member.prepared.scene, inputs.view, inputs.samples, exposure)
+        self._set(VIEW_BLOCK, {**values, **inputs.lights})
 
     def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
@@ -308,17 +323,23 @@ class Renderer:
         """Prepare the light and the background of an environment."""
         self._lights.background(name)
 
-    def programs_key(self, prepared: PreparedScene, camera: Camera) -> Hashable:
-        """Return a key that is equal for all draws at one image size that use the same programs.
+    def programs_key(
+        self, prepared: PreparedScene, camera: Camera, size: tuple[int, int]
+    ) -> Hashable:
+        """Return a key that is equal for all draws that use the same programs.
 
         Args:
             prepared: The scene.
             camera: The camera.
+            size: (width, height) in pixels.
         """
+        view = view_of(camera, size)
+        members = [(each.prepared, view.in_frame(each.pose)) for each in prepared.present]
+        per_axis = frozenset(self._targets.samples_per_axis(*each) for each in members)
         damages = seen_damages(prepared.scene.damages, camera.position_mm)
         lights = shader_lights(self.ambient(prepared.scene.environment).lights)
         spreader = prepared.scene.spreader.present
-        return variant(damages), lights, camera.lens is not None, spreader
+        return variant(damages), lights, camera.lens is not None, spreader, per_axis
 
     @property
     def shadow_map(self) -> ShadowMap:

@@ -36,8 +36,8 @@ SKY_PLACES = {
     1: ((-0.25, -0.25), (0.25, 0.25)),
     2: tuple(itertools.product((-0.25, 0.25), repeat=2)),
 }
-"""Position of each lookup of the background in pixels from the pixel's centre: for images with one
-sample per pixel, and with more. With one lookup, lamps and windows between pixel centres flicker
+"""Position of each lookup of the background in pixels from the pixel's centre: for one lookup of
+the material layers, and for more. With one place, lamps and windows between pixel centres flicker
 as the camera moves. One lookup in a mip level would be cheaper, but its bilinear filter widens
 lamps by a pixel."""
 

@@ -105,6 +105,10 @@ class VisibilityBuffer:
                 self._clear(texture, box, FLOATS, _OUT_OF_REACH_MM)
         self._use(self._undamaged)
 
+    def limit(self, region: Region) -> None:
+        """Restrict drawing to what pixels of a region read, until `end`."""
+        self._undamaged.scissor = self._texels(region)
+
     def begin_damaged(self) -> None:
         """Bind the buffer for surfaces that damages touch, which also store rest positions."""
         self._use(self._damaged)
@@ -153,7 +157,8 @@ class VisibilityBuffer:
         self._enable(GL_SCISSOR_TEST, 1)
 
     def end(self) -> None:
-        """Lift the restriction of `limit_inside`."""
+        """Lift the restrictions of `limit` and `limit_inside`."""
+        self._undamaged.scissor = (0, 0, *self._fine)
         self._disable(GL_SCISSOR_TEST, 1)
 
     def _texels(self, region: Region | None) -> Region:

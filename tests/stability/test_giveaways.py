@@ -13,13 +13,16 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.camera.projection import view_of
 from fastgen.classes import (
     ALL_DAMAGE_CLASSES,
     CONTAINER_ID,
     MARKER_CLASSES,
     UNDAMAGED_CONTAINER,
 )
+from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render import renderer as rendering
+from fastgen.render.draw_inputs import regions_of
 
 SIZE = (320, 240)
 DAMAGED = {"damage": {"probability": 1, "count": [12, 14], "kinds": list(ALL_DAMAGE_CLASSES)}}
@@ -157,3 +160,20 @@ def test_traces_of_rendering_tell_labels_no_better_on_the_pixel_grid_than_beside
             apart.append(np.array([separation(each, marked) for each in every]))
         # quads of one object resemble each other, so AUCs differ by chance by a few hundredths
         assert (apart[0] < apart[1] + 0.1).all(), (name, apart)
+
+
+def test_damage_does_not_change_where_cables_get_more_samples():
+    """`draft` draws regions above containers with more samples, and damage may reach into them."""
+    config = Config.from_values(DAMAGED)
+    compared = 0
+    with Generator(config, seed=2, size=SIZE, quality="draft") as generator:
+        for index, name in itertools.product(range(6), ("A", "B", "Cl", "Cr")):
+            scene = generator.scene(index)
+            view = view_of(scene.camera(name), SIZE)
+            damaged, plain = (
+                regions_of(view, PreparedScene(each), each.damages, apart=True).cables
+                for each in (scene, replace(scene, damages=()))
+            )
+            assert damaged == plain, (index, name)
+            compared += len(plain)
+    assert compared > 5

@@ -9,6 +9,7 @@ from fastgen.light.sky_visibility import lobe_masks
 from fastgen.render.constants import LOBE_CELLS, REACH_MARGIN_MM
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.program import Programs, ShaderProgram
+from fastgen.render.regions import around, within
 from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
 
 
@@ -40,7 +41,7 @@ class GeometryPass:
 
     def run(self, inputs: DrawInputs) -> None:
         """Draw the meshes, and add the buffer's textures to `inputs.textures`."""
-        samples, damages = inputs.targets.samples, inputs.damages
+        samples, damages = inputs.samples, inputs.damages
         regions, damage = inputs.regions, inputs.variant.damage
         drawn = regions.drawn
         # other parts may keep an earlier image's rest positions: only rays read them everywhere
@@ -77,6 +78,21 @@ class GeometryPass:
         for region in regions.holes:
             samples.limit_inside(region)
             container.draw("holed", container.clusters.seen_in(inputs.view, region, moved_mm))
+        samples.end()
+        inputs.textures.update(samples.textures)
+
+    def run_cables(self, inputs: DrawInputs) -> None:
+        """Draw the parts of the spreader in regions that show nothing else, as `run` does."""
+        samples, spreader = inputs.samples, inputs.spreader
+        regions = within(inputs.regions.surfaces, (0, 0, *inputs.targets.size))
+        assert spreader is not None, "only scenes with a spreader have regions of cables"
+        samples.begin("undamaged", regions, over=inputs.variant.over)
+        whole = around(regions)
+        samples.limit(whole)
+        self._ctx.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        self._ctx.front_face = "cw"
+        self._programs["undamaged"].bind({**inputs.textures, "lobe_masks": self._lobes})
+        spreader.draw("undamaged", spreader.clusters.seen_in(inputs.view, whole, 0.0))
         samples.end()
         inputs.textures.update(samples.textures)
 

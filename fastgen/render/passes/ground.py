@@ -191,7 +191,7 @@ def _steps(plan: GroundPlan, inputs: DrawInputs) -> list[_Step]:
         for each in plan.plane:
             own = replace(variant, ground=each.variant)
             steps.append(_Step("ground.frag", own, each.tiles & ~plan.props.tiles))
-    own = replace(variant, samples_per_axis=inputs.variant.samples_per_axis, ground=props)
+    own = replace(variant, lookups=inputs.variant.lookups, ground=props)
     steps.append(_Step("ground.frag", own, plan.props.tiles))
     return [step for step in steps if step.tiles.any()]
 
