@@ -78,9 +78,8 @@ class Strikes:
             return task
         if scene is None:
             raise OutputError(
-                f"worker processes die before they render anything ({ended}); run fastgen doctor, "
-                'and in a script call this under `if __name__ == "__main__":`; files written so '
-                "far stay valid"
+                f"worker processes die before they render anything ({ended}); run fastgen doctor; "
+                "files written so far stay valid"
             )
         reason = f"the process that rendered it died ({ended})"
         return replace(task, skip={**task.skip, scene: reason})
