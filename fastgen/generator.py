@@ -27,7 +27,7 @@ from fastgen.render.session import GpuSession
 from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
-from fastgen.sampling.coverage import extreme_lenses
+from fastgen.sampling.lens_check import check_lenses
 from fastgen.sampling.scene import sample_scene
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import check_camera, check_scene
@@ -87,7 +87,7 @@ class Generator:
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.settings = RenderSettings(size, quality, backend, device_index, hdri_dir)
-        _check_lenses(self.config, self.settings.size)
+        check_lenses(self.config, self.settings.size)
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
@@ -332,13 +332,3 @@ def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     if name not in hdris:
         raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, hdris)}")
     return load_environment(hdris[name])
-
-
-def _check_lenses(config: Config, size: tuple[int, int]) -> None:
-    """Refuse lenses that cannot be drawn at this size before the first image is drawn."""
-    for name, rig in config.cameras.items():
-        for lens in extreme_lenses(rig.lens) if rig.lens else ():
-            camera = Camera(
-                name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
-            )
-            view_of(camera, size)

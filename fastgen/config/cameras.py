@@ -23,6 +23,9 @@ best ones, and steps of the ternary search over the distance."""
 _ROUNDED_MM = 0.1
 """Camera positions are rounded to this."""
 
+LONGEST_FOCAL_MM = 2000.0
+"""Upper limit of focal lengths."""
+
 Array = NDArray[np.float64]
 
 _Aim = Annotated[Range, Bounds(-2.0, 2.0)]
@@ -58,7 +61,7 @@ class CameraConfig:
     """
 
     face: Annotated[str, OneOf(FACES)]
-    focal_mm: Annotated[float, Bounds(1.0, 2000.0, "mm")]
+    focal_mm: Annotated[float, Bounds(1.0, LONGEST_FOCAL_MM, "mm")]
     distance_mm: Annotated[Range, Bounds(300.0, 1.5e5, "mm")]  # well before the far plane
     azimuth_deg: _Angle = Range(-12, 12)
     elevation_deg: _Angle = Range(-8, 18)

@@ -7,7 +7,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
 from fastgen.config.commented_yaml import meanings
-from fastgen.config.config import Config
+from fastgen.config.config import PRESET_KEY, Config
 from fastgen.validation import Bounds, adapter, annotation
 
 
@@ -18,6 +18,11 @@ def json_schema() -> dict[str, Any]:
     values, such as a range whose lowest value is above its highest, are not part of it.
     """
     schema = adapter(Config).json_schema(schema_generator=_Generator)
+    start = {
+        "type": "string",
+        "description": "Preset to start from, or the path of another file, relative to this one.",
+    }
+    schema["properties"] = {PRESET_KEY: start, **schema["properties"]}
     return {"$schema": _Generator.schema_dialect, **schema, "title": "fastgen configuration"}
 
 
