@@ -47,6 +47,11 @@ _CameraName = Annotated[
     ),
 ]
 
+_FUNCTION = Matching(
+    r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*|",
+    "is not a function; write package.module:function",
+)
+
 
 @dataclass(frozen=True)
 class ContainerConfig:
@@ -191,6 +196,8 @@ class Config:
     Attributes:
         cameras: Rig of cameras by name. A file that has this key gives the whole rig; a camera with
             the name of one of the preset's inherits what the file leaves out.
+        postprocess: Function that changes every finished sample, as package.module:function; empty
+            for none. It takes the sample and a NumPy random generator, and returns a Sample.
     """
 
     container: ContainerConfig = field(default_factory=ContainerConfig)
@@ -209,6 +216,7 @@ class Config:
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
+    postprocess: Annotated[str, _FUNCTION] = ""
 
     def __post_init__(self) -> None:
         """Refuse splits without shares, camera names that differ only in case, and lone twins."""
@@ -274,8 +282,6 @@ class Config:
         Raises:
             ConfigError: naming the key or value that does not fit.
         """
-        if not isinstance(base, Config | None):
-            raise ConfigError(f"base: {base!r} is not a Config; take one from Config.preset")
         return _merged(data, base, Path(), ())
 
     @staticmethod
@@ -295,6 +301,14 @@ class Config:
             ConfigError: naming the file and the key or value that does not fit.
         """
         return _from_file(Path(path) if isinstance(path, str) else path, base, ())
+
+    @property
+    def classes(self) -> dict[str, tuple[str, ...]]:
+        """Class names in label order by name of the task whose list the configuration decides."""
+        return {
+            "damage": self.damage.segmentation_classes,
+            "imdg": self.markings.detection_classes,
+        }
 
     def to_plain(self) -> dict[str, Any]:
         """Return the configuration as plain values, ready for JSON or YAML."""
@@ -349,6 +363,8 @@ def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]
 
     Paths in `data` are relative to `folder`.
     """
+    if not isinstance(base, Config | None):
+        raise ConfigError(f"base: {base!r} is not a Config; take one from Config.preset")
     if isinstance(data, Mapping) and PRESET_KEY in data:
         if base is not None:
             raise ConfigError(
@@ -359,4 +375,4 @@ def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]
         data = {key: value for key, value in data.items() if key != PRESET_KEY}
     if base is None:
         base = Config.preset()
-    return _with_room(from_plain(Config, data, base=base))
+    return _with_room(from_plain(Config, data, base=base, folder=folder))

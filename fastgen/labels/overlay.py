@@ -3,6 +3,7 @@
 import colorsys
 from collections.abc import Mapping
 from types import MappingProxyType
+from zlib import crc32
 
 import cv2
 import numpy as np
@@ -40,8 +41,11 @@ _PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 def class_color(name: str) -> tuple[int, int, int]:
     """Return the RGB colour of a class.
 
-    Markers and marks have pale colours. All other classes have strong colours that differ clearly.
+    Markers and marks have pale colours, also those of a configuration. All other classes have
+    strong colours that differ clearly.
     """
+    if name not in _STRONG and name not in _PALE:
+        return _color(crc32(name.encode()), 0.4, 1.0)
     names, saturation = (_STRONG, 0.85) if name in _STRONG else (_PALE, 0.4)
     return _color(names.index(name), saturation, 1.0)
 

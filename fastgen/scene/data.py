@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import MaxLen
 from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DAMAGE_CLASSES, ALL_DETECTION_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES, CLASS_NAME
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.errors import ConfigError
@@ -43,7 +43,16 @@ from fastgen.scene.limits import (
 )
 from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
-from fastgen.validation import Bounds, Flag, OneOf, Share, check_fields, from_plain, to_plain
+from fastgen.validation import (
+    Bounds,
+    Flag,
+    Matching,
+    OneOf,
+    Share,
+    check_fields,
+    from_plain,
+    to_plain,
+)
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue in the luminance; ITU-R BT.709-6, section 3.2."""
@@ -66,8 +75,9 @@ class Decal:
             the square that stands on its corner, for a text the tight box around its ink. A
             triangle has its tip in the middle of the upper side.
         rotation_deg: Counter-clockwise rotation on the sheet.
-        art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes,
-            'patch' for a repainted rectangle.
+        art: Name of the marker, sticker or emblem, as in `artwork.art_layers`, or in
+            `MarkingsConfig.own_art` for one of the configuration; 'stripes' for the bands of high
+            cubes, 'patch' for a repainted rectangle.
         lines: Text, one string per line. In vertical text the letters of a line are below one
             another, and lines are columns from left to right.
         parts: Parts of a text with places of their own; they decide the layout if there are any,
@@ -86,7 +96,10 @@ class Decal:
     """
 
     kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind not in COMPUTED_ART))]
-    class_name: Annotated[str, OneOf(("", *ALL_DETECTION_CLASSES[1:]))]
+    class_name: Annotated[
+        str,
+        Matching(f"{CLASS_NAME}|", "is not a class name; give a class of the marker task or ''"),
+    ]
     face: Annotated[str, OneOf(SHEET_FACES)]
     center_mm: Vec2
     size_mm: tuple[_Length, _Length]
