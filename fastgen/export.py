@@ -355,7 +355,7 @@ def _append_camera(
     if view.distortion:
         extras |= {key: view_values(view)[key] for key in ("distortion_model", "distortion")}
     perspective = {
-        "yfov": 2 * float(np.arctan(height / 2 / view.focal_px)),
+        "yfov": 2 * float(np.arctan(height / 2 / view.focals_px[1])),
         "aspectRatio": width / height,
         "znear": 0.1,
         "zfar": 1000.0,

@@ -115,7 +115,7 @@ def test_the_shader_removes_the_distortion(lens, focal_mm):
         kept = blocks(
             gl,
             lens_center=view.center_px,
-            lens_focal=view.focal_px,
+            lens_focal=view.focals_px,
             **view.distortion.shader_values,
         )
         # no texture is wide enough for all pixels in one row

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 
 from annotated_types import MinLen
 
+from fastgen.config.calibration import with_focal_lengths
 from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
 from fastgen.config.fields import HexColors, Weight
@@ -375,4 +376,6 @@ def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]
         data = {key: value for key, value in data.items() if key != PRESET_KEY}
     if base is None:
         base = Config.preset()
+    if isinstance(data, Mapping) and isinstance(data.get("cameras"), Mapping):
+        data = {**data, "cameras": with_focal_lengths(data["cameras"], base.cameras, folder)}
     return _with_room(from_plain(Config, data, base=base, folder=folder))

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
+from fastgen.config.calibration import SHORTHANDS
 from fastgen.config.commented_yaml import meanings
 from fastgen.config.config import PRESET_KEY, Config
 from fastgen.validation import Bounds, adapter, annotation
@@ -23,6 +24,7 @@ def json_schema() -> dict[str, Any]:
         "description": "Preset to start from, or the path of another file, relative to this one.",
     }
     schema["properties"] = {PRESET_KEY: start, **schema["properties"]}
+    schema["$defs"]["CameraConfig"]["properties"] |= SHORTHANDS
     return {"$schema": _Generator.schema_dialect, **schema, "title": "fastgen configuration"}
 
 

@@ -240,7 +240,7 @@ def premultiplied_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     return rgba
 
 
-def texels(rgba: NDArray[np.float32]) -> NDArray[np.uint8]:
+def texels(rgba: np.ndarray) -> NDArray[np.uint8]:
     """Return the image of linear light times alpha: the inverse of `premultiplied_light`."""
     light = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
     image = np.empty(rgba.shape, np.uint8)

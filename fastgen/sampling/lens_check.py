@@ -43,7 +43,16 @@ def check_lenses(config: Config, size: tuple[int, int]) -> None:
 def _problem(name: str, rig: CameraConfig, size: tuple[int, int]) -> ConfigError | None:
     """Return why one of the lenses of a camera cannot be drawn, or None if all can."""
     for lens in extreme_lenses(rig.lens) if rig.lens else ():
-        camera = Camera(name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens)
+        camera = Camera(
+            name,
+            (0, 0, 0),
+            (0, 1, 0),
+            rig.focal_mm,
+            sensor_width_mm=rig.sensor_width_mm,
+            lens=lens,
+            pixel_aspect=rig.pixel_aspect,
+            principal_point=rig.principal_point,
+        )
         try:
             view_of(camera, size)
         except ConfigError as error:

@@ -41,7 +41,7 @@ from fastgen.scene.limits import (
     Millimetres,
     Number,
 )
-from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
+from fastgen.scene.optics import ASPECT_LIMITS, PRINCIPAL_LIMITS, Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
 from fastgen.validation import (
     Bounds,
@@ -60,6 +60,7 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 Vec3 = tuple[Number, Number, Number]
 
 _Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
+_Shift = Annotated[float, Bounds(*PRINCIPAL_LIMITS)]
 
 
 @dataclass(frozen=True)
@@ -326,6 +327,9 @@ class Camera:
         exposure_ev: Deviation from the metered exposure, in stops.
         lens: Distortion, None for a pinhole.
         sensor: Effects of the sensor on the image, None for none.
+        pixel_aspect: Focal length down the image relative to that across it.
+        principal_point: Place where the optical axis meets the image: distance to the right and
+            down from its centre, as shares of its width.
     """
 
     name: str
@@ -337,6 +341,8 @@ class Camera:
     exposure_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     lens: Lens | None = None
     sensor: Sensor | None = None
+    pixel_aspect: Annotated[float, Bounds(*ASPECT_LIMITS)] = 1.0
+    principal_point: tuple[_Shift, _Shift] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
