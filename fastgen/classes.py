@@ -1,6 +1,6 @@
 """Class names with their order in the label formats, and the values of masks and id targets."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 MARKER_CLASSES = (
     *("C1.1", "C1.2", "C1.3", "C1.4", "C2.1", "C2.2", "C2.3", "C2.4", "C2.5", "C3.1", "C3.2"),
@@ -40,6 +40,16 @@ SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 ALL_SEGMENTATION_CLASSES = ("container", *ALL_DAMAGE_CLASSES)
 """COCO category i + 1 is ALL_SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance. The
 first five are SEGMENTATION_CLASSES."""
+
+
+def segmentation_classes(kinds: Iterable[str]) -> tuple[str, ...]:
+    """Return the classes of the damage task, in label order, if these kinds of damage may occur.
+
+    The paper's five classes always come first. Later classes follow up to the last one that occurs.
+    """
+    last = max((ALL_SEGMENTATION_CLASSES.index(kind) for kind in kinds), default=0)
+    return ALL_SEGMENTATION_CLASSES[: max(last + 1, len(SEGMENTATION_CLASSES))]
+
 
 UNDAMAGED_CONTAINER = 101
 """Mask value of the undamaged container: category 1, instance 1 (SeaFront paper, 3.3.4)."""

@@ -45,7 +45,7 @@ def _loaded(field: str, entry: EntryPoint, kind: type[T]) -> T:
     what = f"{field}: {entry.name} of the package {_package(entry)}"
     try:
         made = entry.load()
-    except Exception as error:  # whatever the module of another package raises
+    except Exception as error:  # the package may raise anything while it is imported
         raise ConfigError(
             f"{what} cannot be loaded from {entry.value} ({error!r}); reinstall or mend that "
             "package"

@@ -29,7 +29,7 @@ def imported(name: str) -> Postprocess:
     module, _, attribute = name.partition(":")
     try:
         function: Postprocess = getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # whatever the user's module raises
+    except Exception as error:  # the module may raise anything while it is imported
         raise ConfigError(
             f"postprocess: {name} cannot be imported ({error!r}); install its package, or put its "
             "folder into PYTHONPATH"

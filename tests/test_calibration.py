@@ -1,6 +1,7 @@
 """Cameras from OpenCV's camera matrix and from calibration files, compared with OpenCV and rays."""
 
 import re
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -153,6 +154,20 @@ def test_a_calibration_replaces_the_lens_of_the_base(tmp_path):
     lens = Config.from_values(values, base).cameras["A"].lens
     assert lens.model == "brown_conrady"
     assert (lens.k1, lens.p2) == ((-0.22, -0.22), (-0.0009, -0.0009))
+
+
+def test_the_cameras_of_the_docs_page_can_be_drawn(tmp_path):
+    page = (Path(__file__).parent.parent / "docs/sensor.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```yaml\n(cameras:\n[^`]*calibration:[^`]*)```$", page, re.MULTILINE)
+    (tmp_path / "port.yaml").write_text(block)
+    opencv_file(tmp_path / "gate_camera.yaml", BARREL)
+    generator = Generator(Config.load(tmp_path / "port.yaml"), size=(192, 108))
+    gate, roof, side = generator.scene(0).cameras
+    assert gate.lens.coefficients == tuple(BARREL)
+    assert roof.focal_mm == pytest.approx(18 / np.tan(np.radians(47.5)))
+    view = view_of(side, (1920, 1080))
+    wanted = [[1210.4, 0, 968.7], [0, 1208.9, 532.2], [0, 0, 1]]
+    np.testing.assert_allclose(view.intrinsics, wanted, atol=1e-9)
 
 
 GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"

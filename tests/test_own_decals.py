@@ -1,8 +1,10 @@
 """Markers, stickers and brands of a user's configuration, from the file to every label."""
 
 import json
+import re
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -130,6 +132,21 @@ def test_pixels_of_a_marker_and_of_a_sticker_have_the_colour_of_their_file(confi
                 seen[item.class_name] += 1
     assert seen["ENV"] > 2
     assert seen["tag"] > 2
+
+
+def test_the_example_of_the_docs_page_is_drawn(tmp_path):
+    page = (Path(__file__).parent.parent / "docs/extend.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```yaml\n([^`]*)```$", page, re.MULTILINE)
+    (tmp_path / "art").mkdir()
+    for name in ("env", "tag", "emblem"):
+        Image.new("RGB", (90, 90)).save(tmp_path / f"art/{name}.png")
+    (tmp_path / "port.yaml").write_text(block)
+    config = Config.load(tmp_path / "port.yaml")
+    assert config.markings.detection_classes[-3:] == ("ENV", "fleet_tag", "owner_plate")
+    config = Config.from_values({"markings": {"marked_containers": 1}}, config)
+    generator = Generator(config, seed=1)
+    found = {decal.art for index in range(30) for decal in generator.scene(index).decals}
+    assert found >= {"marker/ENV", "sticker/fleet_tag", "emblem/Ours"}
 
 
 def test_weights_are_the_frequencies_of_markers(config):

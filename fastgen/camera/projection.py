@@ -188,12 +188,12 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     rolled_right = np.cos(roll) * right - np.sin(roll) * down
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
-    aspect, right, below = camera.pixel_aspect, *camera.principal_point
-    principal_px = (size[0] / 2 + right * size[0], size[1] / 2 + below * size[0])
+    aspect, (shift_x, shift_y) = camera.pixel_aspect, camera.principal_point
+    principal_px = (size[0] / 2 + shift_x * size[0], size[1] / 2 + shift_y * size[0])
     distortion = None
     if camera.lens is not None:
         # the farther border on each axis
-        half = (abs(right) * size[0] + size[0] / 2, abs(below) * size[0] + size[1] / 2)
+        half = (abs(shift_x) * size[0] + size[0] / 2, abs(shift_y) * size[0] + size[1] / 2)
         try:
             distortion = _distortion(camera.lens, (half[0] / focal_px, half[1] / aspect / focal_px))
         except ConfigError as error:

@@ -23,7 +23,7 @@ def assigned(config: Config, texts: Iterable[str]) -> Config:
             them as the value.
 
     Raises:
-        ConfigError: A text has no value or is no YAML, or the value does not fit its key.
+        ConfigError: A value is missing, is not YAML, or does not fit its key.
     """
     texts = list(texts)
     if not texts:
@@ -44,7 +44,7 @@ def assigned(config: Config, texts: Iterable[str]) -> Config:
 
 
 def _assign(plain: dict[str, Any], steps: list[str], value: Any) -> None:
-    """Set a value of nested mappings. A step into anything else makes a mapping of it."""
+    """Set a value of nested mappings. Mappings replace other values on the way to it."""
     *tables, name = steps
     for step in tables:
         inner = plain.get(step)

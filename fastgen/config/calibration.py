@@ -191,7 +191,7 @@ def _lens(model: str, numbers_given: list[float]) -> dict[str, Any] | None:
 
 
 def _ordered(names: str, values: Sequence[float]) -> dict[str, float]:
-    """Return coefficients by name, 0 for those that are missing and those of the other model."""
+    """Return coefficients by name; missing ones and the other model's are 0."""
     unused = dict.fromkeys(("k1", "k2", "k3", "k4", "p1", "p2"), 0.0)
     return {**unused, **dict(zip(names.split(), values, strict=False))}
 

@@ -338,7 +338,7 @@ def _start(name: Any, folder: Path, seen: tuple[Path, ...]) -> Config:
         return _from_file(folder / name, None, seen)
     preset = preset_named(name)
     try:
-        return from_plain(Config, preset.values, base=Config())
+        return _merged(preset.values, Config(), Path(), seen)
     except ConfigError as error:  # of another package
         raise ConfigError(f"preset {name}: {error}") from None
 

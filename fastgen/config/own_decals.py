@@ -34,7 +34,7 @@ _Side = Annotated[float, Bounds(10.0, 5000.0, "mm")]
 
 @dataclass(frozen=True)
 class MarkerConfig:
-    """A marker: a square that stands on its corner.
+    """A diamond-shaped marker with a label.
 
     Attributes:
         art: Path of a square PNG or SVG image, relative to the file that names it. The tips of the
@@ -60,8 +60,8 @@ class StickerConfig:
 
     Attributes:
         art: Path of a PNG or SVG image, relative to the file that names it. It is stretched to
-            the size, and where it is transparent the paint shows. The configuration keeps the
-            image itself.
+            the size. The paint shows through transparent parts. The configuration keeps the image
+            itself.
         size_mm: Width and height.
         faces: Faces that may carry it.
         weight: Relative frequency among the stickers_per_face.
@@ -93,8 +93,8 @@ class BrandConfig:
     """A shipping line, whose name, emblem and owner codes containers carry.
 
     Attributes:
-        emblem: Path of a PNG or SVG image, relative to the file that names it. Where it is
-            transparent the paint shows. The configuration keeps the image itself.
+        emblem: Path of a PNG or SVG image, relative to the file that names it. The paint shows
+            through transparent parts. The configuration keeps the image itself.
         wordmark: Text below the emblem, of capitals, digits and some signs.
         main_texts: Further large texts; an empty list stands for the wordmark.
         owner_codes: Owner codes, used with the probability identifiers.brand_codes.

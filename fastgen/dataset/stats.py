@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.classes import MARK_CLASSES
+from fastgen.classes import ALL_SEGMENTATION_CLASSES, MARK_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
@@ -119,8 +119,8 @@ def _records(out: str, manifest: dict[str, Any]) -> Iterator[Record]:
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:
     rows = {name: [each.by_class[name] for each in found.values()] for name in task.classes}
-    # most datasets have neither marks nor scrapes
-    optional = (*MARK_CLASSES, "scrape")
+    # most datasets have neither marks nor kinds of damage beyond those of the paper
+    optional = (*MARK_CLASSES, *ALL_SEGMENTATION_CLASSES[len(SEGMENTATION_CLASSES) :])
     return _table({n: row for n, row in rows.items() if n not in optional or any(row)})
 
 

@@ -19,7 +19,7 @@ from fastgen.sampling.scene import SPLITS
 
 class _Imdg(Format):
     name = "imdg"
-    classes = ALL_DETECTION_CLASSES
+    classes: tuple[str, ...] = ALL_DETECTION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample, split, stem = item.sample, item.split, item.stem

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import (
+    ALL_DAMAGE_CLASSES,
     CONTAINER_ID,
     DAMAGE_CLASSES,
     DAMAGE_VALUES,
@@ -34,7 +35,8 @@ DAMAGE_GREYS = MappingProxyType(
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal", "scrape")
+_LATER = ALL_DAMAGE_CLASSES[len(DAMAGE_CLASSES) :]
+_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal", *_LATER)
 _PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 
 
