@@ -1,5 +1,7 @@
 """Class names with their order in the label formats, and the values of masks and id targets."""
 
+from collections.abc import Iterable, Sequence
+
 MARKER_CLASSES = (
     *("C1.1", "C1.2", "C1.3", "C1.4", "C2.1", "C2.2", "C2.3", "C2.4", "C2.5", "C3.1", "C3.2"),
     *("C4.1", "C4.2", "C4.3", "C4.4", "C5.1", "C5.2", "C5.3", "C6.1", "C6.2"),
@@ -9,6 +11,9 @@ MARKER_CLASSES = (
 
 DETECTION_CLASSES = ("container", "text", *MARKER_CLASSES)
 """The 28 classes of the marker task, in the order of YOLO labels."""
+
+CLASS_NAME = "[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}"
+"""Pattern of class names. Label files separate names by spaces."""
 
 MARK_CLASSES = (
     "limited_quantity",
@@ -36,11 +41,35 @@ ALL_SEGMENTATION_CLASSES = ("container", *ALL_DAMAGE_CLASSES)
 """COCO category i + 1 is ALL_SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance. The
 first five are SEGMENTATION_CLASSES."""
 
+
+def segmentation_classes(kinds: Iterable[str]) -> tuple[str, ...]:
+    """Return the classes of the damage task, in label order, if these kinds of damage may occur.
+
+    The paper's five classes always come first. Later classes follow up to the last one that occurs.
+    """
+    last = max((ALL_SEGMENTATION_CLASSES.index(kind) for kind in kinds), default=0)
+    return ALL_SEGMENTATION_CLASSES[: max(last + 1, len(SEGMENTATION_CLASSES))]
+
+
 UNDAMAGED_CONTAINER = 101
 """Mask value of the undamaged container: category 1, instance 1 (SeaFront paper, 3.3.4)."""
 
 DAMAGE_VALUES = range(200, (len(ALL_SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance. They are also the ids of damages."""
+
+OTHER_CLASSES = frozenset({*ALL_DAMAGE_CLASSES, "spreader", "seal"})
+"""Classes of labels that do not belong to the marker task."""
+
+
+def with_marks(classes: Sequence[str]) -> tuple[str, ...]:
+    """Return classes of the marker task, followed by the marks that are not among them."""
+    return (*classes, *(name for name in MARK_CLASSES if name not in classes))
+
+
+def is_detection(name: str) -> bool:
+    """Return whether a class belongs to the marker task; any name may be a user's own class."""
+    return name not in OTHER_CLASSES
+
 
 CONTAINER_ID = 1
 """Id of the container. In the id target 0 is the surroundings, and decals count up from 2."""

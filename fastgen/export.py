@@ -37,7 +37,7 @@ from fastgen.render.passes.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.render.surface_values import SEAL_STEEL_ALBEDO
 from fastgen.scene import Camera, Color, Ground, Pose, Prop, Scene
 from fastgen.scene.boxes import rotation_of
-from fastgen.scene.check import check_camera, check_scene
+from fastgen.scene.check import check_camera
 from fastgen.scene.limits import MM
 from fastgen.validation import to_plain
 
@@ -82,7 +82,7 @@ def export_glb(
         ConfigError: The texel is too small, the scene cannot be drawn, or it has no container.
         OutputError: The file cannot be written.
     """
-    scene = check_scene(scene)
+    scene = generator.checked(scene)
     if not (scene.container.present or scene.neighbours or scene.ground):
         raise ConfigError(
             f"scene {scene.index}: has no container to export; take another, or set "
@@ -355,7 +355,7 @@ def _append_camera(
     if view.distortion:
         extras |= {key: view_values(view)[key] for key in ("distortion_model", "distortion")}
     perspective = {
-        "yfov": 2 * float(np.arctan(height / 2 / view.focal_px)),
+        "yfov": 2 * float(np.arctan(height / 2 / view.focals_px[1])),
         "aspectRatio": width / height,
         "znear": 0.1,
         "zfar": 1000.0,

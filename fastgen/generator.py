@@ -8,7 +8,9 @@ from typing import Any, Self
 
 from fastgen.camera.projection import view_of
 from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
+from fastgen.classes import with_marks
 from fastgen.config.config import Config, LabelConfig
+from fastgen.decals.own_art import art_of
 from fastgen.errors import ConfigError
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.background import background_objects
@@ -18,6 +20,7 @@ from fastgen.light.container_map import ContainerMap, container_map_path, load_c
 from fastgen.light.environment import EnvironmentLight, load_environment
 from fastgen.light.exposure import airlight
 from fastgen.light.hdri import bundled_hdris, bundled_weights, content_hash, hdris_by_name
+from fastgen.postprocess import imported, postprocessed
 from fastgen.preload import preload
 from fastgen.render.cuda import CudaFrame, cuda_reason
 from fastgen.render.gl import open_context
@@ -27,10 +30,10 @@ from fastgen.render.session import GpuSession
 from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
-from fastgen.sampling.coverage import extreme_lenses
-from fastgen.sampling.scene import sample_scene
+from fastgen.sampling.lens_check import check_lenses
+from fastgen.sampling.scene import sample_scene, stream
 from fastgen.scene import Camera, Scene
-from fastgen.scene.check import check_camera, check_scene
+from fastgen.scene.check import OwnDecals, check_camera, check_scene
 from fastgen.validation import check_fields, check_known, nearest, whole
 
 
@@ -87,14 +90,18 @@ class Generator:
         self.config = Config.checked(config)
         self.seed = whole("seed", seed)
         self.settings = RenderSettings(size, quality, backend, device_index, hdri_dir)
-        _check_lenses(self.config, self.settings.size)
+        check_lenses(self.config, self.settings.size)
         self._hdris = bundled_hdris() if hdri_dir is None else hdris_by_name(hdri_dir)
         self._weights = (
             bundled_weights() if hdri_dir is None else dict.fromkeys(sorted(self._hdris), 1.0)
         )
+        if self.config.postprocess:
+            imported(self.config.postprocess)  # refuses an unusable one at once
         # the cameras of a scene are usually rendered one after the other
         self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
         self._given: tuple[Scene, PreparedScene] | None = None
+        own_art = self.config.markings.own_art
+        self._own_decals = OwnDecals(self.config.markings.detection_classes, tuple(own_art))
         self.gpu = GpuSession(
             partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
@@ -102,6 +109,7 @@ class Generator:
                 light=partial(_load_light, self._hdris),
                 quality=QUALITY[quality],
                 mask_threshold_mm=self.config.damage.mask_threshold_mm,
+                own_art={name: art_of(text) for name, text in own_art.items()},
             ),
         )
 
@@ -182,6 +190,7 @@ class Generator:
         Raises:
             ConfigError: An argument is not valid or the scene cannot be drawn.
             ContextError: There is no OpenGL.
+            FastgenError: The function `config.postprocess` fails.
         """
         if labels is not None:
             labels = check_fields(labels, LabelConfig, "labels")
@@ -207,7 +216,7 @@ class Generator:
         if containers is not None and config.labels.background != "none":
             more, background = background_objects(shot, containers)
             objects += more
-        return Sample(
+        sample = Sample(
             image=frame.image,
             cover=frame.cover,
             ids=frame.ids,
@@ -219,7 +228,12 @@ class Generator:
             objects=objects,
             normals=frame.normals,
             background=background,
+            marker_classes=with_marks(config.markings.detection_classes),
         )
+        if not config.postprocess or layer != "all":
+            return sample
+        rng = stream(scene.seed, scene.index, f"postprocess.{camera.name}")
+        return postprocessed(sample, config.postprocess, rng)
 
     def render_cuda(
         self,
@@ -278,6 +292,14 @@ class Generator:
             checked = self._prepared(scene).scene
             return renderer.exposure(checked, check_camera(camera, checked), self.size).factor
 
+    def checked(self, scene: Scene) -> Scene:
+        """Return a copy of a scene that this generator can draw, see `check_scene`.
+
+        Raises:
+            ConfigError: naming the first part that cannot be drawn.
+        """
+        return check_scene(scene, self._own_decals)
+
     def preload(self, on_step: Callable[[], None] = lambda: None) -> None:
         """Prepare every light, shape and program that scenes may need.
 
@@ -324,7 +346,7 @@ class Generator:
         if sampled is not None and scene is sampled[1].scene:
             return sampled[1]
         if given is None or scene is not given[0]:
-            self._given = given = scene, PreparedScene(check_scene(scene))
+            self._given = given = scene, PreparedScene(self.checked(scene))
         return given[1]
 
 
@@ -332,13 +354,3 @@ def _load_light(hdris: Mapping[str, Path], name: str) -> EnvironmentLight:
     if name not in hdris:
         raise ConfigError(f"environment: no HDRI {name!r}{nearest(name, hdris)}")
     return load_environment(hdris[name])
-
-
-def _check_lenses(config: Config, size: tuple[int, int]) -> None:
-    """Refuse lenses that cannot be drawn at this size before the first image is drawn."""
-    for name, rig in config.cameras.items():
-        for lens in extreme_lenses(rig.lens) if rig.lens else ():
-            camera = Camera(
-                name, (0, 0, 0), (0, 1, 0), rig.focal_mm, 0, rig.sensor_width_mm, 0, lens
-            )
-            view_of(camera, size)

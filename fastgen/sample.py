@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
+from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.frame import Frame
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.scene.object_ids import scene_numbers
@@ -126,6 +127,9 @@ class Sample(Frame):
         background: uint16 [H, W], id - BACKGROUND_ID of the panorama's container at a pixel, 0
             elsewhere. None if these containers are not labelled: they are unknown in photographs,
             and LabelConfig.background may switch them off.
+        marker_classes: Classes of the marker task in label order, see
+            MarkingsConfig.detection_classes. The marks follow where they are not among them,
+            because scenes made by hand may have marks.
     """
 
     scene: Scene
@@ -133,6 +137,7 @@ class Sample(Frame):
     view: View
     objects: list[Object]
     background: NDArray[np.uint16] | None = field(default=None, kw_only=True)
+    marker_classes: tuple[str, ...] = field(default=ALL_DETECTION_CLASSES, kw_only=True)
 
     def container_at(self, number: int) -> ContainerView:
         """Return a container of the scene, as the camera sees it in the container's own frame.

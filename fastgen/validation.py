@@ -15,6 +15,7 @@ import numbers
 import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -30,6 +31,9 @@ T = TypeVar("T")
 _PAIR = "[lowest, highest]"
 _NUMBER = "[number]"
 """Tags in the location of pydantic's errors, for the two ways to write a range."""
+
+FOLDER = "folder"
+"""Key of the folder of relative paths in the context of pydantic's validators."""
 
 _MOST_CHOICES = 60
 """Most names that a message lists."""
@@ -214,7 +218,9 @@ def to_plain(value: Any) -> Any:
     return value
 
 
-def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -> T:
+def from_plain(
+    cls: type[T], data: Any, path: str = "", base: T | None = None, folder: Path | None = None
+) -> T:
     """Return an instance of dataclass `cls`, validated.
 
     Args:
@@ -224,6 +230,7 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
         base: Values of the fields that `data` leaves out, at any depth. A `dict` field is replaced
             as a whole, but a dataclass in it takes from the base's entry of the same name what it
             leaves out. Without a base, the defaults of `cls` apply.
+        folder: Folder that paths of files are relative to; None for the working directory.
 
     Raises:
         ConfigError: naming the field, the value and what to give instead.
@@ -232,7 +239,7 @@ def from_plain(cls: type[T], data: Any, path: str = "", base: T | None = None) -
         values = _over(base, data)
     except RecursionError:  # a value contains itself, so no field accepts it
         values = data
-    made: T = _validated(cls, values, path, strict=None)
+    made: T = _validated(cls, values, path, strict=None, folder=folder)
     return made
 
 
@@ -295,11 +302,14 @@ def adapter(cls: type) -> "TypeAdapter[Any]":
     return TypeAdapter(with_config(settings)(cls))
 
 
-def _validated(cls: type, value: Any, path: str, strict: bool | None) -> Any:
+def _validated(
+    cls: type, value: Any, path: str, strict: bool | None, folder: Path | None = None
+) -> Any:
     from pydantic import ValidationError
 
     try:
-        return adapter(cls).validate_python(value, strict=strict)
+        context = {FOLDER: folder or Path()}
+        return adapter(cls).validate_python(value, strict=strict, context=context)
     except ValidationError as error:
         raise _in_words(cls, error.errors(include_url=False), path) from None
 

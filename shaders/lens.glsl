@@ -16,7 +16,7 @@ vec2 tangential(vec2 p) {
 vec4 bent(vec4 clip) {
     if (lens_model == 0.0) return clip;
     mat2 to_clip = mat2(lens_to_clip.xy, lens_to_clip.zw);
-    vec2 ideal = inverse(to_clip) * clip.xy / clip.w;
+    vec2 ideal = inverse(to_clip) * (clip.xy - lens_clip_center * clip.w) / clip.w;
     float radius = max(length(ideal), 1e-6);
     float t = lens_model == 2.0 ? atan(radius) : radius;
     float inner = min(t, lens_linear_from.x);
@@ -24,7 +24,7 @@ vec4 bent(vec4 clip) {
     float curve = 1.0 + q * (lens_radial.x + q * (lens_radial.y + q * (lens_radial.z + q * lens_radial.w)));
     float seen = inner * curve + lens_linear_from.y * (t - inner);
     vec2 moved = ideal * (seen / radius) + tangential(ideal * min(1.0, lens_linear_from.x / radius));
-    return vec4(to_clip * moved * clip.w, clip.zw);
+    return vec4(to_clip * moved * clip.w + lens_clip_center * clip.w, clip.zw);
 }
 
 // Ratio of the undistorted to the distorted radius: the reciprocal of a polynomial in the squared

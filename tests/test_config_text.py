@@ -49,11 +49,11 @@ def test_the_command_prints_a_preset_changed_by_a_file(tmp_path, capsys):
         (
             "cameras: {x: {face: door, focal_mm: 24, distance_mm: 5000, "
             "lens: {model: fisheye, k1: [-0.5, 0.1]}}}",
-            "cameras.x.lens: its distortion folds the image over",
+            "cameras.x.focal_mm: 24 mm is too short for this lens at 640x640; use at least",
         ),
         (
             "cameras: {x: {face: door, focal_mm: 3, distance_mm: 5000, lens: {k1: 0}}}",
-            "cameras.x.lens: the image's corners look",
+            "cameras.x.focal_mm: 3 mm is too short for this lens at 640x640; use at least",
         ),
         ("environment: {names: [quay]}", "environment.names: HDRI 'quay' is not available"),
         (

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from itertools import combinations, product
 
 import cv2
@@ -114,7 +115,7 @@ def test_the_shader_removes_the_distortion(lens, focal_mm):
         kept = blocks(
             gl,
             lens_center=view.center_px,
-            lens_focal=view.focal_px,
+            lens_focal=view.focals_px,
             **view.distortion.shader_values,
         )
         # no texture is wide enough for all pixels in one row
@@ -350,11 +351,24 @@ def test_a_lens_without_distortion_is_a_pinhole():
     assert lens.half_angle_deg == pytest.approx(plain.half_angle_deg)
 
 
-def test_a_rig_that_cannot_be_drawn_is_refused_at_once():
+def test_a_rig_that_cannot_be_drawn_is_refused_with_the_focal_length_that_can():
     lens = {"model": "fisheye", "k1": [-0.1, 0.2]}
-    config = Config.from_values({"cameras": {"A": {"focal_mm": 11, "lens": lens}}})
-    with pytest.raises(ConfigError, match=r"cameras.A.lens: .* take a larger focal_mm"):
-        Generator(config)
+
+    def opened(focal_mm, size=SIZE):
+        Generator(
+            Config.from_values({"cameras": {"A": {"focal_mm": focal_mm, "lens": lens}}}), 0, size
+        )
+
+    for size in (SIZE, (96, 192)):  # a tall image sees more above and below
+        words = (
+            r"^cameras\.A\.focal_mm: 4 mm is too short for this lens at .*; use at least (.*) mm$"
+        )
+        with pytest.raises(ConfigError, match=words) as caught:
+            opened(4, size)
+        least_mm = float(re.match(words, str(caught.value))[1])
+        opened(least_mm, size)
+        with pytest.raises(ConfigError, match=f"use at least {least_mm:g} mm"):
+            opened(least_mm - 0.1, size)
 
 
 def test_the_shaded_region_contains_edges_bowed_by_a_fisheye():

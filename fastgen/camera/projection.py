@@ -27,9 +27,11 @@ class View:
     Attributes:
         rotation: float64 [3, 3], world to view.
         position_m: float64 [3], world metres.
-        focal_px: Focal length in pixels, equal on both axes.
+        focal_px: Focal length along x in pixels.
         size: (width, height) in pixels.
         distortion: Lens distortion, None for a pinhole.
+        pixel_aspect: Focal length along y relative to that along x.
+        principal_px: Principal point (x, y) in pixels; None for the centre of the image.
     """
 
     rotation: NDArray[np.float64]
@@ -37,17 +39,25 @@ class View:
     focal_px: float
     size: tuple[int, int]
     distortion: Distortion | None = None
+    pixel_aspect: float = 1.0
+    principal_px: tuple[float, float] | None = None
 
     @property
     def center_px(self) -> tuple[float, float]:
-        """Principal point (x, y) in pixels: the centre of the image."""
-        return self.size[0] / 2, self.size[1] / 2
+        """Principal point (x, y) in pixels."""
+        return self.principal_px or (self.size[0] / 2, self.size[1] / 2)
+
+    @property
+    def focals_px(self) -> NDArray[np.float64]:
+        """Focal lengths along x and y in pixels, float64 [2]."""
+        return np.array([self.focal_px, self.pixel_aspect * self.focal_px])
 
     @property
     def intrinsics(self) -> NDArray[np.float64]:
         """Camera matrix float64 [3, 3], view space to pixels; Hartley and Zisserman, 6.1."""
         x, y = self.center_px
-        return np.array([[self.focal_px, 0, x], [0, self.focal_px, y], [0, 0, 1]])
+        across, down = self.focals_px
+        return np.array([[across, 0, x], [0, down, y], [0, 0, 1]])
 
     @property
     def translation_mm(self) -> NDArray[np.float64]:
@@ -91,8 +101,8 @@ class View:
             np.multiply(view[..., axis], inverse, out=plane[..., axis])
         if self.distortion:
             plane = self.distortion.apply(plane)
-        plane *= self.focal_px
-        for axis, center in enumerate(self.center_px):
+        for axis, (focal, center) in enumerate(zip(self.focals_px, self.center_px, strict=True)):
+            plane[..., axis] *= focal
             plane[..., axis] += center
         return plane, depth
 
@@ -111,7 +121,7 @@ class View:
         if pixels is None:
             x, y = np.arange(width) + 0.5, np.arange(height) + 0.5
             pixels = np.stack(np.meshgrid(x, y), axis=-1)
-        across = (np.asarray(pixels, np.float64) - self.center_px) / self.focal_px
+        across = (np.asarray(pixels, np.float64) - self.center_px) / self.focals_px
         if self.distortion:
             across = self.distortion.remove(across)
         rays = np.concatenate([across, np.ones_like(across[..., :1])], axis=-1) @ self.rotation
@@ -133,9 +143,10 @@ class View:
         """
         return {
             **(self.distortion.shader_values if self.distortion else PINHOLE),
-            "lens_to_clip": (to_samples * 2 * self.focal_px / self.size).T.ravel(),
+            "lens_to_clip": (to_samples * 2 * self.focals_px / self.size).T.ravel(),
+            "lens_clip_center": to_samples @ (2 * np.array(self.center_px) / self.size - 1),
             "lens_center": self.center_px,
-            "lens_focal": self.focal_px,
+            "lens_focal": self.focals_px,
         }
 
     def clip_matrix(self) -> NDArray[np.float64]:
@@ -145,13 +156,12 @@ class View:
         top row of the image, read-back needs no flip, and front faces are clockwise. Depth
         [NEAR_M, FAR_M] maps to [-1, 1]. OpenGL 4.5 core specification, section 13.6.
         """
-        width, height = self.size
         world_to_view = np.eye(4)
         world_to_view[:3, :3] = self.rotation
         world_to_view[:3, 3] = -self.rotation @ self.position_m
         projection = np.zeros((4, 4))
-        projection[0, 0] = 2 * self.focal_px / width
-        projection[1, 1] = 2 * self.focal_px / height
+        projection[[0, 1], [0, 1]] = 2 * self.focals_px / self.size
+        projection[:2, 2] = 2 * np.array(self.center_px) / self.size - 1
         projection[2, 2] = (FAR_M + NEAR_M) / (FAR_M - NEAR_M)
         projection[2, 3] = -2 * FAR_M * NEAR_M / (FAR_M - NEAR_M)
         projection[3, 2] = 1.0
@@ -178,14 +188,18 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     rolled_right = np.cos(roll) * right - np.sin(roll) * down
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
+    aspect, (shift_x, shift_y) = camera.pixel_aspect, camera.principal_point
+    principal_px = (size[0] / 2 + shift_x * size[0], size[1] / 2 + shift_y * size[0])
     distortion = None
     if camera.lens is not None:
+        # the farther border on each axis
+        half = (abs(shift_x) * size[0] + size[0] / 2, abs(shift_y) * size[0] + size[1] / 2)
         try:
-            distortion = _distortion(camera.lens, (size[0] / 2 / focal_px, size[1] / 2 / focal_px))
+            distortion = _distortion(camera.lens, (half[0] / focal_px, half[1] / aspect / focal_px))
         except ConfigError as error:
             raise ConfigError(f"cameras.{camera.name}.{error}") from None
     rotation = np.stack([rolled_right, rolled_down, forward])
-    return View(rotation, position, focal_px, size, distortion)
+    return View(rotation, position, focal_px, size, distortion, aspect, principal_px)
 
 
 @lru_cache(maxsize=64)

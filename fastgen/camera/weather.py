@@ -130,7 +130,7 @@ def add_rain(
     height, width = depth_m.shape
     slope = 4.1 * rain.rate_mm_h**-0.21  # 1/mm
     per_m3 = 8000 / slope * (np.exp(-slope * _SMALLEST_MM) - np.exp(-slope * _LARGEST_MM))
-    reach = np.array([width, height]) / view.focal_px
+    reach = np.array([width, height]) / view.focals_px
     volume = reach.prod() * (_FARTHEST_M**3 - _NEAREST_M**3) / 3
     fallen = int(rng.poisson(per_m3 * volume))
     count = min(fallen, _MOST_DROPS)
@@ -145,8 +145,8 @@ def add_rain(
     aside = np.array([down[1], -down[0], 0.0])
     fall_m = (speed * rain.shutter_s)[:, None] * (down + rain.wind * aside)
     # the derivative of a pinhole's projection
-    from_center = (start - view.center_px) / view.focal_px
-    way_px = (fall_m[:, :2] - from_center * fall_m[:, 2:]) / z[:, None] * view.focal_px
+    from_center = (start - view.center_px) / view.focals_px
+    way_px = (fall_m[:, :2] - from_center * fall_m[:, 2:]) / z[:, None] * view.focals_px
     wide_px = size_mm * 1e-3 / z * view.focal_px
     cover = _streaks(start, way_px, wide_px, z, depth_m, fallen / max(count, 1))
     return _mixed(light, _DROP_LIGHT * sky, cover)

@@ -23,7 +23,7 @@ from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
 from fastgen.dataset.verify import examine
-from fastgen.formats.registry import SEAFRONT, known_formats
+from fastgen.formats.registry import SEAFRONT, format_names
 
 _GENERATE = """\
 Generate a labelled dataset, or continue one that was stopped.
@@ -86,7 +86,7 @@ def add_generate(commands: Any) -> None:
     output.add_argument(
         "--also",
         default="",
-        metavar=",".join(sorted(set(known_formats()) - set(SEAFRONT))),
+        metavar=",".join(name for name in format_names() if name not in SEAFRONT),
         help="label files to write in addition, separated by commas; bop needs the seafront format",
     )
     defaults = ", ".join(f"{count} in {name}" for name, count in SHARD_SCENES.items())

@@ -56,8 +56,8 @@ def add_fit(commands: Any) -> None:
     command.add_argument(
         "--preset",
         default="gate",
-        metavar="|".join(PRESETS),
-        help="built-in configuration to start from; default: %(default)s",
+        metavar=f"{'|'.join(PRESETS)}|FILE",
+        help="preset or file to start from; `fastgen presets` lists all; default: %(default)s",
     )
     command.set_defaults(run=_fit)
 

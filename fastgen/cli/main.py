@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import fastgen
-from fastgen.cli.config_command import add_config_command
+from fastgen.cli.config_command import add_config_command, add_presets
 from fastgen.cli.dataset_commands import add_generate, add_stats, add_verify
 from fastgen.cli.fit_command import add_fit
 from fastgen.cli.scene_commands import add_export, add_show
@@ -87,8 +87,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"fastgen {fastgen.__version__}")
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
     adders = (
-        *(add_generate, add_config_command, add_fit, add_show, add_export, add_stats),
-        add_verify,
+        *(add_generate, add_config_command, add_presets, add_fit, add_show, add_export),
+        *(add_stats, add_verify),
     )
     for add in adders:
         add(commands)

@@ -4,6 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
+from fastgen.config.assignments import assigned
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
 from fastgen.dataset.addresses import place_of
@@ -13,20 +14,30 @@ from fastgen.render.settings import QUALITY, RenderSettings
 
 
 def add_config(command: argparse.ArgumentParser) -> None:
-    """Add --preset and --config, which `config_of` reads."""
+    """Add --preset, --config and --set, which `config_of` reads."""
     group = command.add_argument_group("scenes")
     group.add_argument(
         "--preset",
-        default="seafront",
-        metavar="|".join(PRESETS),
-        help="built-in configuration to start from; default: %(default)s",
+        metavar=f"{'|'.join(PRESETS)}|FILE",
+        help="preset or file to start from; `fastgen presets` lists all; default: seafront",
     )
     group.add_argument(
         "--config",
         type=Path,
+        action="append",
+        default=[],
         metavar="FILE",
-        help="YAML or JSON file with values that replace those of the preset; "
-        "`fastgen config` prints all keys",
+        help="YAML or JSON file with values that replace those of the preset; `fastgen config` "
+        "prints all keys. Of several, each changes the result of those before it",
+    )
+    group.add_argument(
+        "--set",
+        dest="assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="single value that replaces that of preset and files, as in damage.probability=0.8; "
+        "may be given several times",
     )
 
 
@@ -51,12 +62,7 @@ def add_index(command: argparse.ArgumentParser) -> None:
 def add_render(command: argparse.ArgumentParser, quality: bool = True) -> None:
     """Add the options that `render_settings` reads; --quality only if `quality`."""
     group = command.add_argument_group("rendering")
-    group.add_argument(
-        "--size",
-        default="640x640",
-        metavar="WxH",
-        help="width and height of the images in pixels, each 64 to 4096; default: %(default)s",
-    )
+    add_size(group)
     if quality:
         group.add_argument(
             "--quality",
@@ -73,6 +79,16 @@ def add_render(command: argparse.ArgumentParser, quality: bool = True) -> None:
         help="OpenGL backend; auto takes the first that works; default: %(default)s",
     )
     add_device(group)
+
+
+def add_size(command: argparse._ActionsContainer) -> None:
+    """Add --size, which `size_of` reads."""
+    command.add_argument(
+        "--size",
+        default="640x640",
+        metavar="WxH",
+        help="width and height of the images in pixels, each 64 to 4096; default: %(default)s",
+    )
 
 
 def add_hdri(command: argparse._ActionsContainer, note: str = "") -> None:
@@ -108,15 +124,17 @@ def output_file(text: str) -> Path:
 
 
 def config_of(options: argparse.Namespace) -> Config:
-    """Return the configuration that --preset and --config describe."""
-    preset = Config.preset(options.preset)
-    return Config.load(options.config, preset) if options.config else preset
+    """Return the configuration that --preset, --config and --set describe."""
+    config = None if options.preset is None else Config.preset(options.preset)
+    for path in options.config:
+        config = Config.load(path, config)
+    return assigned(Config.preset() if config is None else config, options.assignments)
 
 
 def render_settings(options: argparse.Namespace) -> RenderSettings:
     """Return the settings that the options of `add_render` describe."""
     return RenderSettings(
-        size=_size(options.size),
+        size=size_of(options),
         quality=getattr(options, "quality", "balanced"),
         backend=options.backend,
         device_index=options.device_index,
@@ -124,7 +142,9 @@ def render_settings(options: argparse.Namespace) -> RenderSettings:
     )
 
 
-def _size(text: str) -> tuple[int, int]:
+def size_of(options: argparse.Namespace) -> tuple[int, int]:
+    """Return the width and height that --size gives."""
+    text = options.size
     match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
     if not match:
         raise ConfigError(f"size: {shown(text)} is not a size; write WIDTHxHEIGHT, as in 640x640")

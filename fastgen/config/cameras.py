@@ -14,6 +14,7 @@ from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, mm_away
 from fastgen.scene.faces import FACES
 from fastgen.scene.limits import MM, NEAR_M
+from fastgen.scene.optics import ASPECT_LIMITS, PRINCIPAL_LIMITS
 from fastgen.validation import Bounds, OneOf, Range
 
 _STEPS, _ROUNDS, _THIRDS = 33, 3, 40
@@ -23,9 +24,13 @@ best ones, and steps of the ternary search over the distance."""
 _ROUNDED_MM = 0.1
 """Camera positions are rounded to this."""
 
+LONGEST_FOCAL_MM = 2000.0
+"""Upper limit of focal lengths."""
+
 Array = NDArray[np.float64]
 
 _Aim = Annotated[Range, Bounds(-2.0, 2.0)]
+_Shift = Annotated[float, Bounds(*PRINCIPAL_LIMITS)]
 _Angle = Annotated[Range, Bounds(-89.0, 89.0, "degrees")]
 
 
@@ -53,12 +58,15 @@ class CameraConfig:
             left edge, 1 for its right edge.
         aim_up: Further shift upward, as a share of half the height of the face.
         sensor_width_mm: Width of the sensor, which spans the width of the image.
+        pixel_aspect: Focal length down the image relative to focal_mm, fy / fx of a calibration.
+        principal_point: Distance of the principal point to the right and down from the centre of
+            the image, as shares of its width.
         exposure_ev: Deviation from the metered exposure.
         lens: Distortion, null for a pinhole.
     """
 
     face: Annotated[str, OneOf(FACES)]
-    focal_mm: Annotated[float, Bounds(1.0, 2000.0, "mm")]
+    focal_mm: Annotated[float, Bounds(1.0, LONGEST_FOCAL_MM, "mm")]
     distance_mm: Annotated[Range, Bounds(300.0, 1.5e5, "mm")]  # well before the far plane
     azimuth_deg: _Angle = Range(-12, 12)
     elevation_deg: _Angle = Range(-8, 18)
@@ -67,6 +75,8 @@ class CameraConfig:
     aim_right: _Aim = Range(0, 0)
     aim_up: _Aim = Range(0, 0)
     sensor_width_mm: Annotated[float, Bounds(0.1, 1000.0, "mm")] = 36.0
+    pixel_aspect: Annotated[float, Bounds(*ASPECT_LIMITS)] = 1.0
+    principal_point: tuple[_Shift, _Shift] = (0.0, 0.0)
     exposure_ev: Annotated[Range, Bounds(-10.0, 10.0, "stops")] = Range(-0.5, 0.4)
     lens: LensConfig | None = None
 

@@ -70,6 +70,14 @@ class _Text:
             yield from _explained(name if value else f"{name} {{}}", words, _limits(value, hint))
             for item_key, item in value.items():
                 yield from _indented(self._entry(item_key, item, None))
+            cls = _entry_class(hint)
+            if not value and cls is not None and cls not in self._described:
+                about, words_of = meanings(cls)
+                self._described.add(cls)
+                lines = [f"Each entry is a mapping with a name of its own. {about}"]
+                lines += [f"{name}: {words_of[name]}" for name in words_of]
+                for line in lines:
+                    yield from _indented(_comment(line))
         elif value is None:
             yield from _explained(f"{name} null", words)
             (cls,) = (arg for arg in typing.get_args(hint) if arg is not type(None))
@@ -79,6 +87,13 @@ class _Text:
         else:
             plain = list(value) if isinstance(value, tuple) else value
             yield from _explained(f"{name} {_plain(plain)}", words, _limits(value, hint))
+
+
+def _entry_class(hint: Any) -> type | None:
+    """Return the dataclass of a mapping's values, or None for other values."""
+    arguments = typing.get_args(hint)
+    made = arguments[1] if len(arguments) == 2 else None
+    return made if isinstance(made, type) and dataclasses.is_dataclass(made) else None
 
 
 def _indented(lines: Iterator[str]) -> Iterator[str]:

@@ -12,12 +12,13 @@ from typing import Annotated, Any
 
 from annotated_types import MinLen
 
+from fastgen.config.calibration import with_focal_lengths
 from fastgen.config.cameras import CameraConfig, check_above_ground, check_room, seafront_rig
 from fastgen.config.damage import DamageConfig
 from fastgen.config.fields import HexColors, Weight
 from fastgen.config.lamps import LampsConfig
 from fastgen.config.markings import MarkingsConfig
-from fastgen.config.presets import PRESETS
+from fastgen.config.presets import preset_named
 from fastgen.config.sensor import SensorConfig, WeatherConfig
 from fastgen.config.surface import SurfaceConfig
 from fastgen.config.surroundings import GroundConfig, PlacementConfig
@@ -31,11 +32,13 @@ from fastgen.validation import (
     OneOf,
     Range,
     Share,
-    check_known,
     check_weights,
     from_plain,
     to_plain,
 )
+
+PRESET_KEY = "preset"
+"""Key of a file or mapping that names the preset to start from."""
 
 _CameraName = Annotated[
     str,
@@ -44,6 +47,11 @@ _CameraName = Annotated[
         "is not a camera name; it is used in file names, so give up to 64 letters, digits, - and _",
     ),
 ]
+
+_FUNCTION = Matching(
+    r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*|",
+    "is not a function; write package.module:function",
+)
 
 
 @dataclass(frozen=True)
@@ -189,6 +197,8 @@ class Config:
     Attributes:
         cameras: Rig of cameras by name. A file that has this key gives the whole rig; a camera with
             the name of one of the preset's inherits what the file leaves out.
+        postprocess: Function that changes every finished sample, as package.module:function; empty
+            for none. It takes the sample and a NumPy random generator, and returns a Sample.
     """
 
     container: ContainerConfig = field(default_factory=ContainerConfig)
@@ -207,6 +217,7 @@ class Config:
     weather: WeatherConfig = field(default_factory=WeatherConfig)
     labels: LabelConfig = field(default_factory=LabelConfig)
     split: SplitConfig = field(default_factory=SplitConfig)
+    postprocess: Annotated[str, _FUNCTION] = ""
 
     def __post_init__(self) -> None:
         """Refuse splits without shares, camera names that differ only in case, and lone twins."""
@@ -230,13 +241,16 @@ class Config:
 
     @staticmethod
     def preset(name: str = "seafront") -> "Config":
-        """Return a named preset.
+        """Return a configuration to start from.
+
+        Args:
+            name: Name of a preset of fastgen or of an installed package, or the path of a file for
+                `load`, which ends in .yaml, .yml or .json.
 
         Raises:
-            ConfigError: for an unknown name, suggesting the nearest one.
+            ConfigError: for an unknown name, suggesting the nearest one, or an unusable file.
         """
-        check_known("preset", name, tuple(PRESETS))
-        return from_plain(Config, PRESETS[name], base=Config())
+        return _start(name, Path(), ())
 
     @staticmethod
     def checked(config: Any) -> "Config":
@@ -263,15 +277,13 @@ class Config:
 
         Args:
             data: Mapping of plain values, as in a file; see `load`.
-            base: Values of everything that `data` leaves out; None stands for preset seafront.
+            base: Values of everything that `data` leaves out. None stands for the preset that
+                `data` names with the key `preset`, or else for seafront.
 
         Raises:
             ConfigError: naming the key or value that does not fit.
         """
-        if not isinstance(base, Config | None):
-            raise ConfigError(f"base: {base!r} is not a Config; take one from Config.preset")
-        base = Config.preset() if base is None else base
-        return _with_room(from_plain(Config, data, base=base))
+        return _merged(data, base, Path(), ())
 
     @staticmethod
     def load(path: str | Path, base: "Config | None" = None) -> "Config":
@@ -283,21 +295,21 @@ class Config:
 
         Args:
             path: YAML or JSON file of at most yaml_values.LONGEST_FILE bytes.
-            base: Values of everything that the file leaves out; None stands for preset seafront.
+            base: Values of everything that the file leaves out. None stands for the preset that
+                the file names with the key `preset`, or else for seafront.
 
         Raises:
             ConfigError: naming the file and the key or value that does not fit.
         """
-        data = loaded_file(path)
-        if not isinstance(data, Mapping | None):
-            raise ConfigError(
-                f"{path}: holds {shown(data)}; give keys with their values, as in "
-                "damage: {probability: 0.5}"
-            )
-        try:
-            return Config.from_values({} if data is None else data, base)
-        except ConfigError as error:
-            raise ConfigError(f"{path}: {error}") from None
+        return _from_file(Path(path) if isinstance(path, str) else path, base, ())
+
+    @property
+    def classes(self) -> dict[str, tuple[str, ...]]:
+        """Class names in label order by name of the task whose list the configuration decides."""
+        return {
+            "damage": self.damage.segmentation_classes,
+            "imdg": self.markings.detection_classes,
+        }
 
     def to_plain(self) -> dict[str, Any]:
         """Return the configuration as plain values, ready for JSON or YAML."""
@@ -312,3 +324,58 @@ def _with_room(config: Config) -> Config:
         check_room(name, rig, kinds, config.damage.bulge_mm)
         check_above_ground(name, rig, config.placement.grounded, config.damage.bulge_mm)
     return config
+
+
+def _start(name: Any, folder: Path, seen: tuple[Path, ...]) -> Config:
+    """Return the preset called `name`, or the configuration in the file with this path.
+
+    Args:
+        name: Name or path, the latter relative to `folder`.
+        folder: Folder of the file that names it.
+        seen: Files that start from this one.
+    """
+    if isinstance(name, str) and name.lower().endswith((".yaml", ".yml", ".json")):
+        return _from_file(folder / name, None, seen)
+    preset = preset_named(name)
+    try:
+        return _merged(preset.values, Config(), Path(), seen)
+    except ConfigError as error:  # of another package
+        raise ConfigError(f"preset {name}: {error}") from None
+
+
+def _from_file(path: Path, base: Config | None, seen: tuple[Path, ...]) -> Config:
+    data = loaded_file(path)
+    if not isinstance(data, Mapping | None):
+        raise ConfigError(
+            f"{path}: holds {shown(data)}; give keys with their values, as in "
+            "damage: {probability: 0.5}"
+        )
+    try:
+        place = path.resolve()
+        if place in seen:
+            raise ConfigError("preset: the file starts from itself; name another preset")
+        return _merged({} if data is None else data, base, path.parent, (*seen, place))
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
+
+
+def _merged(data: Any, base: Config | None, folder: Path, seen: tuple[Path, ...]) -> Config:
+    """Return `base`, or the preset that `data` names, with the values that `data` changes.
+
+    Paths in `data` are relative to `folder`.
+    """
+    if not isinstance(base, Config | None):
+        raise ConfigError(f"base: {base!r} is not a Config; take one from Config.preset")
+    if isinstance(data, Mapping) and PRESET_KEY in data:
+        if base is not None:
+            raise ConfigError(
+                f"{PRESET_KEY}: another configuration to start from is given already; remove this "
+                "key, or start from nothing else (--preset, an earlier --config, base)"
+            )
+        base = _start(data[PRESET_KEY], folder, seen)
+        data = {key: value for key, value in data.items() if key != PRESET_KEY}
+    if base is None:
+        base = Config.preset()
+    if isinstance(data, Mapping) and isinstance(data.get("cameras"), Mapping):
+        data = {**data, "cameras": with_focal_lengths(data["cameras"], base.cameras, folder)}
+    return _with_room(from_plain(Config, data, base=base, folder=folder))

@@ -5,9 +5,8 @@ from typing import Annotated
 
 from fastgen.classes import (
     ALL_DAMAGE_CLASSES,
-    ALL_SEGMENTATION_CLASSES,
     DAMAGE_CLASSES,
-    SEGMENTATION_CLASSES,
+    segmentation_classes,
 )
 from fastgen.errors import ConfigError
 from fastgen.scene.faces import SHEET_FACES
@@ -218,7 +217,7 @@ class DamageConfig:
     @property
     def segmentation_classes(self) -> tuple[str, ...]:
         """Classes of the damage task, in the order of YOLO labels."""
-        return ALL_SEGMENTATION_CLASSES if "scrape" in self.kinds else SEGMENTATION_CLASSES
+        return segmentation_classes(self.kinds)
 
     def __post_init__(self) -> None:
         """Refuse repeated names, and damages that have no face."""

@@ -3,15 +3,11 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from fastgen.config.own_decals import Face, OwnerCode
 from fastgen.decals.identifier_layout import LAYOUTS
-from fastgen.scene.faces import SHEET_FACES
-from fastgen.validation import Bounds, Matching, OneOf, Share, check_weights
+from fastgen.validation import Bounds, OneOf, Share, check_weights
 
-_Face = Annotated[str, OneOf(SHEET_FACES)]
 _Weights = dict[Annotated[str, OneOf(LAYOUTS)], Annotated[float, Bounds(0.0, 1e6)]]
-_OwnerCode = Annotated[
-    str, Matching("[A-Z]{3}[UJZ]", "is not an owner code; give three letters and U, J or Z")
-]
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class IdentifierConfig:
             and have no label.
     """
 
-    layouts: dict[_Face, _Weights] = field(
+    layouts: dict[Face, _Weights] = field(
         default_factory=lambda: {
             "front": {"rows": 0.15, "block": 0.4, "column": 0.45},
             "back": {"rows": 0.15, "block": 0.4, "column": 0.45},
@@ -43,7 +39,7 @@ class IdentifierConfig:
             "roof": {"rows": 1.0},
         }
     )
-    owner_codes: tuple[_OwnerCode, ...] = ()
+    owner_codes: tuple[OwnerCode, ...] = ()
     brand_codes: Share = 0.25
     check_digit_box: Share = 0.93
     rib_pitch: Share = 0.35

@@ -3,10 +3,20 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from fastgen.classes import ALL_DETECTION_CLASSES, DETECTION_CLASSES, MARK_CLASSES
+from fastgen.classes import DETECTION_CLASSES, MARK_CLASSES, MARKER_CLASSES
+from fastgen.config.fields import Weight
 from fastgen.config.identifiers import IdentifierConfig
+from fastgen.config.own_decals import (
+    BrandConfig,
+    Face,
+    MarkerConfig,
+    OwnName,
+    StickerConfig,
+    check_class_names,
+)
 from fastgen.decals.artwork import glyph_tiles
-from fastgen.scene.faces import SHEET_FACES
+from fastgen.decals.artwork import stickers as bundled_stickers
+from fastgen.errors import ConfigError
 from fastgen.validation import (
     LENGTH,
     UNIT,
@@ -16,9 +26,8 @@ from fastgen.validation import (
     Share,
     check_distinct,
     check_known,
+    check_weights,
 )
-
-_Face = Annotated[str, OneOf(SHEET_FACES)]
 
 
 @dataclass(frozen=True)
@@ -88,6 +97,10 @@ class MarkingsConfig:
             face (IMDG Code 5.3.2.1, ADR 5.3.2.2). It has no label.
         removed_markers: Number of removed markers per face: overpainted diamonds, darker than the
             faded paint around them, and glue residue. They have no label.
+        markers: Changes to single markers by class name, and new markers, which become classes of
+            the marker task after those of fastgen.
+        other_marker_weight: Relative frequency of the markers of fastgen that `markers` does not
+            name. With 0 they are neither drawn nor classes.
         marks: Probability of each mark of the IMDG Code on a container. A mark is on all
             marker_faces, but the fumigation warning is on the door alone. Marks that are not named
             are not drawn. If any is named, the marker task has all five as its classes 28 to 32.
@@ -100,10 +113,16 @@ class MarkingsConfig:
         identifiers: Layouts and codes of identifiers.
         colored_lettering: Probability of colored lettering; otherwise it is white or black.
         brand: Probability of a brand by face, th_alpha of Algorithm A1.
+        brands: New brands by name.
+        bundled_brand_weight: Relative frequency of each invented brand of fastgen.
         main_text: Probability of another large text by face, th_beta of Algorithm A1.
         brand_cap_mm: Height of a brand's capitals; it is less than half of this on the ends.
         stickers_per_face: Number of signs and stickers, in addition to the plates that every
             container has.
+        stickers: New stickers by name.
+        sticker_weights: Factor of the frequency of stickers of fastgen, by name; 0 leaves one out.
+        labelled_stickers: Names of stickers that become classes of the marker task, after all
+            markers.
         sticker_wear: Scratches, dirt and peeled patches of stickers.
         patches_per_face: Number of rectangles that were painted over with slightly different paint.
         runs: Probability that dirt has run down from a marker or sticker, and rust from a hole or
@@ -113,7 +132,7 @@ class MarkingsConfig:
         height_marks: Probability of striped height marks on a high cube.
     """
 
-    marker_faces: tuple[_Face, ...] = ("front", "back", "door", "no_door")
+    marker_faces: tuple[Face, ...] = ("front", "back", "door", "no_door")
     marked_containers: Share = 1.0
     markers_per_face: Annotated[tuple[int, int], Bounds(0, 300)] = (1, 6)
     marker_side_mm: Annotated[Range, Bounds(40, 5000, "mm")] = Range(250, 300)
@@ -126,6 +145,8 @@ class MarkingsConfig:
     marker_rivets: Share = 0.12
     marker_un_panel: Share = 0.15
     removed_markers: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
+    markers: dict[OwnName, MarkerConfig] = field(default_factory=dict)
+    other_marker_weight: Weight = 1.0
     marks: dict[Annotated[str, OneOf(MARK_CLASSES)], Share] = field(default_factory=dict)
     fonts: tuple[str, ...] = ()
     cap_mm: Annotated[Range, Bounds(100, 2000, "mm")] = Range(100, 165)
@@ -134,14 +155,19 @@ class MarkingsConfig:
     second_identifier: Share = 0.45
     identifiers: IdentifierConfig = field(default_factory=IdentifierConfig)
     colored_lettering: Share = 0.12
-    brand: dict[_Face, Share] = field(
+    brand: dict[Face, Share] = field(
         default_factory=lambda: {"front": 0.6, "back": 0.6, "door": 0.35, "no_door": 0.3}
     )
-    main_text: dict[_Face, Share] = field(
+    brands: dict[OwnName, BrandConfig] = field(default_factory=dict)
+    bundled_brand_weight: Weight = 1.0
+    main_text: dict[Face, Share] = field(
         default_factory=lambda: {"front": 0.2, "back": 0.2, "door": 0.3, "no_door": 0.2}
     )
     brand_cap_mm: Annotated[Range, Bounds(20, 5000, "mm")] = Range(300, 620)
     stickers_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 4)
+    stickers: dict[OwnName, StickerConfig] = field(default_factory=dict)
+    sticker_weights: dict[str, Weight] = field(default_factory=dict)
+    labelled_stickers: tuple[str, ...] = ()
     sticker_wear: Annotated[Range, UNIT] = Range(0.0, 0.5)
     patches_per_face: Annotated[tuple[int, int], Bounds(0, 100)] = (0, 1)
     runs: Share = 0.2
@@ -150,14 +176,63 @@ class MarkingsConfig:
     height_marks: Share = 0.85
 
     @property
+    def marker_weights(self) -> dict[str, float]:
+        """Relative frequency of each marker that is drawn, by class: those of fastgen first."""
+        weights = dict.fromkeys(MARKER_CLASSES, self.other_marker_weight)
+        weights |= {name: marker.weight for name, marker in self.markers.items()}
+        return {name: weight for name, weight in weights.items() if weight > 0}
+
+    @property
     def detection_classes(self) -> tuple[str, ...]:
         """Classes of the marker task, in the order of YOLO labels."""
-        return ALL_DETECTION_CLASSES if self.marks else DETECTION_CLASSES
+        drawn = self.marker_weights
+        bundled = (
+            name for name in DETECTION_CLASSES if name not in MARKER_CLASSES or name in drawn
+        )
+        own = (name for name in drawn if name not in MARKER_CLASSES)
+        marks = MARK_CLASSES if self.marks else ()
+        return (*bundled, *marks, *own, *self.labelled_stickers)
+
+    @property
+    def own_art(self) -> dict[str, str]:
+        """Images of the configuration by the names that scenes give them, see decals.own_art."""
+        found = {f"marker/{name}": each.art for name, each in self.markers.items()}
+        found |= {f"sticker/{name}": each.art for name, each in self.stickers.items()}
+        found |= {f"emblem/{name}": each.emblem for name, each in self.brands.items()}
+        return {name: text for name, text in found.items() if text}
 
     def __post_init__(self) -> None:
-        """Refuse unknown fonts and repeated faces."""
+        """Refuse unknown fonts and stickers, repeated names, and classes that cannot be."""
         if self.fonts:
             _, bundled = glyph_tiles()
             for font in self.fonts:
                 check_known("fonts", font, bundled)
         check_distinct("marker_faces", self.marker_faces, "increase markers_per_face instead")
+        for name, marker in self.markers.items():
+            if not marker.art and name not in MARKER_CLASSES:
+                raise ConfigError(
+                    f"markers.{name}.art: is missing, and fastgen has no such marker; give the "
+                    "path of a square PNG or SVG image"
+                )
+        hint = "give one above 0, or marked_containers: 0"
+        check_weights("markers", self.marker_weights.values(), hint)
+        lines = [self.bundled_brand_weight, *(brand.weight for brand in self.brands.values())]
+        check_weights("brands", lines, "give one above 0, or bundled_brand_weight")
+        for name in self.stickers:
+            if name in bundled_stickers():
+                raise ConfigError(f"stickers.{name}: is a sticker of fastgen; rename yours")
+        for name in self.sticker_weights:
+            check_known("sticker_weights", name, bundled_stickers())
+        for name in self.labelled_stickers:
+            check_known("labelled_stickers", name, {*bundled_stickers(), *self.stickers})
+        check_distinct("labelled_stickers", self.labelled_stickers, "give each name once")
+        try:
+            check_class_names(self.markers, ("container", "text", *MARK_CLASSES))
+        except ConfigError as error:
+            raise ConfigError(f"markers.{error}") from None
+        try:
+            check_class_names(
+                self.labelled_stickers, (*DETECTION_CLASSES, *MARK_CLASSES, *self.markers)
+            )
+        except ConfigError as error:
+            raise ConfigError(f"labelled_stickers: {error}") from None

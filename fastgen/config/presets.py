@@ -1,6 +1,30 @@
 """Presets: the values by which each differs from the defaults, which are those of the paper."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
+
+from fastgen import plugins
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A named configuration to start from.
+
+    Packages offer their own as entry points of the group `fastgen.presets`.
+
+    Attributes:
+        about: What it shows, in one line.
+        values: Values that differ from the defaults, nested as in a file. Paths of files are
+            absolute.
+    """
+
+    about: str
+    values: Mapping[str, Any]
+
+
+_GROUP = "fastgen.presets"
+"""Entry points by which packages offer presets."""
 
 _FLEET_PAINT = {
     "oxide red": 22,
@@ -123,99 +147,123 @@ _QUAY_END = {
     "lens": _SLIGHT,
 }
 
-PRESETS: dict[str, dict[str, Any]] = {
-    "seafront": {},
-    # images of real crane cameras
-    "crane": {**_OUTDOORS, "cameras": _LENSES, "markings": {"marked_containers": 0.35}},
-    # trucks that pass a gate in lanes; cameras on portals see parts of containers from near by
-    "gate": {
-        **_ON_GROUND,
-        "markings": {"marked_containers": 0.15},
-        "spreader": {"probability": 0.0},
-        "placement": {
-            "arrangements": {"trailer": 1.0, "twin": 0.5},
-            "neighbours": [0, 3],
-            "lifted_twins": 0.0,
-            "islands": 0.6,
-        },
-        "ground": {
-            "kinds": {"asphalt": 0.4, "concrete": 0.2, "paving": 0.4},
-            "line_probability": 0.6,
-            "line_spacing_mm": [3500, 4500],
-        },
-        "cameras": {
-            "rear": {"face": "door", **_GATE_END},
-            "front": {"face": "no_door", **_GATE_END},
-            "left": {"face": "front", **_GATE_SIDE},
-            "right": {"face": "back", **_GATE_SIDE},
-            "roof": {
-                "face": "roof",
-                "focal_mm": 20.0,
-                "distance_mm": [2200, 4500],
-                "azimuth_deg": [-25, 25],
-                "elevation_deg": [-20, 20],
-                "aim_right": [-0.9, 0.9],
-                "lens": _FISHEYE,
+PRESETS: dict[str, Preset] = {
+    "seafront": Preset(
+        "one container in the air, seen by the perfect cameras of the SeaFront paper", {}
+    ),
+    "crane": Preset(
+        "the same with the cameras of a real crane: wide lenses, noise, weather, seals",
+        {**_OUTDOORS, "cameras": _LENSES, "markings": {"marked_containers": 0.35}},
+    ),
+    "gate": Preset(
+        "trailers in the lanes of a gate, seen from portals near by",
+        {
+            **_ON_GROUND,
+            "markings": {"marked_containers": 0.15},
+            "spreader": {"probability": 0.0},
+            "placement": {
+                "arrangements": {"trailer": 1.0, "twin": 0.5},
+                "neighbours": [0, 3],
+                "lifted_twins": 0.0,
+                "islands": 0.6,
+            },
+            "ground": {
+                "kinds": {"asphalt": 0.4, "concrete": 0.2, "paving": 0.4},
+                "line_probability": 0.6,
+                "line_spacing_mm": [3500, 4500],
+            },
+            "cameras": {
+                "rear": {"face": "door", **_GATE_END},
+                "front": {"face": "no_door", **_GATE_END},
+                "left": {"face": "front", **_GATE_SIDE},
+                "right": {"face": "back", **_GATE_SIDE},
+                "roof": {
+                    "face": "roof",
+                    "focal_mm": 20.0,
+                    "distance_mm": [2200, 4500],
+                    "azimuth_deg": [-25, 25],
+                    "elevation_deg": [-20, 20],
+                    "aim_right": [-0.9, 0.9],
+                    "lens": _FISHEYE,
+                },
             },
         },
-    },
-    # piles and rows, seen from a reach stacker and from poles
-    "yard": {
-        **_ON_GROUND,
-        "markings": {"marked_containers": 0.1},
-        "spreader": {"probability": 0.0},
-        "placement": {
-            "arrangements": {"stack": 0.75, "row": 0.25},
-            "neighbours": [3, 11],
-            "tiers": [2, 4],
-        },
-        "ground": {"line_probability": 0.7, "line_spacing_mm": [2700, 3300]},
-        "cameras": {
-            "stacker": {
-                "face": "front",
-                "focal_mm": 22.0,
-                "distance_mm": [4000, 9000],
-                "azimuth_deg": [-35, 35],
-                "elevation_deg": [-5, 25],
-                "aim_right": [-0.5, 0.5],
-                "lens": _FISHEYE,
+    ),
+    "yard": Preset(
+        "piles and rows on the ground, seen from a reach stacker, poles and a mast",
+        {
+            **_ON_GROUND,
+            "markings": {"marked_containers": 0.1},
+            "spreader": {"probability": 0.0},
+            "placement": {
+                "arrangements": {"stack": 0.75, "row": 0.25},
+                "neighbours": [3, 11],
+                "tiers": [2, 4],
             },
-            "pole_door": {"face": "door", "distance_mm": [7000, 18000], **_YARD_POLE},
-            "pole_end": {"face": "no_door", "distance_mm": [7000, 18000], **_YARD_POLE},
-            "mast": {
-                "face": "front",
-                "focal_mm": 35.0,
-                "distance_mm": [12000, 30000],
-                "azimuth_deg": [-50, 50],
-                "elevation_deg": [20, 45],
-                "target_shift_mm": [-3000, 3000],
+            "ground": {"line_probability": 0.7, "line_spacing_mm": [2700, 3300]},
+            "cameras": {
+                "stacker": {
+                    "face": "front",
+                    "focal_mm": 22.0,
+                    "distance_mm": [4000, 9000],
+                    "azimuth_deg": [-35, 35],
+                    "elevation_deg": [-5, 25],
+                    "aim_right": [-0.5, 0.5],
+                    "lens": _FISHEYE,
+                },
+                "pole_door": {"face": "door", "distance_mm": [7000, 18000], **_YARD_POLE},
+                "pole_end": {"face": "no_door", "distance_mm": [7000, 18000], **_YARD_POLE},
+                "mast": {
+                    "face": "front",
+                    "focal_mm": 35.0,
+                    "distance_mm": [12000, 30000],
+                    "azimuth_deg": [-50, 50],
+                    "elevation_deg": [20, 45],
+                    "target_shift_mm": [-3000, 3000],
+                },
             },
         },
-    },
-    # containers under a ship-to-shore crane: in the air, on trailers and on the quay
-    "quay": {
-        **_ON_GROUND,
-        "markings": {"marked_containers": 0.35},
-        "spreader": {"probability": 0.6},
-        "placement": {
-            "arrangements": {
-                "lifted": 0.4,
-                "trailer": 0.3,
-                "stack": 0.1,
-                "standing": 0.1,
-                "twin": 0.5,
+    ),
+    "quay": Preset(
+        "containers under a ship-to-shore crane: in the air, on trailers, on the quay",
+        {
+            **_ON_GROUND,
+            "markings": {"marked_containers": 0.35},
+            "spreader": {"probability": 0.6},
+            "placement": {
+                "arrangements": {
+                    "lifted": 0.4,
+                    "trailer": 0.3,
+                    "stack": 0.1,
+                    "standing": 0.1,
+                    "twin": 0.5,
+                },
+                "neighbours": [0, 4],
+                "tiers": [1, 2],
+                "lifted_twins": 0.5,
             },
-            "neighbours": [0, 4],
-            "tiers": [1, 2],
-            "lifted_twins": 0.5,
+            "ground": {"kinds": {"asphalt": 0.3, "concrete": 0.5, "paving": 0.2}},
+            "cameras": {
+                "waterside": {"face": "front", **_QUAY_SIDE},
+                "landside": {"face": "back", **_QUAY_SIDE},
+                "end_left": {"face": "no_door", **_QUAY_END},
+                "end_right": {"face": "door", **_QUAY_END},
+            },
         },
-        "ground": {"kinds": {"asphalt": 0.3, "concrete": 0.5, "paving": 0.2}},
-        "cameras": {
-            "waterside": {"face": "front", **_QUAY_SIDE},
-            "landside": {"face": "back", **_QUAY_SIDE},
-            "end_left": {"face": "no_door", **_QUAY_END},
-            "end_right": {"face": "door", **_QUAY_END},
-        },
-    },
+    ),
 }
-"""Values of each preset, nested as in a file. `examples/ports/` explains those of ports."""
+"""The presets of fastgen itself. `examples/ports/` explains the values of ports."""
+
+
+def preset_names() -> list[str]:
+    """Return the names of all presets, those of fastgen first."""
+    return list(dict.fromkeys((*PRESETS, *plugins.names(_GROUP))))
+
+
+def preset_named(name: str) -> Preset:
+    """Return a preset of fastgen or of an installed package.
+
+    Raises:
+        ConfigError: The name is unknown, or the package that offers the preset is broken.
+    """
+    return plugins.chosen("preset", name, PRESETS, _GROUP, Preset)

@@ -6,8 +6,9 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
+from fastgen.config.calibration import SHORTHANDS
 from fastgen.config.commented_yaml import meanings
-from fastgen.config.config import Config
+from fastgen.config.config import PRESET_KEY, Config
 from fastgen.validation import Bounds, adapter, annotation
 
 
@@ -18,6 +19,12 @@ def json_schema() -> dict[str, Any]:
     values, such as a range whose lowest value is above its highest, are not part of it.
     """
     schema = adapter(Config).json_schema(schema_generator=_Generator)
+    start = {
+        "type": "string",
+        "description": "Preset to start from, or the path of another file, relative to this one.",
+    }
+    schema["properties"] = {PRESET_KEY: start, **schema["properties"]}
+    schema["$defs"]["CameraConfig"]["properties"] |= SHORTHANDS
     return {"$schema": _Generator.schema_dialect, **schema, "title": "fastgen configuration"}
 
 

@@ -33,7 +33,9 @@ _OPTIONS = {
     "cameras": ("--cameras",),
     "environments": ("--hdri",),
     "shard_scenes": ("--shard",),
-    "config": ("--preset", "--config"),
+    "config": ("--preset", "--config", "--set"),
+    "postprocess": ("--preset", "--config", "--set"),
+    "classes": ("--preset", "--config", "--set"),
 }
 """Options of `fastgen generate` that determine each setting."""
 
@@ -154,7 +156,7 @@ def _differ_message(job: Job, settings: Mapping[str, Any], found: Mapping[str, A
 def _options(name: str) -> tuple[str, ...]:
     """Return the options that determine a setting."""
     if name.startswith("config.split"):
-        return "--split", "--config"
+        return "--split", "--config", "--set"
     return _OPTIONS.get(name.split(".")[0], ())
 
 

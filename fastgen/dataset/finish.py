@@ -15,7 +15,7 @@ from fastgen.dataset.storage import Folder, Storage
 from fastgen.errors import OutputError
 from fastgen.files.images import encode_picture
 from fastgen.formats.format import Format, Record
-from fastgen.formats.registry import formats_of
+from fastgen.formats.registry import formats_for
 from fastgen.sampling.scene import SPLITS
 
 CONTACT_SHEET = "contact_sheet.png"
@@ -27,7 +27,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     Returns:
         The content of dataset.json.
     """
-    formats = formats_of(job.formats)
+    formats = formats_for(job.formats, job.config.classes)
     shards: dict[str, str] = {}
     makers: list[dict[str, str]] = []
     failed: list[dict[str, Any]] = []

@@ -40,8 +40,11 @@ def generate(
 ) -> dict[str, Any]:
     """Make the dataset at `job.out`, or finish it.
 
+    Worker processes import the main script, so a script calls this under a guard:
+
     Example:
-        generate(Job("boxes", images=1000, seed=7, render=RenderSettings(quality="draft")))
+        if __name__ == "__main__":
+            generate(Job("boxes", images=1000, seed=7, render=RenderSettings(quality="draft")))
 
     Args:
         job: What to make.
@@ -56,6 +59,7 @@ def generate(
         OutputError: The place cannot be written, is in use by another run, or holds something
             else or a dataset with other settings.
     """
+    workers.end_unguarded_worker()
     worker_count = default_workers() if worker_count is None else worker_count
     job, settings = settled(job, worker_count)
     storage = storage_of(job.out)

@@ -4,7 +4,7 @@ Both files contain a hash of themselves, but whoever edits a file can also updat
 """
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 from annotated_types import Ge, Le, MinLen
@@ -12,7 +12,6 @@ from annotated_types import Ge, Le, MinLen
 from fastgen.dataset.job import LAYOUTS
 from fastgen.errors import shown, shown_name
 from fastgen.files.inner_path import INNER_PATH
-from fastgen.formats.registry import known_formats
 from fastgen.render.settings import MAX_SIZE
 from fastgen.sampling.scene import SPLITS
 from fastgen.validation import Matching, OneOf
@@ -42,7 +41,7 @@ class Started:
 
     version: str
     format: Annotated[str, OneOf(LAYOUTS)]
-    formats: tuple[Annotated[str, OneOf(tuple(known_formats()))], ...]
+    formats: tuple[str, ...]
     seed: _Count
     size: tuple[_Side, _Side]
     quality: str
@@ -51,6 +50,8 @@ class Started:
     shard_scenes: _Number
     config: dict[str, Any]
     images: _Number
+    postprocess: dict[str, str] = field(default_factory=dict, kw_only=True)
+    classes: dict[str, tuple[str, ...]] = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from fastgen.errors import ConfigError
 from fastgen.formats.registry import formats_of
 from fastgen.light.environment import load_environment
 from fastgen.light.hdri import find_hdris
+from fastgen.postprocess import source_hash
 from fastgen.sampling.scene import SPLITS
 from fastgen.validation import check_known, nearest
 
@@ -123,7 +124,11 @@ def _settings(job: Job) -> dict[str, Any]:
         "cameras": list(job.cameras),
         "environments": generator.environment_record,
         "shard_scenes": job.scenes_per_shard,
+        "classes": generator.config.classes,
         "config": generator.config.to_plain(),
     }
+    name = generator.config.postprocess
+    if name:
+        settings["postprocess"] = {"function": name, "sha256": source_hash(name)}
     plain: dict[str, Any] = json.loads(json.dumps(settings))
     return plain

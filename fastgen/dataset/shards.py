@@ -26,7 +26,7 @@ from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
 from fastgen.formats.format import Files, Record, Same, assemble
 from fastgen.formats.item import Item
-from fastgen.formats.registry import formats_of
+from fastgen.formats.registry import formats_for
 from fastgen.sampling.scene import SPLITS, split_of
 
 _PRELOAD_IMAGES = 1000
@@ -78,9 +78,8 @@ class Strikes:
             return task
         if scene is None:
             raise OutputError(
-                f"worker processes die before they render anything ({ended}); run fastgen doctor, "
-                'and in a script call this under `if __name__ == "__main__":`; files written so '
-                "far stay valid"
+                f"worker processes die before they render anything ({ended}); run fastgen doctor; "
+                "files written so far stay valid"
             )
         reason = f"the process that rendered it died ({ended})"
         return replace(task, skip={**task.skip, scene: reason})
@@ -106,7 +105,7 @@ class Maker:
             cv2.setNumThreads(1)
         self._job = job
         self._report = report
-        self._formats = formats_of(job.formats)
+        self._formats = formats_for(job.formats, job.config.classes)
         self._storage = storage_of(job.out)
         self._generator = job.generator()
         if job.images > _PRELOAD_IMAGES:

@@ -8,16 +8,20 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fastgen.classes import ALL_DAMAGE_CLASSES, MARK_CLASSES, MARKER_CLASSES
+from fastgen.classes import ALL_SEGMENTATION_CLASSES, MARK_CLASSES, SEGMENTATION_CLASSES
 from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import OutputError
 from fastgen.formats.format import Format, Record
-from fastgen.formats.registry import formats_of
+from fastgen.formats.registry import formats_for
 from fastgen.sampling.scene import SPLITS
+
+_UNSIZED = ("container", "text", *MARK_CLASSES)
+"""Classes whose boxes are not among those of damages and markers."""
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
@@ -28,7 +32,8 @@ class _Labels:
 
     Attributes:
         by_class: Number of labels by class name.
-        sizes: Width and height of each box of a damage or marker, as shares of the image.
+        sizes: Width and height of each box of a damage, marker or labelled sticker, as shares of
+            the image.
         images: Number of images that have such a box.
     """
 
@@ -42,7 +47,7 @@ class _Labels:
         before = len(self.sizes)
         for name, (_, _, width, height) in task.labels(record["facts"][task.name]):
             self.by_class[name] += 1
-            if name in ALL_DAMAGE_CLASSES or name in MARKER_CLASSES:
+            if name not in _UNSIZED:
                 self.sizes.append((width / image_width, height / image_height))
         self.images += len(self.sizes) > before
 
@@ -53,11 +58,12 @@ def report(out: str | Path) -> str:
     Raises:
         OutputError: `out` is not a finished dataset.
     """
-    damage, imdg = formats_of(("damage", "imdg"))
+    manifest = _manifest(str(out))
+    damage, imdg = formats_for(("damage", "imdg"), manifest.get("classes", {}))
     images = dict.fromkeys(SPLITS, 0)
     damages = {split: _Labels() for split in SPLITS}
     markers = {split: _Labels() for split in SPLITS}
-    for record in _records(str(out)):
+    for record in _records(str(out), manifest):
         split = record["split"]
         images[split] += 1
         damages[split].add(damage, record)
@@ -84,28 +90,37 @@ def report(out: str | Path) -> str:
     )
 
 
-def _records(out: str) -> Iterator[Record]:
+def _manifest(out: str) -> dict[str, Any]:
+    """Return the content of dataset.json."""
     storage = storage_of(out)
     try:
         manifest = parsed(storage.read(MANIFEST))
     except FileNotFoundError:
         raise without_manifest(storage, out) from None
-    damaged = OutputError(f"{out}: is damaged; run fastgen verify {out}")
     if manifest is None:
-        raise damaged
+        raise _damaged(out)
     if "digest" not in manifest:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")
+    return manifest
+
+
+def _damaged(out: str) -> OutputError:
+    return OutputError(f"{out}: is damaged; run fastgen verify {out}")
+
+
+def _records(out: str, manifest: dict[str, Any]) -> Iterator[Record]:
+    storage = storage_of(out)
     for number in manifest["shards"]:
         shard = read_manifest(storage, int(number))
         if shard is None:
-            raise damaged
+            raise _damaged(out)
         yield from shard["records"]
 
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:
     rows = {name: [each.by_class[name] for each in found.values()] for name in task.classes}
-    # most datasets have neither marks nor scrapes
-    optional = (*MARK_CLASSES, "scrape")
+    # most datasets have neither marks nor kinds of damage beyond those of the paper
+    optional = (*MARK_CLASSES, *ALL_SEGMENTATION_CLASSES[len(SEGMENTATION_CLASSES) :])
     return _table({n: row for n, row in rows.items() if n not in optional or any(row)})
 
 

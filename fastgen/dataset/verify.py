@@ -14,9 +14,9 @@ from fastgen.dataset.job import manifest_path
 from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
-from fastgen.errors import FastgenError, OutputError
+from fastgen.errors import FastgenError, OutputError, shown
 from fastgen.formats.format import Format, Read, Record
-from fastgen.formats.registry import formats_of
+from fastgen.formats.registry import format_names, formats_for
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
 
@@ -60,6 +60,10 @@ def examine(out: str) -> Findings:
     problem = unfit(text, Finished)
     if problem:
         return Findings([f"{MANIFEST}: {problem}; {_AGAIN}"])
+    unknown = [name for name in manifest["formats"] if name not in format_names()]
+    if unknown:
+        words = f"format {shown(unknown[0])} is unknown; install the package that offers it"
+        return Findings([f"{MANIFEST}: {words}"])
     faults = [
         f"scene {each['scene']} is missing: it failed ({each['error']})"
         for each in manifest["failed"]
@@ -89,7 +93,7 @@ def examine(out: str) -> Findings:
     faults += [f"{path}: does not belong here" for path in astray]
     if manifest["format"] == "seafront":
         records = [record for shard in shards for record in shard["records"]]
-        formats = formats_of(manifest["formats"])
+        formats = formats_for(manifest["formats"], manifest.get("classes", {}))
         faults += _contradictions(storage, records, broken, formats)
         if not unlisted:
             faults += _split_contradictions(storage, records, broken, formats)

@@ -25,6 +25,12 @@ Setup = Callable[[Callable[[str, Any], None]], Callable[[Any], None]]
 HANG_S = 300.0
 """A worker without a report for this many seconds hangs. Known steps take at most 3 s."""
 
+_NAME = "fastgen worker"
+"""Name of every worker process."""
+
+_UNGUARDED = 78
+"""Exit code of a worker whose main script starts a run when it is imported."""
+
 _POLL_S = 1.0
 _STOPS = {signal.SIGINT, signal.SIGTERM}
 
@@ -104,7 +110,7 @@ class _Worker:
         # an OpenGL context made before a fork hangs the child
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, setup), daemon=True)
+        self.process = context.Process(target=_work, args=(theirs, setup), name=_NAME, daemon=True)
         # Ctrl-C reaches the whole process group, but the parent decides what happens. The worker
         # inherits this mask until it is ready. Starting the tracker here would lift the mask.
         resource_tracker.ensure_running()
@@ -132,6 +138,16 @@ class _Worker:
         self.pipe.close()
 
 
+def end_unguarded_worker() -> None:
+    """End this process if it is a worker. A run calls this before it starts workers of its own.
+
+    A new process imports the main script of its parent. Without a guard, the script would start a
+    run in each worker.
+    """
+    if multiprocessing.current_process().name == _NAME:
+        raise SystemExit(_UNGUARDED)
+
+
 def run(
     setup: Setup,
     tasks: Iterable[Any],
@@ -155,7 +171,8 @@ def run(
         whole_machine: There is a process on every core, so matrices need no threads.
 
     Raises:
-        OutputError: A worker met an error that another attempt cannot fix; in its words.
+        OutputError: A worker met an error that another attempt cannot fix, in its words; or the
+            main script starts a run when it is imported.
     """
     waiting = Waiting(tasks)
     workers: list[_Worker] = []
@@ -200,6 +217,11 @@ def _listen(worker: _Worker, on_report: Callable[[str, Any], None], hang_s: floa
     except (EOFError, ConnectionResetError):
         worker.process.join()
         code = worker.process.exitcode or 0
+        if code == _UNGUARDED:
+            raise OutputError(
+                "generate: worker processes import your script, which calls generate again; move "
+                'the call under `if __name__ == "__main__":`'
+            ) from None
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
     if worker.task is not None and time.monotonic() - worker.heard > hang_s:
         return f"no sign of life for {hang_s:g} s"

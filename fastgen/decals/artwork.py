@@ -78,6 +78,7 @@ class Sticker:
         ink: 'art' for the drawing's own colours, 'lettering' for the colour of the lettering, or
             'overpaint' for a darker tone of the paint.
         group: Name of a group, or ''. Of a group, a container carries only one sticker.
+        art: Name of its artwork if that is not `name`.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Sticker:
     place: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
     ink: str = "art"
     group: str = ""
+    art: str = ""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Brand:
-    """Invented shipping line.
+    """Shipping line: an invented one of fastgen, or one of a configuration.
 
     Attributes:
         name: Name of the line.
@@ -117,6 +119,8 @@ class Brand:
         owner_codes: Owner codes of its containers, four letters each, the last a U.
         wordmark: Text below the emblem.
         main_texts: Further large texts on its containers.
+        ink: 'lettering' for an emblem in the colour of the lettering, or 'art' for the drawing's
+            own colours.
     """
 
     name: str
@@ -124,6 +128,7 @@ class Brand:
     owner_codes: tuple[str, ...]
     wordmark: str
     main_texts: tuple[str, ...]
+    ink: str = "lettering"
 
 
 @lru_cache(maxsize=1)
@@ -234,18 +239,29 @@ def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
     Returns:
         Levels with N / 2, N / 4, ... 1 texels per side, encoded as the image.
     """
-    rgba: np.ndarray = cv2.LUT(image, _LIGHT_AND_ALPHA)
-    for channel in range(3):
-        rgba[..., channel] *= rgba[..., 3]
+    rgba: np.ndarray = premultiplied_light(image)
     found = []
     while len(rgba) > 1:
         rgba = cv2.resize(rgba, (len(rgba) // 2,) * 2, interpolation=cv2.INTER_AREA)
-        light = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
-        half = np.empty(rgba.shape, np.uint8)
-        half[..., :3] = ENCODED[(light * (len(ENCODED) - 1) + 0.5).astype(np.uint16)]
-        half[..., 3] = rgba[..., 3] * 255 + 0.5
-        found.append(half)
+        found.append(texels(rgba))
     return found
+
+
+def premultiplied_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Return an image [H, W, 4] as linear light times alpha, and alpha, both in 0..1."""
+    rgba: np.ndarray = cv2.LUT(image, _LIGHT_AND_ALPHA)
+    for channel in range(3):
+        rgba[..., channel] *= rgba[..., 3]
+    return rgba
+
+
+def texels(rgba: np.ndarray) -> NDArray[np.uint8]:
+    """Return the image of linear light times alpha: the inverse of `premultiplied_light`."""
+    light = rgba[..., :3] / np.maximum(rgba[..., 3:], 1e-6)
+    image = np.empty(rgba.shape, np.uint8)
+    image[..., :3] = ENCODED[(light * (len(ENCODED) - 1) + 0.5).astype(np.uint16)]
+    image[..., 3] = rgba[..., 3] * 255 + 0.5
+    return image
 
 
 _LIGHT_AND_ALPHA = np.stack([DECODED] * 3 + [np.linspace(0, 1, 256)], axis=1)[None].astype(

@@ -68,6 +68,10 @@ class Format(ABC):
         The shard's manifest keeps the facts; the other methods work on them.
         """
 
+    def with_classes(self, classes: Sequence[str]) -> "Format":
+        """Return this format for the class list of a dataset, which a configuration may change."""
+        return self
+
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         """Yield the path and content of each file that covers a whole split.
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DETECTION_CLASSES
+from fastgen.classes import ALL_DETECTION_CLASSES, is_detection, with_marks
 from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records, Same
@@ -19,11 +19,11 @@ from fastgen.sampling.scene import SPLITS
 
 class _Imdg(Format):
     name = "imdg"
-    classes = ALL_DETECTION_CLASSES
+    classes: tuple[str, ...] = ALL_DETECTION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         sample, split, stem = item.sample, item.split, item.stem
-        labels = yolo.detection_lines(sample.objects, sample.view.size)
+        labels = yolo.detection_lines(sample.objects, sample.view.size, sample.marker_classes)
         files: Files = {
             # Trainers replace `images` by `labels` in the resolved path of this folder. If the
             # folder were a link, they would look outside of imdg.
@@ -38,7 +38,7 @@ class _Imdg(Format):
                 found.append(item.container_annotations[thing.id])
                 continue
             part = window(sample.ids, box) == thing.id
-            category = ALL_DETECTION_CLASSES.index(thing.class_name) + 1
+            category = sample.marker_classes.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
             found.append(
                 {
@@ -47,6 +47,11 @@ class _Imdg(Format):
                 }
             )
         return files, found + item.background_annotations
+
+    def with_classes(self, classes: Sequence[str]) -> Format:
+        made = _Imdg()
+        made.classes = with_marks(classes)
+        return made
 
     def labels(self, facts: Any) -> Iterable[Label]:
         return coco.labels(facts, self.classes)
@@ -83,12 +88,13 @@ class _Imdg(Format):
             (index, [round(v, 1) for v in yolo.pixel_box(values, (width, height))])
             for index, values in yolo.rows(read(path).decode())
         ]
+        numbers = {name: number for number, name in enumerate(self.classes)}
         visible = [
-            (ALL_DETECTION_CLASSES.index(item["class_name"]), item["bbox"])
+            (numbers.get(item["class_name"]), item["bbox"])
             for item in scene["objects"]
-            if item["class_name"] in ALL_DETECTION_CLASSES and item["bbox"] and not item["ignored"]
+            if is_detection(item["class_name"]) and item["bbox"] and not item["ignored"]
         ]
-        if sorted(listed) != sorted(visible):
+        if sorted(listed, key=repr) != sorted(visible, key=repr):
             yield f"{path}: differs from the scene file's objects"
 
 

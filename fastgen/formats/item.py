@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from fastgen.classes import ALL_DETECTION_CLASSES
+from fastgen.classes import is_detection
 from fastgen.config.config import LabelConfig
 from fastgen.files.images import jpeg
 from fastgen.formats import coco
@@ -96,5 +96,5 @@ def detections(objects: Iterable[Object]) -> Iterator[tuple[Object, Box]]:
     objects are included.
     """
     for thing in objects:
-        if thing.class_name in ALL_DETECTION_CLASSES and thing.bbox is not None:
+        if is_detection(thing.class_name) and thing.bbox is not None:
             yield thing, thing.bbox

@@ -2,10 +2,11 @@
 
 import importlib
 import pkgutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
-from fastgen import formats
+from fastgen import formats, plugins
+from fastgen.errors import ConfigError
 from fastgen.formats.format import Format
 from fastgen.validation import check_known
 
@@ -13,16 +14,24 @@ SEAFRONT = ("damage", "imdg", "container", "text", "door")
 """Formats that `--format seafront` always writes: the tasks of the SeaFront paper, and container
 corners."""
 
+_GROUP = "fastgen.formats"
+"""Entry points by which packages offer formats: instances of Format."""
+
 
 @cache
 def known_formats() -> dict[str, Format]:
-    """Return every format of the package `fastgen.formats` by name."""
+    """Return every format of fastgen by name."""
     found: dict[str, Format] = {}
     for module in pkgutil.iter_modules(formats.__path__, f"{formats.__name__}."):
         made = getattr(importlib.import_module(module.name), "FORMAT", None)
         if made is not None:
             found[made.name] = made
     return found
+
+
+def format_names() -> list[str]:
+    """Return the names of all formats, also those of installed packages, in alphabetical order."""
+    return sorted({*known_formats(), *plugins.names(_GROUP)})
 
 
 def formats_of(names: Sequence[str]) -> list[Format]:
@@ -33,6 +42,31 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     """
     known = known_formats()
     for name in names:
-        if name not in known:
-            check_known("also", name, set(known) - set(SEAFRONT))
-    return [known[name] for name in names]
+        if name not in format_names():
+            check_known("also", name, set(format_names()) - set(SEAFRONT))
+    return [_chosen(name, known) for name in names]
+
+
+def _chosen(name: str, known: Mapping[str, Format]) -> Format:
+    made: Format = plugins.chosen("also", name, known, _GROUP, Format)  # type: ignore[type-abstract]
+    if made.name != name:
+        raise ConfigError(
+            f"also: the format {name} calls itself {made.name!r}; give both the same name"
+        )
+    return made
+
+
+def formats_for(names: Sequence[str], classes: Mapping[str, Sequence[str]]) -> list[Format]:
+    """Return formats by name, for the class lists of a dataset.
+
+    Args:
+        names: Names of formats.
+        classes: Class names in label order by name of the task, as in dataset.json.
+
+    Raises:
+        ConfigError: A name is unknown.
+    """
+    return [
+        each.with_classes(classes[each.name]) if each.name in classes else each
+        for each in formats_of(names)
+    ]

@@ -17,13 +17,20 @@ from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Object
 
 
-def detections(objects: Iterable[Object]) -> list[tuple[int, Object, Box]]:
+def detections(
+    objects: Iterable[Object], classes: Sequence[str] = ALL_DETECTION_CLASSES
+) -> list[tuple[int, Object, Box]]:
     """Return class index, object and visible box of the objects that the marker task labels.
 
     Ignored objects are not included, because YOLO files cannot mark them.
+
+    Args:
+        objects: Objects of one image.
+        classes: Class names in label order, see Sample.marker_classes.
     """
+    numbers = {name: number for number, name in enumerate(classes)}
     return [
-        (ALL_DETECTION_CLASSES.index(thing.class_name), thing, box)
+        (numbers[thing.class_name], thing, box)
         for thing, box in item.detections(objects)
         if not thing.ignored
     ]
@@ -46,9 +53,13 @@ def pixel_box(values: Sequence[float], size: tuple[int, int]) -> tuple[float, fl
     return (x - w / 2) * width, (y - h / 2) * height, (x + w / 2) * width, (y + h / 2) * height
 
 
-def detection_lines(objects: Iterable[Object], size: tuple[int, int]) -> str:
+def detection_lines(
+    objects: Iterable[Object],
+    size: tuple[int, int],
+    classes: Sequence[str] = ALL_DETECTION_CLASSES,
+) -> str:
     """Return the label file of an image of this size, with a line for each of `detections`."""
-    found = detections(objects)
+    found = detections(objects, classes)
     return "".join(line(index, normalised(box, size)) for index, _, box in found)
 
 

@@ -3,12 +3,14 @@
 import colorsys
 from collections.abc import Mapping
 from types import MappingProxyType
+from zlib import crc32
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import (
+    ALL_DAMAGE_CLASSES,
     CONTAINER_ID,
     DAMAGE_CLASSES,
     DAMAGE_VALUES,
@@ -33,15 +35,19 @@ DAMAGE_GREYS = MappingProxyType(
 
 _GOLDEN = (5**0.5 - 1) / 2
 
-_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal", "scrape")
+_LATER = ALL_DAMAGE_CLASSES[len(DAMAGE_CLASSES) :]
+_STRONG = ("container", "text", *DAMAGE_CLASSES, "spreader", "seal", *_LATER)
 _PALE = (*MARKER_CLASSES, *MARK_CLASSES)
 
 
 def class_color(name: str) -> tuple[int, int, int]:
     """Return the RGB colour of a class.
 
-    Markers and marks have pale colours. All other classes have strong colours that differ clearly.
+    Markers and marks have pale colours, also those of a configuration. All other classes have
+    strong colours that differ clearly.
     """
+    if name not in _STRONG and name not in _PALE:
+        return _color(crc32(name.encode()), 0.4, 1.0)
     names, saturation = (_STRONG, 0.85) if name in _STRONG else (_PALE, 0.4)
     return _color(names.index(name), saturation, 1.0)
 

@@ -66,9 +66,10 @@ VIEW_BLOCK = Block(
         ("vec2", "lens_tangential"),
         ("int", "lens_steps"),  # of the inverse, for tangential distortion
         ("vec4", "lens_to_clip"),  # columns of the matrix from the image plane to clip space
+        ("vec2", "lens_clip_center"),  # principal point in clip space
         ("vec2", "lens_center"),
         ("vec2", "lens_linear_from"),  # radius beyond which the distortion is linear, slope there
-        ("float", "lens_focal"),
+        ("vec2", "lens_focal"),
         ("float", "lens_model"),  # 0 none, 1 Brown-Conrady, 2 fisheye
         ("mat4", "ray_to_shadow", MAX_LIGHTS),  # vector from the eye in m to (u, v, depth)
         ("vec4", "shadow_tile", MAX_LIGHTS),  # (u, v) of the first and the last texel of its tile

@@ -177,10 +177,10 @@ def hull_corners(
         low, high = border.min(axis=(1, 2)), border.max(axis=(1, 2))
         # an arc deviates from its chord by an eighth of the second difference
         bow = np.abs(np.diff(border, n=2, axis=2)).max(axis=(1, 2, 3)) / 8
-        margin += view.focal_px * bow[:, None]
+        margin += view.focals_px.max() * bow[:, None]
     center = np.array(view.center_px)
-    first = 2 * np.floor((view.focal_px * low + center - margin) / 2)
-    last = 2 * np.ceil((view.focal_px * high + center + margin) / 2)
+    first = 2 * np.floor((view.focals_px * low + center - margin) / 2)
+    last = 2 * np.ceil((view.focals_px * high + center + margin) / 2)
     first[near], last[near] = 0, view.size
     corners = np.concatenate([np.clip(first, 0, view.size), np.clip(last, 0, view.size)], axis=1)
     return corners.astype(np.int64), near

@@ -8,6 +8,7 @@ draw. Labels are taken at the pixel centre and never filtered: a sample lies exa
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
@@ -71,6 +72,7 @@ class Renderer:
         mask_threshold_mm: float = 5.0,
         read: Read = shader_text,
         without: tuple[str, ...] = (),
+        own_art: Mapping[str, NDArray[np.uint8]] = MappingProxyType({}),
     ) -> None:
         """Prepare a renderer.
 
@@ -82,6 +84,7 @@ class Renderer:
             mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
             read: Returns the text of a shader file by its name.
             without: Material layers of LAYERS to leave out of images.
+            own_art: Artwork of a configuration by name, see own_art.art_of.
         """
         self._gl = gl
         self.ctx = gl.ctx
@@ -106,8 +109,10 @@ class Renderer:
         }
         for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
             self._blocks[block.name].bind_to_uniform_block(block.binding)
-        self._art_layers = art_layers()
-        self._tables = material_tables(gl)
+        bundled = art_layers()
+        own_layers = {name: len(bundled) + i for i, name in enumerate(own_art)}
+        self._art_layers = {**bundled, **own_layers}
+        self._tables = material_tables(gl, list(own_art.values()))
 
     def render(
         self,

@@ -55,7 +55,7 @@ class Tiles:
     def _margin(self) -> float:
         """Deviation of the sides of tiles from straight lines in that plane, and half a pixel."""
         bow = max(np.abs(np.diff(self._plane, n=2, axis=axis)).max(initial=0) for axis in (0, 1))
-        return float(bow / 8 + 0.5 / self.view.focal_px)
+        return float(bow / 8 + 0.5 / self.view.focals_px.min())
 
     def touched(self, points_mm: Array) -> Mask:
         """Return at least the tiles that the convex hulls of groups of points touch.

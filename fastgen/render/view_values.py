@@ -17,14 +17,15 @@ def view_values(
     to_samples[:2, :2] = samples.to_clip
     right, down, forward = view.rotation
     center_x, center_y = view.center_px
+    focal_x, focal_y = view.focals_px
     yaw = np.deg2rad(scene.environment.yaw_deg)
     return {
         "world_to_clip": to_samples @ view.clip_matrix(),
-        "ray_corner": forward - (center_x * right + center_y * down) / view.focal_px,
+        "ray_corner": forward - (center_x * right + center_y / view.pixel_aspect * down) / focal_x,
         "eye_m": view.position_m,
-        "ray_right": right / view.focal_px,
-        "ray_down": down / view.focal_px,
-        "pixel_angle": 1 / view.focal_px,
+        "ray_right": right / focal_x,
+        "ray_down": down / focal_y,
+        "pixel_angle": 1 / focal_x,
         "exposure": exposure,
         "yaw": (np.cos(yaw), np.sin(yaw)),
         "point_step": point_step(view.size),

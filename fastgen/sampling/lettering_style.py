@@ -44,10 +44,31 @@ def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Strea
     albedo = _LIGHT if light else _DARK
     if rng.random() < config.colored_lettering:
         albedo = _COLORED[int(rng.integers(len(_COLORED)))] if not light else YELLOW
-    made = brands()
-    brand = made[int(streams("brand").integers(len(made)))]
+    brand = _brand(config, streams("brand"))
     identifier = _identifier(config.identifiers, kind, brand, streams)
     return Style(font, albedo, brand, identifier)
+
+
+def _brand(config: MarkingsConfig, rng: np.random.Generator) -> Brand:
+    """Sample a brand of fastgen or of the configuration."""
+    bundled = brands()
+    if not config.brands and config.bundled_brand_weight > 0:
+        return bundled[int(rng.integers(len(bundled)))]
+    own = [
+        Brand(
+            name,
+            f"emblem/{name}",
+            each.owner_codes,
+            each.wordmark,
+            each.main_texts or (each.wordmark,),
+            each.ink,
+        )
+        for name, each in config.brands.items()
+    ]
+    weights = [config.bundled_brand_weight] * len(bundled)
+    weights += [each.weight for each in config.brands.values()]
+    shares = np.array(weights) / sum(weights)
+    return (*bundled, *own)[int(rng.choice(len(shares), p=shares))]
 
 
 def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Streams) -> Identifier:

@@ -62,7 +62,7 @@ def sample_fittings(
         elif with_rivets:
             above.append(replace(metal, art="marker_rivets"))
     if with_panel and markers:
-        below += _panel(sheet, markers, wear, rng)
+        below += _panel(config, sheet, markers, wear, rng)
     return below, above
 
 
@@ -76,13 +76,27 @@ def _frame_limit_mm(markers: Sequence[Decal]) -> float:
     return (min(apart) - widest) / 2 if apart else _HOLDER_MM.hi
 
 
+def _panel_numbers(config: MarkingsConfig, class_name: str) -> tuple[str, tuple[str, ...]]:
+    """Return the hazard number and the UN numbers of a marker; none for some of a configuration."""
+    own = config.markers.get(class_name)
+    if own is not None and own.un_numbers:
+        return own.hazard_number, own.un_numbers
+    return un_numbers().get(class_name, ("", ()))
+
+
 def _panel(
-    sheet: Sheet, markers: Sequence[Decal], wear: float, rng: np.random.Generator
+    config: MarkingsConfig,
+    sheet: Sheet,
+    markers: Sequence[Decal],
+    wear: float,
+    rng: np.random.Generator,
 ) -> list[Decal]:
     """Return an orange panel and its digits beside the markers, or nothing without room."""
     art, size, cap_mm = _PANELS[int(rng.integers(len(_PANELS)))]
     marker = markers[int(rng.integers(len(markers)))]
-    hazard, numbers = un_numbers()[marker.class_name]
+    hazard, numbers = _panel_numbers(config, marker.class_name)
+    if not numbers:
+        return []
     number = str(rng.choice(numbers))
     reach = np.array(marker.size_mm) / 2
     low = np.array([m.center_mm for m in markers]).min(axis=0) - reach

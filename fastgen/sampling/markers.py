@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.classes import MARKER_CLASSES
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import marker_prints
 from fastgen.sampling.sheet import Sheet, between, tenth
@@ -53,7 +52,11 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> li
     side = between(rng, config.marker_side_mm)
     gap = between(rng, config.marker_gap_mm)
     diagonal = tenth(side * math.sqrt(2))
-    classes = rng.choice(MARKER_CLASSES, size=count)
+    weights = config.marker_weights
+    shares = np.array(list(weights.values())) / sum(weights.values())
+    # equal weights draw integers, whose stream all datasets of the bundled markers share
+    equal = len(set(weights.values())) == 1
+    classes = rng.choice(list(weights), size=count, p=None if equal else shares)
     tilts = rng.uniform(*config.marker_tilt_deg, size=count)
     wears = rng.uniform(*config.marker_wear, size=count)
     print_rng = streams(f"marker_prints.{sheet.face}")
@@ -87,7 +90,8 @@ def sample_markers(config: MarkingsConfig, sheet: Sheet, streams: Streams) -> li
 
 def _print(config: MarkingsConfig, class_name: str, rng: np.random.Generator) -> dict[str, Any]:
     """Sample the appearance of one marker: artwork, tint, bleaching and torn corners."""
-    art = str(rng.choice(marker_prints()[class_name]))
+    own = class_name in config.markers and config.markers[class_name].art
+    art = str(rng.choice((f"marker/{class_name}",) if own else marker_prints()[class_name]))
     tint = rng.uniform(0.86, 0.98) + rng.uniform(-0.02, 0.02, 3)
     fade = rng.uniform(*config.marker_fade)
     # Corners that show the class digit are torn less often, or the class would be unknown.

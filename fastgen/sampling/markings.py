@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fastgen.classes import MARKER_CLASSES
+from fastgen.classes import MARK_CLASSES
 from fastgen.config.markings import MarkingsConfig
 from fastgen.sampling.identifiers import sample_identifiers
 from fastgen.sampling.lettering_style import (
@@ -59,11 +59,11 @@ def sample_decals(
     labelled += sample_marks(config, faces, streams)
     for face in config.marker_faces:
         sheet = faces[face]
-        markers = [d for d in labelled if d.face == face and d.class_name in MARKER_CLASSES]
+        markers = [d for d in labelled if d.face == face and d.class_name not in MARK_CLASSES]
         below, above = sample_fittings(config, sheet, markers, streams)
         drawn += sample_removed_markers(config, sheet, paint_albedo, streams) + below
         held += above
-    known = stickers_of(kind, streams("stickers"))
+    known = stickers_of(config, kind, streams("stickers"))
     inks = {"lettering": style.albedo, "overpaint": paint_albedo}
     for sheet in faces.values():
         drawn += _brand(config, sheet, style, streams(f"brand.{sheet.face}"))
@@ -91,7 +91,7 @@ def _brand(
         if center:
             top = center[1] + size[1] / 2
             mark = Decal(
-                kind="emblem",
+                kind="emblem" if style.brand.ink == "lettering" else "sticker",
                 class_name="",
                 face=sheet.face,
                 center_mm=(center[0], tenth(top - emblem / 2)),

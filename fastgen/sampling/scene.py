@@ -228,6 +228,8 @@ def _camera(name: str, rig: CameraConfig, kind: str, streams: Streams) -> Camera
         position_mm=position,
         target_mm=_rounded(target),
         focal_mm=rig.focal_mm,
+        pixel_aspect=rig.pixel_aspect,
+        principal_point=rig.principal_point,
         roll_deg=round(roll, 3),
         sensor_width_mm=rig.sensor_width_mm,
         exposure_ev=round(rig.exposure_ev.draw(rng), 3),

@@ -1,4 +1,7 @@
-"""Sampling of plates, signs and stickers other than markers; they have no label."""
+"""Sampling of plates, signs and stickers other than markers.
+
+They have no label unless the configuration gives them one.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,20 +18,44 @@ _OVERPAINT = 0.6
 """Albedo of fresh paint relative to the faded paint around it."""
 
 
-def stickers_of(kind: str, rng: np.random.Generator) -> list[Sticker]:
+def stickers_of(config: MarkingsConfig, kind: str, rng: np.random.Generator) -> list[Sticker]:
     """Return the stickers that one container may carry.
 
     Args:
+        config: Weights of stickers, and new ones.
         kind: Container kind, a key of `KINDS`.
         rng: Random generator that picks one sticker of each group.
     """
-    known = [s for _, s in sorted(stickers().items()) if not s.kinds or kind in s.kinds]
+    known = [s for s in _all_stickers(config) if not s.kinds or kind in s.kinds]
     groups: dict[str, list[Sticker]] = {}
     for each in known:
         if each.group:
             groups.setdefault(each.group, []).append(each)
     picked = [group[int(rng.integers(len(group)))] for group in groups.values()]
     return [s for s in known if not s.group] + picked
+
+
+def _all_stickers(config: MarkingsConfig) -> list[Sticker]:
+    """Return the stickers of fastgen with the configuration's weights, then its own stickers."""
+    factors = config.sticker_weights
+    found = [s for _, s in sorted(stickers().items()) if factors.get(s.name, 1.0) > 0]
+    if factors:
+        scaled = ((s, factors.get(s.name, 1.0)) for s in found)
+        found = [replace(s, weight=f * s.weight, share=min(f * s.share, 1.0)) for s, f in scaled]
+    for name, own in config.stickers.items():
+        sticker = Sticker(
+            name=name,
+            size_mm=own.size_mm,
+            where=own.faces,
+            always=own.always,
+            weight=own.weight,
+            share=own.share,
+            kinds=own.kinds,
+            place=(*own.across, *own.up),
+            art=f"sticker/{name}",
+        )
+        found.append(sticker)
+    return found
 
 
 def sample_stickers(
@@ -80,7 +107,9 @@ def _placed(
         return None
     wear = round(float(rng.uniform(*config.sticker_wear)), 3)
     size = (width, height)
-    decal = Decal("sticker", "", sheet.face, center, size, tilt_deg, sticker.name, wear=wear)
+    class_name = sticker.name if sticker.name in config.labelled_stickers else ""
+    art = sticker.art or sticker.name
+    decal = Decal("sticker", class_name, sheet.face, center, size, tilt_deg, art, wear=wear)
     if sticker.ink == "art":
         return decal
     red, green, blue = inks[sticker.ink]

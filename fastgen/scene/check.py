@@ -2,10 +2,11 @@
 
 import math
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.decals.artwork import art_layers, glyph_tiles
 from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
@@ -25,11 +26,30 @@ from fastgen.validation import check_fields, check_known
 _ART_KINDS = ("marker", "sticker", "triangle", "emblem")
 
 
-def check_scene(scene: Any) -> Scene:
+class OwnDecals(NamedTuple):
+    """Decals that a configuration adds to those of fastgen.
+
+    Attributes:
+        classes: Names of its classes.
+        art: Names of its artwork.
+    """
+
+    classes: tuple[str, ...] = ()
+    art: tuple[str, ...] = ()
+
+
+_NONE = OwnDecals()
+
+
+def check_scene(scene: Any, own: OwnDecals = _NONE) -> Scene:
     """Return a copy of a scene that can be drawn, with NumPy's numbers as Python's.
 
     Every field is checked against its type and bounds, then against limits that involve several
     fields.
+
+    Args:
+        scene: The scene.
+        own: Decals that may occur beside those of fastgen.
 
     Raises:
         ConfigError: naming the first part that cannot be drawn.
@@ -40,7 +60,7 @@ def check_scene(scene: Any) -> Scene:
             "Scene.from_json"
         )
     checked = check_fields(scene, Scene, "scene")
-    _check_limits(checked)
+    _check_limits(checked, own)
     return checked
 
 
@@ -59,7 +79,7 @@ def check_camera(camera: Any, scene: Scene) -> Camera:
     return checked
 
 
-def _check_limits(scene: Scene) -> None:
+def _check_limits(scene: Scene, own: OwnDecals) -> None:
     """Check limits that involve several fields."""
     carried = scene.decals or scene.damages or scene.seals or scene.spreader.present
     if not scene.container.present and carried:
@@ -67,9 +87,9 @@ def _check_limits(scene: Scene) -> None:
             "scene.container.present: false, but the scene has decals, damages, seals or a "
             "spreader; remove them"
         )
-    _check_contents(scene, "scene")
+    _check_contents(scene, "scene", own)
     for i, neighbour in enumerate(scene.neighbours):
-        _check_contents(neighbour, f"scene.neighbours[{i}]")
+        _check_contents(neighbour, f"scene.neighbours[{i}]", own)
     damages = [*scene.damages, *(damage for each in scene.neighbours for damage in each.damages)]
     for kind, count in Counter(damage.kind for damage in damages).items():
         if count > MAX_INSTANCES:
@@ -83,7 +103,7 @@ def _check_limits(scene: Scene) -> None:
         _check_camera(camera, f"scene.cameras[{i}]", scene)
 
 
-def _check_contents(carrier: Scene | Neighbour, path: str) -> None:
+def _check_contents(carrier: Scene | Neighbour, path: str, own: OwnDecals) -> None:
     """Check what one container carries."""
     for hasp, count in Counter(seal.hasp for seal in carrier.seals).items():
         if count > 1:
@@ -91,7 +111,7 @@ def _check_contents(carrier: Scene | Neighbour, path: str) -> None:
                 f"{path}.seals: {count} are at hasp {hasp}, and a hasp holds one; remove some"
             )
     for i, decal in enumerate(carrier.decals):
-        _check_decal(decal, f"{path}.decals[{i}]")
+        _check_decal(decal, f"{path}.decals[{i}]", own)
     for i, damage in enumerate(carrier.damages):
         _check_damage(damage, f"{path}.damages[{i}]")
 
@@ -130,7 +150,9 @@ def _check_camera(camera: Camera, path: str, scene: Scene) -> None:
         )
 
 
-def _check_decal(decal: Decal, path: str) -> None:
+def _check_decal(decal: Decal, path: str, own: OwnDecals) -> None:
+    classes = ("", *ALL_DETECTION_CLASSES[1:], *own.classes)
+    check_known(f"{path}.class_name", decal.class_name, classes)
     if decal.kind == "text":
         check_known(f"{path}.font", decal.font, glyph_tiles()[1])
         if not decal.cap_mm > 0:
@@ -156,7 +178,7 @@ def _check_decal(decal: Decal, path: str) -> None:
                     "one in a box"
                 )
     if decal.kind in _ART_KINDS and decal.art not in COMPUTED_ART:
-        check_known(f"{path}.art", decal.art, art_layers())
+        check_known(f"{path}.art", decal.art, {*art_layers(), *own.art})
     if decal.kind == "marker" and decal.size_mm[0] != decal.size_mm[1]:
         width, height = decal.size_mm
         raise ConfigError(

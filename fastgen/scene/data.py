@@ -15,7 +15,7 @@ import numpy as np
 from annotated_types import MaxLen
 from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DAMAGE_CLASSES, ALL_DETECTION_CLASSES
+from fastgen.classes import ALL_DAMAGE_CLASSES, CLASS_NAME
 from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.errors import ConfigError
@@ -41,9 +41,18 @@ from fastgen.scene.limits import (
     Millimetres,
     Number,
 )
-from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
+from fastgen.scene.optics import ASPECT_LIMITS, PRINCIPAL_LIMITS, Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
-from fastgen.validation import Bounds, Flag, OneOf, Share, check_fields, from_plain, to_plain
+from fastgen.validation import (
+    Bounds,
+    Flag,
+    Matching,
+    OneOf,
+    Share,
+    check_fields,
+    from_plain,
+    to_plain,
+)
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
 """Weights of linear red, green and blue in the luminance; ITU-R BT.709-6, section 3.2."""
@@ -51,6 +60,7 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 Vec3 = tuple[Number, Number, Number]
 
 _Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
+_Shift = Annotated[float, Bounds(*PRINCIPAL_LIMITS)]
 
 
 @dataclass(frozen=True)
@@ -66,8 +76,9 @@ class Decal:
             the square that stands on its corner, for a text the tight box around its ink. A
             triangle has its tip in the middle of the upper side.
         rotation_deg: Counter-clockwise rotation on the sheet.
-        art: Name of the marker, sticker or emblem; 'stripes' for the bands of high cubes,
-            'patch' for a repainted rectangle.
+        art: Name of the marker, sticker or emblem, as in `artwork.art_layers`, or in
+            `MarkingsConfig.own_art` for one of the configuration; 'stripes' for the bands of high
+            cubes, 'patch' for a repainted rectangle.
         lines: Text, one string per line. In vertical text the letters of a line are below one
             another, and lines are columns from left to right.
         parts: Parts of a text with places of their own; they decide the layout if there are any,
@@ -86,7 +97,10 @@ class Decal:
     """
 
     kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind not in COMPUTED_ART))]
-    class_name: Annotated[str, OneOf(("", *ALL_DETECTION_CLASSES[1:]))]
+    class_name: Annotated[
+        str,
+        Matching(f"{CLASS_NAME}|", "is not a class name; give a class of the marker task or ''"),
+    ]
     face: Annotated[str, OneOf(SHEET_FACES)]
     center_mm: Vec2
     size_mm: tuple[_Length, _Length]
@@ -313,6 +327,9 @@ class Camera:
         exposure_ev: Deviation from the metered exposure, in stops.
         lens: Distortion, None for a pinhole.
         sensor: Effects of the sensor on the image, None for none.
+        pixel_aspect: Focal length down the image relative to that across it.
+        principal_point: Place where the optical axis meets the image: distance to the right and
+            down from its centre, as shares of its width.
     """
 
     name: str
@@ -324,6 +341,8 @@ class Camera:
     exposure_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     lens: Lens | None = None
     sensor: Sensor | None = None
+    pixel_aspect: Annotated[float, Bounds(*ASPECT_LIMITS)] = 1.0
+    principal_point: tuple[_Shift, _Shift] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from fastgen.classes import (
     ALL_SEGMENTATION_CLASSES,
     CONTAINER_ID,
     SEAL_ID,
-    SEGMENTATION_CLASSES,
     SPREADER_ID,
     UNDAMAGED_CONTAINER,
+    segmentation_classes,
 )
 from fastgen.scene.data import Damage, Decal, Scene, Seal
 from fastgen.scene.limits import HASPS
@@ -47,9 +47,8 @@ def scene_numbers(scene: Scene) -> list[Numbers]:
     carried: list[tuple[tuple[Decal, ...], tuple[Damage, ...]]] = [(scene.decals, scene.damages)]
     carried += [(each.decals, each.damages) for each in scene.neighbours]
     kinds = {damage.kind for _, damages in carried for damage in damages}
-    # without scrapes, their values stay free for ids, so that older scenes keep their ids
-    known = SEGMENTATION_CLASSES if kinds <= set(SEGMENTATION_CLASSES) else ALL_SEGMENTATION_CLASSES
-    taken = range(200, 100 * (len(known) + 1))
+    # the values of later kinds stay free for ids, so that a new kind does not change older scenes
+    taken = range(200, 100 * (len(segmentation_classes(kinds)) + 1))
     free = (number for number in range(CONTAINER_ID, SPREADER_ID) if number not in taken)
     values = iter(mask_values(tuple(damage for _, damages in carried for damage in damages)))
     return [

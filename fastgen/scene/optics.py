@@ -17,6 +17,12 @@ CONTRAST_LIMITS = (0.8, 2.0)
 """Slope of a response curve at middle grey. Lower values would be too steep near black for the
 table that the curve is stored in."""
 
+ASPECT_LIMITS = (0.5, 2.0)
+"""Focal length down an image relative to that across it."""
+
+PRINCIPAL_LIMITS = (-0.45, 0.45)
+"""Distance of the principal point from the centre of an image, as a share of its width."""
+
 SHUTTER_LIMITS_S = (1e-5, 0.5)
 """Shortest and longest time that a shutter may be open."""
 

@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View, view_of
-from fastgen.classes import ALL_DETECTION_CLASSES, ALL_SEGMENTATION_CLASSES
+from fastgen.classes import ALL_SEGMENTATION_CLASSES
 from fastgen.config.config import Config
 from fastgen.errors import ConfigError
 from fastgen.formats.door import door_number
@@ -76,7 +76,7 @@ def class_counts(
             if task == "damage":
                 _count_damages(counts, scene, camera, view, config)
             else:
-                _count_decals(counts, prepared, view, config.labels.min_visible_px)
+                _count_decals(counts, prepared, view, config)
     return torch.from_numpy(counts)
 
 
@@ -142,7 +142,7 @@ def _covered_px(damage: Damage, view: View, threshold_mm: float) -> float:
 
 
 def _count_decals(
-    counts: NDArray[np.int64], prepared: PreparedScene, view: View, min_visible_px: int
+    counts: NDArray[np.int64], prepared: PreparedScene, view: View, config: Config
 ) -> None:
     labelled, outlines = prepared.decals.decals, prepared.decals.outlines_mm
     if not labelled:
@@ -151,9 +151,14 @@ def _count_decals(
     x, y = pixels[..., 0], pixels[..., 1]
     # y points down, so an outline that is counter-clockwise on its sheet has a negative area
     area = -0.5 * (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)
-    seen = (depth > 0).all(axis=1) & (area >= min_visible_px) & _inside(view, outlines.mean(axis=1))
+    seen = (
+        (depth > 0).all(axis=1)
+        & (area >= config.labels.min_visible_px)
+        & _inside(view, outlines.mean(axis=1))
+    )
+    classes = config.markings.detection_classes
     for decal, visible in zip(labelled, seen, strict=True):
-        counts[ALL_DETECTION_CLASSES.index(decal.class_name)] += bool(visible)
+        counts[classes.index(decal.class_name)] += bool(visible)
 
 
 def _inside(view: View, points_mm: NDArray[np.float64]) -> NDArray[np.bool_]:

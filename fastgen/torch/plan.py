@@ -173,7 +173,12 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
     if made.markings.detection_classes != base.markings.detection_classes:
         raise ConfigError(
             f"curriculum: epoch {epoch} changes which classes there are; give markings.marks in "
-            "every epoch or in none, with 0 for no mark"
+            "every epoch or in none, with 0 for no mark, and keep markers above weight 0"
+        )
+    if made.markings.own_art != base.markings.own_art:
+        raise ConfigError(
+            f"curriculum: epoch {epoch} changes the images of markers, stickers or brands; keep "
+            "them, and change their weights"
         )
     if made.damage.segmentation_classes != base.damage.segmentation_classes:
         raise ConfigError(

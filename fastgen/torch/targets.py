@@ -225,7 +225,7 @@ def _damages(sample: Sample) -> list[_Found]:
 
 def _markers(sample: Sample) -> list[_Found]:
     """Return class from 0, box and visible pixels of each label of the marker task."""
-    found = yolo.detections(sample.objects)
+    found = yolo.detections(sample.objects, sample.marker_classes)
     return [(index, box, thing.area, None) for index, thing, box in found]
 
 

@@ -1,0 +1,72 @@
+"""Post-processing of every sample by a function that a configuration names."""
+
+import hashlib
+import importlib
+import inspect
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from fastgen.errors import ConfigError, FastgenError
+from fastgen.sample import Sample
+
+Postprocess = Callable[[Sample, np.random.Generator], Sample]
+"""Takes a sample and a random generator of its own, and returns the changed sample."""
+
+_ARRAYS = ("image", "ids", "damage", "depth")
+"""Arrays that keep their shape and type."""
+
+
+@cache
+def imported(name: str) -> Postprocess:
+    """Return the function called `name`, as in 'package.module:function'.
+
+    Raises:
+        ConfigError: It cannot be imported.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        function: Postprocess = getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # the module may raise anything while it is imported
+        raise ConfigError(
+            f"postprocess: {name} cannot be imported ({error!r}); install its package, or put its "
+            "folder into PYTHONPATH"
+        ) from error
+    if not callable(function):
+        raise ConfigError(f"postprocess: {name} is no function of a sample and a random generator")
+    return function
+
+
+def source_hash(name: str) -> str:
+    """Return the SHA-256 of the file that defines a function, which decides its samples."""
+    path = inspect.getsourcefile(inspect.unwrap(imported(name)))
+    return hashlib.sha256(Path(path).read_bytes() if path else b"").hexdigest()
+
+
+def postprocessed(sample: Sample, name: str, rng: np.random.Generator) -> Sample:
+    """Return what a function makes of a sample.
+
+    Args:
+        sample: The sample.
+        name: Name of the function.
+        rng: Random generator that depends on seed, scene and camera alone.
+
+    Raises:
+        FastgenError: The function fails, or returns something else than such a sample.
+    """
+    try:
+        made = imported(name)(sample, rng)
+    except Exception as error:
+        raise FastgenError(f"postprocess: {name} raised {error!r}; mend it") from error
+    if not isinstance(made, Sample):
+        raise FastgenError(f"postprocess: {name} returned {made!r}; it has to return a Sample")
+    for field in _ARRAYS:
+        before, now = getattr(sample, field), np.asarray(getattr(made, field))
+        if (now.shape, now.dtype) != (before.shape, before.dtype):
+            raise FastgenError(
+                f"postprocess: {name} returned {field} as {now.dtype} {list(now.shape)}; keep "
+                f"{before.dtype} {list(before.shape)}"
+            )
+    return made

@@ -1,0 +1,200 @@
+"""The package of docs/extend.md, installed beside fastgen, adds a marker, a format and a preset."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+PAGE = Path(__file__).parent.parent / "docs/extend.md"
+PARTS = re.compile(r"^`([\w./]+)`[^\n]*\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+SIZE = ["--size", "192x192", "--quality", "draft"]
+
+
+def install(site, name, groups):
+    """Describe a distribution on a folder of sys.path, as pip does."""
+    info = site / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    lines = [
+        line
+        for group, entries in groups.items()
+        for line in (f"[{group}]", *(f"{key} = {value}" for key, value in entries.items()))
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """A folder of sys.path with the package of the docs page."""
+    site = tmp_path_factory.mktemp("site")
+    parts = dict(PARTS.findall(PAGE.read_text(encoding="utf-8")))
+    assert set(parts) == {
+        "pyproject.toml",
+        *(f"quaytools/{name}.py" for name in ("presets", "boxes", "dust")),
+    }
+    (site / "quaytools").mkdir()
+    (site / "quaytools/__init__.py").touch()
+    project = tomllib.loads(parts.pop("pyproject.toml"))["project"]
+    for path, text in parts.items():
+        (site / path).write_text(text)
+    Image.new("RGB", (64, 64), (20, 180, 40)).save(site / "quaytools/env.png")
+    install(site, project["name"], project["entry-points"])
+    return site
+
+
+def fastgen(*arguments, path=(), code=0):
+    """Run the command with folders on PYTHONPATH; return what it prints."""
+    paths = [*map(str, path), *filter(None, [os.environ.get("PYTHONPATH")])]
+    done = subprocess.run(
+        [sys.executable, "-m", "fastgen", *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == code, done.stderr
+    return done.stderr if code else done.stdout
+
+
+@pytest.fixture(scope="module")
+def dataset(site, tmp_path_factory):
+    out = tmp_path_factory.mktemp("made") / "out"
+    given = ["--images", "10", "--preset", "our_gate", "--also", "boxes", "--workers", "2"]
+    fastgen("generate", out, *given, *SIZE, path=[site])
+    return out
+
+
+def test_the_preset_is_listed(site):
+    listed = fastgen("presets", path=[site])
+    assert re.search(r"^our_gate +our gate, with the marker of our port$", listed, re.MULTILINE)
+    assert "our_gate" not in fastgen("presets")
+
+
+def test_the_marker_and_the_format_reach_the_files(dataset):
+    names = yaml.safe_load((dataset / "imdg/data.yaml").read_text())["names"]
+    assert names[28] == "ENV"
+    assert len(names) == 29
+    boxes = 0
+    for path in dataset.glob("boxes/*/*.csv"):
+        rows = [line.split(",") for line in path.read_text().splitlines()]
+        label = dataset / "imdg/labels" / path.parent.name / f"{path.stem}.txt"
+        lines = [line.split() for line in label.read_text().splitlines()]
+        assert [row[0] for row in rows] == [names[int(line[0])] for line in lines]
+        for (_, x0, _, x1, _), line in zip(rows, lines, strict=True):
+            assert float(line[3]) * 192 == pytest.approx(int(x1) - int(x0), abs=1e-3)
+        boxes += len(rows)
+    counts = json.loads((dataset / "dataset.json").read_text())["counts"].values()
+    assert boxes == sum(count["boxes"] for count in counts) > 10
+    assert "ENV" in "".join(path.read_text() for path in dataset.glob("boxes/*/*.csv"))
+
+
+def test_the_function_changes_pixels_and_is_recorded(dataset, site, tmp_path):
+    record = json.loads((dataset / "dataset.json").read_text())
+    assert record["postprocess"]["function"] == "quaytools.dust:dust"
+    assert len(record["postprocess"]["sha256"]) == 64
+    pictures = []
+    for name, more in (("with", []), ("again", []), ("without", ["--set", "postprocess=''"])):
+        path = tmp_path / f"{name}.png"
+        given = ["--index", "0", "--camera", "rear", "-o", path, *SIZE, *more]
+        fastgen("show", "--preset", "our_gate", *given, path=[site])
+        pictures.append(np.array(Image.open(path)).astype(int))
+    dusty, again, clean = pictures
+    np.testing.assert_array_equal(dusty, again)
+    changed = (dusty != clean).any(axis=2)
+    assert 0.005 < changed.mean() < 0.02
+    np.testing.assert_array_equal(dusty[changed], clean[changed] // 2)
+
+
+def test_the_dataset_needs_its_package(dataset, site):
+    assert "whole and consistent" in fastgen("verify", dataset, path=[site])
+    said = subprocess.run(
+        [sys.executable, "-m", "fastgen", "verify", dataset], capture_output=True, text=True
+    )
+    assert said.returncode == 1
+    assert "dataset.json: format 'boxes' is unknown; install the package" in said.stdout
+    given = ["--images", "10", "--preset", "our_gate", "--also", "boxes"]
+    assert "preset: 'our_gate' is unknown" in fastgen("generate", dataset, *given, *SIZE, code=2)
+
+
+def test_a_changed_function_is_refused_when_a_dataset_is_continued(dataset, site):
+    path = site / "quaytools/dust.py"
+    text = path.read_text()
+    path.write_text(text.replace("0.01", "0.02"))
+    given = ["--images", "20", "--preset", "our_gate", "--also", "boxes", *SIZE]
+    said = fastgen("generate", dataset, *given, path=[site], code=2)
+    path.write_text(text)
+    assert "was made with other settings (postprocess.sha256 was" in said
+
+
+@pytest.mark.parametrize(
+    ("groups", "arguments", "words"),
+    [
+        (
+            {"fastgen.presets": {"gate": "broken:NONE"}},
+            ["config", "--preset", "gate"],
+            "preset: gate is offered by fastgen and other; uninstall one or rename its entry point",
+        ),
+        (
+            {"fastgen.presets": {"mine": "broken:NONE"}},
+            ["config", "--preset", "mine"],
+            "preset: mine of the package other cannot be loaded from broken:NONE (ModuleNotFound",
+        ),
+        (
+            {"fastgen.presets": {"mine": "json:dumps"}},
+            ["config", "--preset", "mine"],
+            "preset: mine of the package other is a function; json:dumps has to be an instance of",
+        ),
+        (
+            {"fastgen.formats": {"mine": "quaytools.boxes:FORMAT"}},
+            ["generate", "{out}", "--images", "1", "--also", "mine"],
+            "also: the format mine calls itself 'boxes'; give both the same name",
+        ),
+    ],
+)
+def test_a_broken_package_is_named(groups, arguments, words, site, tmp_path):
+    install(tmp_path, "other", groups)
+    given = [each.format(out=tmp_path / "out") for each in arguments]
+    assert fastgen(*given, path=[tmp_path, site], code=2).startswith(f"fastgen: {words}")
+    assert fastgen("presets", path=[tmp_path, site])
+
+
+FAULTY = """
+from dataclasses import replace
+def raises(sample, rng):
+    raise ValueError("no")
+def nothing(sample, rng):
+    return None
+def smaller(sample, rng):
+    return replace(sample, image=sample.image[1:])
+NUMBER = 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("faulty", "--set: postprocess: 'faulty' is not a function; write package.module:function"),
+        ("faultily:raises", "postprocess: faultily:raises cannot be imported (ModuleNotFound"),
+        ("faulty:missing", "postprocess: faulty:missing cannot be imported (AttributeError"),
+        ("faulty:NUMBER", "postprocess: faulty:NUMBER is no function of a sample"),
+        ("faulty:raises", "postprocess: faulty:raises raised ValueError('no'); mend it"),
+        ("faulty:nothing", "postprocess: faulty:nothing returned None; it has to return a Sample"),
+        (
+            "faulty:smaller",
+            "postprocess: faulty:smaller returned image as uint8 [191, 192, 3]; keep",
+        ),
+    ],
+)
+def test_an_unusable_function_gets_one_line(name, words, tmp_path):
+    (tmp_path / "faulty.py").write_text(FAULTY)
+    given = ["show", "--index", "0", "-o", tmp_path / "x.png", *SIZE]
+    said = fastgen(*given, "--set", f"postprocess={name}", path=[tmp_path], code=2)
+    assert said.startswith(f"fastgen: {words}")
+    assert not (tmp_path / "x.png").exists()
