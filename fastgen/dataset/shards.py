@@ -20,7 +20,7 @@ import cv2
 import orjson
 
 from fastgen.dataset.freed_memory import return_freed_memory
-from fastgen.dataset.job import Job, Task, manifest_path, stem_of
+from fastgen.dataset.job import Job, Task, manifest_path, scene_and_camera
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
@@ -139,7 +139,10 @@ class Maker:
         if unreported:
             self._report("images", unreported)
         made = [(files, record) for files, record in made if _index(record) not in skip]
-        files = pack(made, task.shard) if self._job.layout == "webdataset" else _joined(made)
+        if self._job.layout == "webdataset":
+            files = pack(made, task.shard)
+        else:
+            files = _joined(made, self._storage.links)
         self._storage.commit(files, f"{task.shard:06d}")
         manifest = {
             "shard": task.shard,
@@ -179,11 +182,12 @@ class Maker:
         item = Item(
             sample,
             split_of(job.config, job.seed, index),
-            stem_of(index, camera),
+            job.stem(index, camera),
             index * len(job.cameras) + job.cameras.index(camera),
             job.config.labels,
+            job.coco_masks == "polygon",
         )
-        return assemble(item, self._formats)
+        return assemble(item, self._formats, job.layout != "seafront")
 
 
 def pack(made: Sequence[tuple[Files, Record]], shard: int) -> Files:
@@ -225,8 +229,14 @@ def _member(path: str, stem: str) -> str:
     return ".".join(filter(None, (stem, folder, *inner, part, ending)))
 
 
-def _joined(made: Sequence[tuple[Files, Record]]) -> Files:
-    return {path: content for files, _ in made for path, content in files.items()}
+def _joined(made: Sequence[tuple[Files, Record]], links: bool) -> Files:
+    """Return the files of all samples; without `links`, leave out those that are only links."""
+    return {
+        path: content
+        for files, _ in made
+        for path, content in files.items()
+        if links or not (isinstance(content, Same) and content.link_only)
+    }
 
 
 def _entries(files: Files) -> dict[str, list[Any]]:
@@ -241,4 +251,4 @@ def _entries(files: Files) -> dict[str, list[Any]]:
 
 
 def _index(record: Record) -> int:
-    return int(record["stem"].split("_", 1)[0])
+    return scene_and_camera(record["stem"])[0]

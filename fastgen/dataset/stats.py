@@ -5,7 +5,7 @@ storage.
 """
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,7 +40,7 @@ class _Labels:
         """Count the labels of one image."""
         image_width, image_height = record["size"]
         before = len(self.sizes)
-        for name, (_, _, width, height) in task.labels(record["facts"][task.name]):
+        for name, (_, _, width, height) in task.labels(record["facts"].get(task.name, ())):
             self.by_class[name] += 1
             if name in ALL_DAMAGE_CLASSES or name in MARKER_CLASSES:
                 self.sizes.append((width / image_width, height / image_height))
@@ -53,11 +53,16 @@ def report(out: str | Path) -> str:
     Raises:
         OutputError: `out` is not a finished dataset.
     """
+    return "\n\n".join(_tables(str(out)))
+
+
+def _tables(out: str) -> Iterator[str]:
+    written, records = _contents(out)
     damage, imdg = formats_of(("damage", "imdg"))
     images = dict.fromkeys(SPLITS, 0)
     damages = {split: _Labels() for split in SPLITS}
     markers = {split: _Labels() for split in SPLITS}
-    for record in _records(str(out)):
+    for record in records:
         split = record["split"]
         images[split] += 1
         damages[split].add(damage, record)
@@ -67,24 +72,29 @@ def report(out: str | Path) -> str:
     texts = sum(each.by_class["text"] for each in markers.values())
     undamaged = [images[split] - damages[split].images for split in SPLITS]
     damaged = [each.images for each in damages.values()]
-    return "\n\n".join(
-        [
-            "Table 1: images without and with visible damage",
-            _table({"No damage": undamaged, "Damaged": damaged}),
-            "Table 2: instances in the damage task",
-            _class_table(damage, damages),
-            "Table 3: instances in the marker task",
-            _class_table(imdg, markers),
-            f"Per image: {len(marker_sizes) / count:.2f} markers, {texts / count:.2f} texts",
-            "Fig. 8: box width and height as shares of the image, at quantiles "
-            + ", ".join(f"{q:g}" for q in _QUANTILES),
-            _sizes("damage", [size for each in damages.values() for size in each.sizes]),
-            _sizes("markers", marker_sizes),
-        ]
-    )
+    sizes = []
+    if damage.name in written:
+        yield "Table 1: images without and with visible damage"
+        yield _table({"No damage": undamaged, "Damaged": damaged})
+        yield "Table 2: instances in the damage task"
+        yield _class_table(damage, damages)
+        sizes.append(_sizes("damage", [size for each in damages.values() for size in each.sizes]))
+    else:
+        yield "Images"
+        yield _table({"All": [*images.values()]})
+    if imdg.name in written:
+        yield "Table 3: instances in the marker task"
+        yield _class_table(imdg, markers)
+        yield f"Per image: {len(marker_sizes) / count:.2f} markers, {texts / count:.2f} texts"
+        sizes.append(_sizes("markers", marker_sizes))
+    if sizes:
+        quantiles = ", ".join(f"{q:g}" for q in _QUANTILES)
+        yield f"Fig. 8: box width and height as shares of the image, at quantiles {quantiles}"
+        yield from sizes
 
 
-def _records(out: str) -> Iterator[Record]:
+def _contents(out: str) -> tuple[Sequence[str], Iterator[Record]]:
+    """Return the names of a dataset's formats, and the records of its images."""
     storage = storage_of(out)
     try:
         manifest = parsed(storage.read(MANIFEST))
@@ -95,11 +105,15 @@ def _records(out: str) -> Iterator[Record]:
         raise damaged
     if "digest" not in manifest:
         raise OutputError(f"{out}: the dataset is not finished; run generate again")
-    for number in manifest["shards"]:
-        shard = read_manifest(storage, int(number))
-        if shard is None:
-            raise damaged
-        yield from shard["records"]
+
+    def records() -> Iterator[Record]:
+        for number in manifest["shards"]:
+            shard = read_manifest(storage, int(number))
+            if shard is None:
+                raise damaged
+            yield from shard["records"]
+
+    return manifest["formats"], records()
 
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:

@@ -138,7 +138,7 @@ def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
         pattern, numbered = r"bop/.*/(\d{6,})(?:_\d+)?\.\w+", scenes * len(cameras)
     else:
         names = "|".join(map(re.escape, cameras))
-        pattern, numbered = rf".*/(\d{{6,}})_(?:{names})(?:_\d+)?\.\w+", scenes
+        pattern, numbered = rf".*/(?:s\d+_)?(\d{{6,}})_(?:{names})(?:_\w+)?\.\w+", scenes
     found = re.fullmatch(pattern, path)
     return None if found is None else int(found[1]) // numbered
 

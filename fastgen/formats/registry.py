@@ -10,7 +10,7 @@ from fastgen.formats.format import Format
 from fastgen.validation import check_known
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
-"""Formats that `--format seafront` always writes: the tasks of the SeaFront paper, and container
+"""Formats that are written unless others are chosen: the tasks of the SeaFront paper, and container
 corners."""
 
 
@@ -25,8 +25,12 @@ def known_formats() -> dict[str, Format]:
     return found
 
 
-def formats_of(names: Sequence[str]) -> list[Format]:
+def formats_of(names: Sequence[str], option: str = "also") -> list[Format]:
     """Return formats by name.
+
+    Args:
+        names: Names of the formats.
+        option: Option that gave the names, for the error message.
 
     Raises:
         ConfigError: A name is unknown.
@@ -34,5 +38,5 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     known = known_formats()
     for name in names:
         if name not in known:
-            check_known("also", name, set(known) - set(SEAFRONT))
+            check_known(option, name, set(known) - (set(SEAFRONT) if option == "also" else set()))
     return [known[name] for name in names]
