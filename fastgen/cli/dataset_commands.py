@@ -81,7 +81,8 @@ def add_generate(commands: Any) -> None:
         default=LAYOUTS[0],
         metavar="|".join(LAYOUTS),
         help="layout of the dataset: seafront has one folder for each task, webdataset has tar "
-        "files; default: %(default)s",
+        "files, parquet has tables with a row per image and needs fastgen[parquet]; default: "
+        "%(default)s",
     )
     output.add_argument(
         "--tasks",
@@ -117,8 +118,8 @@ def add_generate(commands: Any) -> None:
         "--shard",
         type=int,
         metavar="SCENES",
-        help="number of scenes that a worker makes and commits together, and that share a tar "
-        f"file; default: {defaults}",
+        help="number of scenes that a worker makes and commits together, and that share a "
+        f"tar or Parquet file; default: {defaults}",
     )
     machines = command.add_argument_group("machines")
     machines.add_argument(

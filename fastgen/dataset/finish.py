@@ -8,12 +8,13 @@ from typing import Any
 from fastgen.dataset.console import say
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
-from fastgen.dataset.job import Job, manifest_path
+from fastgen.dataset.job import ARCHIVE_ENDINGS, Job, manifest_path
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
 from fastgen.errors import OutputError
 from fastgen.files.images import encode_picture
+from fastgen.formats.card import card
 from fastgen.formats.format import Format, Record
 from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
@@ -53,8 +54,11 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
         storage.write(path, sums)
         files[path] = sums.entry()
 
-    if job.layout == "seafront":
-        splits = [split for split in SPLITS if counts[split]["images"]] or SPLITS[:1]
+    splits = [split for split in SPLITS if counts[split]["images"]] or SPLITS[:1]
+    if job.layout in ARCHIVE_ENDINGS:
+        pattern = f"SPLIT-*.{ARCHIVE_ENDINGS[job.layout]}"
+        put("README.md", map(str.encode, card(pattern, splits)))
+    else:
         for each in formats:
             for path, content in each.shared_files(splits, job.config):
                 put(path, [content] if isinstance(content, bytes) else map(str.encode, content))

@@ -8,10 +8,13 @@ from fastgen.formats.registry import SEAFRONT
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 
-SHARD_SCENES = {"seafront": 4, "webdataset": 64}
+SHARD_SCENES = {"seafront": 4, "webdataset": 64, "parquet": 64}
 """Default number of scenes per shard in each layout."""
 
 LAYOUTS = tuple(SHARD_SCENES)
+
+ARCHIVE_ENDINGS = {"webdataset": "tar", "parquet": "parquet"}
+"""File name extension of the archives in each layout that packs samples."""
 
 STEMS = ("seed", "short")
 """Kinds of file names: with the seed, as in s7_000017_A, or without it, as in 000017_A."""
@@ -34,7 +37,7 @@ class Job:
         seed: Whole number of 0 or more.
         cameras: Names of the cameras to render in each scene; () takes all of `config`.
         render: Settings of the renderer.
-        layout: "seafront" (one folder for each task) or "webdataset" (tar files).
+        layout: "seafront" (one folder for each task), "webdataset" (tar files) or "parquet".
         tasks: Names of the formats to write.
         also: Names of formats to write in addition to `tasks`.
         shard_scenes: Scenes that one process makes and commits together. None takes

@@ -1,5 +1,6 @@
 """Checks of a job before it runs, and its settings as dataset.json stores them."""
 
+import importlib.util
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -80,6 +81,8 @@ def _check(job: Job, worker_count: int) -> None:
         check_known("cameras", name, job.config.cameras)
     if len(set(job.cameras)) != len(job.cameras):
         raise ConfigError("cameras: a name occurs twice; give each only once")
+    if job.layout == "parquet" and importlib.util.find_spec("pyarrow") is None:
+        raise ConfigError("format: parquet needs pyarrow: pip install 'fastgen[parquet]'")
     check_known("stems", job.stems, STEMS)
     check_known("coco_masks", job.coco_masks, COCO_MASKS)
     if not job.tasks:

@@ -155,12 +155,15 @@ class Task:
         usual: Number of categories that a file lists, from the first. If an annotation has a
             later category, the file lists all: scenes made by hand may contain objects that the
             configuration does not draw.
+        more: Keys that its annotations have beside those of `annotation`, each with the value that
+            stands for a missing key: "" for text, () for a list of numbers.
     """
 
     name: str
     description: str
     categories: Sequence[dict[str, Any]]
     usual: int
+    more: tuple[tuple[str, str | tuple[()]], ...] = ()
 
     def split_file(
         self, split: str, records: Callable[[], Iterable[dict[str, Any]]]
@@ -211,6 +214,20 @@ def file_text(
             yield ("," if count > 1 else "") + _json({"id": count, "image_id": number, **item})
     # after the annotations, which determine how many categories are listed
     yield f'],"categories":{_json(task.categories[:usual])}}}'
+
+
+def columns(annotations: Sequence[dict[str, Any]], task: Task) -> dict[str, list[Any]]:
+    """Return the annotations of one image as lists, one for each kind of value.
+
+    Categories count from 0.
+    """
+    return {
+        "bbox": [each["bbox"] for each in annotations],
+        "category": [each["category_id"] - 1 for each in annotations],
+        "area": [each["area"] for each in annotations],
+        "iscrowd": [bool(each["iscrowd"]) for each in annotations],
+        **{key: [each.get(key, empty) for each in annotations] for key, empty in task.more},
+    }
 
 
 def _json(value: Any) -> str:

@@ -10,7 +10,7 @@ from fastgen.formats import coco, container, damage, imdg
 from fastgen.formats.format import DatasetFiles, Files, Format, Records
 from fastgen.formats.item import Item
 
-_TASKS = {
+TASKS = {
     "imdg": (imdg.FORMAT.coco_task, "instances"),
     "damage": (damage.FORMAT.coco_task, "instances"),
     "container": (container.FORMAT.coco_task, "person_keypoints"),
@@ -21,14 +21,14 @@ _TASKS = {
 class _CocoFolders(Format):
     name = "coco"
     fits_archives = False
-    builds_on = tuple(_TASKS)
+    builds_on = tuple(TASKS)
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         return {}, None
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         first = next(iter(records()), None)
-        for name, (task_of, start) in _TASKS.items():
+        for name, (task_of, start) in TASKS.items():
             if first is None or name not in first["facts"]:
                 continue
             text = coco.file_text(task_of(config), records, "")

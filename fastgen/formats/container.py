@@ -57,7 +57,7 @@ class _Container(Format):
 
     def coco_task(self, config: Config) -> coco.Task:
         words = "Corner castings of synthetic shipping containers, and the containers' poses"
-        return coco.Task(self.name, words, CATEGORIES, len(CATEGORIES))
+        return coco.Task(self.name, words, CATEGORIES, len(CATEGORIES), (("keypoints", ()),))
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         yield self.coco_task(config).split_file(split, records)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.config.config import Config
+from fastgen.formats import coco
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import scene_file
 
@@ -30,7 +31,8 @@ Files = dict[str, bytes | Same]
 """Content of files by path relative to the dataset, with forward slashes."""
 
 Record = dict[str, Any]
-"""One image as JSON values: stem, split, size [width, height], and facts by name of format."""
+"""One image as JSON values: stem, split, number in the dataset, size [width, height], and facts by
+name of format."""
 
 Records = Callable[[], Iterable[Record]]
 """Returns the records of one split in order; each call starts from the beginning."""
@@ -90,6 +92,10 @@ class Format(ABC):
             config: Configuration of the dataset, which decides the list of classes.
         """
         return iter(())
+
+    def coco_task(self, config: Config) -> coco.Task | None:
+        """Return the task whose COCO annotations are this format's facts; None if they are not."""
+        return None
 
     def members(self, item: Item, files: Files, facts: Any) -> Files:
         """Return the files of one sample for an archive, where all samples have the same members.
@@ -174,6 +180,7 @@ def assemble(item: Item, formats: Sequence[Format], archived: bool = False) -> t
     record = {
         "stem": item.stem,
         "split": item.split,
+        "number": item.number,
         "size": list(item.sample.view.size),
         "facts": facts,
     }

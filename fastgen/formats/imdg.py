@@ -51,6 +51,7 @@ class _Imdg(Format):
             "Synthetic shipping containers with dangerous-goods markers and identifiers",
             [{"id": i + 1, "name": name} for i, name in enumerate(self.classes)],
             len(config.markings.detection_classes),
+            (("text", ""),),
         )
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
