@@ -159,7 +159,7 @@ class Maker:
             case "parquet":
                 return parquet_files(made, shard, self._formats, self._job.config)
             case _:
-                return _joined(made, self._storage.links)
+                return loose_files(made, self._storage.links)
 
     def _image_or_skip(
         self, index: int, camera: str, skip: dict[int, str]
@@ -196,7 +196,7 @@ class Maker:
         return assemble(item, self._formats, job.layout != "seafront")
 
 
-def _joined(made: Sequence[Made], links: bool) -> Files:
+def loose_files(made: Sequence[Made], links: bool) -> Files:
     """Return the files of all samples; without `links`, leave out those that are only links."""
     return {
         path: content
