@@ -52,7 +52,7 @@ class QuickMaker(Maker):
         files = {
             f"images/{split}/{stem}.jpg": simplejpeg.encode_jpeg(pixels),
             f"imdg/labels/{split}/{stem}.txt": b"",
-            f"damage/labels/{split}/{stem}.txt": b"",
+            f"damage/yolo/{split}/{stem}.txt": b"",
             f"scenes/{split}/{stem}.json": random.Random(index).randbytes(2000 + index),
         }
         facts = {"damage": [], "imdg": [], "container": [], "text": [], "door": None}

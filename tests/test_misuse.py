@@ -145,7 +145,7 @@ def test_resuming_with_a_folder_of_the_shipped_hdris_is_refused(copy, tmp_path, 
 def test_labels_that_the_contact_sheet_cannot_read_are_reported(copy, line):
     images = [(path.parent.name, path.stem) for path in copy.glob("images/*/*.jpg")]
     contact_sheet(copy, images, formats_of(SEAFRONT))
-    next(copy.glob("damage/labels/*/*.txt")).write_text(line)
+    next(copy.glob("damage/yolo/*/*.txt")).write_text(line)
     with pytest.raises(OutputError, match=f"label files is damaged; run fastgen verify {copy} --r"):
         contact_sheet(copy, images, formats_of(SEAFRONT))
 

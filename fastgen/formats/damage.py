@@ -119,13 +119,14 @@ class _Damage(Format):
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         size = picture.shape[1::-1]
-        for index, values in yolo.finite_rows(read(f"damage/labels/{name}.txt")):
+        for index, values in yolo.finite_rows(read(f"damage/yolo/{name}.txt")):
             if index:  # the container shows as a box already
                 draw_outline(picture, np.reshape(values, (-1, 2)) * size, self.classes[index])
 
     def check(self, record: Record, read: Read) -> Iterator[str]:
         name = f"{record['split']}/{record['stem']}"
-        outlines, mask = f"damage/labels/{name}.txt", f"damage/masks/{name}.png"
+        # older datasets have no damage/labels
+        outlines, mask = f"damage/yolo/{name}.txt", f"damage/masks/{name}.png"
         for fault in _outline_faults(yolo.rows(read(outlines).decode())):
             yield f"{outlines}: {fault}"
         fault = _mask_fault(read(mask), record["size"], record["facts"][self.name])

@@ -26,7 +26,7 @@ class Item:
     Attributes:
         sample: The image with its labels.
         split: train, val or test.
-        stem: Name of its files without the suffix: scene and camera, as in 000017_A.
+        stem: Name of its files without the suffix: seed, scene and camera, as in s7_000017_A.
         number: Position of the image in the whole dataset.
         rules: Limits below which labels are ignored or left out.
         polygons: Write COCO masks that are not crowds as polygons instead of run lengths.
