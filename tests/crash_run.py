@@ -19,7 +19,7 @@ import simplejpeg
 
 from fastgen.config.config import Config
 from fastgen.dataset.generate import generate, run_here
-from fastgen.dataset.job import Job, stem_of
+from fastgen.dataset.job import Job
 from fastgen.dataset.shards import Maker
 from fastgen.dataset.storage import storage_of
 from fastgen.render.settings import RenderSettings
@@ -44,7 +44,10 @@ class QuickMaker(Maker):
         if index == FAULTY_SCENE and os.environ.get("FAULT") == "hang":
             time.sleep(3600)
         time.sleep(0.004)
-        split, stem = split_of(self._job.config, self._job.seed, index), stem_of(index, camera)
+        split, stem = (
+            split_of(self._job.config, self._job.seed, index),
+            self._job.stem(index, camera),
+        )
         pixels = np.full((64, 64, 3), index % 256, np.uint8)
         files = {
             f"images/{split}/{stem}.jpg": simplejpeg.encode_jpeg(pixels),

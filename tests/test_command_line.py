@@ -22,7 +22,10 @@ from fastgen.render.variant import LAYERS
         (["generate", "{out}", "--images", "2", "--cameras", "A,D"], "cameras: 'D' is unknown"),
         (["generate", "{out}", "--images", "2", "--format", "voc"], "format: 'voc' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
-        (["generate", "{out}", "--images", "2", "--also", "x"], "from bop, depth, ids, kitti, nor"),
+        (
+            ["generate", "{out}", "--images", "2", "--also", "x"],
+            "from bop, coco, depth, ids, kitti, nor",
+        ),
         (["generate", "{out}", "--images", "2", "--also", "voc,"], "also: '' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "voc,voc"], "also: a name occurs twice"),
         (["generate", "{out}", "--images", "2", "--hdri", ""], "'': is not a folder"),

@@ -125,7 +125,9 @@ def test_a_changed_manifest_is_made_again(dataset, copy):
     assert content(copy) == content(dataset)
 
 
-@pytest.mark.parametrize("also", [[], ["--also", "bop,kitti"], ["--format", "webdataset"]])
+@pytest.mark.parametrize(
+    "also", [[], ["--also", "bop,kitti"], ["--format", "webdataset"], ["--format", "parquet"]]
+)
 def test_verify_reports_only_a_lost_manifest_and_stray_files(tmp_path, capsys, also):
     out = tmp_path / "out"
     assert run(out, *also) == 0

@@ -108,7 +108,7 @@ def test_repair_refuses_zero_workers_even_with_nothing_to_repair(dataset, capsys
 def test_strange_files_among_the_images_do_not_stop_a_run(copy):
     for name in ("stray.jpg", "more_A.jpg", "Thumbs.db"):
         (copy / "images/train" / name).write_bytes(b"no image")
-    next(copy.glob("images/*/000000_A.jpg")).unlink()
+    next(copy.glob("images/*/s3_000000_A.jpg")).unlink()
     assert main(["generate", str(copy), *ARGUMENTS, "--workers", "1"]) == 0
 
 
@@ -118,12 +118,12 @@ def test_a_refused_device_changes_nothing(copy, tmp_path, capsys):
     assert main(["generate", str(copy), "--images", "10", *more]) == 2
     assert "no device 99 among" in capsys.readouterr().err
     assert content(copy) == before
-    next(copy.glob("images/*/000000_A.jpg")).unlink()
+    next(copy.glob("images/*/s3_000000_A.jpg")).unlink()
     assert main(["verify", str(copy), "--repair", "--device-index", "99"]) == 2
     capsys.readouterr()
     assert main(["verify", str(copy)]) == 1
     told = capsys.readouterr().out
-    assert "000000_A.jpg: missing" in told
+    assert "s3_000000_A.jpg: missing" in told
     assert "not finished" not in told
     assert main(["generate", str(tmp_path / "new"), "--images", "2", *more]) == 2
     assert content(tmp_path / "new") == {}
@@ -182,7 +182,7 @@ def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
         *("formats", "seed", "size", "quality"),
         "and 4 more",  # shard_scenes, config.split.test, .train, .val
     ]
-    options = "--also, --seed, --size, --quality, --shard, --split, --config, or give"
+    options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, or give"
     assert told[2].startswith(options)
 
 

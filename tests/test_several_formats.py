@@ -44,7 +44,7 @@ def test_each_container_is_an_instance_of_coco_with_its_own_pixels(sample, item)
     for name in ("imdg", "damage", "container"):
         _, facts = FORMATS[name].sample_files(item)
         found = [each for each in facts if each["category_id"] == 1]
-        masks = np.array([coco_mask.decode(each["segmentation"]) for each in found], bool)
+        masks = np.array([decoded(each["segmentation"]) for each in found], bool)
         assert len(masks) == 4
         assert not (masks.sum(axis=0) > 1).any()
         np.testing.assert_array_equal(masks.any(axis=0), sample.damage > 0)
@@ -53,6 +53,13 @@ def test_each_container_is_an_instance_of_coco_with_its_own_pixels(sample, item)
             np.testing.assert_array_equal(
                 mask, np.isin(sample.damage, damage_values(sample, thing.container))
             )
+
+
+def decoded(segmentation):
+    width, height = SIZE
+    if isinstance(segmentation, list):
+        segmentation = coco_mask.merge(coco_mask.frPyObjects(segmentation, height, width))
+    return coco_mask.decode(segmentation)
 
 
 def damage_values(sample, number):

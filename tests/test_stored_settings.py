@@ -5,6 +5,7 @@ The configuration is left out: versions add keys to it, and only its own version
 
 import hashlib
 import json
+from dataclasses import replace
 
 import fastgen
 from fastgen.dataset.job import Job
@@ -47,6 +48,8 @@ def test_settings_of_a_job_are_stored_as_in_0_23(monkeypatch):
         cameras=("A", "Cr"),
         render=RenderSettings((96, 64)),
         also=("voc", "depth"),
+        stems="short",
+        coco_masks="rle",
     )
     _, settings = settled(job, 1)
     assert list(settings) == [
@@ -55,6 +58,8 @@ def test_settings_of_a_job_are_stored_as_in_0_23(monkeypatch):
     ]
     assert settings["formats"] == ["damage", "imdg", "container", "text", "door", "depth", "voc"]
     assert digest(settings) == "17f2f307e2b0a7b0cb03d1fb220c0de1873f1b0ebaa5d971b2d5457f90b57025"
+    _, more = settled(replace(job, stems="seed", coco_masks="polygon"), 1)
+    assert more == {**settings, "stems": "seed", "coco_masks": "polygon"}
 
 
 def test_state_of_a_loader_is_stored_as_in_0_23():

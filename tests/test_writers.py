@@ -12,7 +12,7 @@ from pycocotools import mask as coco_mask
 from fastgen.classes import DETECTION_CLASSES, SEGMENTATION_CLASSES
 from fastgen.config.config import Config, LabelConfig
 from fastgen.files import images as encode
-from fastgen.formats import coco, damage, yolo
+from fastgen.formats import coco, damage, outlines, yolo
 from fastgen.formats.format import assemble
 from fastgen.formats.item import Item
 from fastgen.formats.registry import known_formats
@@ -43,6 +43,33 @@ def test_run_lengths_decode_in_pycocotools_to_the_same_mask():
         assert coco_mask.area(packed) == mask.sum()
         reference = coco_mask.encode(np.asfortranarray(mask.astype(np.uint8)))
         assert reference["counts"].decode() == made["counts"]
+
+
+def packed_of(annotation, width, height):
+    """Return the run lengths that pycocotools makes of an annotation's mask."""
+    mask = annotation["segmentation"]
+    if isinstance(mask, list):
+        return coco_mask.merge(coco_mask.frPyObjects(mask, height, width))
+    return {"size": mask["size"], "counts": mask["counts"].encode()}
+
+
+def test_polygons_decode_in_pycocotools_to_the_same_mask():
+    for mask in masks():
+        height, width = mask.shape
+        found = outlines.polygons(mask)
+        assert bool(found) == mask.any()
+        box = mask_box(mask)
+        for crowd in (False, True) if box else ():
+            made = coco.annotation(1, box, window(mask, box), (width, height), crowd, True)
+            assert isinstance(made["segmentation"], dict if crowd else list)
+            packed = packed_of(made, width, height)
+            np.testing.assert_array_equal(coco_mask.decode(packed).astype(bool), mask)
+        # the area inside by the shoelace formula, with holes counted against it
+        area = 0.0
+        for points in found:
+            (x, y), (ahead_x, ahead_y) = points.T, np.roll(points, -1, axis=0).T
+            area += (x * ahead_y - y * ahead_x).sum() / 2
+        assert abs(area) == mask.sum()
 
 
 @pytest.mark.parametrize("values", [[0, 101, 501, 65535], np.array([0, 7, 255], np.uint8)])
@@ -115,8 +142,7 @@ def test_coco_annotations_equal_the_mask(samples):
         _, facts = damage.FORMAT.sample_files(item_of(sample))
         found = [each for each in facts if not each.get("background")]
         for annotation in found:
-            packed = dict(annotation["segmentation"])
-            packed["counts"] = packed["counts"].encode()
+            packed = packed_of(annotation, 320, 320)
             mask = coco_mask.decode(packed).astype(bool)
             category = annotation["category_id"]
             allowed = sample.damage > 0 if category == 1 else sample.damage // 100 == category
@@ -131,7 +157,7 @@ def test_yolo_outlines_are_the_borders_of_their_masks(samples):
     seen = 0
     for sample in samples:
         files, found = damage.FORMAT.sample_files(item_of(sample))
-        (text,) = [data.decode() for path, data in files.items() if path.endswith(".txt")]
+        text = files[f"damage/labels/train/000000_{sample.camera.name}.txt"].decode()
         wanted = [annotation for annotation in found if not annotation["iscrowd"]]
         lines = text.splitlines()
         assert len(lines) == len(wanted)
@@ -144,9 +170,7 @@ def test_yolo_outlines_are_the_borders_of_their_masks(samples):
             assert np.abs(corners.min(axis=0) - (x, y)).max() < 0.51
             assert np.abs(corners.max(axis=0) - (x + width, y + height)).max() < 0.51
             drawn = coco_mask.decode(coco_mask.frPyObjects([points.tolist()], 320, 320))[..., 0]
-            packed = dict(annotation["segmentation"])
-            packed["counts"] = packed["counts"].encode()
-            mask = coco_mask.decode(packed)
+            mask = coco_mask.decode(packed_of(annotation, 320, 320))
             union = (drawn | mask).sum()
             # outlines fill holes, and slanted borders cut half pixels off corners
             assert (drawn & mask).sum() / union > (0.95 if mask.sum() > 2000 else 0.6)

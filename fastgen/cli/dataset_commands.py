@@ -18,7 +18,7 @@ from fastgen.dataset.addresses import place_of
 from fastgen.dataset.console import tell
 from fastgen.dataset.finish import CONTACT_SHEET
 from fastgen.dataset.generate import generate
-from fastgen.dataset.job import LAYOUTS, SHARD_SCENES, Job
+from fastgen.dataset.job import COCO_MASKS, LAYOUTS, SHARD_SCENES, STEMS, Job
 from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
@@ -81,21 +81,45 @@ def add_generate(commands: Any) -> None:
         default=LAYOUTS[0],
         metavar="|".join(LAYOUTS),
         help="layout of the dataset: seafront has one folder for each task, webdataset has tar "
-        "files; default: %(default)s",
+        "files, parquet has tables with a row per image and needs fastgen[parquet]; default: "
+        "%(default)s",
+    )
+    output.add_argument(
+        "--tasks",
+        default=",".join(SEAFRONT),
+        metavar=",".join(SEAFRONT),
+        help="tasks to write, separated by commas, out of these and those of --also; images and "
+        "scene files are always written; default: all of these",
     )
     output.add_argument(
         "--also",
         default="",
         metavar=",".join(name for name in format_names() if name not in SEAFRONT),
-        help="label files to write in addition, separated by commas; bop needs the seafront format",
+        help="label files to write in addition to --tasks, separated by commas; bop and coco need "
+        "the seafront format",
+    )
+    output.add_argument(
+        "--stems",
+        default=STEMS[0],
+        metavar="|".join(STEMS),
+        help="names of files: seed has the seed, as in s7_000017_A, so that datasets of different "
+        "seeds can be merged; short has only scene and camera, as in 000017_A; default: "
+        "%(default)s",
+    )
+    output.add_argument(
+        "--coco-masks",
+        default=COCO_MASKS[0],
+        metavar="|".join(COCO_MASKS),
+        help="masks in COCO files, except those of crowds, which are always rle; default: "
+        "%(default)s",
     )
     defaults = ", ".join(f"{count} in {name}" for name, count in SHARD_SCENES.items())
     output.add_argument(
         "--shard",
         type=int,
         metavar="SCENES",
-        help="number of scenes that a worker makes and commits together, and that share a tar "
-        f"file; default: {defaults}",
+        help="number of scenes that a worker makes and commits together, and that share a "
+        f"tar or Parquet file; default: {defaults}",
     )
     machines = command.add_argument_group("machines")
     machines.add_argument(
@@ -159,8 +183,11 @@ def _generate(options: argparse.Namespace) -> int:
         cameras=() if options.cameras is None else tuple(options.cameras.split(",")),
         render=render_settings(options),
         layout=options.format,
+        tasks=tuple(options.tasks.split(",")) if options.tasks else (),
         also=tuple(options.also.split(",")) if options.also else (),
         shard_scenes=options.shard,
+        stems=options.stems,
+        coco_masks=options.coco_masks,
     )
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
     manifest = generate(job, options.workers, runner)

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.dataset.job import scene_and_camera
 from fastgen.dataset.storage import Folder
 from fastgen.errors import OutputError
 from fastgen.files.images import decode
@@ -34,7 +35,7 @@ def contact_sheet(
     by_camera: dict[str, list[Path]] = {}
     for split, stem in sorted(images, key=lambda image: image[1]):
         path = out / "images" / split / f"{stem}.jpg"
-        by_camera.setdefault(stem.split("_", 1)[1], []).append(path)
+        by_camera.setdefault(scene_and_camera(stem)[1], []).append(path)
     # one camera after the other, each spread over the dataset
     count = min(len(images), _COLUMNS * _ROWS)
     share = -(-count // max(len(by_camera), 1))

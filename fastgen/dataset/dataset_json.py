@@ -26,13 +26,15 @@ _SHOWN = 4
 
 _OPTIONS = {
     "format": ("--format",),
-    "formats": ("--also",),
+    "formats": ("--tasks", "--also"),
     "seed": ("--seed",),
     "size": ("--size",),
     "quality": ("--quality",),
     "cameras": ("--cameras",),
     "environments": ("--hdri",),
     "shard_scenes": ("--shard",),
+    "stems": ("--stems",),
+    "coco_masks": ("--coco-masks",),
     "config": ("--preset", "--config", "--set"),
     "postprocess": ("--preset", "--config", "--set"),
     "classes": ("--preset", "--config", "--set"),

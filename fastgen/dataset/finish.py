@@ -8,12 +8,13 @@ from typing import Any
 from fastgen.dataset.console import say
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
-from fastgen.dataset.job import Job, manifest_path
+from fastgen.dataset.job import ARCHIVE_ENDINGS, Job, manifest_path
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
 from fastgen.errors import OutputError
 from fastgen.files.images import encode_picture
+from fastgen.formats.card import card
 from fastgen.formats.format import Format, Record
 from fastgen.formats.registry import formats_for
 from fastgen.sampling.scene import SPLITS
@@ -32,6 +33,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     makers: list[dict[str, str]] = []
     failed: list[dict[str, Any]] = []
     images: list[tuple[str, str]] = []
+    filled: set[str] = set()
     counts = {split: _count(formats, []) for split in SPLITS}
     for shard in range(job.shard_count):
         shards[str(shard)], manifest = _manifest(job, storage, shard)
@@ -39,6 +41,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
         if made_by not in makers:
             makers.append(made_by)
         failed += manifest["failed"]
+        filled.update(path.rpartition("/")[0] for path in manifest["files"])
         for split in SPLITS:
             records = [record for record in manifest["records"] if record["split"] == split]
             counts[split].update(_count(formats, records))
@@ -51,7 +54,14 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
         storage.write(path, sums)
         files[path] = sums.entry()
 
-    if job.layout == "seafront":
+    splits = [split for split in SPLITS if counts[split]["images"]] or SPLITS[:1]
+    if job.layout in ARCHIVE_ENDINGS:
+        pattern = f"SPLIT-*.{ARCHIVE_ENDINGS[job.layout]}"
+        put("README.md", map(str.encode, card(pattern, splits)))
+    else:
+        for each in formats:
+            for path, content in each.shared_files(splits, job.config):
+                put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         for split in SPLITS:
             storage.make_folders([f"images/{split}", f"scenes/{split}"])
             for each in formats:
@@ -72,6 +82,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
         "shards": shards,
     }
     storage.write(MANIFEST, [seal(unsealed(result))])
+    _say_what_is_empty(job, storage, formats, counts, filled)
     if len(makers) > 1:
         names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
         say(
@@ -79,6 +90,36 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
             "same bytes everywhere, generate it anew with one of them"
         )
     return result
+
+
+def _say_what_is_empty(
+    job: Job,
+    storage: Storage,
+    formats: Iterable[Format],
+    counts: dict[str, Counter[str]],
+    filled: set[str],
+) -> None:
+    """Print the splits without images, and the folders of the other splits without files.
+
+    Args:
+        job: The job.
+        storage: Its place; object stores have no empty folders.
+        formats: Its formats.
+        counts: Number of images, under "images", of each split.
+        filled: Folders that have files.
+    """
+    used = [split for split in SPLITS if counts[split]["images"]]
+    empty = [split for split in SPLITS if split not in used]
+    if empty:
+        say(
+            f"fastgen: no image is in {' and '.join(empty)}; more scenes, or other --split "
+            "fractions, fill them"
+        )
+    if isinstance(storage, Folder) and job.layout == "seafront":
+        folders = [folder for split in used for each in formats for folder in each.folders(split)]
+        bare = [folder for folder in folders if folder not in filled]
+        if bare:
+            say(f"fastgen: empty, because no image shows what they are for: {', '.join(bare)}")
 
 
 def _count(formats: Iterable[Format], records: list[Record]) -> Counter[str]:

@@ -16,7 +16,7 @@ from fastgen.dataset import workers
 from fastgen.dataset.console import say
 from fastgen.dataset.dataset_json import MANIFEST, existing, read_manifest, shard_numbers, unsealed
 from fastgen.dataset.finish import finish
-from fastgen.dataset.job import Job, Task, manifest_path, stem_of
+from fastgen.dataset.job import Job, Task, manifest_path
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.settings import settled
 from fastgen.dataset.shards import Maker, Strikes
@@ -196,7 +196,7 @@ def _made(job: Job, storage: Storage, old: Mapping[str, Any]) -> dict[int, int]:
         manifest = read_manifest(storage, shard)
         if manifest is None:  # is made again; beyond the job's images, `verify` reports it
             continue
-        wanted = [stem_of(index, camera) for index, camera in job.wanted(shard)]
+        wanted = [job.stem(index, camera) for index, camera in job.wanted(shard)]
         if manifest["settings"] != job.settings_digest:
             raise OutputError(
                 f"{job.out}: {manifest_path(shard)} was made with other settings; give another "

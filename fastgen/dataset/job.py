@@ -1,5 +1,6 @@
 """Job: everything that decides the files of a dataset; and the names of its files."""
 
+import re
 from dataclasses import dataclass, field
 
 from fastgen.config.config import Config
@@ -7,10 +8,22 @@ from fastgen.formats.registry import SEAFRONT
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 
-SHARD_SCENES = {"seafront": 4, "webdataset": 64}
+SHARD_SCENES = {"seafront": 4, "webdataset": 64, "parquet": 64}
 """Default number of scenes per shard in each layout."""
 
 LAYOUTS = tuple(SHARD_SCENES)
+
+ARCHIVE_ENDINGS = {"webdataset": "tar", "parquet": "parquet"}
+"""File name extension of the archives in each layout that packs samples."""
+
+STEMS = ("seed", "short")
+"""Kinds of file names: with the seed, as in s7_000017_A, or without it, as in 000017_A."""
+
+COCO_MASKS = ("polygon", "rle")
+"""Ways to write the masks of COCO annotations that are not crowds."""
+
+STEM_PATTERN = r"(?:s[0-9]+_)?([0-9]{6,})_([A-Za-z0-9_-]{1,64})"
+"""Stem of an image with either kind of name; its groups are the scene's index and the camera."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +37,13 @@ class Job:
         seed: Whole number of 0 or more.
         cameras: Names of the cameras to render in each scene; () takes all of `config`.
         render: Settings of the renderer.
-        layout: "seafront" (one folder for each task) or "webdataset" (tar files).
-        also: Names of formats to write in addition to those of SEAFRONT.
+        layout: "seafront" (one folder for each task), "webdataset" (tar files) or "parquet".
+        tasks: Names of the formats to write.
+        also: Names of formats to write in addition to `tasks`.
         shard_scenes: Scenes that one process makes and commits together. None takes
             SHARD_SCENES of the layout.
+        stems: One of STEMS. Names with the seed stay distinct when datasets are merged.
+        coco_masks: One of COCO_MASKS.
         settings_digest: Hash of everything that decides the content of the files. It tells whose a
             shard is. `generate` fills it in.
     """
@@ -39,8 +55,11 @@ class Job:
     cameras: tuple[str, ...] = ()
     render: RenderSettings = field(default_factory=RenderSettings)
     layout: str = LAYOUTS[0]
+    tasks: tuple[str, ...] = SEAFRONT
     also: tuple[str, ...] = ()
     shard_scenes: int | None = None
+    stems: str = STEMS[0]
+    coco_masks: str = COCO_MASKS[0]
     settings_digest: str = ""
 
     def __post_init__(self) -> None:
@@ -50,8 +69,9 @@ class Job:
 
     @property
     def formats(self) -> tuple[str, ...]:
-        """Names of all formats to write, in an order that does not depend on that of `also`."""
-        return tuple(dict.fromkeys((*SEAFRONT, *sorted(self.also))))
+        """Names of all formats to write, in an order that does not depend on the job's."""
+        chosen = {*self.tasks, *self.also}
+        return tuple([each for each in SEAFRONT if each in chosen] + sorted(chosen - {*SEAFRONT}))
 
     @property
     def scenes_per_shard(self) -> int:
@@ -71,6 +91,11 @@ class Job:
         numbers = range(shard * per_shard, min((shard + 1) * per_shard, self.images))
         return [(number // count, self.cameras[number % count]) for number in numbers]
 
+    def stem(self, index: int, camera: str) -> str:
+        """Return the file name, without extension, of scene `index` as seen by `camera`."""
+        seed = f"s{self.seed}_" if self.stems == "seed" else ""
+        return f"{seed}{index:06d}_{camera}"
+
     def generator(self) -> Generator:
         """Return a Generator for this job. Raises ConfigError for invalid values."""
         return Generator.of(self.config, self.seed, self.render)
@@ -89,9 +114,12 @@ class Task:
     skip: dict[int, str] = field(default_factory=dict)
 
 
-def stem_of(index: int, camera: str) -> str:
-    """Return the file name, without extension, of scene `index` as seen by `camera`."""
-    return f"{index:06d}_{camera}"
+def scene_and_camera(stem: str) -> tuple[int, str]:
+    """Return the scene's index and the camera of an image by its stem."""
+    found = re.fullmatch(STEM_PATTERN, stem)
+    if found is None:
+        raise ValueError(f"{stem!r} is not the name of an image")
+    return int(found[1]), found[2]
 
 
 def manifest_path(shard: int) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from annotated_types import Ge, Le, MinLen
 
-from fastgen.dataset.job import LAYOUTS
+from fastgen.dataset.job import COCO_MASKS, LAYOUTS, STEM_PATTERN, STEMS
 from fastgen.errors import shown, shown_name
 from fastgen.files.inner_path import INNER_PATH
 from fastgen.render.settings import MAX_SIZE
@@ -35,9 +35,12 @@ class _Failure:
     error: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Started:
-    """Values of dataset.json in a dataset that is not finished."""
+    """Values of dataset.json in a dataset that is not finished.
+
+    Defaults are those of versions that did not write the value.
+    """
 
     version: str
     format: Annotated[str, OneOf(LAYOUTS)]
@@ -52,9 +55,11 @@ class Started:
     images: _Number
     postprocess: dict[str, str] = field(default_factory=dict, kw_only=True)
     classes: dict[str, tuple[str, ...]] = field(default_factory=dict, kw_only=True)
+    stems: Annotated[str, OneOf(STEMS)] = "short"
+    coco_masks: Annotated[str, OneOf(COCO_MASKS)] = "rle"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finished(Started):
     """Values of dataset.json in a finished dataset."""
 
@@ -69,7 +74,7 @@ class Finished(Started):
 
 @dataclass(frozen=True)
 class _Record:
-    stem: Annotated[str, Matching("[0-9]{6,}_[A-Za-z0-9_-]{1,64}", "is not the name of an image")]
+    stem: Annotated[str, Matching(STEM_PATTERN, "is not the name of an image")]
     split: Annotated[str, OneOf(SPLITS)]
     size: tuple[_Side, _Side]
     facts: dict[str, Any]

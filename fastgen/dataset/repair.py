@@ -13,7 +13,6 @@ from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import examine
 from fastgen.errors import OutputError
-from fastgen.formats.registry import SEAFRONT
 from fastgen.render.settings import RenderSettings
 
 
@@ -80,6 +79,8 @@ def _job(
             hdri_dir=hdri_dir,
         ),
         layout=manifest["format"],
-        also=tuple(name for name in manifest["formats"] if name not in SEAFRONT),
+        tasks=tuple(manifest["formats"]),
         shard_scenes=manifest["shard_scenes"],
+        stems=manifest.get("stems", "short"),
+        coco_masks=manifest.get("coco_masks", "rle"),
     )

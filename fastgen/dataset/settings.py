@@ -1,5 +1,6 @@
 """Checks of a job before it runs, and its settings as dataset.json stores them."""
 
+import importlib.util
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -8,7 +9,7 @@ from typing import Any
 
 from fastgen.config.config import Config, SplitConfig
 from fastgen.dataset.dataset_json import unsealed
-from fastgen.dataset.job import LAYOUTS, Job
+from fastgen.dataset.job import COCO_MASKS, LAYOUTS, STEMS, Job
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest
 from fastgen.errors import ConfigError
@@ -81,16 +82,26 @@ def _check(job: Job, worker_count: int) -> None:
         check_known("cameras", name, job.config.cameras)
     if len(set(job.cameras)) != len(job.cameras):
         raise ConfigError("cameras: a name occurs twice; give each only once")
-    also = formats_of(job.also)
-    if len(set(job.also)) != len(job.also):
-        raise ConfigError("also: a name occurs twice; give each only once")
-    for each in also:
-        if job.layout == "webdataset" and not each.fits_archives:
-            raise ConfigError(
-                f"also: {each.name} keeps poses in files that cover all images, which the "
-                "webdataset format does not have; each sample's json has the pose too, or use "
-                "the seafront format"
-            )
+    if job.layout == "parquet" and importlib.util.find_spec("pyarrow") is None:
+        raise ConfigError("format: parquet needs pyarrow: pip install 'fastgen[parquet]'")
+    check_known("stems", job.stems, STEMS)
+    check_known("coco_masks", job.coco_masks, COCO_MASKS)
+    if not job.tasks:
+        raise ConfigError("tasks: no task is named; give at least one")
+    for option, names in (("tasks", job.tasks), ("also", job.also)):
+        if len(set(names)) != len(names):
+            raise ConfigError(f"{option}: a name occurs twice; give each only once")
+        for each in formats_of(names, option):
+            if job.layout != "seafront" and not each.fits_archives:
+                raise ConfigError(
+                    f"{option}: {each.name} keeps labels in files that cover all images, which the "
+                    f"{job.layout} format does not have; leave it out (the json of each sample has "
+                    "all labels), or use the seafront format"
+                )
+    for each in formats_of(job.formats):
+        if each.builds_on and not set(each.builds_on) & set(job.formats):
+            needed = ", ".join(each.builds_on)
+            raise ConfigError(f"also: {each.name} adds files to other tasks; add one of {needed}")
 
 
 def _load_all(hdris: Sequence[Path]) -> None:
@@ -130,5 +141,10 @@ def _settings(job: Job) -> dict[str, Any]:
     name = generator.config.postprocess
     if name:
         settings["postprocess"] = {"function": name, "sha256": source_hash(name)}
+    # older datasets lack these, so their values are those that apply without the key
+    if job.stems != "short":
+        settings["stems"] = job.stems
+    if job.coco_masks != "rle":
+        settings["coco_masks"] = job.coco_masks
     plain: dict[str, Any] = json.loads(json.dumps(settings))
     return plain

@@ -5,29 +5,28 @@ records of its images, from which the files over the whole dataset are made. A s
 manifest counts as never made.
 """
 
-import io
 import os
-import tarfile
 import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import PurePosixPath
 from typing import Any
 
 import cv2
 import orjson
 
 from fastgen.dataset.freed_memory import return_freed_memory
-from fastgen.dataset.job import Job, Task, manifest_path, stem_of
+from fastgen.dataset.job import Job, Task, manifest_path, scene_and_camera
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.storage import storage_of
 from fastgen.errors import AssetError, ContextError, FastgenError, OutputError
+from fastgen.formats.archives import Made, tar_files
 from fastgen.formats.format import Files, Record, Same, assemble
 from fastgen.formats.item import Item
+from fastgen.formats.parquet import parquet_files
 from fastgen.formats.registry import formats_for
-from fastgen.sampling.scene import SPLITS, split_of
+from fastgen.sampling.scene import split_of
 
 _PRELOAD_IMAGES = 1000
 """Runs with more images load all lights and shapes first, so that memory does not grow later."""
@@ -118,7 +117,7 @@ class Maker:
         if self._since_trim >= _TRIM_IMAGES:
             return_freed_memory()
             self._since_trim = 0
-        made: list[tuple[Files, Record]] = []
+        made: list[Made] = []
         skip = dict(task.skip)
         at, unreported, reported = None, 0, time.monotonic()
         for index, camera in self._job.wanted(task.shard):
@@ -138,7 +137,7 @@ class Maker:
         if unreported:
             self._report("images", unreported)
         made = [(files, record) for files, record in made if _index(record) not in skip]
-        files = pack(made, task.shard) if self._job.layout == "webdataset" else _joined(made)
+        files = self._packed(made, task.shard)
         self._storage.commit(files, f"{task.shard:06d}")
         manifest = {
             "shard": task.shard,
@@ -150,6 +149,16 @@ class Maker:
             "records": [record for _, record in made],
         }
         self._storage.write(manifest_path(task.shard), [seal(orjson.dumps(manifest))])
+
+    def _packed(self, made: Sequence[Made], shard: int) -> Files:
+        """Return the files of a shard in the job's layout."""
+        match self._job.layout:
+            case "webdataset":
+                return tar_files(made, shard)
+            case "parquet":
+                return parquet_files(made, shard, self._formats, self._job.config)
+            case _:
+                return loose_files(made, self._storage.links)
 
     def _image_or_skip(
         self, index: int, camera: str, skip: dict[int, str]
@@ -178,54 +187,22 @@ class Maker:
         item = Item(
             sample,
             split_of(job.config, job.seed, index),
-            stem_of(index, camera),
+            job.stem(index, camera),
             index * len(job.cameras) + job.cameras.index(camera),
             job.config.labels,
+            job.coco_masks == "polygon",
         )
-        return assemble(item, self._formats)
+        return assemble(item, self._formats, job.layout != "seafront")
 
 
-def pack(made: Sequence[tuple[Files, Record]], shard: int) -> Files:
-    """Pack samples as WebDataset shards: one tar file for each split that occurs.
-
-    Members of a sample share its stem. Their extensions are `jpg`, `json`, and for label files the
-    name of the folder and the file's extension, as in `damage.png` and `imdg.txt`.
-    """
-    packed: Files = {}
-    for split in SPLITS:
-        buffer = io.BytesIO()
-        chosen = [(files, record) for files, record in made if record["split"] == split]
-        if not chosen:
-            continue
-        with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as tar:
-            for files, record in chosen:
-                names: set[str] = set()
-                for path, content in files.items():
-                    if isinstance(content, Same):
-                        continue
-                    member = tarfile.TarInfo(_member(path, record["stem"]))
-                    assert member.name not in names, member.name
-                    names.add(member.name)
-                    member.size = len(content)
-                    tar.addfile(member, io.BytesIO(content))
-        packed[f"{split}-{shard:06d}.tar"] = buffer.getvalue()
-    return packed
-
-
-def _member(path: str, stem: str) -> str:
-    pure = PurePosixPath(path)
-    folder, *between = pure.parts[:-1]
-    ending = pure.suffix[1:]
-    if folder in ("images", "scenes"):
-        return f"{stem}.{ending}"
-    # kitti has files with the same name in different folders
-    inner = [part for part in between if folder == "kitti" and part not in SPLITS]
-    part = pure.stem.removeprefix(stem).strip("_")
-    return ".".join(filter(None, (stem, folder, *inner, part, ending)))
-
-
-def _joined(made: Sequence[tuple[Files, Record]]) -> Files:
-    return {path: content for files, _ in made for path, content in files.items()}
+def loose_files(made: Sequence[Made], links: bool) -> Files:
+    """Return the files of all samples; without `links`, leave out those that are only links."""
+    return {
+        path: content
+        for files, _ in made
+        for path, content in files.items()
+        if links or not (isinstance(content, Same) and content.link_only)
+    }
 
 
 def _entries(files: Files) -> dict[str, list[Any]]:
@@ -240,4 +217,4 @@ def _entries(files: Files) -> dict[str, list[Any]]:
 
 
 def _index(record: Record) -> int:
-    return int(record["stem"].split("_", 1)[0])
+    return scene_and_camera(record["stem"])[0]

@@ -45,7 +45,7 @@ class _Labels:
         """Count the labels of one image."""
         image_width, image_height = record["size"]
         before = len(self.sizes)
-        for name, (_, _, width, height) in task.labels(record["facts"][task.name]):
+        for name, (_, _, width, height) in task.labels(record["facts"].get(task.name, ())):
             self.by_class[name] += 1
             if name not in _UNSIZED:
                 self.sizes.append((width / image_width, height / image_height))
@@ -58,12 +58,17 @@ def report(out: str | Path) -> str:
     Raises:
         OutputError: `out` is not a finished dataset.
     """
-    manifest = _manifest(str(out))
+    return "\n\n".join(_tables(str(out)))
+
+
+def _tables(out: str) -> Iterator[str]:
+    manifest = _manifest(out)
+    written = manifest["formats"]
     damage, imdg = formats_for(("damage", "imdg"), manifest.get("classes", {}))
     images = dict.fromkeys(SPLITS, 0)
     damages = {split: _Labels() for split in SPLITS}
     markers = {split: _Labels() for split in SPLITS}
-    for record in _records(str(out), manifest):
+    for record in _records(out, manifest):
         split = record["split"]
         images[split] += 1
         damages[split].add(damage, record)
@@ -73,21 +78,25 @@ def report(out: str | Path) -> str:
     texts = sum(each.by_class["text"] for each in markers.values())
     undamaged = [images[split] - damages[split].images for split in SPLITS]
     damaged = [each.images for each in damages.values()]
-    return "\n\n".join(
-        [
-            "Table 1: images without and with visible damage",
-            _table({"No damage": undamaged, "Damaged": damaged}),
-            "Table 2: instances in the damage task",
-            _class_table(damage, damages),
-            "Table 3: instances in the marker task",
-            _class_table(imdg, markers),
-            f"Per image: {len(marker_sizes) / count:.2f} markers, {texts / count:.2f} texts",
-            "Fig. 8: box width and height as shares of the image, at quantiles "
-            + ", ".join(f"{q:g}" for q in _QUANTILES),
-            _sizes("damage", [size for each in damages.values() for size in each.sizes]),
-            _sizes("markers", marker_sizes),
-        ]
-    )
+    sizes = []
+    if damage.name in written:
+        yield "Table 1: images without and with visible damage"
+        yield _table({"No damage": undamaged, "Damaged": damaged})
+        yield "Table 2: instances in the damage task"
+        yield _class_table(damage, damages)
+        sizes.append(_sizes("damage", [size for each in damages.values() for size in each.sizes]))
+    else:
+        yield "Images"
+        yield _table({"All": [*images.values()]})
+    if imdg.name in written:
+        yield "Table 3: instances in the marker task"
+        yield _class_table(imdg, markers)
+        yield f"Per image: {len(marker_sizes) / count:.2f} markers, {texts / count:.2f} texts"
+        sizes.append(_sizes("markers", marker_sizes))
+    if sizes:
+        quantiles = ", ".join(f"{q:g}" for q in _QUANTILES)
+        yield f"Fig. 8: box width and height as shares of the image, at quantiles {quantiles}"
+        yield from sizes
 
 
 def _manifest(out: str) -> dict[str, Any]:

@@ -42,6 +42,9 @@ class UnreadableError(OutputError):
 class Folder:
     """A dataset in a folder of this machine. Paths and links that lead out of it are refused."""
 
+    links = True
+    """Files with equal content can share space. A disk without hard links gets copies."""
+
     def __init__(self, root: Path) -> None:
         self.root = root
 
@@ -196,6 +199,8 @@ class Folder:
 
 class Remote:
     """A dataset at an fsspec address such as s3://bucket/folder, where puts are atomic."""
+
+    links = False
 
     def __init__(self, address: str) -> None:
         try:

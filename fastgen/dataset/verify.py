@@ -10,7 +10,7 @@ from typing import Any
 import simplejpeg
 
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, without_manifest
-from fastgen.dataset.job import manifest_path
+from fastgen.dataset.job import ARCHIVE_ENDINGS, manifest_path
 from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
@@ -136,13 +136,14 @@ def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
     """Return the shard of a sample's file by its name, or None if the name has no number."""
     scenes: int = manifest["shard_scenes"]
     cameras = manifest["cameras"]
-    if manifest["format"] == "webdataset":
-        pattern, numbered = rf"(?:{'|'.join(SPLITS)})-(\d{{6,}})\.tar", 1
+    if manifest["format"] in ARCHIVE_ENDINGS:
+        endings = "|".join(ARCHIVE_ENDINGS.values())
+        pattern, numbered = rf"(?:{'|'.join(SPLITS)})-(\d{{6,}})\.(?:{endings})", 1
     elif path.startswith("bop/"):
         pattern, numbered = r"bop/.*/(\d{6,})(?:_\d+)?\.\w+", scenes * len(cameras)
     else:
         names = "|".join(map(re.escape, cameras))
-        pattern, numbered = rf".*/(\d{{6,}})_(?:{names})(?:_\d+)?\.\w+", scenes
+        pattern, numbered = rf".*/(?:s\d+_)?(\d{{6,}})_(?:{names})(?:_\w+)?\.\w+", scenes
     found = re.fullmatch(pattern, path)
     return None if found is None else int(found[1]) // numbered
 

@@ -27,7 +27,7 @@ _PNG_FAST = [
 ]
 
 _FILTER_UP = 2
-_GREY = 0
+_GREY, _INDEXED = 0, 3
 
 _PICTURE_OPTIONS: dict[str, dict[str, Any]] = {
     ".png": {"compress_level": 1},
@@ -50,22 +50,27 @@ def jpeg(image: NDArray[np.uint8]) -> bytes:
     return data
 
 
-def png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+def png(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: NDArray[np.uint8] | None = None
+) -> bytes:
     """Return an image as PNG.
 
     Args:
         pixels: sRGB uint8 [H, W, 3], the same with alpha [H, W, 4], or a mask uint8 or uint16
             [H, W].
+        palette: Colours uint8 [N, 3] of the values of a mask of 8 bits, as which viewers show it.
     """
     if pixels.ndim == 2:
-        return _mask_png(pixels)
+        return _mask_png(pixels, palette)
     channels = [2, 1, 0, 3][: pixels.shape[2]]
     done, data = cv2.imencode(".png", np.ascontiguousarray(pixels[..., channels]), _PNG_FAST)
     assert done
     return data.tobytes()
 
 
-def _mask_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+def _mask_png(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16], palette: NDArray[np.uint8] | None
+) -> bytes:
     """Encode each row's difference to the row above with run lengths, which suits flat areas.
 
     W3C, Portable Network Graphics, second edition, sections 5 (chunks), 9 (filters) and 11.
@@ -80,8 +85,11 @@ def _mask_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     # zlib gives the same bytes but takes ten times as long
     packer = zlib_ng.compressobj(1, zlib.DEFLATED, zlib.MAX_WBITS, 8, zlib.Z_RLE)
     packed = packer.compress(rows) + packer.flush()
-    head = struct.pack(">IIBBBBB", width, height, depth, _GREY, 0, 0, 0)
-    chunks = _chunk(b"IHDR", head), _chunk(b"IDAT", packed), _chunk(b"IEND", b"")
+    kind = _GREY if palette is None else _INDEXED
+    head = struct.pack(">IIBBBBB", width, height, depth, kind, 0, 0, 0)
+    chunks = [_chunk(b"IHDR", head), _chunk(b"IDAT", packed), _chunk(b"IEND", b"")]
+    if palette is not None:
+        chunks.insert(1, _chunk(b"PLTE", palette.tobytes()))
     return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
 
 

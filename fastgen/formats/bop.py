@@ -8,7 +8,7 @@ counts. `px_count_valid` counts pixels of the visible part only.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,6 @@ from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import view_values
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.sampling.scene import SPLITS
 from fastgen.scene.container_kinds import KINDS
 
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
@@ -78,8 +77,9 @@ class _Bop(Format):
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
             yield f"bop/{split}/000000/scene_{name}.json", _by_image(records, key)
-        if split == SPLITS[0]:
-            yield from _models()
+
+    def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
+        return _models()
 
 
 def _by_image(records: Records, key: str) -> Iterator[str]:

@@ -5,11 +5,13 @@ Sources: cocodataset.org, "Data format", and the notes of its mask API.
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.formats import outlines
 from fastgen.sample import Box
 
 _LICENSE = {
@@ -73,12 +75,32 @@ def _packed(counts: NDArray[np.int64]) -> str:
     return text
 
 
+def segmentation(
+    part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int], polygons: bool
+) -> dict[str, Any] | list[list[int]]:
+    """Encode a mask as polygons or as compressed run lengths; pycocotools decodes both to it.
+
+    Args:
+        part: bool [h, w], a window of the mask that contains all its pixels.
+        corner: (x, y) of the window's first pixel.
+        size: (width, height) of the mask.
+        polygons: Return polygons.
+
+    Returns:
+        Polygons [[x0, y0, x1, y1, ...], ...], or what `rle` returns.
+    """
+    if not polygons:
+        return rle(part, corner, size)
+    return [(loop + corner).astype(int).ravel().tolist() for loop in outlines.polygons(part)]
+
+
 def annotation(
     category_id: int,
     box: Box,
     part: NDArray[np.bool_],
     size: tuple[int, int],
     ignored: bool,
+    polygons: bool,
 ) -> dict[str, Any]:
     """Return the annotation of one instance without its ids.
 
@@ -88,13 +110,14 @@ def annotation(
         part: bool [h, w], the instance's pixels within the box.
         size: (width, height) of the image.
         ignored: Mark the instance as a crowd. Scorers neither expect nor punish its detection.
+        polygons: Write the mask as polygons. Those of crowds are always run lengths, as in COCO.
     """
     x0, y0, x1, y1 = box
     return {
         "category_id": category_id,
         "bbox": [x0, y0, x1 - x0, y1 - y0],
         "area": int(np.count_nonzero(part)),
-        "segmentation": rle(part, (x0, y0), size),
+        "segmentation": segmentation(part, (x0, y0), size, polygons and not ignored),
         "iscrowd": int(ignored),
     }
 
@@ -121,28 +144,49 @@ def has_annotations(text: bytes, annotations: list[dict[str, Any]]) -> bool:
     ]
 
 
+@dataclass(frozen=True)
+class Task:
+    """A task whose labels are COCO annotations.
+
+    Attributes:
+        name: Name of its format, whose facts are the annotations, and of its folder.
+        description: Description of the dataset.
+        categories: Categories in the order of their ids.
+        usual: Number of categories that a file lists, from the first. If an annotation has a
+            later category, the file lists all: scenes made by hand may contain objects that the
+            configuration does not draw.
+        more: Keys that its annotations have beside those of `annotation`, each with the value that
+            stands for a missing key: "" for text, () for a list of numbers.
+    """
+
+    name: str
+    description: str
+    categories: Sequence[dict[str, Any]]
+    usual: int
+    more: tuple[tuple[str, str | tuple[()]], ...] = ()
+
+    def split_file(
+        self, split: str, records: Callable[[], Iterable[dict[str, Any]]]
+    ) -> tuple[str, Iterator[str]]:
+        """Return path and text of a split's file, whose image names start at the dataset."""
+        return f"{self.name}/coco_{split}.json", file_text(self, records, f"images/{split}/")
+
+
 def file_text(
-    description: str,
-    categories: Sequence[dict[str, Any]],
-    usual: int,
-    records: Callable[[], Iterable[dict[str, Any]]],
-    facts: str,
+    task: Task, records: Callable[[], Iterable[dict[str, Any]]], folder: str
 ) -> Iterator[str]:
     """Yield a COCO file in pieces, so that memory does not depend on its size.
 
     Args:
-        description: Description of the dataset.
-        categories: Categories in the order of their ids.
-        usual: Number of categories that the file lists, from the first. If an annotation has a
-            later category, the file lists all: scenes made by hand may contain objects that the
-            configuration does not draw.
+        task: The task.
         records: Returns the images' records; each call starts from the beginning.
-        facts: Name of the format whose facts are the annotations.
+        folder: Start of each image's `file_name`.
     """
     from fastgen import __version__
 
+    usual = task.usual
     info = {
-        "description": description,
+        "description": task.description,
         "version": __version__,
         "contributor": "fastgen",
         "year": 2026,
@@ -154,7 +198,7 @@ def file_text(
         width, height = record["size"]
         image = {
             "id": number,
-            "file_name": f"images/{record['split']}/{record['stem']}.jpg",
+            "file_name": f"{folder}{record['stem']}.jpg",
             "width": width,
             "height": height,
             "license": 1,
@@ -163,13 +207,27 @@ def file_text(
     yield '],"annotations":['
     count = 0
     for number, record in enumerate(records(), start=1):
-        for item in record["facts"][facts]:
+        for item in record["facts"][task.name]:
             count += 1
             if item["category_id"] > usual:
-                usual = len(categories)
+                usual = len(task.categories)
             yield ("," if count > 1 else "") + _json({"id": count, "image_id": number, **item})
     # after the annotations, which determine how many categories are listed
-    yield f'],"categories":{_json(categories[:usual])}}}'
+    yield f'],"categories":{_json(task.categories[:usual])}}}'
+
+
+def columns(annotations: Sequence[dict[str, Any]], task: Task) -> dict[str, list[Any]]:
+    """Return the annotations of one image as lists, one for each kind of value.
+
+    Categories count from 0.
+    """
+    return {
+        "bbox": [each["bbox"] for each in annotations],
+        "category": [each["category_id"] - 1 for each in annotations],
+        "area": [each["area"] for each in annotations],
+        "iscrowd": [bool(each["iscrowd"]) for each in annotations],
+        **{key: [each.get(key, empty) for each in annotations] for key, empty in task.more},
+    }
 
 
 def _json(value: Any) -> str:

@@ -1,4 +1,4 @@
-"""Labels of the damage task: 16-bit masks, COCO files and YOLO outlines."""
+"""Labels of the damage task: 16-bit masks, COCO files and a folder for YOLO segmentation."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -15,11 +15,20 @@ from fastgen.classes import (
 from fastgen.config.config import Config
 from fastgen.files.images import decode, png
 from fastgen.formats import coco, yolo
-from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
+from fastgen.formats.format import (
+    DatasetFiles,
+    Files,
+    Format,
+    Label,
+    Read,
+    Record,
+    Records,
+    Same,
+)
 from fastgen.formats.item import Item
 from fastgen.labels.background import background_masks
 from fastgen.labels.overlay import draw_outline
-from fastgen.labels.visibility import window
+from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Sample
 
 
@@ -67,12 +76,15 @@ class _Damage(Format):
             if len(polygon) > 2:
                 points = (polygon + box[:2]) / (width, height)
                 lines.append(yolo.line(category - 1, points.ravel().tolist()))
+        name = f"{item.split}/{item.stem}"
         files: Files = {
-            f"damage/masks/{item.split}/{item.stem}.png": png(item.sample.damage),
-            f"damage/yolo/{item.split}/{item.stem}.txt": "".join(lines).encode(),
+            f"damage/masks/{name}.png": png(item.sample.damage),
+            **yolo.files("damage", item, "".join(lines)),
+            # the place for readers that know images by another folder
+            f"damage/yolo/{name}.txt": Same(f"damage/labels/{name}.txt"),
         }
         facts = [
-            coco.annotation(value // 100, box, window(mask, box), (width, height), ignored)
+            item.annotation(value // 100, box, window(mask, box), ignored)
             for value, box, mask, ignored in found
         ]
         return files, facts + item.background_annotations
@@ -85,17 +97,25 @@ class _Damage(Format):
         return {"damages": sum(name in ALL_DAMAGE_CLASSES for name in names)}
 
     def folders(self, split: str) -> Sequence[str]:
-        return (f"damage/masks/{split}", f"damage/yolo/{split}")
+        folders = ("images", "labels", "masks", "yolo")
+        return tuple(f"damage/{each}/{split}" for each in folders)
+
+    def coco_task(self, config: Config) -> coco.Task:
+        return coco.Task(
+            self.name,
+            "Synthetic shipping containers with damage masks",
+            [
+                {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
+                for i, name in enumerate(self.classes)
+            ],
+            len(config.damage.segmentation_classes),
+        )
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
-        words = "Synthetic shipping containers with damage masks"
-        categories = [
-            {"id": i + 1, "name": name, "supercategory": "damage" if i else "container"}
-            for i, name in enumerate(self.classes)
-        ]
-        usual = len(config.damage.segmentation_classes)
-        text = coco.file_text(words, categories, usual, records, self.name)
-        yield f"damage/coco_{split}.json", text
+        yield self.coco_task(config).split_file(split, records)
+
+    def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
+        return yolo.task_files("damage", config.damage.segmentation_classes, splits)
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         size = picture.shape[1::-1]
@@ -105,6 +125,7 @@ class _Damage(Format):
 
     def check(self, record: Record, read: Read) -> Iterator[str]:
         name = f"{record['split']}/{record['stem']}"
+        # older datasets have no damage/labels
         outlines, mask = f"damage/yolo/{name}.txt", f"damage/masks/{name}.png"
         for fault in _outline_faults(yolo.rows(read(outlines).decode())):
             yield f"{outlines}: {fault}"
@@ -142,21 +163,23 @@ def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str
     annotations = [item for item in annotations if not item.get("background")]
     # the mask does not tell which of several containers a damage is on
     several = sum(item["category_id"] == 1 for item in annotations) > 1
+    listed = [item for item in annotations if not (several and item["category_id"] == 1)]
     parts = [(1, mask > 0)] if mask.any() and not several else []
     parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
+    # as the dataset's masks are written
+    polygons = any(isinstance(item["segmentation"], list) for item in listed)
     from_mask = []
     for category, part in parts:
-        rows, columns = np.nonzero(part)
-        x, y = int(columns.min()), int(rows.min())
-        box = [x, y, int(columns.max()) + 1 - x, int(rows.max()) + 1 - y]
-        runs = coco.rle(part, (0, 0), (width, height))["counts"]
-        from_mask.append((category, int(rows.size), box, runs))
-    listed = [
-        (item["category_id"], item["area"], item["bbox"], item["segmentation"]["counts"])
-        for item in annotations
-        if not (several and item["category_id"] == 1)
-    ]
-    same = sorted(from_mask, key=repr) == sorted(listed, key=repr)
+        box = mask_box(part)
+        assert box is not None
+        found = [
+            coco.annotation(category, box, window(part, box), (width, height), ignored, polygons)
+            for ignored in (False, True)
+        ]
+        from_mask.append(found)
+    same = len(listed) == len(from_mask) and all(
+        any(item in found for item in listed) for found in from_mask
+    )
     return "" if same else "differs from the COCO annotations"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.config.config import Config
+from fastgen.formats import coco
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import scene_file
 
@@ -19,16 +20,19 @@ class Same:
 
     Attributes:
         path: The other file, relative to the dataset.
+        link_only: The file is only worth its name: storage without links leaves it out.
     """
 
     path: str
+    link_only: bool = False
 
 
 Files = dict[str, bytes | Same]
 """Content of files by path relative to the dataset, with forward slashes."""
 
 Record = dict[str, Any]
-"""One image as JSON values: stem, split, size [width, height], and facts by name of format."""
+"""One image as JSON values: stem, split, number in the dataset, size [width, height], and facts by
+name of format."""
 
 Records = Callable[[], Iterable[Record]]
 """Returns the records of one split in order; each call starts from the beginning."""
@@ -40,7 +44,7 @@ Label = tuple[str, Sequence[float]]
 """Class name, and box as x, y, width and height in pixels."""
 
 DatasetFiles = Iterator[tuple[str, Iterable[str] | bytes]]
-"""Path and content of each file that covers a whole split; the content is bytes or text pieces."""
+"""Path and content of files that cover many images; the content is bytes or text pieces."""
 
 
 class Format(ABC):
@@ -52,14 +56,16 @@ class Format(ABC):
         name: Name on the command line and key of `Record["facts"]`.
         classes: Class names of its labels in order; empty where labels have no classes.
         needs_normals: `sample_files` reads `Sample.normals`, which cost another draw.
-        fits_archives: The webdataset layout can hold this format, because `sample_files` alone
-            gives everything a reader needs.
+        fits_archives: Layouts that pack samples into archives can hold this format, because
+            `sample_files` alone gives everything a reader needs.
+        builds_on: Formats whose facts it writes in another form; one of them must be chosen too.
     """
 
     name: str
     classes: tuple[str, ...] = ()
     needs_normals: bool = False
     fits_archives: bool = True
+    builds_on: tuple[str, ...] = ()
 
     @abstractmethod
     def sample_files(self, item: Item) -> tuple[Files, Any]:
@@ -81,6 +87,29 @@ class Format(ABC):
             config: Configuration of the dataset, which decides the list of classes.
         """
         return iter(())
+
+    def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
+        """Yield the path and content of each file that covers all splits, such as class lists.
+
+        Args:
+            splits: The splits that have images, at least one.
+            config: Configuration of the dataset, which decides the list of classes.
+        """
+        return iter(())
+
+    def coco_task(self, config: Config) -> coco.Task | None:
+        """Return the task whose COCO annotations are this format's facts; None if they are not."""
+        return None
+
+    def members(self, item: Item, files: Files, facts: Any) -> Files:
+        """Return the files of one sample for an archive, where all samples have the same members.
+
+        Args:
+            item: The sample.
+            files: The files that `sample_files` returned.
+            facts: The facts that it returned.
+        """
+        return files
 
     def folders(self, split: str) -> Sequence[str]:
         """Return folders that readers expect even when they are empty."""
@@ -124,16 +153,38 @@ class Format(ABC):
         return ()
 
 
-def assemble(item: Item, formats: Sequence[Format]) -> tuple[Files, Record]:
-    """Return the files of one sample, its image first and its scene file last, and its record."""
+def crop_lines(name: str, item: Item, crops: Iterable[tuple[Sequence[float], str]]) -> Files:
+    """Return a file with a line `coordinates<TAB>words` for each crop of an image.
+
+    Args:
+        name: Name of the format.
+        item: The image.
+        crops: Corners of each crop in pixels, and what it shows.
+    """
+    lines = [f"{' '.join(f'{v:g}' for v in corners)}\t{words}\n" for corners, words in crops]
+    return {f"{name}/{item.split}/{item.stem}.txt": "".join(lines).encode()}
+
+
+def assemble(item: Item, formats: Sequence[Format], archived: bool = False) -> tuple[Files, Record]:
+    """Return the files of one sample and its record.
+
+    Args:
+        item: The sample.
+        formats: Formats to write.
+        archived: The files become members of an archive.
+
+    Returns:
+        The files, the image first and the scene file last, and the record.
+    """
     files: Files = {item.image_path: item.jpeg}
     facts = {}
     for each in formats:
         more, facts[each.name] = each.sample_files(item)
-        files.update(more)
+        files.update(each.members(item, more, facts[each.name]) if archived else more)
     record = {
         "stem": item.stem,
         "split": item.split,
+        "number": item.number,
         "size": list(item.sample.view.size),
         "facts": facts,
     }

@@ -1,4 +1,4 @@
-"""Labels of the marker task: YOLO with its data.yaml, and COCO with masks, texts and crowds."""
+"""Labels of the marker task: a folder for YOLO, and COCO with masks, texts and crowds."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 from fastgen.classes import ALL_DETECTION_CLASSES, is_detection, with_marks
 from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
-from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records, Same
+from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
 from fastgen.formats.item import Item
 from fastgen.labels.overlay import draw_box
 from fastgen.labels.visibility import window
-from fastgen.sampling.scene import SPLITS
 
 
 class _Imdg(Format):
@@ -22,14 +21,8 @@ class _Imdg(Format):
     classes: tuple[str, ...] = ALL_DETECTION_CLASSES
 
     def sample_files(self, item: Item) -> tuple[Files, Any]:
-        sample, split, stem = item.sample, item.split, item.stem
-        labels = yolo.detection_lines(sample.objects, sample.view.size, sample.marker_classes)
-        files: Files = {
-            # Trainers replace `images` by `labels` in the resolved path of this folder. If the
-            # folder were a link, they would look outside of imdg.
-            f"imdg/images/{split}/{stem}.jpg": Same(item.image_path),
-            f"imdg/labels/{split}/{stem}.txt": labels.encode(),
-        }
+        sample = item.sample
+        lines = yolo.detection_lines(sample.objects, sample.view.size, sample.marker_classes)
         found: list[dict[str, Any]] = []
         for thing, box in item.detections:
             if thing.background:
@@ -40,13 +33,8 @@ class _Imdg(Format):
             part = window(sample.ids, box) == thing.id
             category = sample.marker_classes.index(thing.class_name) + 1
             more = {"text": thing.text} if thing.text else {}
-            found.append(
-                {
-                    **coco.annotation(category, box, part, sample.view.size, thing.ignored),
-                    **more,
-                }
-            )
-        return files, found + item.background_annotations
+            found.append({**item.annotation(category, box, part, thing.ignored), **more})
+        return yolo.files("imdg", item, lines), found + item.background_annotations
 
     def with_classes(self, classes: Sequence[str]) -> Format:
         made = _Imdg()
@@ -62,17 +50,20 @@ class _Imdg(Format):
     def folders(self, split: str) -> Sequence[str]:
         return (f"imdg/images/{split}", f"imdg/labels/{split}")
 
+    def coco_task(self, config: Config) -> coco.Task:
+        return coco.Task(
+            self.name,
+            "Synthetic shipping containers with dangerous-goods markers and identifiers",
+            [{"id": i + 1, "name": name} for i, name in enumerate(self.classes)],
+            len(config.markings.detection_classes),
+            (("text", ""),),
+        )
+
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
-        words = "Synthetic shipping containers with dangerous-goods markers and identifiers"
-        classes = config.markings.detection_classes
-        categories = [{"id": i + 1, "name": name} for i, name in enumerate(self.classes)]
-        text = coco.file_text(words, categories, len(classes), records, self.name)
-        yield f"imdg/coco_{split}.json", text
-        if split == SPLITS[0]:
-            names = "".join(f"  {i}: {name}\n" for i, name in enumerate(classes))
-            # without the key `path`, trainers take folders relative to this file
-            head = "".join(f"{each}: images/{each}\n" for each in SPLITS)
-            yield "imdg/data.yaml", f"{head}nc: {len(classes)}\nnames:\n{names}".encode()
+        yield self.coco_task(config).split_file(split, records)
+
+    def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
+        return yolo.task_files("imdg", config.markings.detection_classes, splits)
 
     def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
         height, width = picture.shape[:2]

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fastgen.classes import is_detection
 from fastgen.config.config import LabelConfig
 from fastgen.files.images import jpeg
@@ -23,9 +26,10 @@ class Item:
     Attributes:
         sample: The image with its labels.
         split: train, val or test.
-        stem: Name of its files without the suffix: scene and camera, as in 000017_A.
+        stem: Name of its files without the suffix: seed, scene and camera, as in s7_000017_A.
         number: Position of the image in the whole dataset.
         rules: Limits below which labels are ignored or left out.
+        polygons: Write COCO masks that are not crowds as polygons instead of run lengths.
     """
 
     sample: Sample
@@ -33,6 +37,7 @@ class Item:
     stem: str
     number: int
     rules: LabelConfig
+    polygons: bool = True
 
     @property
     def image_path(self) -> str:
@@ -64,11 +69,11 @@ class Item:
     @cached_property
     def container_annotations(self) -> dict[int, dict[str, Any]]:
         """COCO annotation of each visible container by its id, category 1 of each task."""
-        found, size = {}, self.sample.view.size
+        found = {}
         for thing in self.containers:
             if thing.bbox is not None:
                 part = window(self.sample.container_mask(thing.container), thing.bbox)
-                found[thing.id] = coco.annotation(1, thing.bbox, part, size, thing.ignored)
+                found[thing.id] = self.annotation(1, thing.bbox, part, thing.ignored)
         return found
 
     @cached_property
@@ -77,11 +82,17 @@ class Item:
 
         Each has the additional key `background`, which is true.
         """
-        size = self.sample.view.size
         return [
-            {**coco.annotation(1, box, part, size, thing.ignored), "background": True}
+            {**self.annotation(1, box, part, thing.ignored), "background": True}
             for thing, box, part in background_masks(self.sample)
         ]
+
+    def annotation(
+        self, category_id: int, box: Box, part: NDArray[np.bool_], ignored: bool
+    ) -> dict[str, Any]:
+        """Return `coco.annotation` of an instance in this image."""
+        size = self.sample.view.size
+        return coco.annotation(category_id, box, part, size, ignored, self.polygons)
 
     @cached_property
     def jpeg(self) -> bytes:

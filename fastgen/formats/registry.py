@@ -11,7 +11,7 @@ from fastgen.formats.format import Format
 from fastgen.validation import check_known
 
 SEAFRONT = ("damage", "imdg", "container", "text", "door")
-"""Formats that `--format seafront` always writes: the tasks of the SeaFront paper, and container
+"""Formats that are written unless others are chosen: the tasks of the SeaFront paper, and container
 corners."""
 
 _GROUP = "fastgen.formats"
@@ -34,8 +34,12 @@ def format_names() -> list[str]:
     return sorted({*known_formats(), *plugins.names(_GROUP)})
 
 
-def formats_of(names: Sequence[str]) -> list[Format]:
+def formats_of(names: Sequence[str], option: str = "also") -> list[Format]:
     """Return formats by name.
+
+    Args:
+        names: Names of the formats.
+        option: Option that gave the names, for the error message.
 
     Raises:
         ConfigError: A name is unknown.
@@ -43,7 +47,9 @@ def formats_of(names: Sequence[str]) -> list[Format]:
     known = known_formats()
     for name in names:
         if name not in format_names():
-            check_known("also", name, set(format_names()) - set(SEAFRONT))
+            check_known(
+                option, name, set(format_names()) - (set(SEAFRONT) if option == "also" else set())
+            )
     return [_chosen(name, known) for name in names]
 
 

@@ -1,7 +1,13 @@
-"""YOLO label files: boxes and outlines as shares of the image, from 0 to 1.
+"""YOLO folders and label files: boxes, outlines and points as shares of the image, from 0 to 1.
 
 A label is a line: the class index, then numbers. Values are clipped, because trainers refuse values
 above 1.
+
+Each task has a folder with `images`, `labels`, `data.yaml` and `classes.txt`. Trainers find the
+labels of an image by replacing `images` by `labels` in its resolved path, so each task needs image
+files of its own. They are hard links: they take no space, and unlike symbolic links they resolve to
+the task's folder. Object stores have no links and no trainer reads YOLO folders there, so these
+files are left out; the dataset's `images` can be linked into the task's folder after download.
 """
 
 import math
@@ -12,9 +18,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import ALL_DETECTION_CLASSES
-from fastgen.formats import item
+from fastgen.formats.format import DatasetFiles, Files, Same
+from fastgen.formats.item import Item
+from fastgen.formats.item import detections as visible_detections
+from fastgen.formats.outlines import borders, joined
 from fastgen.labels.visibility import mask_box, window
 from fastgen.sample import Box, Object
+
+
+def files(task: str, item: Item, lines: str) -> Files:
+    """Return the image and the label file of one sample in a task's folder."""
+    name = f"{item.split}/{item.stem}"
+    return {
+        f"{task}/images/{name}.jpg": Same(item.image_path, link_only=True),
+        f"{task}/labels/{name}.txt": lines.encode(),
+    }
+
+
+def task_files(
+    task: str, classes: Sequence[str], splits: Sequence[str], more: str = ""
+) -> DatasetFiles:
+    """Yield data.yaml and classes.txt of a task's folder.
+
+    Args:
+        task: Name of the folder.
+        classes: Class names in order.
+        splits: Splits that have images, at least one.
+        more: Further lines of data.yaml.
+    """
+    # Ultralytics needs both `train` and `val`, and stops at an empty folder
+    folders = {"train": splits[0], "val": splits[-1], **{each: each for each in splits}}
+    lines = [f"{key}: images/{folder}\n" for key, folder in folders.items()]
+    lines += [f"nc: {len(classes)}\n", more, "names:\n"]
+    lines += [f"  {number}: {name}\n" for number, name in enumerate(classes)]
+    # without the key `path`, trainers take folders relative to this file
+    yield f"{task}/data.yaml", lines
+    yield f"{task}/classes.txt", [f"{name}\n" for name in classes]
 
 
 def detections(
@@ -31,7 +70,7 @@ def detections(
     numbers = {name: number for number, name in enumerate(classes)}
     return [
         (numbers[thing.class_name], thing, box)
-        for thing, box in item.detections(objects)
+        for thing, box in visible_detections(objects)
         if not thing.ignored
     ]
 
@@ -107,17 +146,8 @@ def outline(mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     box = mask_box(mask)
     if box is None:
         return np.zeros((0, 2))
-    # contours run through pixel centres; at twice the size they round to the pixels' outer edges
-    seen = window(mask, box).view(np.uint8)
-    quarters = cv2.resize(seen, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-    found, _ = cv2.findContours(quarters, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    borders = [((contour + 1) // 2).astype(np.float32) for contour in found]
-    parts = [cv2.approxPolyDP(each, 0.5, True)[:, 0].astype(np.float64) for each in borders]
-    parts = sorted((part + box[:2] for part in parts), key=len, reverse=True)
-    joined = parts[0]
-    for part in parts[1:]:
-        gap = np.linalg.norm(joined[:, None] - part[None], axis=-1)
-        i, j = np.unravel_index(int(gap.argmin()), gap.shape)
-        loop = np.concatenate([part[j:], part[: j + 1]])
-        joined = np.concatenate([joined[: i + 1], loop, joined[i:]])
-    return joined
+    parts = [
+        cv2.approxPolyDP(outer.astype(np.float32)[:, None], 0.5, True)[:, 0].astype(np.float64)
+        for outer, *_ in borders(window(mask, box), holes=False)
+    ]
+    return joined(sorted(parts, key=len, reverse=True)) + box[:2]

@@ -40,11 +40,14 @@ class HaspCrop:
         sealed: Whether a locked seal secures it. A hanging seal does not.
         pixels: uint8 [h, w, 3], 260 x 260 mm around the hasp, turned upright, with a margin of 3
             pixels.
+        quad: Corners of the crop without its margin in the image, float64 [4, 2] in pixels,
+            clockwise from the upper left of the door.
     """
 
     hasp: int
     sealed: bool
     pixels: NDArray[np.uint8]
+    quad: NDArray[np.float64]
 
 
 def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
@@ -82,7 +85,7 @@ def hasp_crops(sample: Sample) -> Iterator[HaspCrop]:
         seal = seals.get(hasp)
         if seal is None or fractions[numbers.seal(seal)] >= _SEAL_SHOWN:
             sealed = seal is not None and seal.state == "locked"
-            yield HaspCrop(hasp, sealed, upright_crop(sample.image, quad))
+            yield HaspCrop(hasp, sealed, upright_crop(sample.image, quad), quad)
 
 
 def _large(quad: NDArray[np.float64]) -> bool:

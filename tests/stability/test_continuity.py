@@ -14,8 +14,8 @@ CONFIG = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}
 SIZE = (64, 64)
 ENVIRONMENTS = ("port_noon", "port_night", "sky")
 JUMP = 0.045
-"""Largest change between two images relative to the mean. Where the sun grazes a wall, shadows of the
-corrugation change a third of the light within three degrees; a lost sun would change it at once."""
+"""Largest change between two images relative to the mean. Where the sun grazes a wall, shadows of
+the corrugation change a third of the light in three degrees; a lost sun changes it at once."""
 
 
 @pytest.fixture(scope="module")
