@@ -1,6 +1,7 @@
-"""Commands about whole datasets: generate, stats and verify."""
+"""Commands about whole datasets: generate, merge, stats and verify."""
 
 import argparse
+import json
 import shlex
 from typing import Any
 
@@ -13,15 +14,16 @@ from fastgen.cli.options import (
     config_of,
     render_settings,
 )
-from fastgen.dataset import stats
 from fastgen.dataset.addresses import place_of
 from fastgen.dataset.console import tell
 from fastgen.dataset.finish import CONTACT_SHEET
 from fastgen.dataset.generate import generate
 from fastgen.dataset.job import LAYOUTS, SHARD_SCENES, Job
+from fastgen.dataset.merge import merge
 from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
+from fastgen.dataset.stats import report, statistics
 from fastgen.dataset.verify import examine
 from fastgen.formats.registry import SEAFRONT, known_formats
 
@@ -37,9 +39,18 @@ examples:
   fastgen generate boxes --images 5000 --seed 7 --config port.yaml --quality draft --workers 8
   fastgen generate s3://bucket/boxes --images 100000 --format webdataset"""
 
+_MERGE = """\
+Merge finished datasets of the same layout, formats and classes into a new one.
+
+OUT appears when it is complete. The datasets do not change. Files are hard links where the file
+system allows it. Names of images begin with the seed of their dataset."""
+
 _VERIFY = """\
 Check that every file of a dataset is present, unchanged since it was written, and consistent with
-the other labels. The exit code is 1 if there are faults."""
+the other labels. The exit code is 1 if there are faults. Files that are not part of the dataset,
+such as caches of trainers, are listed and stay as they are."""
+
+_RAW = argparse.RawDescriptionHelpFormatter
 
 _OUT = "folder of the dataset, or an address such as s3://bucket/folder"
 
@@ -51,7 +62,7 @@ def add_generate(commands: Any) -> None:
         help="generate a dataset, or continue one",
         description=_GENERATE,
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_RAW,
     )
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
     command.add_argument(
@@ -115,11 +126,24 @@ def add_generate(commands: Any) -> None:
     command.set_defaults(run=_generate)
 
 
+def add_merge(commands: Any) -> None:
+    """Add `fastgen merge`."""
+    command = commands.add_parser(
+        "merge", help="make one dataset of several", description=_MERGE, formatter_class=_RAW
+    )
+    command.add_argument(
+        "datasets", type=_place, nargs="+", metavar="DATASET", help="folder of a finished dataset"
+    )
+    command.add_argument("out", type=_place, metavar="OUT", help="new folder")
+    command.set_defaults(run=_merge)
+
+
 def add_stats(commands: Any) -> None:
     """Add `fastgen stats`."""
     words = "print how many images and labels a dataset has, by class and split"
     command = commands.add_parser("stats", help=words, description=f"{words.capitalize()}.")
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
+    command.add_argument("--json", action="store_true", help="print the numbers as JSON")
     command.set_defaults(run=_stats)
 
 
@@ -172,22 +196,32 @@ def _generate(options: argparse.Namespace) -> int:
     return 1 if manifest["failed"] else 0
 
 
+def _merge(options: argparse.Namespace) -> int:
+    manifest = merge(options.datasets, options.out)
+    total = sum(split["images"] for split in manifest["counts"].values())
+    tell(f"{total} images of {len(options.datasets)} datasets in {options.out}")
+    return 0
+
+
 def _stats(options: argparse.Namespace) -> int:
-    tell(stats.report(options.out))
+    tell(json.dumps(statistics(options.out)) if options.json else report(options.out))
     return 0
 
 
 def _verify(options: argparse.Namespace) -> int:
     if options.repair:
-        repaired, faults = repair(options.out, options.workers, options.hdri, options.device_index)
+        repaired, found = repair(options.out, options.workers, options.hdri, options.device_index)
         for fault in repaired:
             tell(f"repaired: {fault}")
-        hint = ""
     else:
         found = examine(options.out)
-        faults = found.faults
-        hint = f"fastgen verify {shlex.quote(options.out)} --repair" if found.broken else ""
-    tell("\n".join(faults) if faults else f"{options.out}: whole and consistent")
-    if hint:
-        tell(f"to make damaged and missing files again: {hint}")
-    return 1 if faults else 0
+    for fault in found.faults:
+        tell(fault)
+    for path in found.foreign:
+        tell(f"{path}: not part of the dataset")
+    if not found.faults:
+        tell(f"{options.out}: whole and consistent")
+    elif found.broken and not options.repair:
+        again = f"fastgen verify {shlex.quote(options.out)} --repair"
+        tell(f"to make damaged and missing files again: {again}")
+    return 1 if found.faults else 0

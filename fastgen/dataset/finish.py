@@ -7,7 +7,7 @@ from typing import Any
 
 from fastgen.dataset.console import say
 from fastgen.dataset.contact_sheet import contact_sheet
-from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
+from fastgen.dataset.dataset_json import MANIFEST, class_lists, shard_manifest, unsealed
 from fastgen.dataset.job import Job, manifest_path
 from fastgen.dataset.seal import digest, seal
 from fastgen.dataset.shards import MADE_BY
@@ -21,8 +21,16 @@ from fastgen.sampling.scene import SPLITS
 CONTACT_SHEET = "contact_sheet.png"
 
 
-def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, Any]:
+def finish(
+    job: Job, storage: Storage, settings: dict[str, Any], shard_count: int
+) -> dict[str, Any]:
     """Write the files that cover all samples, and dataset.json, which seals them, last.
+
+    Args:
+        job: Decides layout, formats and class lists.
+        storage: Holds the files of all shards.
+        settings: First values of dataset.json.
+        shard_count: Number of shards; they are numbered from 0.
 
     Returns:
         The content of dataset.json.
@@ -33,7 +41,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     failed: list[dict[str, Any]] = []
     images: list[tuple[str, str]] = []
     counts = {split: _count(formats, []) for split in SPLITS}
-    for shard in range(job.shard_count):
+    for shard in range(shard_count):
         shards[str(shard)], manifest = _manifest(job, storage, shard)
         made_by = {name: manifest[name] for name in MADE_BY}
         if made_by not in makers:
@@ -56,7 +64,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
             storage.make_folders([f"images/{split}", f"scenes/{split}"])
             for each in formats:
                 storage.make_folders(each.folders(split))
-                records_of = _records(job, storage, split)
+                records_of = _records(job, storage, split, shard_count)
                 for path, content in each.dataset_files(split, records_of, job.config):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder) and images:
@@ -66,13 +74,14 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
         **settings,
         **makers[0],
         "images": job.images,
+        "classes": class_lists(job.config),
         "counts": {split: dict(count) for split, count in counts.items()},
         "failed": failed,
         "files": files,
         "shards": shards,
     }
     storage.write(MANIFEST, [seal(unsealed(result))])
-    if len(makers) > 1:
+    if len(makers) > 1 and "merged_from" not in settings:
         names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
         say(
             f"fastgen: {job.out} was rendered by {names}, which may round differently; to get the "
@@ -99,9 +108,11 @@ def _manifest(job: Job, storage: Storage, shard: int) -> tuple[str, dict[str, An
     return digest(text), manifest
 
 
-def _records(job: Job, storage: Storage, split: str) -> Callable[[], Iterator[Record]]:
+def _records(
+    job: Job, storage: Storage, split: str, shard_count: int
+) -> Callable[[], Iterator[Record]]:
     def through() -> Iterator[Record]:
-        for shard in range(job.shard_count):
+        for shard in range(shard_count):
             _, manifest = _manifest(job, storage, shard)
             yield from (record for record in manifest["records"] if record["split"] == split)
 

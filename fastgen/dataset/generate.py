@@ -93,7 +93,7 @@ def generate(
                 raise
             finally:
                 progress.close()
-        return finish(job, storage, settings)
+        return finish(job, storage, settings, job.shard_count)
 
 
 def check_resumable(job: Job, worker_count: int) -> None:

@@ -4,7 +4,7 @@ Both files contain a hash of themselves, but whoever edits a file can also updat
 """
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
 from annotated_types import Ge, Le, MinLen
@@ -36,13 +36,18 @@ class _Failure:
     error: str
 
 
-@dataclass(frozen=True)
-class Started:
-    """Values of dataset.json in a dataset that is not finished."""
-
+@dataclass(frozen=True, kw_only=True)
+class _Layout:
     version: str
     format: Annotated[str, OneOf(LAYOUTS)]
     formats: tuple[Annotated[str, OneOf(tuple(known_formats()))], ...]
+    images: _Number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Started(_Layout):
+    """Values of dataset.json in a dataset that is not finished."""
+
     seed: _Count
     size: tuple[_Side, _Side]
     quality: str
@@ -50,25 +55,42 @@ class Started:
     environments: dict[str, Any]
     shard_scenes: _Number
     config: dict[str, Any]
-    images: _Number
 
 
-@dataclass(frozen=True)
-class Finished(Started):
-    """Values of dataset.json in a finished dataset."""
-
+@dataclass(frozen=True, kw_only=True)
+class _Result:
     backend: str
     renderer: str
     counts: dict[str, dict[str, _Count]]
     failed: tuple[_Failure, ...]
     files: _Entries
     shards: dict[Annotated[str, Matching("[0-9]{1,12}", "is not a number")], str]
+    classes: dict[str, tuple[str, ...]] = field(default_factory=dict)
     digest: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished(_Result, Started):
+    """Values of dataset.json in a dataset that was generated completely."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merged(_Result, _Layout):
+    """Values of dataset.json in a dataset that was merged from others.
+
+    Attributes:
+        merged_from: What dataset.json of each of the others says about how it was made.
+    """
+
+    merged_from: tuple[Started, ...]
 
 
 @dataclass(frozen=True)
 class _Record:
-    stem: Annotated[str, Matching("[0-9]{6,}_[A-Za-z0-9_-]{1,64}", "is not the name of an image")]
+    stem: Annotated[
+        str,
+        Matching("(?:s[0-9]{1,20}_)?[0-9]{6,}_[A-Za-z0-9_-]{1,64}", "is not the name of an image"),
+    ]
     split: Annotated[str, OneOf(SPLITS)]
     size: tuple[_Side, _Side]
     facts: dict[str, Any]
@@ -98,6 +120,11 @@ def parsed_json(text: bytes | str) -> Any:
     from pydantic_core import from_json
 
     return from_json(text)
+
+
+def unfit_finished(text: bytes) -> str:
+    """Return what does not fit in the text of a finished or merged dataset's dataset.json."""
+    return unfit(text, Merged if "merged_from" in parsed_json(text) else Finished)
 
 
 def unfit(text: bytes, cls: type) -> str:
