@@ -9,10 +9,12 @@ from fastgen.cli.options import (
     add_config,
     add_device,
     add_hdri,
+    add_output,
     add_render,
     add_seed,
     config_of,
     render_settings,
+    summarize,
 )
 from fastgen.dataset.addresses import place_of
 from fastgen.dataset.console import tell
@@ -123,6 +125,7 @@ def add_generate(commands: Any) -> None:
         help="render on a Ray cluster: auto or HOST:PORT, or no value to start Ray on this "
         "machine; all nodes must be able to write to OUT",
     )
+    add_output(command)
     command.set_defaults(run=_generate)
 
 
@@ -135,6 +138,7 @@ def add_merge(commands: Any) -> None:
         "datasets", type=_place, nargs="+", metavar="DATASET", help="folder of a finished dataset"
     )
     command.add_argument("out", type=_place, metavar="OUT", help="new folder")
+    add_output(command)
     command.set_defaults(run=_merge)
 
 
@@ -163,6 +167,7 @@ def add_verify(commands: Any) -> None:
     )
     add_hdri(command, ", if the dataset was made with such a folder")
     add_device(command)
+    add_output(command)
     command.set_defaults(run=_verify)
 
 
@@ -188,18 +193,28 @@ def _generate(options: argparse.Namespace) -> int:
     )
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
     manifest = generate(job, options.workers, runner)
-    total = sum(split["images"] for split in manifest["counts"].values())
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
-    tell(f"{total} images in {options.out}{look}")
-    for each in manifest["failed"]:
-        tell(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
+    failures = (
+        f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}"
+        for each in manifest["failed"]
+    )
+    result = _result(options.out, manifest)
+    lines = (f"{result['images']} images in {options.out}{look}", *failures)
+    summarize(options, result, lines)
     return 1 if manifest["failed"] else 0
 
 
-def _merge(options: argparse.Namespace) -> int:
-    manifest = merge(options.datasets, options.out)
+def _result(out: str, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return what --json prints about a new dataset."""
     total = sum(split["images"] for split in manifest["counts"].values())
-    tell(f"{total} images of {len(options.datasets)} datasets in {options.out}")
+    parts = {key: manifest[key] for key in ("counts", "failed")}
+    return {"out": out, "images": total, **parts}
+
+
+def _merge(options: argparse.Namespace) -> int:
+    result = _result(options.out, merge(options.datasets, options.out))
+    words = f"{result['images']} images of {len(options.datasets)} datasets in {options.out}"
+    summarize(options, result, [words])
     return 0
 
 
@@ -209,19 +224,23 @@ def _stats(options: argparse.Namespace) -> int:
 
 
 def _verify(options: argparse.Namespace) -> int:
+    repaired: list[str] = []
     if options.repair:
         repaired, found = repair(options.out, options.workers, options.hdri, options.device_index)
-        for fault in repaired:
-            tell(f"repaired: {fault}")
     else:
         found = examine(options.out)
-    for fault in found.faults:
-        tell(fault)
-    for path in found.foreign:
-        tell(f"{path}: not part of the dataset")
+    lines = [f"repaired: {fault}" for fault in repaired] + found.faults
+    lines += [f"{path}: not part of the dataset" for path in found.foreign]
     if not found.faults:
-        tell(f"{options.out}: whole and consistent")
+        lines.append(f"{options.out}: whole and consistent")
     elif found.broken and not options.repair:
         again = f"fastgen verify {shlex.quote(options.out)} --repair"
-        tell(f"to make damaged and missing files again: {again}")
+        lines.append(f"to make damaged and missing files again: {again}")
+    result = {
+        "out": options.out,
+        "faults": found.faults,
+        "foreign": found.foreign,
+        "repaired": repaired,
+    }
+    summarize(options, result, lines)
     return 1 if found.faults else 0

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from fastgen.dataset.console import say
+from fastgen.dataset.console import hint
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, class_lists, shard_manifest, unsealed
 from fastgen.dataset.job import Job, manifest_path
@@ -83,9 +83,9 @@ def finish(
     storage.write(MANIFEST, [seal(unsealed(result))])
     if len(makers) > 1 and "merged_from" not in settings:
         names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
-        say(
-            f"fastgen: {job.out} was rendered by {names}, which may round differently; to get the "
-            "same bytes everywhere, generate it anew with one of them"
+        hint(
+            f"{job.out} was rendered by {names}, which may round differently; to get the same "
+            "bytes everywhere, generate it anew with one of them"
         )
     return result
 

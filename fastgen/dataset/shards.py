@@ -6,6 +6,7 @@ manifest counts as never made.
 """
 
 import io
+import logging
 import os
 import tarfile
 import time
@@ -19,6 +20,7 @@ from typing import Any
 import cv2
 import orjson
 
+from fastgen.dataset.console import LOGGER
 from fastgen.dataset.freed_memory import return_freed_memory
 from fastgen.dataset.job import Job, Task, manifest_path, stem_of
 from fastgen.dataset.seal import digest, seal
@@ -49,8 +51,20 @@ Report = Callable[[str, Any], None]
 """Sends a report to the parent process.
 
 Reports are "at" with the index of the scene that comes next, "images" with a number of finished
-images, and "busy" with None during preparations.
+images, and "busy" during preparations, with words about them or None.
 """
+
+
+class _Announcer(logging.Handler):
+    """Reports what the package logs in a worker, so that the parent can show it."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__()
+        self._report = report
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.name != LOGGER.name:  # the parent logs reports with this name
+            self._report("busy", record.getMessage())
 
 
 class Strikes:
@@ -104,6 +118,8 @@ class Maker:
             # llvmpipe reads this at its first context
             os.environ.setdefault("LP_NUM_THREADS", "0")
             cv2.setNumThreads(1)
+        LOGGER.handlers = [_Announcer(report)]
+        LOGGER.setLevel(logging.INFO)
         self._job = job
         self._report = report
         self._formats = formats_of(job.formats)
