@@ -2,12 +2,13 @@
 
 import inspect
 import itertools
+import warnings
 
 import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from fastgen.torch import ContainerDataset, ContainerStream, Loader, ShardSampler
+from fastgen.torch import ContainerDataset, ContainerStream, Loader, ShardSampler, collate_lists
 from tests.test_torch import PERSISTENT, bare, dataset, stream  # noqa: F401, `bare` is a fixture
 
 pytestmark = pytest.mark.usefixtures("bare")
@@ -148,3 +149,34 @@ def test_ranks_that_start_after_the_loader_was_made_divide_the_positions(
         found.append(passes(loader, 1)[0])
         assert len(loader) == -(-len(found[-1]) // 4)
     assert found == [in_epoch(0)[0::2], in_epoch(0)[1::2]]
+
+
+@pytest.mark.parametrize("make", [dataset, stream])
+def test_a_second_pass_with_the_same_scenes_is_reported_once(make):
+    loader = DataLoader(make(), 4, collate_fn=collate_lists)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert passes(loader, 1) == [in_epoch(0)]
+    with pytest.warns(
+        UserWarning, match="a second pass .* epoch 0 again; use fastgen.torch.Loader"
+    ):
+        passes(loader, 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        passes(loader, 2)
+
+
+@pytest.mark.parametrize("workers", [0, 2])
+def test_passes_with_new_scenes_or_fixed_ones_are_not_reported(workers, capfd):
+    data, fixed = dataset(), dataset(fixed=True)
+    assert len({data[0], data[1], data[2]}) == 3  # looking at some items is no pass
+    plain = DataLoader(data, 4, num_workers=workers, collate_fn=collate_lists)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for epoch in (0, 1, 1):
+            data.set_epoch(epoch)
+            passes(plain, 1)
+        passes(DataLoader(fixed, 4, num_workers=workers, collate_fn=collate_lists), 3)
+        for made in (dataset(), stream(), dataset(fixed=True)):
+            passes(Loader(made, batch_size=4, num_workers=workers), 3)
+    assert capfd.readouterr().err == ""

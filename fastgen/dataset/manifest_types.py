@@ -82,7 +82,7 @@ class Merged(_Result, _Layout):
         merged_from: What dataset.json of each of the others says about how it was made.
     """
 
-    merged_from: tuple[Started, ...]
+    merged_from: Annotated[tuple[Started, ...], MinLen(1)]
 
 
 @dataclass(frozen=True)

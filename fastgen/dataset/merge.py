@@ -201,9 +201,7 @@ class _Renaming:
         ):
             for member in old:
                 stream = old.extractfile(member)
-                if stream is None:
-                    continue
-                data = self.content(member.name, stream.read())
+                data = self.content(member.name, stream.read() if stream else b"")
                 member.name, member.size = self.name(member.name), len(data)
                 new.addfile(member, io.BytesIO(data))
         return buffer.getvalue()
@@ -339,7 +337,10 @@ def _copy_shard(part: _Part, shard: dict[str, Any], names: _Renaming, storage: F
         entries[new_path] = [size, hashed]
         if names.prefix and path.endswith((*_LABEL_SUFFIXES, ".tar")):
             content = part.intact(path, hashed)
-            renamed = names.content(path, content)
+            try:
+                renamed = names.content(path, content)
+            except tarfile.TarError:
+                raise part.damaged(path) from None
             if renamed != content:
                 changed[new_path] = renamed
                 entries[new_path] = [len(renamed), digest(renamed)]

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import operator
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -86,6 +87,7 @@ class ContainerDataset(Dataset[Item]):
         # shared memory, so that persistent workers see it change, forked or spawned
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
         self.epoch_settings = 0
+        self._taken = torch.zeros(2, dtype=torch.int64).share_memory_()  # items, and if it warned
         self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
         self._scene: tuple[tuple[int, int], Scene] | None = None
         self._digests: dict[int, str] = {}
@@ -139,6 +141,7 @@ class ContainerDataset(Dataset[Item]):
         epoch = whole("epoch", epoch, 0, MAX_EPOCH)
         config_of(self.scenes.curriculum, self.config, epoch)  # fails here, not in a worker
         self._epoch.fill_(epoch)
+        self.begin_count()
         self.epoch_settings += 1
 
     @property
@@ -179,6 +182,24 @@ class ContainerDataset(Dataset[Item]):
         image, target = changed
         return image, target
 
+    def begin_count(self) -> None:
+        """Count items anew, because a sampler begins a pass."""
+        self._taken[0] = 0
+
+    def count_item(self) -> None:
+        """Count an item that a pass takes, and warn once if a second pass has the same scenes."""
+        self._taken[0] += 1
+        # half an epoch more, because somebody may look at single items between passes
+        again = 2 * self._taken[0] > 3 * self.length
+        if again and not self._taken[1] and not self.scenes.fixed:
+            self._taken[1] = 1
+            warnings.warn(
+                f"a second pass over the data has the scenes of epoch {self.epoch} again; use "
+                "fastgen.torch.Loader or ShardSampler, or call set_epoch before each pass "
+                "(SceneSettings(fixed=True) says that this is intended)",
+                stacklevel=3,
+            )
+
     def config_at(self, epoch: int) -> Config:
         """Return the configuration of an epoch."""
         last = self._epoch_config
@@ -201,6 +222,7 @@ class ContainerDataset(Dataset[Item]):
             raise TypeError(f"position {position!r} is not a whole number") from None
         if not -self.length <= position < self.length:
             raise IndexError(f"position {position} is out of range; there are {self.length}")
+        self.count_item()
         return self.item(position % self.length)
 
 
@@ -276,4 +298,7 @@ class ContainerStream(IterableDataset[Item]):
         share = (worker.id, worker.num_workers) if worker else (0, 1)
         epoch = self.epoch  # read once: a pass stays in one epoch
         places = positions(int(self._place[0]), self.length, self.part, share, self.batch_size)
-        return (self.dataset.item(position, epoch) for position in places)
+        for position in places:
+            if self.length is not None:
+                self.dataset.count_item()
+            yield self.dataset.item(position, epoch)

@@ -26,6 +26,7 @@ class _Passes:
         if data.epoch_settings == self._last_setting:
             data.set_epoch(data.epoch + 1)
         self._last_setting = data.epoch_settings
+        data.begin_count()
 
 
 class ShardSampler(Sampler[int]):
