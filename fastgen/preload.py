@@ -1,5 +1,6 @@
 """Preparation of everything that scenes of a generator may need, ahead of a long run."""
 
+import logging
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator
 from dataclasses import replace
 from typing import Protocol
@@ -13,6 +14,8 @@ from fastgen.sampling.coverage import damage_variant_configs, possible_shapes
 from fastgen.sampling.scene import environment_weights, sample_scene
 from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.optics import Lamp
+
+_log = logging.getLogger(__name__)
 
 
 class SceneRenderer(Protocol):
@@ -55,17 +58,21 @@ def preload(generator: SceneRenderer, on_step: Callable[[], None]) -> None:
     scene = generator.scene(0)
     lens = any(camera.lens is not None for camera in scene.cameras)
     with generator.gpu.drawing() as renderer:
-        for name in environments:
+        for number, name in enumerate(environments, start=1):
             on_step()
+            _log.info("loading light %d of %d", number, len(environments))
             renderer.preload_environment(name)
             generator.container_map(name)
-        for container, spreader in possible_shapes(config):
+        shapes = list(possible_shapes(config))
+        for number, (container, spreader) in enumerate(shapes, start=1):
             on_step()
+            _log.info("loading shape %d of %d", number, len(shapes))
             shape = replace(scene, container=container, spreader=spreader, damages=())
             renderer.preload(PreparedScene(shape), lens, config.damage.probability > 0)
         draws = _distinct_draws(renderer, _typical_scenes(generator, environments), generator.size)
-    for shown, camera in draws:
+    for number, (shown, camera) in enumerate(draws, start=1):
         on_step()
+        _log.info("compiling shaders, %d of %d", number, len(draws))
         generator.render(scene=shown, camera=camera)
 
 

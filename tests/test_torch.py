@@ -136,6 +136,7 @@ def test_a_resumed_loader_continues_with_the_next_sample(make, workers):
         second.load_state_dict(state)
         second.set_epoch(2)  # a training loop sets the epoch again
         assert begun + seen(second) == whole
+        second.set_epoch(2)
         assert seen(second) == whole  # the next pass is complete
 
 

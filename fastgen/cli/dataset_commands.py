@@ -1,6 +1,7 @@
-"""Commands about whole datasets: generate, stats and verify."""
+"""Commands about whole datasets: generate, merge, stats and verify."""
 
 import argparse
+import json
 import shlex
 from typing import Any
 
@@ -8,20 +9,23 @@ from fastgen.cli.options import (
     add_config,
     add_device,
     add_hdri,
+    add_output,
     add_render,
     add_seed,
     config_of,
     render_settings,
+    summarize,
 )
-from fastgen.dataset import stats
 from fastgen.dataset.addresses import place_of
 from fastgen.dataset.console import tell
 from fastgen.dataset.finish import CONTACT_SHEET
 from fastgen.dataset.generate import generate
 from fastgen.dataset.job import COCO_MASKS, LAYOUTS, SHARD_SCENES, STEMS, Job
+from fastgen.dataset.merge import merge
 from fastgen.dataset.on_ray import run_on_ray
 from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
+from fastgen.dataset.stats import report, statistics
 from fastgen.dataset.verify import examine
 from fastgen.formats.registry import SEAFRONT, format_names
 
@@ -37,9 +41,18 @@ examples:
   fastgen generate boxes --images 5000 --seed 7 --config port.yaml --quality draft --workers 8
   fastgen generate s3://bucket/boxes --images 100000 --format webdataset"""
 
+_MERGE = """\
+Merge finished datasets of the same layout, formats and classes into a new one.
+
+OUT appears when it is complete. The datasets do not change. Files are hard links where the file
+system allows it. Names of images begin with the seed of their dataset."""
+
 _VERIFY = """\
 Check that every file of a dataset is present, unchanged since it was written, and consistent with
-the other labels. The exit code is 1 if there are faults."""
+the other labels. The exit code is 1 if there are faults. Files that are not part of the dataset,
+such as caches of trainers, are listed and stay as they are."""
+
+_RAW = argparse.RawDescriptionHelpFormatter
 
 _OUT = "folder of the dataset, or an address such as s3://bucket/folder"
 
@@ -51,7 +64,7 @@ def add_generate(commands: Any) -> None:
         help="generate a dataset, or continue one",
         description=_GENERATE,
         epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_RAW,
     )
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
     command.add_argument(
@@ -136,7 +149,21 @@ def add_generate(commands: Any) -> None:
         help="render on a Ray cluster: auto or HOST:PORT, or no value to start Ray on this "
         "machine; all nodes must be able to write to OUT",
     )
+    add_output(command)
     command.set_defaults(run=_generate)
+
+
+def add_merge(commands: Any) -> None:
+    """Add `fastgen merge`."""
+    command = commands.add_parser(
+        "merge", help="make one dataset of several", description=_MERGE, formatter_class=_RAW
+    )
+    command.add_argument(
+        "datasets", type=_place, nargs="+", metavar="DATASET", help="folder of a finished dataset"
+    )
+    command.add_argument("out", type=_place, metavar="OUT", help="new folder")
+    add_output(command)
+    command.set_defaults(run=_merge)
 
 
 def add_stats(commands: Any) -> None:
@@ -144,6 +171,7 @@ def add_stats(commands: Any) -> None:
     words = "print how many images and labels a dataset has, by class and split"
     command = commands.add_parser("stats", help=words, description=f"{words.capitalize()}.")
     command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
+    command.add_argument("--json", action="store_true", help="print the numbers as JSON")
     command.set_defaults(run=_stats)
 
 
@@ -163,6 +191,7 @@ def add_verify(commands: Any) -> None:
     )
     add_hdri(command, ", if the dataset was made with such a folder")
     add_device(command)
+    add_output(command)
     command.set_defaults(run=_verify)
 
 
@@ -191,30 +220,54 @@ def _generate(options: argparse.Namespace) -> int:
     )
     runner = None if options.ray is None else run_on_ray(options.ray or None, options.workers)
     manifest = generate(job, options.workers, runner)
-    total = sum(split["images"] for split in manifest["counts"].values())
     look = f"; look at {options.out}/{CONTACT_SHEET}" if CONTACT_SHEET in manifest["files"] else ""
-    tell(f"{total} images in {options.out}{look}")
-    for each in manifest["failed"]:
-        tell(f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}")
+    failures = (
+        f"scene {each['scene']} of seed {each['seed']} failed: {each['error']}"
+        for each in manifest["failed"]
+    )
+    result = _result(options.out, manifest)
+    lines = (f"{result['images']} images in {options.out}{look}", *failures)
+    summarize(options, result, lines)
     return 1 if manifest["failed"] else 0
 
 
+def _result(out: str, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Return what --json prints about a new dataset."""
+    total = sum(split["images"] for split in manifest["counts"].values())
+    parts = {key: manifest[key] for key in ("counts", "failed")}
+    return {"out": out, "images": total, **parts}
+
+
+def _merge(options: argparse.Namespace) -> int:
+    result = _result(options.out, merge(options.datasets, options.out))
+    words = f"{result['images']} images of {len(options.datasets)} datasets in {options.out}"
+    summarize(options, result, [words])
+    return 0
+
+
 def _stats(options: argparse.Namespace) -> int:
-    tell(stats.report(options.out))
+    tell(json.dumps(statistics(options.out)) if options.json else report(options.out))
     return 0
 
 
 def _verify(options: argparse.Namespace) -> int:
+    repaired: list[str] = []
     if options.repair:
-        repaired, faults = repair(options.out, options.workers, options.hdri, options.device_index)
-        for fault in repaired:
-            tell(f"repaired: {fault}")
-        hint = ""
+        repaired, found = repair(options.out, options.workers, options.hdri, options.device_index)
     else:
         found = examine(options.out)
-        faults = found.faults
-        hint = f"fastgen verify {shlex.quote(options.out)} --repair" if found.broken else ""
-    tell("\n".join(faults) if faults else f"{options.out}: whole and consistent")
-    if hint:
-        tell(f"to make damaged and missing files again: {hint}")
-    return 1 if faults else 0
+    lines = [f"repaired: {fault}" for fault in repaired] + found.faults
+    lines += [f"{path}: not part of the dataset" for path in found.foreign]
+    if not found.faults:
+        lines.append(f"{options.out}: whole and consistent")
+    elif found.broken and not options.repair:
+        again = f"fastgen verify {shlex.quote(options.out)} --repair"
+        lines.append(f"to make damaged and missing files again: {again}")
+    result = {
+        "out": options.out,
+        "faults": found.faults,
+        "foreign": found.foreign,
+        "repaired": repaired,
+    }
+    summarize(options, result, lines)
+    return 1 if found.faults else 0

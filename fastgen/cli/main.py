@@ -8,11 +8,12 @@ from typing import Any, NoReturn
 
 import fastgen
 from fastgen.cli.config_command import add_config_command, add_presets
-from fastgen.cli.dataset_commands import add_generate, add_stats, add_verify
+from fastgen.cli.dataset_commands import add_generate, add_merge, add_stats, add_verify
 from fastgen.cli.fit_command import add_fit
+from fastgen.cli.options import log_level
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
-from fastgen.dataset.console import drop_unprinted, mend_streams, say, tell
+from fastgen.dataset.console import drop_unprinted, mend_streams, printed_log, say, tell
 from fastgen.errors import FastgenError, one_line
 from fastgen.render import doctor
 
@@ -38,7 +39,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         try:
             options = _parser().parse_args(arguments)
-            with interrupted_by_sigterm():
+            with printed_log(log_level(options)), interrupted_by_sigterm():
                 code: int = options.run(options)
         finally:
             tell("", end="")  # flushes what argparse has printed
@@ -88,7 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
     adders = (
         *(add_generate, add_config_command, add_presets, add_fit, add_show, add_export),
-        *(add_stats, add_verify),
+        *(add_stats, add_verify, add_merge),
     )
     for add in adders:
         add(commands)

@@ -1,16 +1,23 @@
 """Options that several commands share, and the objects they describe."""
 
 import argparse
+import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from fastgen.config.assignments import assigned
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
 from fastgen.dataset.addresses import place_of
+from fastgen.dataset.console import tell
 from fastgen.errors import ConfigError, OutputError, shown
 from fastgen.render.gl import BACKENDS
 from fastgen.render.settings import QUALITY, RenderSettings
+from fastgen.validation import check_known
+
+LOG_LEVELS = ("info", "warning", "error")
 
 
 def add_config(command: argparse.ArgumentParser) -> None:
@@ -98,6 +105,39 @@ def add_hdri(command: argparse._ActionsContainer, note: str = "") -> None:
         metavar="DIR",
         help=f"folder of .hdr and .exr panoramas that replace the bundled ones as lights{note}",
     )
+
+
+def add_output(command: argparse.ArgumentParser) -> None:
+    """Add --quiet, --json and --log-level; `main` and `summarize` read them."""
+    group = command.add_argument_group("messages")
+    group.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    group.add_argument(
+        "--json",
+        action="store_true",
+        help="print the result as one line of JSON, even with --quiet",
+    )
+    group.add_argument(
+        "--log-level",
+        default="warning",
+        metavar="|".join(LOG_LEVELS),
+        help="least important messages to print; default: %(default)s",
+    )
+
+
+def log_level(options: argparse.Namespace) -> str:
+    """Return the level that the options of `add_output` describe."""
+    level: str = getattr(options, "log_level", "warning")
+    check_known("log-level", level, LOG_LEVELS)
+    return "error" if getattr(options, "quiet", False) else level
+
+
+def summarize(options: argparse.Namespace, result: dict[str, Any], lines: Iterable[str]) -> None:
+    """Print the result of a command as JSON or as lines, as the options of `add_output` say."""
+    if options.json:
+        tell(json.dumps(result))
+    elif not options.quiet:
+        for line in lines:
+            tell(line)
 
 
 def add_device(command: argparse._ActionsContainer, note: str = "") -> None:

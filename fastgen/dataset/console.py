@@ -2,11 +2,51 @@
 
 import contextlib
 import io
+import logging
 import os
 import sys
+from collections.abc import Iterator
+from typing import TextIO
 
-from fastgen.errors import OutputError
+from fastgen.errors import OutputError, one_line
 from fastgen.redaction import without_secrets
+
+LOGGER = logging.getLogger("fastgen")
+
+
+class _Printer(logging.Handler):
+    """Prints log records as lines on standard error, over a progress line if there is one."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        clear = "\r\x1b[K" if is_live(sys.stderr) else ""
+        say(clear + one_line(f"fastgen: {record.getMessage()}"))
+
+
+@contextlib.contextmanager
+def printed_log(level: str) -> Iterator[None]:
+    """Print what the package logs in the block.
+
+    Args:
+        level: Least level to print, a name of `logging` in lower case.
+    """
+    printer, before = _Printer(), LOGGER.level
+    LOGGER.addHandler(printer)
+    LOGGER.setLevel(level.upper())
+    try:
+        yield
+    finally:
+        LOGGER.setLevel(before)
+        LOGGER.removeHandler(printer)
+
+
+def shows_warnings() -> bool:
+    """Return whether hints and progress are to be shown."""
+    return LOGGER.isEnabledFor(logging.WARNING)
+
+
+def is_live(stream: TextIO) -> bool:
+    """Return whether a stream is a terminal that can overwrite a line."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def mend_streams() -> None:
@@ -48,6 +88,12 @@ def tell(words: str, end: str = "\n") -> None:
         raise
     except OSError as error:
         raise OutputError(f"standard output: {error.strerror}") from None
+
+
+def hint(words: str) -> None:
+    """Print a line about the run to standard error, unless only errors are to be shown."""
+    if shows_warnings():
+        say(f"fastgen: {words}")
 
 
 def say(words: str) -> None:

@@ -1,5 +1,6 @@
 """Contact sheet: small copies of a dataset's images with the labels from its files drawn on."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,9 @@ from fastgen.formats.format import Format
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
+_CAMERA = re.compile("(?:s[0-9]+_)?[0-9]+_")
+"""Part of a stem before the name of the camera."""
+
 
 def contact_sheet(
     out: Path, images: Sequence[tuple[str, str]], formats: Sequence[Format]
@@ -23,7 +27,7 @@ def contact_sheet(
 
     Args:
         out: Folder of the dataset.
-        images: Split and stem of each image, at least one. All have the same size.
+        images: Split and stem of each image, at least one.
         formats: Formats whose labels are drawn, the first one on top.
 
     Returns:
@@ -54,12 +58,12 @@ def contact_sheet(
                 f"{image_path}: the image or one of its label files is damaged; "
                 f"run fastgen verify {out} --repair"
             ) from None
-    height, width = tiles[0].shape[:2]
+    height, width = np.max([tile.shape[:2] for tile in tiles], axis=0)
     columns = min(count, _COLUMNS)
     sheet = np.full((-(-count // columns) * height, columns * width, 3), 32, np.uint8)
     for i, tile in enumerate(tiles):
         y, x = i // columns * height, i % columns * width
-        sheet[y : y + height, x : x + width] = tile
+        sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
     return sheet
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fastgen.dataset.job import Job, manifest_path, shard_of
-from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
+from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_finished
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, UnreadableError
 from fastgen.errors import OutputError, shown_name
@@ -65,6 +65,11 @@ def existing(storage: Storage, job: Job, settings: Mapping[str, Any]) -> dict[st
     found = parsed(text)
     if found is not None and _same({key: found.get(key) for key in settings}, settings):
         return found
+    if found is not None and "merged_from" in found:
+        raise OutputError(
+            f"{job.out}: was merged from other datasets; extend those and merge them again, or "
+            "give another folder"
+        )
     if found is not None and "digest" in found:
         raise OutputError(_differ_message(job, settings, found))
     # an unfinished dataset.json can be edited unnoticed, so the shards' manifests decide
@@ -122,7 +127,7 @@ def parsed(text: bytes) -> dict[str, Any] | None:
         return None
     if not isinstance(content, dict):
         return None
-    damaged = "digest" in content and (not is_sealed(text) or unfit(text, Finished))
+    damaged = "digest" in content and (not is_sealed(text) or unfit_finished(text))
     return None if damaged else content
 
 

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from fastgen.dataset.console import say
+from fastgen.dataset.console import hint
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
 from fastgen.dataset.job import ARCHIVE_ENDINGS, Job, manifest_path
@@ -22,8 +22,16 @@ from fastgen.sampling.scene import SPLITS
 CONTACT_SHEET = "contact_sheet.png"
 
 
-def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, Any]:
+def finish(
+    job: Job, storage: Storage, settings: dict[str, Any], shard_count: int
+) -> dict[str, Any]:
     """Write the files that cover all samples, and dataset.json, which seals them, last.
+
+    Args:
+        job: Decides layout, formats and class lists.
+        storage: Holds the files of all shards.
+        settings: First values of dataset.json.
+        shard_count: Number of shards; they are numbered from 0.
 
     Returns:
         The content of dataset.json.
@@ -35,7 +43,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     images: list[tuple[str, str]] = []
     filled: set[str] = set()
     counts = {split: _count(formats, []) for split in SPLITS}
-    for shard in range(job.shard_count):
+    for shard in range(shard_count):
         shards[str(shard)], manifest = _manifest(job, storage, shard)
         made_by = {name: manifest[name] for name in MADE_BY}
         if made_by not in makers:
@@ -66,7 +74,7 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
             storage.make_folders([f"images/{split}", f"scenes/{split}"])
             for each in formats:
                 storage.make_folders(each.folders(split))
-                records_of = _records(job, storage, split)
+                records_of = _records(job, storage, split, shard_count)
                 for path, content in each.dataset_files(split, records_of, job.config):
                     put(path, [content] if isinstance(content, bytes) else map(str.encode, content))
         if isinstance(storage, Folder) and images:
@@ -83,11 +91,11 @@ def finish(job: Job, storage: Storage, settings: dict[str, Any]) -> dict[str, An
     }
     storage.write(MANIFEST, [seal(unsealed(result))])
     _say_what_is_empty(job, storage, formats, counts, filled)
-    if len(makers) > 1:
+    if len(makers) > 1 and "merged_from" not in settings:
         names = " and by ".join(" ".join(made_by.values()) for made_by in makers)
-        say(
-            f"fastgen: {job.out} was rendered by {names}, which may round differently; to get the "
-            "same bytes everywhere, generate it anew with one of them"
+        hint(
+            f"{job.out} was rendered by {names}, which may round differently; to get the same "
+            "bytes everywhere, generate it anew with one of them"
         )
     return result
 
@@ -111,15 +119,15 @@ def _say_what_is_empty(
     used = [split for split in SPLITS if counts[split]["images"]]
     empty = [split for split in SPLITS if split not in used]
     if empty:
-        say(
-            f"fastgen: no image is in {' and '.join(empty)}; more scenes, or other --split "
+        hint(
+            f"no image is in {' and '.join(empty)}; more scenes, or other --split "
             "fractions, fill them"
         )
     if isinstance(storage, Folder) and job.layout == "seafront":
         folders = [folder for split in used for each in formats for folder in each.folders(split)]
         bare = [folder for folder in folders if folder not in filled]
         if bare:
-            say(f"fastgen: empty, because no image shows what they are for: {', '.join(bare)}")
+            hint(f"empty, because no image shows what they are for: {', '.join(bare)}")
 
 
 def _count(formats: Iterable[Format], records: list[Record]) -> Counter[str]:
@@ -140,9 +148,11 @@ def _manifest(job: Job, storage: Storage, shard: int) -> tuple[str, dict[str, An
     return digest(text), manifest
 
 
-def _records(job: Job, storage: Storage, split: str) -> Callable[[], Iterator[Record]]:
+def _records(
+    job: Job, storage: Storage, split: str, shard_count: int
+) -> Callable[[], Iterator[Record]]:
     def through() -> Iterator[Record]:
-        for shard in range(job.shard_count):
+        for shard in range(shard_count):
             _, manifest = _manifest(job, storage, shard)
             yield from (record for record in manifest["records"] if record["split"] == split)
 

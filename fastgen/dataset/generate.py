@@ -13,7 +13,7 @@ from typing import Any
 
 from fastgen.cpus import usable_cpus
 from fastgen.dataset import workers
-from fastgen.dataset.console import say
+from fastgen.dataset.console import LOGGER, hint
 from fastgen.dataset.dataset_json import MANIFEST, existing, read_manifest, shard_numbers, unsealed
 from fastgen.dataset.finish import finish
 from fastgen.dataset.job import Job, Task, manifest_path
@@ -82,12 +82,16 @@ def generate(
             # a generator, for there may be millions of shards
             tasks = (Task(shard) for shard in range(job.shard_count) if shard not in made)
             progress = Progress(job.images, job.images - left)
+            progress.note("starting")
             if runner is None and old is None:
                 _report_idle_workers(job, worker_count)
 
             def on_report(kind: str, value: Any) -> None:
                 if kind == "images":
                     progress.add(value)
+                elif kind == "busy" and value:
+                    LOGGER.info(value)
+                    progress.note(value)
 
             try:
                 (runner or run_here(worker_count))(job, tasks, on_report)
@@ -97,7 +101,7 @@ def generate(
                 raise
             finally:
                 progress.close()
-        return finish(job, storage, settings)
+        return finish(job, storage, settings, job.shard_count)
 
 
 def check_resumable(job: Job, worker_count: int) -> None:
@@ -154,8 +158,8 @@ def _report_idle_workers(job: Job, worker_count: int) -> None:
     scenes = -(-job.images // len(job.cameras))
     shards, fair = job.shard_count, -(-scenes // worker_count)
     if shards < worker_count and shards < -(-scenes // fair):
-        say(
-            f"fastgen: only {shards} of {worker_count} workers have work, because each shard has "
+        hint(
+            f"only {shards} of {worker_count} workers have work, because each shard has "
             f"{job.scenes_per_shard} scenes; use --shard {fair} in another folder to share it"
         )
 

@@ -36,15 +36,21 @@ class _Failure:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Started:
+class _Layout:
+    version: str
+    format: Annotated[str, OneOf(LAYOUTS)]
+    formats: tuple[str, ...]
+    images: _Number
+    classes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Started(_Layout):
     """Values of dataset.json in a dataset that is not finished.
 
     Defaults are those of versions that did not write the value.
     """
 
-    version: str
-    format: Annotated[str, OneOf(LAYOUTS)]
-    formats: tuple[str, ...]
     seed: _Count
     size: tuple[_Side, _Side]
     quality: str
@@ -52,17 +58,13 @@ class Started:
     environments: dict[str, Any]
     shard_scenes: _Number
     config: dict[str, Any]
-    images: _Number
-    postprocess: dict[str, str] = field(default_factory=dict, kw_only=True)
-    classes: dict[str, tuple[str, ...]] = field(default_factory=dict, kw_only=True)
+    postprocess: dict[str, str] = field(default_factory=dict)
     stems: Annotated[str, OneOf(STEMS)] = "short"
     coco_masks: Annotated[str, OneOf(COCO_MASKS)] = "rle"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finished(Started):
-    """Values of dataset.json in a finished dataset."""
-
+class _Result:
     backend: str
     renderer: str
     counts: dict[str, dict[str, _Count]]
@@ -70,6 +72,22 @@ class Finished(Started):
     files: _Entries
     shards: dict[Annotated[str, Matching("[0-9]{1,12}", "is not a number")], str]
     digest: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished(_Result, Started):
+    """Values of dataset.json in a dataset that was generated completely."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merged(_Result, _Layout):
+    """Values of dataset.json in a dataset that was merged from others.
+
+    Attributes:
+        merged_from: What dataset.json of each of the others says about how it was made.
+    """
+
+    merged_from: Annotated[tuple[Started, ...], MinLen(1)]
 
 
 @dataclass(frozen=True)
@@ -104,6 +122,11 @@ def parsed_json(text: bytes | str) -> Any:
     from pydantic_core import from_json
 
     return from_json(text)
+
+
+def unfit_finished(text: bytes) -> str:
+    """Return what does not fit in the text of a finished or merged dataset's dataset.json."""
+    return unfit(text, Merged if "merged_from" in parsed_json(text) else Finished)
 
 
 def unfit(text: bytes, cls: type) -> str:

@@ -11,7 +11,7 @@ from fastgen.dataset.job import Job
 from fastgen.dataset.manifest_types import Started, unfit
 from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
-from fastgen.dataset.verify import examine
+from fastgen.dataset.verify import Findings, examine
 from fastgen.errors import OutputError
 from fastgen.render.settings import RenderSettings
 
@@ -21,10 +21,10 @@ def repair(
     worker_count: int | None = None,
     hdri_dir: str | Path | None = None,
     device_index: int | None = None,
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[str], Findings]:
     """Make every shard again that has a changed or missing file or a failed scene.
 
-    An unfinished dataset is finished.
+    An unfinished dataset is finished. Files that are not part of the dataset stay as they are.
 
     Args:
         out: Folder or address of the dataset.
@@ -33,7 +33,7 @@ def repair(
         device_index: EGL device to draw with; None takes the first that works.
 
     Returns:
-        The faults that were repaired, and those that are left.
+        The faults that were repaired, and the findings that are left.
 
     Raises:
         OutputError: dataset.json is unusable, or its settings are not available here.
@@ -46,7 +46,12 @@ def repair(
         raise OutputError(f"{out}: {found.faults[0]}")
     finished = "digest" in found.manifest  # otherwise this may be the rest of a repair
     if finished and not found.broken and not found.manifest["failed"]:
-        return [], found.faults
+        return [], found
+    if "merged_from" in found.manifest:
+        raise OutputError(
+            f"{out}: was merged, so its files cannot be made again ({found.faults[0]}); repair the "
+            "datasets it was merged from, and merge them again"
+        )
     job = _job(out, found.manifest, hdri_dir, device_index)
     check_resumable(job, worker_count)  # before anything is removed
     storage = storage_of(out)
@@ -54,8 +59,8 @@ def repair(
         for path in sorted(found.broken):
             storage.remove(path)  # `generate` makes missing files, but does not check content
     generate(job, worker_count)
-    left = examine(out).faults
-    return [fault for fault in found.faults if finished and fault not in left], left
+    left = examine(out)
+    return [fault for fault in found.faults if finished and fault not in left.faults], left
 
 
 def _job(

@@ -5,6 +5,7 @@ records of its images, from which the files over the whole dataset are made. A s
 manifest counts as never made.
 """
 
+import logging
 import os
 import time
 import traceback
@@ -16,6 +17,7 @@ from typing import Any
 import cv2
 import orjson
 
+from fastgen.dataset.console import LOGGER
 from fastgen.dataset.freed_memory import return_freed_memory
 from fastgen.dataset.job import Job, Task, manifest_path, scene_and_camera
 from fastgen.dataset.seal import digest, seal
@@ -48,8 +50,20 @@ Report = Callable[[str, Any], None]
 """Sends a report to the parent process.
 
 Reports are "at" with the index of the scene that comes next, "images" with a number of finished
-images, and "busy" with None during preparations.
+images, and "busy" during preparations, with words about them or None.
 """
+
+
+class _Announcer(logging.Handler):
+    """Reports what the package logs in a worker, so that the parent can show it."""
+
+    def __init__(self, report: Report) -> None:
+        super().__init__()
+        self._report = report
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.name != LOGGER.name:  # the parent logs reports with this name
+            self._report("busy", record.getMessage())
 
 
 class Strikes:
@@ -102,6 +116,8 @@ class Maker:
             # llvmpipe reads this at its first context
             os.environ.setdefault("LP_NUM_THREADS", "0")
             cv2.setNumThreads(1)
+        LOGGER.handlers = [_Announcer(report)]
+        LOGGER.setLevel(logging.INFO)
         self._job = job
         self._report = report
         self._formats = formats_for(job.formats, job.config.classes)

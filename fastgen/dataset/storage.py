@@ -87,6 +87,18 @@ class Folder:
             with whole_file(target) as stream:
                 stream.writelines(pieces)
 
+    def adopt(self, other: "Folder", path: str, new_path: str) -> None:
+        """Make a hard link to a file of another dataset, or a copy if there cannot be a link."""
+        target = place_inside(self.root, new_path)
+        with _readable(other.root, path) as source, _named(target, "written"):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _link(str(source), str(target))
+
+    def flush(self) -> None:
+        """Flush everything that was written to disk."""
+        with _named(self.root, "written"):
+            _flush(self.root)
+
     def make_folders(self, paths: Iterable[str]) -> None:
         """Make these folders unless they exist."""
         for path in paths:

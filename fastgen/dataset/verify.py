@@ -2,16 +2,17 @@
 
 import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache, partial
+from pathlib import PurePosixPath
 from typing import Any
 
 import simplejpeg
 
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, without_manifest
-from fastgen.dataset.job import ARCHIVE_ENDINGS, manifest_path
-from fastgen.dataset.manifest_types import Finished, Shard, parsed_json, unfit
+from fastgen.dataset.job import manifest_path
+from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_finished
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError, shown
@@ -22,6 +23,12 @@ from fastgen.scene import Scene
 
 _AGAIN = "run generate again with the same settings"
 
+_SAMPLE = re.compile(
+    rf"(?:{'|'.join(SPLITS)})-\d{{6,}}\.tar|"
+    r"(?!shards/).+/(?:s\d+_)?\d{6,}(?:_[A-Za-z0-9_-]+)?\.\w+"
+)
+"""Paths that files of samples have."""
+
 
 @dataclass(frozen=True)
 class Findings:
@@ -29,12 +36,15 @@ class Findings:
 
     Attributes:
         faults: A line for each fault, which names a file.
+        foreign: Paths of files and folders that are not part of the dataset, sorted. Trainers leave
+            caches and results beside labels.
         broken: Paths of files that are missing or not as they were written.
         manifest: Content of dataset.json; {} if it was changed. It has no "digest" if the dataset
             is not finished.
     """
 
     faults: list[str]
+    foreign: list[str] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
     manifest: dict[str, Any] = field(default_factory=dict)
 
@@ -49,7 +59,7 @@ def examine(out: str) -> Findings:
     try:
         text = storage.read(MANIFEST)
         manifest = parsed_json(text)
-        manifest["config"], manifest["shard_scenes"]
+        manifest["format"], manifest["formats"]
     except (OSError, ValueError, KeyError, TypeError):
         raise without_manifest(storage, out) from None
     if "digest" not in manifest:
@@ -57,7 +67,7 @@ def examine(out: str) -> Findings:
         return Findings([unfinished], manifest=manifest)
     if not is_sealed(text):
         return Findings([f"{MANIFEST}: was changed after it was written; {_AGAIN}"])
-    problem = unfit(text, Finished)
+    problem = unfit_finished(text)
     if problem:
         return Findings([f"{MANIFEST}: {problem}; {_AGAIN}"])
     unknown = [name for name in manifest["formats"] if name not in format_names()]
@@ -89,15 +99,17 @@ def examine(out: str) -> Findings:
     for path, (size, hashed) in (entry for files in listed for entry in files.items()):
         if not _is_intact(storage, present, path, size, hashed, faults):
             broken.add(path)
-    astray = (path for path in sorted(present) if _shard_by_name(path, manifest) not in unlisted)
-    faults += [f"{path}: does not belong here" for path in astray]
+    ours = {MANIFEST, *broken, *(path for files in listed for path in files)}
+    if unlisted:  # some of the other files may be theirs
+        ours.update(filter(_SAMPLE.fullmatch, present))
+    foreign = _foreign(present.keys() - ours, ours)
     if manifest["format"] == "seafront":
         records = [record for shard in shards for record in shard["records"]]
         formats = formats_for(manifest["formats"], manifest.get("classes", {}))
         faults += _contradictions(storage, records, broken, formats)
         if not unlisted:
             faults += _split_contradictions(storage, records, broken, formats)
-    return Findings(faults, broken, manifest)
+    return Findings(faults, foreign, broken, manifest)
 
 
 def _is_intact(
@@ -132,20 +144,18 @@ def _is_intact(
     return same
 
 
-def _shard_by_name(path: str, manifest: dict[str, Any]) -> int | None:
-    """Return the shard of a sample's file by its name, or None if the name has no number."""
-    scenes: int = manifest["shard_scenes"]
-    cameras = manifest["cameras"]
-    if manifest["format"] in ARCHIVE_ENDINGS:
-        endings = "|".join(ARCHIVE_ENDINGS.values())
-        pattern, numbered = rf"(?:{'|'.join(SPLITS)})-(\d{{6,}})\.(?:{endings})", 1
-    elif path.startswith("bop/"):
-        pattern, numbered = r"bop/.*/(\d{6,})(?:_\d+)?\.\w+", scenes * len(cameras)
-    else:
-        names = "|".join(map(re.escape, cameras))
-        pattern, numbered = rf".*/(?:s\d+_)?(\d{{6,}})_(?:{names})(?:_\w+)?\.\w+", scenes
-    found = re.fullmatch(pattern, path)
-    return None if found is None else int(found[1]) // numbered
+def _foreign(present: Iterable[str], listed: Collection[str]) -> list[str]:
+    """Return the paths that are not part of a dataset, sorted.
+
+    A folder without any listed file is returned instead of its content and ends with a slash.
+    """
+    ours = {str(folder) for path in listed for folder in PurePosixPath(path).parents}
+    found = set()
+    for path in present:
+        folders = [str(folder) for folder in PurePosixPath(path).parents]
+        topmost = next((each for each in reversed(folders) if each not in ours), None)
+        found.add(path if topmost is None else f"{topmost}/")
+    return sorted(found)
 
 
 class _Broken(Exception):

@@ -8,6 +8,7 @@ import contextlib
 import fcntl
 import hashlib
 import importlib.metadata
+import logging
 import mmap
 import os
 import time
@@ -29,6 +30,8 @@ LIMIT_BYTES = 4 << 30
 
 _LIBRARIES = (np.__version__, cv2.__version__, importlib.metadata.version("scipy"))
 """Versions of the libraries that compute the arrays; their results differ between releases."""
+
+_log = logging.getLogger(__name__)
 
 _CHECKSUM = "checksum"
 
@@ -53,6 +56,7 @@ def cached(
     make: Callable[[], Mapping[str, NDArray[Any]]],
     folder: Path | None = None,
     layout: Layout | None = None,
+    what: str = "",
 ) -> Arrays:
     """Return the arrays of an entry, and make and store them if the entry is missing or damaged.
 
@@ -67,13 +71,24 @@ def cached(
         make: Returns the arrays by name.
         folder: Folder of the entries, by default `default_folder()`.
         layout: Type and shape of each array.
+        what: Description of the entry for people, by default `name`.
 
     Returns:
         Read-only arrays by name, mapped from the file where possible.
     """
     key = hashlib.sha256(f"{version} {_LIBRARIES} {inputs!r}".encode()).hexdigest()
     folder = folder or default_folder()
-    arrays = _found(folder / f"{name}-{key[:32]}.npy", make, layout) if folder else dict(make())
+
+    def announced() -> Mapping[str, NDArray[Any]]:
+        once = "once per machine" if folder else "again, because the cache cannot be written"
+        _log.info("preparing %s, %s", what or name.replace("-", " "), once)
+        return make()
+
+    arrays = (
+        _found(folder / f"{name}-{key[:32]}.npy", announced, layout)
+        if folder
+        else dict(announced())
+    )
     for array in arrays.values():
         array.flags.writeable = False
     return arrays

@@ -180,6 +180,7 @@ def load_environment(path: str | Path, cache_dir: str | Path | None = None) -> E
             lambda: _packed(prefilter_environment(path.stem, load_radiance(path))),
             folder,
             _LAYOUT,
+            f"light {path.stem}",
         ),
     )
     if light.mean_luminance > _BRIGHTEST:

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import operator
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -56,6 +57,10 @@ class ContainerDataset(Dataset[Item]):
         scenes: Which scenes an epoch has, and which cameras see them.
         items: What an item holds.
 
+    Attributes:
+        epoch_settings: Number of calls of `set_epoch`, by which loaders and samplers notice that
+            the epoch of their next pass was chosen.
+
     Raises:
         ConfigError: A value is not valid.
     """
@@ -81,6 +86,8 @@ class ContainerDataset(Dataset[Item]):
         self._plan = Plan(self.config, self.seed, self.cameras, scenes)
         # shared memory, so that persistent workers see it change, forked or spawned
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
+        self.epoch_settings = 0
+        self._taken = torch.zeros(2, dtype=torch.int64).share_memory_()  # items, and if it warned
         self._epoch_config = (0, config_of(scenes.curriculum, self.config, 0))
         self._scene: tuple[tuple[int, int], Scene] | None = None
         self._digests: dict[int, str] = {}
@@ -134,6 +141,8 @@ class ContainerDataset(Dataset[Item]):
         epoch = whole("epoch", epoch, 0, MAX_EPOCH)
         config_of(self.scenes.curriculum, self.config, epoch)  # fails here, not in a worker
         self._epoch.fill_(epoch)
+        self.begin_count()
+        self.epoch_settings += 1
 
     @property
     def collate(self) -> Collate:
@@ -173,6 +182,24 @@ class ContainerDataset(Dataset[Item]):
         image, target = changed
         return image, target
 
+    def begin_count(self) -> None:
+        """Count items anew, because a sampler begins a pass."""
+        self._taken[0] = 0
+
+    def count_item(self) -> None:
+        """Count an item that a pass takes, and warn once if a second pass has the same scenes."""
+        self._taken[0] += 1
+        # half an epoch more, because somebody may look at single items between passes
+        again = 2 * self._taken[0] > 3 * self.length
+        if again and not self._taken[1] and not self.scenes.fixed:
+            self._taken[1] = 1
+            warnings.warn(
+                f"a second pass over the data has the scenes of epoch {self.epoch} again; use "
+                "fastgen.torch.Loader or ShardSampler, or call set_epoch before each pass "
+                "(SceneSettings(fixed=True) says that this is intended)",
+                stacklevel=3,
+            )
+
     def config_at(self, epoch: int) -> Config:
         """Return the configuration of an epoch."""
         last = self._epoch_config
@@ -195,6 +222,7 @@ class ContainerDataset(Dataset[Item]):
             raise TypeError(f"position {position!r} is not a whole number") from None
         if not -self.length <= position < self.length:
             raise IndexError(f"position {position} is out of range; there are {self.length}")
+        self.count_item()
         return self.item(position % self.length)
 
 
@@ -206,8 +234,8 @@ class ContainerStream(IterableDataset[Item]):
     Args:
         dataset: The dataset.
         endless: Continue after the dataset's length without an end.
-        rank: Rank of this process; by default that of torch.distributed if it runs when the stream
-            is made, otherwise 0.
+        rank: Rank of this process; by default that of torch.distributed if it runs when a Loader
+            begins a pass, or for a plain DataLoader when the stream is made; otherwise 0.
         world_size: Number of ranks; give both or neither.
         batch_size: Batch size of the DataLoader, so that items come in order with any number of
             workers. Loader sets it.
@@ -231,9 +259,19 @@ class ContainerStream(IterableDataset[Item]):
             )
         self.dataset = dataset
         self.length = None if endless else len(dataset)
-        self.part = shard(rank, world_size)
         self.batch_size = whole("batch_size", batch_size, 1)
-        self._start = torch.zeros(1, dtype=torch.int64).share_memory_()
+        self._rank, self._world_size = rank, world_size
+        # first position, rank and world size: workers read them, but torch.distributed does not run
+        # there
+        self._place = torch.zeros(3, dtype=torch.int64).share_memory_()
+        self.start_at(0)
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """Rank and world size."""
+        if get_worker_info() is None:
+            return shard(self._rank, self._world_size)
+        return int(self._place[1]), int(self._place[2])
 
     @property
     def epoch(self) -> int:
@@ -246,7 +284,7 @@ class ContainerStream(IterableDataset[Item]):
 
     def start_at(self, position: int) -> None:
         """Let passes begin at a position of the epoch, counted over all ranks."""
-        self._start.fill_(whole("position", position))
+        self._place.copy_(torch.tensor([whole("position", position), *self.part]))
 
     def __len__(self) -> int:
         """Return the number of items of this rank in an epoch. Raises TypeError if endless."""
@@ -259,5 +297,8 @@ class ContainerStream(IterableDataset[Item]):
         worker = get_worker_info()
         share = (worker.id, worker.num_workers) if worker else (0, 1)
         epoch = self.epoch  # read once: a pass stays in one epoch
-        places = positions(int(self._start), self.length, self.part, share, self.batch_size)
-        return (self.dataset.item(position, epoch) for position in places)
+        places = positions(int(self._place[0]), self.length, self.part, share, self.batch_size)
+        for position in places:
+            if self.length is not None:
+                self.dataset.count_item()
+            yield self.dataset.item(position, epoch)

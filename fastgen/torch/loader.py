@@ -14,12 +14,30 @@ from fastgen.torch.plan import MAX_EPOCH, shard
 from fastgen.validation import whole
 
 
+class _Passes:
+    """Advances a dataset by one epoch when a pass begins and no epoch was set since the last."""
+
+    def __init__(self, dataset: ContainerDataset) -> None:
+        self._dataset = dataset
+        self._last_setting = -1
+
+    def begin(self) -> None:
+        data = self._dataset
+        if data.epoch_settings == self._last_setting:
+            data.set_epoch(data.epoch + 1)
+        self._last_setting = data.epoch_settings
+        data.begin_count()
+
+
 class ShardSampler(Sampler[int]):
     """Sampler of one rank. Each position occurs once over all ranks; none is repeated as padding.
 
+    Each pass goes to the next epoch, unless `set_epoch` has chosen one since the last pass.
+
     Args:
         dataset: Its length, epoch and seed decide the positions.
-        rank: Rank of this process; by default that of torch.distributed if it runs, otherwise 0.
+        rank: Rank of this process; by default that of torch.distributed if it runs when a pass
+            begins, otherwise 0.
         world_size: Number of ranks; give both or neither.
         shuffle: Use a new order in each epoch, the same on all ranks.
 
@@ -34,9 +52,20 @@ class ShardSampler(Sampler[int]):
         world_size: int | None = None,
         shuffle: bool = False,
     ) -> None:
-        self.part = shard(rank, world_size)
+        shard(rank, world_size)  # refuses bad values here, not in a pass
         self.start = 0
         self._dataset, self._shuffle = dataset, shuffle
+        self._rank, self._world_size = rank, world_size
+        self._passes = _Passes(dataset)
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """Rank and world size; torch.distributed may have started after the sampler was made."""
+        return shard(self._rank, self._world_size)
+
+    def set_epoch(self, epoch: int) -> None:
+        """Set the dataset's epoch; trainers call this before each pass."""
+        self._dataset.set_epoch(epoch)
 
     def __len__(self) -> int:
         """Return the number of positions of this rank in a whole epoch."""
@@ -44,21 +73,28 @@ class ShardSampler(Sampler[int]):
         return len(range(rank, len(self._dataset), world_size))
 
     def __iter__(self) -> Iterator[int]:
+        self._passes.begin()
         data = self._dataset
         places = range(len(data))
         if self._shuffle:
             order = stream(data.seed, data.epoch, "order").permutation(len(data)).tolist()
             places = order
         rank, world_size = self.part
-        return iter(places[self.start + rank :: world_size])
+        yield from places[self.start + rank :: world_size]
 
 
 class Loader:
     """Batches of a ContainerDataset or ContainerStream, with a position that can be saved.
 
+    Each pass goes to the next epoch, unless `set_epoch` has chosen one since the last pass. A pass
+    counts as soon as it has delivered a batch.
+
     `state_dict` counts the samples handed out, not those that workers have prepared. After
     `load_state_dict`, a Loader with the same dataset continues with the next sample. Batch size,
     number of workers and number of ranks may differ. All ranks may load the state of rank 0.
+
+    A Loader has the attributes of a DataLoader but is none. Libraries that replace the samplers of
+    DataLoaders would divide the positions among the ranks a second time.
 
     Args:
         dataset: The dataset or stream.
@@ -70,6 +106,10 @@ class Loader:
         options: Further options of DataLoader: collate_fn (by default the one for the task),
             num_workers, persistent_workers, pin_memory, prefetch_factor, multiprocessing_context,
             timeout, worker_init_fn, generator.
+
+    Attributes:
+        sampler: Has `set_epoch`, which trainers call before each pass. It is a ShardSampler, or the
+            stream itself.
 
     Raises:
         ConfigError: A value is not valid.
@@ -89,31 +129,36 @@ class Loader:
         self.dataset = dataset
         self.batch_size, self.drop_last = whole("batch_size", batch_size, 1), drop_last
         self._shuffle = shuffle
-        self._sampler: ShardSampler | None = None
+        self.sampler: ShardSampler | ContainerStream
         if isinstance(dataset, ContainerStream):
             if shuffle or rank is not None or world_size is not None:
                 raise ConfigError("shuffle, rank, world_size: a stream has its own; leave them out")
             dataset.batch_size = self.batch_size
-            self._items, self._part = dataset.dataset, dataset.part
-            self._length = dataset.length
+            self._items, self.sampler = dataset.dataset, dataset
         elif not isinstance(dataset, ContainerDataset):
             raise ConfigError(
                 f"dataset: {type(dataset).__name__} is neither a ContainerDataset nor a "
                 "ContainerStream; torch's own DataLoader takes others"
             )
         else:
-            self._sampler = ShardSampler(dataset, rank, world_size, shuffle)
-            self._items, self._part = dataset, self._sampler.part
-            self._length = dataset.length
-        self._start = 0
-        self._position = 0
+            self._items, self.sampler = dataset, ShardSampler(dataset, rank, world_size, shuffle)
+        self._length = dataset.length
+        self._passes = _Passes(self._items)
+        self._next_pass = (0, 0)  # epoch and first position; passes in other epochs begin at 0
+        self._reached = (0, 0)  # epoch and position after the last sample
         self._loader: DataLoader[Any] = DataLoader(
             dataset,
             batch_size=self.batch_size,
-            sampler=self._sampler,
+            sampler=None if isinstance(dataset, ContainerStream) else self.sampler,
             drop_last=drop_last,
             **{**options, "collate_fn": options.get("collate_fn") or self._items.collate},
         )
+
+    def __getattr__(self, name: str) -> Any:
+        """Return an attribute of the DataLoader, such as `batch_sampler` or `num_workers`."""
+        if name.startswith("_"):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        return getattr(self._loader, name)
 
     @property
     def epoch(self) -> int:
@@ -121,16 +166,14 @@ class Loader:
         return self._items.epoch
 
     def set_epoch(self, epoch: int) -> None:
-        """Go to an epoch before a pass. The epoch of a loaded state keeps the position in it."""
-        if epoch != self.epoch:
-            self._start = self._position = 0
-            self._items.set_epoch(epoch)
+        """Choose the epoch of the next pass. The epoch of a loaded state keeps the position."""
+        self._items.set_epoch(epoch)
 
     def state_dict(self) -> dict[str, Any]:
         """Return epoch, position after the last sample and description of the samples as JSON."""
         return {
             "epoch": self.epoch,
-            "position": self._position,
+            "position": self._in_this_epoch(self._reached),
             "made": {**self._items.description, "length": self._length, "shuffle": self._shuffle},
         }
 
@@ -157,7 +200,7 @@ class Loader:
                 )
         position = whole("state.position", state["position"], 0, most)
         self._items.set_epoch(epoch)
-        self._start = self._position = position
+        self._next_pass = self._reached = (epoch, position)
 
     def __len__(self) -> int:
         """Return the batches of this rank in a whole epoch. Raises TypeError if there is no end."""
@@ -166,25 +209,31 @@ class Loader:
         return self._batches_in(0)
 
     def __iter__(self) -> Iterator[Any]:
-        start, self._start = self._start, 0
-        self._position = start
-        if isinstance(self.dataset, ContainerStream):
-            self.dataset.start_at(start)
-        elif self._sampler is not None:
-            self._sampler.start = start
-        return self._run(start)
-
-    def _run(self, start: int) -> Iterator[Any]:
+        start = self._in_this_epoch(self._next_pass)
+        self._next_pass = (0, 0)
+        if isinstance(self.sampler, ContainerStream):
+            self._passes.begin()
+            self.sampler.start_at(start)
+        else:
+            self.sampler.start = start
+        _, world_size = self.sampler.part
         for number, batch in enumerate(self._loader, start=1):
-            self._position = start + number * self.batch_size * self._part[1]
+            position = start + number * self.batch_size * world_size
             if self._length is not None and number >= self._batches_in(start):
-                self._position = self._length
+                position = self._length
+            self._reached = (self.epoch, position)
             yield batch
+
+    def _in_this_epoch(self, place: tuple[int, int]) -> int:
+        """Return the position of an epoch and position if the epoch is the current one, else 0."""
+        epoch, position = place
+        return position if epoch == self.epoch else 0
 
     def _batches_in(self, start: int) -> int:
         """Return the number of batches of this rank from a position to the end of the epoch."""
         assert self._length is not None
-        items = len(range(start + self._part[0], self._length, self._part[1]))
+        rank, world_size = self.sampler.part
+        items = len(range(start + rank, self._length, world_size))
         return items // self.batch_size if self.drop_last else -(-items // self.batch_size)
 
 

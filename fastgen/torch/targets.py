@@ -51,7 +51,7 @@ class ItemSettings:
         form: Form of box targets: "detection" for torchvision's dictionaries, "yolo" for rows of
             class and normalized box.
         as_float: Images are float32 in 0..1 instead of uint8.
-        transforms: Called with image and target. Returns both, changed.
+        transforms: Called with image and target as `item_of` makes them. Returns both, changed.
 
     Raises:
         ConfigError: A value is not valid.

@@ -1,0 +1,390 @@
+"""`fastgen merge`: one dataset from several finished ones.
+
+The merged dataset has all shards of the others under new numbers, and its own files over whole
+splits. Image files are hard links. Images whose names lack the seed get it, because other datasets
+have images with the same names; label files that contain such a name are written anew.
+"""
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import tarfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from fastgen.config.config import Config
+from fastgen.dataset.addresses import place_of
+from fastgen.dataset.dataset_json import MANIFEST, parsed, shard_manifest
+from fastgen.dataset.finish import finish
+from fastgen.dataset.job import Job, manifest_path
+from fastgen.dataset.progress import Progress
+from fastgen.dataset.seal import digest, seal
+from fastgen.dataset.storage import LOCK, Folder
+from fastgen.errors import ConfigError, OutputError
+from fastgen.formats.format import Files
+
+_RESULTS = ("images", "counts", "failed", "files", "shards", "digest")
+"""Keys of dataset.json that do not say how the dataset was made."""
+
+_LABEL_SUFFIXES = (".json", ".xml", ".txt")
+"""Suffixes of files that may contain the name of their image."""
+
+
+def merge(sources: Sequence[str], out: str) -> dict[str, Any]:
+    """Merge finished datasets into a new one. The sources do not change.
+
+    The new dataset appears when it is complete. Its files share their disk space with those of the
+    sources if they are on the same file system.
+
+    Args:
+        sources: Folders of two or more datasets with the same layout, formats and classes.
+        out: Folder of the merged dataset, which is new or empty.
+
+    Returns:
+        The content of the new dataset.json.
+
+    Raises:
+        OutputError: A source is not a finished dataset or has damaged files, the sources do not fit
+            together, or `out` is not a place for them.
+    """
+    parts = [_part(each) for each in sources]
+    root = _new_place(out, parts)
+    config = _check_alike(parts)
+    _check_names(parts)
+    first = parts[0].manifest
+    job = Job(
+        out=out,
+        images=sum(part.manifest["images"] for part in parts),
+        config=config,
+        layout=first["format"],
+        tasks=tuple(first["formats"]),
+    )
+    from fastgen import __version__
+
+    settings = {
+        "version": __version__,
+        "format": first["format"],
+        "formats": first["formats"],
+        "classes": _classes(parts[0]),
+        "merged_from": [each for part in parts for each in part.made_with],
+    }
+    with _appearing(root) as storage:
+        count = _copy_shards(parts, storage, job.images)
+        result = finish(job, storage, settings, count)
+        storage.flush()
+    return result
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One of the datasets to merge, and the content of its dataset.json."""
+
+    out: str
+    storage: Folder
+    manifest: dict[str, Any]
+
+    @property
+    def made_with(self) -> list[dict[str, Any]]:
+        """How the dataset was made; several entries if it was merged itself."""
+        own = {key: value for key, value in self.manifest.items() if key not in _RESULTS}
+        own["images"] = self.manifest["images"]
+        merged: list[dict[str, Any]] = self.manifest.get("merged_from", [own])
+        return merged
+
+    @property
+    def shards(self) -> Iterator[dict[str, Any]]:
+        """The manifests of the shards."""
+        for number, hashed in self.manifest["shards"].items():
+            path = manifest_path(int(number))
+            manifest = shard_manifest(self.intact(path, hashed), int(number))
+            if manifest is None:
+                raise self.damaged(path)
+            yield manifest
+
+    def config(self) -> Config:
+        """Return the configuration, of the first source if the dataset was merged itself."""
+        made_with = self.made_with[0]
+        try:
+            return Config.from_values(made_with["config"])
+        except ConfigError as error:
+            raise OutputError(
+                f"{self.out}: was made by fastgen {made_with['version']}, whose configuration this "
+                f"version cannot read ({error}); merge with that version"
+            ) from None
+
+    def intact(self, path: str, hashed: str) -> bytes:
+        """Return the content of a file."""
+        with self._damaged_if_unreadable(path):
+            content = self.storage.read(path)
+        if digest(content) != hashed:
+            raise self.damaged(path)
+        return content
+
+    def link(self, path: str, hashed: str, storage: Folder, new_path: str) -> None:
+        """Make a hard link to a file, or a copy of it, in another dataset."""
+        with self._damaged_if_unreadable(path):
+            same = self.storage.content_hash(path) == hashed
+        if not same:
+            raise self.damaged(path)
+        storage.adopt(self.storage, path, new_path)
+
+    def damaged(self, path: str) -> OutputError:
+        """Return the error for a file that is not as it was written."""
+        return OutputError(
+            f"{self.out}: {path} is missing or was changed; run fastgen verify {self.out} --repair"
+        )
+
+    @contextlib.contextmanager
+    def _damaged_if_unreadable(self, path: str) -> Iterator[None]:
+        try:
+            yield
+        except (FileNotFoundError, OutputError):
+            raise self.damaged(path) from None
+
+
+@dataclass(frozen=True)
+class _Renaming:
+    """New names of the files of one shard.
+
+    Attributes:
+        prefix: Put before the stem of each image; may be empty.
+        stems: Old stems of the images.
+        shard: Old and new number of the shard.
+    """
+
+    prefix: str
+    stems: tuple[str, ...]
+    shard: tuple[int, int]
+
+    def path(self, path: str) -> str:
+        """Return the new path of a file."""
+        old, new = self.shard
+        folder, slash, name = path.rpartition("/")
+        tar = re.fullmatch(rf"(\w+)-{old:06d}\.tar", name)
+        return f"{tar[1]}-{new:06d}.tar" if tar else f"{folder}{slash}{self.name(name)}"
+
+    def name(self, name: str) -> str:
+        """Return the new name of a file, or any other text unchanged."""
+        return f"{self.prefix}{name}" if name.startswith(self.stems) else name
+
+    def values(self, value: Any) -> Any:
+        """Return a JSON value with the new names."""
+        if isinstance(value, str):
+            return self.name(value)
+        if isinstance(value, list):
+            return [self.values(each) for each in value]
+        if isinstance(value, dict):
+            return {key: self.values(each) for key, each in value.items()}
+        return value
+
+    def content(self, path: str, content: bytes) -> bytes:
+        """Return the content of a file with the new names."""
+        if path.endswith(".tar"):
+            return self._tar(content)
+        if not path.endswith(_LABEL_SUFFIXES):
+            return content
+        stems = b"|".join(re.escape(stem.encode()) for stem in self.stems)
+        names = re.compile(rb"(?<![A-Za-z0-9_.-])(?:" + stems + rb")(?![A-Za-z0-9-])")
+        return names.sub(lambda found: self.prefix.encode() + found[0], content)
+
+    def _tar(self, content: bytes) -> bytes:
+        buffer = io.BytesIO()
+        with (
+            tarfile.open(fileobj=io.BytesIO(content)) as old,
+            tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as new,
+        ):
+            for member in old:
+                stream = old.extractfile(member)
+                data = self.content(member.name, stream.read() if stream else b"")
+                member.name, member.size = self.name(member.name), len(data)
+                new.addfile(member, io.BytesIO(data))
+        return buffer.getvalue()
+
+
+def _part(out: str) -> _Part:
+    place = place_of(out)
+    if "://" in place:
+        raise OutputError(
+            f"{out}: is an address; merge works on folders, so copy the dataset first"
+        )
+    storage = Folder(Path(place))
+    try:
+        manifest = parsed(storage.read(MANIFEST))
+    except FileNotFoundError:
+        raise OutputError(f"{out}: no readable {MANIFEST}; give a dataset's folder") from None
+    if manifest is None:
+        raise OutputError(f"{out}: {MANIFEST} is damaged; run fastgen verify {out}")
+    if "digest" not in manifest:
+        raise OutputError(f"{out}: the dataset is not finished; run generate again")
+    return _Part(out, storage, manifest)
+
+
+def _new_place(out: str, parts: Sequence[_Part]) -> Path:
+    """Return the folder for the merged dataset after checks."""
+    if len(parts) < 2:
+        raise OutputError(f"{parts[0].out}: is only one dataset; give two or more, and then OUT")
+    place = place_of(out)
+    if "://" in place:
+        raise OutputError(f"{out}: is an address; merge into a folder, then copy it")
+    root = Path(place)
+    if root.is_symlink() or (root.exists() and not root.is_dir()):
+        raise OutputError(f"{out}: is not a folder; give a new one")
+    if root.is_dir() and any(root.iterdir()):
+        raise OutputError(f"{out}: is not empty; give a new folder")
+    folders: dict[Path, str] = {}
+    for part in parts:
+        folder = part.storage.root.resolve()
+        if folder in folders:
+            raise OutputError(f"{part.out}: is given twice; give each dataset once")
+        if root.resolve().is_relative_to(folder):
+            raise OutputError(f"{out}: is inside {part.out}; give a folder elsewhere")
+        folders[folder] = part.out
+    return root
+
+
+def _check_alike(parts: Sequence[_Part]) -> Config:
+    """Check that datasets fit together, and return a configuration with their classes."""
+    first = parts[0]
+    if first.manifest["format"] == "parquet":
+        raise OutputError(
+            f"{first.out}: has the format parquet, whose readers take the files of several "
+            "datasets; merge works on seafront and webdataset"
+        )
+    config, classes = first.config(), _classes(first)
+    for part in parts[1:]:
+        for key, option in (("format", "--format"), ("formats", "--also")):
+            ours, theirs = first.manifest[key], part.manifest[key]
+            if ours != theirs:
+                raise OutputError(
+                    f"{part.out}: has the {key} {_listed(theirs)}, {first.out} has "
+                    f"{_listed(ours)}; generate both with the same {option}"
+                )
+        for task, names in _classes(part).items():
+            if names != classes.get(task):
+                only = sorted(set(names) ^ set(classes.get(task, ())))
+                what = ", ".join(only) if only else "the order"
+                raise OutputError(
+                    f"{part.out}: its classes of the {task} task differ from those of {first.out} "
+                    f"({what}); generate both with configurations that have the same classes"
+                )
+    return config
+
+
+def _classes(part: _Part) -> dict[str, list[str]]:
+    """Return the class names of each task; dataset.json of an older version has none."""
+    listed = part.manifest.get("classes") or part.config().classes
+    return {task: list(names) for task, names in listed.items()}
+
+
+def _listed(value: str | Sequence[str]) -> str:
+    return value if isinstance(value, str) else ", ".join(value)
+
+
+def _renaming(part: _Part, shard: dict[str, Any], number: int) -> _Renaming:
+    stems = tuple(shard["images"])
+    seedless = any(re.match("[0-9]", stem) for stem in stems)
+    prefix = f"s{part.manifest['seed']}_" if seedless else ""
+    return _Renaming(prefix, stems, (shard["shard"], number))
+
+
+def _numbered_shards(parts: Sequence[_Part]) -> Iterator[tuple[_Part, dict[str, Any], _Renaming]]:
+    """Yield each shard of each dataset with its new names."""
+    number = 0
+    for part in parts:
+        for shard in part.shards:
+            yield part, shard, _renaming(part, shard, number)
+            number += 1
+
+
+def _check_names(parts: Sequence[_Part]) -> None:
+    """Raise OutputError if files of two datasets would get the same path."""
+    owners: dict[str, _Part] = {}
+    for part, shard, names in _numbered_shards(parts):
+        images = tuple(names.values(shard["images"]))
+        paths = map(names.path, shard["files"])
+        others = [path for path in paths if not path.rpartition("/")[2].startswith(images)]
+        for name in (*images, *others):
+            owner = owners.setdefault(name, part)
+            if owner is part:
+                continue
+            if name in images:
+                why = "both have the same seed; generate one of them with another --seed"
+            else:
+                why = "its name does not contain the seed; generate both without such files"
+            raise OutputError(f"{owner.out} and {part.out}: both contain {name}; {why}")
+
+
+def _copy_shards(parts: Sequence[_Part], storage: Folder, images: int) -> int:
+    """Link or write the files and the manifest of each shard, and return the number of shards."""
+    progress = Progress(images)
+    number = -1
+    try:
+        for part, shard, names in _numbered_shards(parts):
+            _, number = names.shard
+            _copy_shard(part, shard, names, storage)
+            progress.add(len(shard["images"]))
+    finally:
+        progress.close_if_drawn()
+    return number + 1
+
+
+def _copy_shard(part: _Part, shard: dict[str, Any], names: _Renaming, storage: Folder) -> None:
+    entries: dict[str, Any] = {}
+    changed: Files = {}
+    for path, (size, hashed) in shard["files"].items():
+        new_path = names.path(path)
+        entries[new_path] = [size, hashed]
+        if names.prefix and path.endswith((*_LABEL_SUFFIXES, ".tar")):
+            content = part.intact(path, hashed)
+            try:
+                renamed = names.content(path, content)
+            except tarfile.TarError:
+                raise part.damaged(path) from None
+            if renamed != content:
+                changed[new_path] = renamed
+                entries[new_path] = [len(renamed), digest(renamed)]
+                continue
+        part.link(path, hashed, storage, new_path)
+    _, number = names.shard
+    if changed:
+        storage.commit(changed, f"{number:06d}")
+    manifest = {
+        **shard,
+        "shard": number,
+        "images": names.values(shard["images"]),
+        "files": entries,
+        "records": names.values(shard["records"]),
+    }
+    del manifest["digest"]
+    storage.write(manifest_path(number), [seal(orjson.dumps(manifest))])
+
+
+@contextlib.contextmanager
+def _appearing(root: Path) -> Iterator[Folder]:
+    """Give a hidden folder beside `root`, which becomes `root` at the end of the block.
+
+    After an error nothing is left.
+    """
+    aside = root.with_name(f".{root.name}.merging")
+    try:
+        aside.mkdir(parents=True, exist_ok=True)
+        storage = Folder(aside)
+        with storage.locked():
+            for left in aside.iterdir():  # of a process that was killed
+                if left.name != LOCK:
+                    shutil.rmtree(left) if left.is_dir() else left.unlink()
+            try:
+                yield storage
+            except BaseException:
+                shutil.rmtree(aside, ignore_errors=True)
+                raise
+        os.replace(aside, root)
+    except OSError as error:
+        shutil.rmtree(aside, ignore_errors=True)
+        raise OutputError(f"{root}: cannot be written ({error.strerror})") from None
