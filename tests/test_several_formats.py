@@ -1,5 +1,6 @@
 """Label formats of a scene with several containers, read by other libraries."""
 
+import json
 from dataclasses import replace
 
 import cv2
@@ -44,7 +45,7 @@ def test_each_container_is_an_instance_of_coco_with_its_own_pixels(sample, item)
     for name in ("imdg", "damage", "container"):
         _, facts = FORMATS[name].sample_files(item)
         found = [each for each in facts if each["category_id"] == 1]
-        masks = np.array([decoded(each["segmentation"]) for each in found], bool)
+        masks = np.array([decoded(each) for each in found], bool)
         assert len(masks) == 4
         assert not (masks.sum(axis=0) > 1).any()
         np.testing.assert_array_equal(masks.any(axis=0), sample.damage > 0)
@@ -55,11 +56,12 @@ def test_each_container_is_an_instance_of_coco_with_its_own_pixels(sample, item)
             )
 
 
-def decoded(segmentation):
+def decoded(annotation):
     width, height = SIZE
-    if isinstance(segmentation, list):
-        segmentation = coco_mask.merge(coco_mask.frPyObjects(segmentation, height, width))
-    return coco_mask.decode(segmentation)
+    if "polygons" not in annotation:
+        return coco_mask.decode(annotation["segmentation"])
+    polygons = json.loads(annotation["polygons"])
+    return coco_mask.decode(coco_mask.merge(coco_mask.frPyObjects(polygons, height, width)))
 
 
 def damage_values(sample, number):

@@ -75,23 +75,17 @@ def _packed(counts: NDArray[np.int64]) -> str:
     return text
 
 
-def segmentation(
-    part: NDArray[np.bool_], corner: tuple[int, int], size: tuple[int, int], polygons: bool
-) -> dict[str, Any] | list[list[int]]:
-    """Encode a mask as polygons or as compressed run lengths; pycocotools decodes both to it.
+def polygons_text(part: NDArray[np.bool_], corner: tuple[int, int]) -> str:
+    """Return the polygons of a mask, from which pycocotools makes the same mask, as JSON.
 
     Args:
         part: bool [h, w], a window of the mask that contains all its pixels.
         corner: (x, y) of the window's first pixel.
-        size: (width, height) of the mask.
-        polygons: Return polygons.
 
     Returns:
-        Polygons [[x0, y0, x1, y1, ...], ...], or what `rle` returns.
+        Text [[x0,y0,x1,y1,...],...].
     """
-    if not polygons:
-        return rle(part, corner, size)
-    return [(loop + corner).astype(int).ravel().tolist() for loop in outlines.polygons(part)]
+    return _json([(loop + corner).astype(int).ravel().tolist() for loop in outlines.polygons(part)])
 
 
 def annotation(
@@ -102,7 +96,10 @@ def annotation(
     ignored: bool,
     polygons: bool,
 ) -> dict[str, Any]:
-    """Return the annotation of one instance without its ids.
+    """Return the annotation of one instance as records hold it, without its ids.
+
+    `file_text` writes both kinds of mask as `segmentation`. Records keep polygons as text under
+    `polygons`, because lists of numbers take ten times the memory.
 
     Args:
         category_id: Category, from 1.
@@ -113,11 +110,16 @@ def annotation(
         polygons: Write the mask as polygons. Those of crowds are always run lengths, as in COCO.
     """
     x0, y0, x1, y1 = box
+    in_polygons = polygons and not ignored
     return {
         "category_id": category_id,
         "bbox": [x0, y0, x1 - x0, y1 - y0],
         "area": int(np.count_nonzero(part)),
-        "segmentation": segmentation(part, (x0, y0), size, polygons and not ignored),
+        **(
+            {"polygons": polygons_text(part, (x0, y0))}
+            if in_polygons
+            else {"segmentation": rle(part, (x0, y0), size)}
+        ),
         "iscrowd": int(ignored),
     }
 
@@ -138,10 +140,12 @@ def labels(
 def has_annotations(text: bytes, annotations: list[dict[str, Any]]) -> bool:
     """Return whether a COCO file holds exactly these annotations, apart from their ids."""
     found = json.loads(text)["annotations"]
-    return annotations == [
-        {key: value for key, value in item.items() if key not in ("id", "image_id")}
-        for item in found
-    ]
+    for item in found:
+        item.pop("id", None)
+        item.pop("image_id", None)
+        if isinstance(item.get("segmentation"), list):
+            item["polygons"] = _json(item.pop("segmentation"))
+    return bool(annotations == found)
 
 
 @dataclass(frozen=True)
@@ -211,7 +215,10 @@ def file_text(
             count += 1
             if item["category_id"] > usual:
                 usual = len(task.categories)
-            yield ("," if count > 1 else "") + _json({"id": count, "image_id": number, **item})
+            values = {"id": count, "image_id": number, **item}
+            polygons = values.pop("polygons", None)
+            mask = "" if polygons is None else f',"segmentation":{polygons}'
+            yield f"{',' if count > 1 else ''}{_json(values)[:-1]}{mask}}}"
     # after the annotations, which determine how many categories are listed
     yield f'],"categories":{_json(task.categories[:usual])}}}'
 

@@ -167,7 +167,7 @@ def _mask_fault(png_file: bytes, size: Sequence[int], annotations: list[dict[str
     parts = [(1, mask > 0)] if mask.any() and not several else []
     parts += [(int(v) // 100, mask == v) for v in np.unique(mask[mask >= DAMAGE_VALUES.start])]
     # as the dataset's masks are written
-    polygons = any(isinstance(item["segmentation"], list) for item in listed)
+    polygons = any("polygons" in item for item in listed)
     from_mask = []
     for category, part in parts:
         box = mask_box(part)
