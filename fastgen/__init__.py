@@ -95,7 +95,7 @@ __all__ = [
     "export_glb",
     "generate",
 ]
-__version__ = "0.30.0"
+__version__ = "0.31.0"
 
 _HOMES = {
     "Config": "config.config",

@@ -1,0 +1,77 @@
+"""Picture of one view with its labels: image, boxes, ids, depth and damage; docs/overview.jpg.
+
+python examples/overview.py docs/overview.jpg
+"""
+
+import argparse
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen import Config, Generator
+from fastgen.files.images import jpeg, write
+from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
+from fastgen.sample import Sample
+
+CONFIG = Config.from_values(
+    {"damage": {"probability": 1.0}, "markings": {"marked_containers": 1.0}}, Config.preset("gate")
+)
+SEED, INDEX, CAMERA = 3, 0, "rear"
+SIDE, GAP, STRIP = 640, 6, 34
+"""Pixels: side of the large image, gap between images, and height of the captions."""
+
+
+def depth_colors(depth_m: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Show depth [H, W] in m as colours [H, W, 3]; near is bright, and void is black."""
+    seen = np.isfinite(depth_m)
+    near, far = np.log(np.quantile(depth_m[seen], [0.0, 0.98]))
+    share = np.clip((far - np.log(np.where(seen, depth_m, 1.0))) / (far - near), 0, 1)
+    colors = cv2.applyColorMap((share * 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
+    return np.where(seen[..., None], colors[..., ::-1], 0).astype(np.uint8)
+
+
+def captioned(image: NDArray[np.uint8], side: int, words: str) -> NDArray[np.uint8]:
+    """Return an image scaled to a side, with a caption below."""
+    scaled = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
+    strip = np.full((STRIP, side, 3), 255, np.uint8)
+    place, black = (2, STRIP - 11), (30, 30, 30)
+    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.58, black, 1, cv2.LINE_AA)
+    return np.concatenate([scaled, strip])
+
+
+def picture(sample: Sample) -> NDArray[np.uint8]:
+    """Return the image of a sample at the left and four of its labels at the right."""
+    side = (SIDE + STRIP - GAP) // 2 - STRIP
+    parts = {
+        "boxes, texts, damage": overlay(sample),
+        "instance ids": label_colors(sample.ids, ID_GREYS),
+        "depth": depth_colors(sample.depth),
+        "damage classes": label_colors(sample.damage, DAMAGE_GREYS),
+    }
+    small = [captioned(image, side, words) for words, image in parts.items()]
+    white = np.full((small[0].shape[0], GAP, 3), 255, np.uint8)
+    rows = [np.concatenate([a, white, b], axis=1) for a, b in (small[:2], small[2:])]
+    line = np.full((GAP, rows[0].shape[1], 3), 255, np.uint8)
+    right = np.concatenate([rows[0], line, rows[1]])
+    left = captioned(sample.image, SIDE, "image")
+    between = np.full((left.shape[0], GAP, 3), 255, np.uint8)
+    return np.concatenate([left, between, right], axis=1)
+
+
+def main() -> None:
+    """Write the picture."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("out", type=Path, help="JPEG file to write")
+    parser.add_argument("--index", type=int, default=INDEX)
+    parser.add_argument("--camera", default=CAMERA)
+    options = parser.parse_args()
+    size = (2 * SIDE, 2 * SIDE)
+    with Generator(CONFIG, seed=SEED, size=size, quality="draft") as generator:
+        sample = generator.render(index=options.index, camera=options.camera)
+    write(options.out, jpeg(picture(sample)))
+
+
+if __name__ == "__main__":
+    main()
