@@ -18,7 +18,7 @@ from fastgen.sample import Sample
 CONFIG = Config.from_values(
     {"damage": {"probability": 1.0}, "markings": {"marked_containers": 1.0}}, Config.preset("gate")
 )
-SEED, INDEX, CAMERA = 3, 0, "rear"
+SEED, INDEX, CAMERA = 3, 1, "rear"
 SIDE, GAP, STRIP = 640, 6, 34
 """Pixels: side of the large image, gap between images, and height of the captions."""
 
@@ -41,9 +41,9 @@ def captioned(image: NDArray[np.uint8], side: int, words: str) -> NDArray[np.uin
     return np.concatenate([scaled, strip])
 
 
-def picture(sample: Sample) -> NDArray[np.uint8]:
-    """Return the image of a sample at the left and four of its labels at the right."""
-    side = (SIDE + STRIP - GAP) // 2 - STRIP
+def picture(large: NDArray[np.uint8], sample: Sample) -> NDArray[np.uint8]:
+    """Return a large image at the left and four labels of the same view at the right."""
+    side = sample.image.shape[0]
     parts = {
         "boxes, texts, damage": overlay(sample),
         "instance ids": label_colors(sample.ids, ID_GREYS),
@@ -55,7 +55,7 @@ def picture(sample: Sample) -> NDArray[np.uint8]:
     rows = [np.concatenate([a, white, b], axis=1) for a, b in (small[:2], small[2:])]
     line = np.full((GAP, rows[0].shape[1], 3), 255, np.uint8)
     right = np.concatenate([rows[0], line, rows[1]])
-    left = captioned(sample.image, SIDE, "image")
+    left = captioned(large, SIDE, "image")
     between = np.full((left.shape[0], GAP, 3), 255, np.uint8)
     return np.concatenate([left, between, right], axis=1)
 
@@ -67,10 +67,12 @@ def main() -> None:
     parser.add_argument("--index", type=int, default=INDEX)
     parser.add_argument("--camera", default=CAMERA)
     options = parser.parse_args()
-    size = (2 * SIDE, 2 * SIDE)
-    with Generator(CONFIG, seed=SEED, size=size, quality="draft") as generator:
-        sample = generator.render(index=options.index, camera=options.camera)
-    write(options.out, jpeg(picture(sample)))
+    side = (SIDE + STRIP - GAP) // 2 - STRIP
+    found = []
+    for pixels in (2 * SIDE, side):
+        with Generator(CONFIG, seed=SEED, size=(pixels, pixels), quality="fine") as generator:
+            found.append(generator.render(index=options.index, camera=options.camera))
+    write(options.out, jpeg(picture(found[0].image, found[1])))
 
 
 if __name__ == "__main__":

@@ -83,7 +83,7 @@ def test_an_unchanged_dataset_is_read_by_all(made):
 FIELDS = (
     *("version", "format", "formats", "seed", "size", "quality", "cameras", "environments"),
     *("shard_scenes", "config", "backend", "renderer", "images", "counts", "failed", "files"),
-    *("shards", "classes"),
+    *("shards", "classes", "stems", "coco_masks"),
 )
 
 
