@@ -9,7 +9,7 @@ for the whole run and for its last two thirds. In these short runs the workers s
 meshes for the first time. For the long runs of `draft` that follow, they prepare everything in
 advance.
 
-Writes bench/results/throughput.json, docs/throughput.png and a table in README.md. `bench/peers.py`
+Writes bench/results/throughput.json, docs/throughput.png and a table in docs/benchmarks.md. `bench/peers.py`
 measures other tools.
 """
 
@@ -290,7 +290,8 @@ def main() -> None:
     told = {"images": long[0], "images_per_s": long[1].whole, "steady_images_per_s": long[1].steady}
     save("throughput", {**origin(), "images": options.images, "rows": rows, "long_runs": told})
     draw(rows, caption, options.chart)
-    write_section("throughput", table(rows, about, options.images, long), ROOT / "README.md")
+    lines = table(rows, about, options.images, long)
+    write_section("throughput", lines, ROOT / "docs" / "benchmarks.md")
 
 
 if __name__ == "__main__":

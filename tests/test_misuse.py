@@ -359,10 +359,10 @@ def test_malformed_config_files_are_named(tmp_path, capsys, text, words):
     assert "<unicode string>" not in error
 
 
-@pytest.mark.parametrize("command", ["generate", "show", "export", "stats", "verify"])
-def test_the_readme_mentions_every_option(command, capsys):
+@pytest.mark.parametrize("command", ["generate", "show", "export", "stats", "verify", "merge"])
+def test_the_page_on_commands_mentions_every_option(command, capsys):
     with pytest.raises(SystemExit):
         main([command, "--help"])
-    words = (Path(__file__).parent.parent / "README.md").read_text()
+    words = (Path(__file__).parent.parent / "docs" / "commands.md").read_text()
     for option in set(re.findall(r"--[a-z-]+", capsys.readouterr().out)) - {"--help"}:
         assert option in words, option
