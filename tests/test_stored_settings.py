@@ -27,11 +27,11 @@ def digest(state):
 def with_floats(value):
     """Turn all numbers into floats, as one state may have 12 and the other 12.0.
 
-    The configuration, the digests of a curriculum's configurations and those of container maps,
-    which version 0.23 had not, are dropped.
+    The configuration, its class lists, the digests of a curriculum's configurations and those of
+    container maps, some of which version 0.23 had not, are dropped.
     """
     if isinstance(value, dict):
-        dropped = ("config", "curriculum", "containers")
+        dropped = ("config", "classes", "curriculum", "containers")
         kept = {key: item for key, item in value.items() if key not in dropped}
         return {key: with_floats(item) for key, item in kept.items()}
     if isinstance(value, list | tuple):
@@ -54,7 +54,7 @@ def test_settings_of_a_job_are_stored_as_in_0_23(monkeypatch):
     _, settings = settled(job, 1)
     assert list(settings) == [
         *("version", "format", "formats", "seed", "size", "quality", "cameras"),
-        *("environments", "shard_scenes", "config"),
+        *("environments", "shard_scenes", "classes", "config"),
     ]
     assert settings["formats"] == ["damage", "imdg", "container", "text", "door", "depth", "voc"]
     assert digest(settings) == "17f2f307e2b0a7b0cb03d1fb220c0de1873f1b0ebaa5d971b2d5457f90b57025"
