@@ -24,7 +24,7 @@ from fastgen.render.variant import LAYERS
         (["generate", "{out}", "--images", "2", "--also", "vox"], "did you mean voc"),
         (
             ["generate", "{out}", "--images", "2", "--also", "x"],
-            "from bop, coco, depth, ids, kitti, nor",
+            "from bop, coco, depth, hub, ids, kitti, nor",
         ),
         (["generate", "{out}", "--images", "2", "--also", "voc,"], "also: '' is unknown"),
         (["generate", "{out}", "--images", "2", "--also", "voc,voc"], "also: a name occurs twice"),

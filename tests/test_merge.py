@@ -36,11 +36,14 @@ def generate(out, seed, *more):
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory):
-    """Two datasets with the same classes and different configurations."""
+    """Two datasets with the same classes and different configurations.
+
+    The names of the first lack the seed.
+    """
     folder = tmp_path_factory.mktemp("sources")
     (folder / "damaged.yaml").write_text("damage: {probability: 1.0}\n")
     size = ["--size", "640x480"]
-    first = generate(folder / "first", 1, *ALSO, *size)
+    first = generate(folder / "first", 1, *ALSO, *size, "--stems", "short")
     second = generate(folder / "second", 2, *ALSO, "--config", str(folder / "damaged.yaml"), *size)
     return first, second
 
@@ -58,7 +61,8 @@ def merged(sources, tmp_path_factory):
 def tars(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tars")
     options = ["--size", "96x80", "--format", "webdataset", "--shard", "1"]
-    return [generate(folder / str(seed), seed, *options) for seed in COUNTS]
+    stems = {1: ("--stems", "short"), 2: ()}
+    return [generate(folder / str(seed), seed, *options, *stems[seed]) for seed in COUNTS]
 
 
 def pixels(path):
@@ -125,14 +129,19 @@ def test_coco_files_have_unique_ids_and_the_annotations_of_the_sources(sources, 
 
 def test_yolo_labels_are_found_as_trainers_find_them(sources, merged):
     data = yaml.safe_load((merged / "imdg/data.yaml").read_text())
-    assert data == yaml.safe_load((sources[0] / "imdg/data.yaml").read_text())
+    one, two = (yaml.safe_load((each / "imdg/data.yaml").read_text()) for each in sources)
+    assert data["names"] == one["names"]
+    assert {key for key, folder in data.items() if folder == f"images/{key}"} == {
+        key for each in (one, two) for key, folder in each.items() if folder == f"images/{key}"
+    }
     labels = {
         pixels(path): (each / "imdg/labels" / path.parent.name / f"{path.stem}.txt").read_text()
         for each in sources
         for path in each.glob("imdg/images/*/*.jpg")
     }
     for split in SPLITS:
-        for image in (merged / "imdg" / data[split]).resolve().glob("*.jpg"):
+        folder = data.get(split, f"images/{split}")
+        for image in (merged / "imdg" / folder).resolve().glob("*.jpg"):
             head, tail = str(image).rsplit("/images/", 1)
             label = Path(f"{head}/labels/{tail}").with_suffix(".txt")
             assert label.read_text() == labels.pop(pixels(image))
@@ -181,9 +190,7 @@ def test_stats_of_a_merged_dataset_are_the_sums(sources, merged, capsys):
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert ["container", *(str(both["damage"]["container"][split]) for split in SPLITS)] in rows
     shown = next(row for row in rows if row[:2] == ["markers", "width"])[2:]
-    assert [float(v) for v in shown] == pytest.approx(
-        both["box_sizes"]["markers"]["width"], abs=1e-4
-    )
+    assert [float(v) for v in shown] == pytest.approx(both["box_sizes"]["imdg"]["width"], abs=1e-4)
 
 
 def test_dataset_json_says_what_was_merged(sources, merged):

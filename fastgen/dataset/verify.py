@@ -11,7 +11,7 @@ from typing import Any
 import simplejpeg
 
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, without_manifest
-from fastgen.dataset.job import manifest_path
+from fastgen.dataset.job import ARCHIVE_ENDINGS, manifest_path
 from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_finished
 from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
@@ -24,7 +24,7 @@ from fastgen.scene import Scene
 _AGAIN = "run generate again with the same settings"
 
 _SAMPLE = re.compile(
-    rf"(?:{'|'.join(SPLITS)})-\d{{6,}}\.tar|"
+    rf"(?:{'|'.join(SPLITS)})-\d{{6,}}\.(?:{'|'.join(ARCHIVE_ENDINGS.values())})|"
     r"(?!shards/).+/(?:s\d+_)?\d{6,}(?:_[A-Za-z0-9_-]+)?\.\w+"
 )
 """Paths that files of samples have."""
