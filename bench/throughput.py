@@ -9,8 +9,8 @@ for the whole run and for its last two thirds. In these short runs the workers s
 meshes for the first time. For the long runs of `draft` that follow, they prepare everything in
 advance.
 
-Writes bench/results/throughput.json, docs/throughput.png and a table in docs/benchmarks.md. `bench/peers.py`
-measures other tools.
+Writes bench/results/throughput.json, docs/throughput.png and a table in docs/benchmarks.md.
+`bench/peers.py` measures other tools.
 """
 
 import argparse
