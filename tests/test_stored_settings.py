@@ -28,7 +28,7 @@ def with_floats(value):
     """Turn all numbers into floats, as one state may have 12 and the other 12.0.
 
     The configuration, its class lists, the digests of a curriculum's configurations and those of
-    container maps, some of which version 0.23 had not, are dropped.
+    container maps, are dropped; version 0.23 lacked some of them.
     """
     if isinstance(value, dict):
         dropped = ("config", "classes", "curriculum", "containers")

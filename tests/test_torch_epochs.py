@@ -169,7 +169,7 @@ def test_a_second_pass_with_the_same_scenes_is_reported_once(make):
 @pytest.mark.parametrize("workers", [0, 2])
 def test_passes_with_new_scenes_or_fixed_ones_are_not_reported(workers, capfd):
     data, fixed = dataset(), dataset(fixed=True)
-    assert len({data[0], data[1], data[2]}) == 3  # looking at some items is no pass
+    assert len({data[0], data[1], data[2]}) == 3  # reading single items is not a pass
     plain = DataLoader(data, 4, num_workers=workers, collate_fn=collate_lists)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -91,7 +91,7 @@ class _Part:
 
     @property
     def made_with(self) -> list[dict[str, Any]]:
-        """How the dataset was made; several entries if it was merged itself."""
+        """Settings of the dataset; several entries if it was merged itself."""
         own = {key: value for key, value in self.manifest.items() if key not in _RESULTS}
         own["images"] = self.manifest["images"]
         merged: list[dict[str, Any]] = self.manifest.get("merged_from", [own])

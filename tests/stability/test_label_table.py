@@ -1,4 +1,4 @@
-"""Scenes and labels of 100 indices equal a stored table; label_table.py tells how to change it."""
+"""Scenes and labels of 100 indices equal a stored table; label_table.py says how to change it."""
 
 import csv
 
