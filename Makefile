@@ -7,7 +7,7 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
 APT_INSTALL := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends
 SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
 
-.PHONY: setup dataset test lint clean system glslang
+.PHONY: setup dataset test lint docs clean system glslang
 
 setup: $(VENV)/.dev
 
@@ -58,6 +58,10 @@ lint: setup
 
 test: glslang lint
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
+
+docs: setup
+	$(BIN)/mkdocs build --quiet
+	@echo 'Open build/docs/index.html; search needs a server: $(PYTHON) -m http.server -d build/docs'
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info dataset

@@ -81,7 +81,11 @@ class Generator:
         Args:
             config: Distribution of the scenes, by default the preset "seafront".
             seed: Whole number of 0 or more.
-            size, backend, hdri_dir, quality, device_index: See RenderSettings.
+            size: (width, height) in pixels. RenderSettings describes it and the arguments below.
+            backend: "auto", "egl" or "osmesa".
+            hdri_dir: Folder of HDRIs that replaces the bundled ones.
+            quality: "draft", "balanced", "fine" or "high".
+            device_index: EGL device, numbered as by `fastgen doctor`.
 
         Raises:
             ConfigError: An argument is not valid, or "high" is chosen without Embree.
