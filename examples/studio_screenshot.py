@@ -24,7 +24,7 @@ FLAGS = (
 )
 """Chromium as root in a container, without requests of its own."""
 
-WINDOW: ViewportSize = {"width": 1280, "height": 860}
+WINDOW: ViewportSize = {"width": 1280, "height": 960}
 SLOW_MS = 120_000
 """Longest wait for a picture. A first one prepares light and shaders."""
 

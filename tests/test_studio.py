@@ -1,11 +1,16 @@
 """The server of `fastgen studio`: what it answers, and what it refuses."""
 
+import http.client
 import json
+import re
 import shlex
+import signal
 import socket
 import subprocess
 import sys
 import threading
+import urllib.request
+from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
@@ -380,6 +385,24 @@ def test_closing_ends_what_still_waits():
 
 
 # ---- the command
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_server_cleanly_even_while_it_draws(number):
+    words = [sys.executable, "-m", "fastgen", "studio", "--no-browser", "--size", "64x64"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as server:
+        address = re.search(r"http://\S+/", server.stdout.readline())[0]
+        connection = http.client.HTTPConnection(address.split("/")[2])
+        # the first image takes seconds, so the signal comes while it is drawn
+        connection.request("POST", f"{urlsplit(address).path}draw", json.dumps(WANTED))
+        urllib.request.urlopen(f"{address}controls").close()  # the server has the first request
+        server.send_signal(number)
+        assert connection.getresponse().status in (200, 503)
+        connection.close()
+        _, errors = server.communicate(timeout=60)
+    assert errors == "fastgen: stopped; run the same command again to go on\n"
+    assert server.returncode == 128 + number
 
 
 def test_a_busy_port_is_refused_in_one_line(capsys):

@@ -53,7 +53,11 @@ _LONGEST_BODY = 512 << 10
 
 _SIDES = ("a", "b")
 
-_LONGEST_SHUTDOWN_S = 1
+_LONGEST_SLEEP_S = 0.2
+"""Longest time until a request that waits for its image notices that the server ends."""
+
+_LONGEST_SHUTDOWN_S = 2
+"""Longest time that the server waits for open connections when it ends."""
 
 
 class Studio:
@@ -80,10 +84,17 @@ class Studio:
         self._count = 0
         first = next(iter(self._bases.values()))
         self._weights = Generator.of(first.config, self._seed, settings).environments
+        self._is_stopping: Callable[[], bool] = lambda: False
         self._thumbnail = lru_cache(lambda name: thumbnail(self._hdris[name]))
 
-    def app(self, token: str) -> Starlette:
-        """Return the application, whose addresses all begin with /TOKEN/."""
+    def app(self, token: str, is_stopping: Callable[[], bool] = lambda: False) -> Starlette:
+        """Return the application.
+
+        Args:
+            token: First part of the path of every valid address.
+            is_stopping: Whether the server ends. Requests then no longer wait for their image.
+        """
+        self._is_stopping = is_stopping
         routes = [
             Route("/controls", self._controls),
             Route("/draw", self._draw, methods=["POST"]),
@@ -129,8 +140,13 @@ class Studio:
         check_known("side", data.get("side"), _SIDES)
         base = self._base(data.get("preset"))
         future = self._drawing.draw(data["side"], lambda: _wanted(base, data))
+        image = asyncio.wrap_future(future)
+        while not image.done():
+            await asyncio.wait({image}, timeout=_LONGEST_SLEEP_S)
+            if self._is_stopping():
+                raise HTTPException(503, "the server ends")
         try:
-            drawn = await asyncio.wrap_future(future)
+            drawn = image.result()
         except Superseded:
             return _json({"superseded": True}, 409)
         self._count += 1
@@ -254,16 +270,17 @@ def run(
     """
     with listening(port) as server, Drawing(settings) as drawing:
         token = secrets.token_urlsafe(16)
-        app = Studio(drawing, settings, bases, seed).app(token)
-        address = f"http://127.0.0.1:{server.getsockname()[1]}/{token}/"
-        show(address)
-        if browser:
-            webbrowser.open(address)
+        studio = Studio(drawing, settings, bases, seed)
         options = uvicorn.Config(
-            app,
+            studio.app(token, lambda: listener.should_exit),
             lifespan="off",
             ws="none",
             log_level="warning",
             timeout_graceful_shutdown=_LONGEST_SHUTDOWN_S,
         )
-        uvicorn.Server(options).run(sockets=[server])
+        listener = uvicorn.Server(options)
+        address = f"http://127.0.0.1:{server.getsockname()[1]}/{token}/"
+        show(address)
+        if browser:
+            webbrowser.open(address)
+        listener.run(sockets=[server])
