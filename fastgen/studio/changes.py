@@ -44,7 +44,7 @@ def bases(preset: str, file: Path | None) -> dict[str, Base]:
         file: Configuration file over this preset, which then comes first under its own path.
 
     Raises:
-        ConfigError: There is no such preset, or the file is not valid.
+        ConfigError: The preset is unknown, or the file is not valid.
     """
     check_known("preset", preset, tuple(PRESETS))
     own = (

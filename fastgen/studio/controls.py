@@ -131,7 +131,8 @@ def _limits(schema: Schema, values: list[float]) -> dict[str, Any]:
 def _span(low: float, high: float, values: list[float]) -> tuple[float, float]:
     """Return the part of the valid values that a slider covers.
 
-    All of them if they span at most _WIDE, or else those up to four times the usual values.
+    A slider covers all values that span at most _WIDE. It ends at four times the usual values in
+    wider ranges.
     """
     if high - low <= _WIDE:
         return low, high

@@ -149,7 +149,7 @@ class Drawing:
     def _drawn(self, wanted: Wanted) -> Drawn:
         start = time.perf_counter()
         settings = replace(self._settings, quality=wanted.quality)
-        # without GL this takes milliseconds, and it checks all that a generator checks
+        # makes the checks of a Generator; without an open context this takes milliseconds
         checked = Generator.of(wanted.config, wanted.seed, settings)
         scene = sample_scene(checked.config, checked.seed, wanted.index, checked.environments)
         labels = checked.config.labels
@@ -176,6 +176,6 @@ class Drawing:
 
 
 def _drop(future: "Future[Drawn]") -> None:
-    """Tell whoever waits for an image that it will not come."""
+    """Raise Superseded where the result of a future is awaited."""
     if future.set_running_or_notify_cancel():
         future.set_exception(Superseded())

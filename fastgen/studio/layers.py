@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.errors import ConfigError
-from fastgen.files.images import jpeg, png
+from fastgen.files.images import jpeg
 from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, class_color, label_colors
 from fastgen.light.hdri import load_radiance
 from fastgen.sample import Sample
@@ -35,8 +35,7 @@ def layer_image(sample: Sample, layer: str) -> Image:
         layer: One of PICTURE_LAYERS.
 
     Returns:
-        uint8 sRGB [H, W, 3] for "colour", and [H, W, 4] for all others, whose alpha is 0 at pixels
-        without a value and 255 elsewhere.
+        uint8 sRGB with alpha [H, W, 4]. Alpha is 0 at pixels without a value and 255 elsewhere.
 
     Raises:
         ConfigError: The layer is unknown, or the sample was rendered without it.
@@ -44,7 +43,7 @@ def layer_image(sample: Sample, layer: str) -> Image:
     check_known("layer", layer, PICTURE_LAYERS)
     match layer:
         case "colour":
-            return sample.image
+            return _with_alpha(sample.image, np.ones_like(sample.ids, bool))
         case "ids":
             return _with_alpha(label_colors(sample.ids, ID_GREYS), sample.ids > 0)
         case "damage":
@@ -57,11 +56,6 @@ def layer_image(sample: Sample, layer: str) -> Image:
         case "background" if sample.background is not None:
             return _with_alpha(label_colors(sample.background, {}), sample.background > 0)
     raise ConfigError(f"layer: this image has no {layer}; choose another HDRI, or turn it off")
-
-
-def layer_png(sample: Sample, layer: str) -> bytes:
-    """Return one layer of a sample as PNG; see `layer_image`."""
-    return png(layer_image(sample, layer))
 
 
 def pixel_values(sample: Sample) -> bytes:

@@ -63,7 +63,8 @@ function clearErrors() {
 
 function showAnswer() {
   clearErrors();
-  const { yaml, command } = active.answer;
+  const { yaml, command, depth } = active.answer;
+  get("depth-range").textContent = depth ? depth.map((metres) => metres.toPrecision(3)).join(" to ") + " m" : "";
   get("yaml").value = yaml || "# nothing is changed\n";
   get("command").value = command;
   get("changed-count").textContent = Object.keys(active.changes).length;
@@ -233,15 +234,16 @@ function buildLayers(about) {
       layer.opacity = Number(slider.value);
       paintAll();
     });
+    const notes = name === "depth" ? [node("small", { id: "depth-range" })] : [];
     get("layers").append(node("div", { className: "layer" },
-      node("label", { htmlFor: box.id }, box, ` ${LAYER_NAMES[name]}`), slider));
+      node("label", { htmlFor: box.id }, box, ` ${LAYER_NAMES[name]}`, ...notes), slider));
   }
 }
 
 async function fetchLayer(side, name) {
   if (!side.answer) return;
   try {
-    side.viewer.images[name] = await server.layer(side.answer.number, name);
+    side.viewer.images[name] = await server.layer(side.answer.number, name, side.about.size);
   } catch (error) {
     if (error.gone) side.refresh();
     else hooks.onError(side, error);

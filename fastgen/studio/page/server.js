@@ -32,8 +32,10 @@ export async function draw(wanted) {
   return (await answer("draw", { method: "POST", body })).json();
 }
 
-export async function layer(number, name) {
-  return createImageBitmap(await (await answer(`pictures/${number}/${name}.png`)).blob());
+// One layer of a picture; the server sends RGBA, row by row.
+export async function layer(number, name, [width, height]) {
+  const data = await (await answer(`pictures/${number}/${name}`)).arrayBuffer();
+  return createImageBitmap(new ImageData(new Uint8ClampedArray(data), width, height));
 }
 
 // Label values of a picture: {ids, damage, background, depth}, one value per pixel, row by row.

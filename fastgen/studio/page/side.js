@@ -92,7 +92,7 @@ export class Side {
   async imagesOf(number) {
     const wanted = this.hooks.layers().filter((layer) => layer.on && layer.name !== "boxes");
     const images = await Promise.all(
-      wanted.map(async ({ name }) => [name, await server.layer(number, name).catch((error) => {
+      wanted.map(async ({ name }) => [name, await server.layer(number, name, this.about.size).catch((error) => {
         if (error.refused) return undefined; // this picture has no such layer
         throw error;
       })]),
