@@ -41,7 +41,9 @@ WANTED = {"side": "a", "preset": "seafront", "seed": 7, "index": 3, "camera": "C
 @pytest.fixture(scope="module")
 def client():
     with Drawing(RenderSettings(SIZE)) as drawing:
-        app = Studio(drawing, RenderSettings(SIZE), bases("seafront", None), 7).app(TOKEN)
+        app = Studio(
+            drawing, RenderSettings(SIZE), bases("seafront", Config.preset("seafront"), ""), 7
+        ).app(TOKEN)
         yield TestClient(app, base_url=BASE)
 
 
@@ -259,7 +261,7 @@ def test_a_file_turns_any_preset_into_any_other(name, other):
 def test_a_users_file_comes_first_and_stays_in_the_copied_yaml(tmp_path):
     file = tmp_path / "port.yaml"
     file.write_text("cameras: {gate: {face: door, focal_mm: 35, distance_mm: 4000}}\n")
-    offered = bases("crane", file)
+    offered = bases("crane", Config.load(file, Config.preset("crane")), str(file))
     assert list(offered) == [
         str(file),
         "crane",

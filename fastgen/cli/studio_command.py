@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from fastgen.cli.options import add_config, add_render, add_seed, render_settings
+from fastgen.cli.options import add_config, add_render, add_seed, config_of, render_settings
 from fastgen.dataset.console import tell
 from fastgen.errors import ConfigError
 
@@ -45,7 +45,7 @@ def _studio(options: argparse.Namespace) -> int:
 
     server.run(
         render_settings(options),
-        bases(options.preset, options.config),
+        bases(options.preset, config_of(options), str(options.config)),
         options.seed,
         options.port,
         lambda address: tell(f"Open {address} in a browser on this machine. Ctrl-C ends it."),

@@ -4,7 +4,6 @@ import math
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -14,7 +13,7 @@ from fastgen.config.presets import PRESETS
 from fastgen.config.yaml_values import Dumper, loaded
 from fastgen.errors import ConfigError, shown
 from fastgen.render.settings import RenderSettings
-from fastgen.validation import check_known, to_plain
+from fastgen.validation import to_plain
 
 CONFIG_FILE = "studio.yaml"
 """File name that the command expects the changed values in."""
@@ -29,29 +28,27 @@ class Base:
 
     Attributes:
         preset: Name of the preset.
-        config: Its configuration, with the values of the user's file if there is one.
+        config: Its configuration, with the values of the user's file and options if there are any.
     """
 
     preset: str
     config: Config
 
 
-def bases(preset: str, file: Path | None) -> dict[str, Base]:
+def bases(preset: str, config: Config, name: str) -> dict[str, Base]:
     """Return all configurations that the page offers by name, the one to begin with first.
 
     Args:
-        preset: Preset to begin with.
-        file: Configuration file over this preset, which then comes first under its own path.
+        preset: Preset that `config` starts from.
+        config: Configuration to begin with.
+        name: Its name on the page, unless it is that of the preset.
 
     Raises:
-        ConfigError: The preset is unknown, or the file is not valid.
+        ConfigError: The preset is unknown.
     """
-    check_known("preset", preset, tuple(PRESETS))
-    own = (
-        {} if file is None else {str(file): Base(preset, Config.load(file, Config.preset(preset)))}
-    )
-    names = sorted(PRESETS, key=lambda name: name != preset)
-    return own | {name: Base(name, Config.preset(name)) for name in names}
+    own = {} if config == Config.preset(preset) else {name: Base(preset, config)}
+    names = sorted(PRESETS, key=lambda each: each != preset)
+    return own | {each: Base(each, Config.preset(each)) for each in names}
 
 
 def changed(base: Config, changes: Mapping[str, Any]) -> Config:

@@ -117,8 +117,12 @@ function setting(key, label, input) {
   input.addEventListener(input.type === "number" ? "input" : "change", async () => {
     active.settings[key] = input.type === "number"
       ? (input.value === "" ? null : Number(input.value)) : input.value;
-    if (key === "preset") await changePreset();
-    active.refresh();
+    try {
+      if (key === "preset") await changePreset();
+      active.refresh();
+    } catch (error) {
+      hooks.onError(active, error);
+    }
   });
   fields[key] = { key, input, fail: (words) => {
     error.textContent = words;
