@@ -241,7 +241,8 @@ def test_the_command_and_the_file_make_the_shown_configuration(client, tmp_path)
     file.write_text(drawn["yaml"], encoding="utf-8")
     loaded = Config.load(file, Config.preset(options["--preset"]))
     assert loaded == changed(Config.preset(), FOG)
-    assert yaml.safe_load(drawn["yaml"])["weather"]["fog_probability"] == 1.0
+    weather = {"fog_probability": 1.0, "visibility_mm": 20000.0}
+    assert yaml.safe_load(drawn["yaml"]) == {"weather": weather}
     plain = draw(client)
     assert plain["yaml"] == ""
     assert "--config" not in plain["command"]

@@ -13,7 +13,7 @@ from fastgen.config.presets import PRESETS
 from fastgen.config.yaml_values import Dumper, loaded
 from fastgen.errors import ConfigError, shown
 from fastgen.render.settings import RenderSettings
-from fastgen.validation import to_plain
+from fastgen.validation import Range, to_plain
 
 CONFIG_FILE = "studio.yaml"
 """File name that the command expects the changed values in."""
@@ -109,6 +109,8 @@ def difference(new: Any, old: Any) -> dict[str, Any]:
                 name: difference(each, theirs[name]) if name in theirs else to_plain(each)
                 for name, each in ours.items()
             }
+        elif isinstance(ours, Range) and ours.lo == ours.hi:
+            found[field.name] = ours.lo  # one number stands for both
         else:
             found[field.name] = to_plain(ours)
     return found
