@@ -7,7 +7,7 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
 APT_INSTALL := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends
 SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
 
-.PHONY: setup dataset test lint docs clean system glslang
+.PHONY: setup dataset test lint docs clean system glslang chromium
 
 setup: $(VENV)/.dev
 
@@ -33,6 +33,15 @@ glslang: | system
 	    $(SUDO) apt-get update -q && $(APT_INSTALL) glslang-tools; \
 	else echo 'Install glslangValidator with your package manager.'; exit 1; fi
 
+# the browser of the tests of `fastgen studio`
+chromium: | system
+	@if command -v chromium >/dev/null || command -v google-chrome >/dev/null; then :; \
+	elif command -v apt-get >/dev/null; then \
+	    if [ "$$(id -u)" != 0 ] && [ -z "$(SUDO)" ]; then \
+	        echo 'As root, run: apt-get install chromium'; exit 1; fi; \
+	    $(SUDO) apt-get update -q && $(APT_INSTALL) chromium; \
+	else echo 'Install Chromium with your package manager.'; exit 1; fi
+
 $(BIN)/python: | system
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo 'fastgen needs Python 3.11 or later: set PYTHON to one'; exit 1; }
@@ -56,7 +65,7 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
-test: glslang lint
+test: glslang chromium lint
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: setup

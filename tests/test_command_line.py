@@ -121,7 +121,7 @@ def test_odd_values_of_every_option_get_one_clear_line_and_code_2(
     required = {"--images": "1", "--index": "0", "-o": "x.zip"}  # and so nothing is rendered
     needed = {"generate": ["--images"], "show": ["--index", "-o"], "export": ["--index", "-o"]}
     given = [f"{name}={required[name]}" for name in needed.get(command, []) if name != option]
-    places = [] if command in ("config", "show", "export") else ["none/there"]
+    places = [] if command in ("config", "show", "export", "studio") else ["none/there"]
     try:
         code = main([command, *places, *given, f"{option}={value}"])
     except SystemExit as stop:

@@ -55,6 +55,12 @@ def test_every_shader_and_asset_is_in_the_wheel(names):
         assert wanted <= set(names)
 
 
+def test_every_file_of_the_studios_page_is_in_the_wheel(names):
+    wanted = {f"fastgen/studio/page/{p.name}" for p in (ROOT / "fastgen/studio/page").iterdir()}
+    assert wanted
+    assert wanted <= set(names)
+
+
 def test_the_wheel_contains_no_tests_or_caches(names):
     assert not [n for n in names if n.startswith("tests") or "__pycache__" in n]
 

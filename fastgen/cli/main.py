@@ -13,6 +13,7 @@ from fastgen.cli.fit_command import add_fit
 from fastgen.cli.options import log_level
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
+from fastgen.cli.studio_command import add_studio
 from fastgen.dataset.console import drop_unprinted, mend_streams, printed_log, say, tell
 from fastgen.errors import FastgenError, one_line
 from fastgen.render import doctor
@@ -88,8 +89,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"fastgen {fastgen.__version__}")
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
     adders = (
-        *(add_generate, add_config_command, add_presets, add_fit, add_show, add_export),
-        *(add_stats, add_verify, add_merge),
+        *(add_generate, add_config_command, add_presets, add_fit, add_studio, add_show),
+        *(add_export, add_stats, add_verify, add_merge),
     )
     for add in adders:
         add(commands)
