@@ -4,6 +4,7 @@ import argparse
 from typing import Any
 
 from fastgen.cli.options import add_config, add_render, add_seed, config_of, render_settings
+from fastgen.config.presets import DEFAULT_PRESET
 from fastgen.dataset.console import tell
 from fastgen.errors import ConfigError
 
@@ -32,6 +33,11 @@ def add_studio(commands: Any) -> None:
     command.set_defaults(run=_studio)
 
 
+def _name(options: argparse.Namespace) -> str:
+    """Return the name on the page for the configuration that files and --set describe."""
+    return ", ".join([*map(str, options.config), *options.assignments])
+
+
 def _studio(options: argparse.Namespace) -> int:
     try:
         from fastgen.studio import server  # here because it needs packages of an extra
@@ -45,7 +51,7 @@ def _studio(options: argparse.Namespace) -> int:
 
     server.run(
         render_settings(options),
-        bases(options.preset, config_of(options), str(options.config)),
+        bases(options.preset or DEFAULT_PRESET, config_of(options), _name(options)),
         options.seed,
         options.port,
         lambda address: tell(f"Open {address} in a browser on this machine. Ctrl-C ends it."),

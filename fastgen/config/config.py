@@ -18,7 +18,7 @@ from fastgen.config.damage import DamageConfig
 from fastgen.config.fields import HexColors, Weight
 from fastgen.config.lamps import LampsConfig
 from fastgen.config.markings import MarkingsConfig
-from fastgen.config.presets import preset_named
+from fastgen.config.presets import DEFAULT_PRESET, preset_named
 from fastgen.config.sensor import SensorConfig, WeatherConfig
 from fastgen.config.surface import SurfaceConfig
 from fastgen.config.surroundings import GroundConfig, PlacementConfig
@@ -240,7 +240,7 @@ class Config:
             )
 
     @staticmethod
-    def preset(name: str = "seafront") -> "Config":
+    def preset(name: str = DEFAULT_PRESET) -> "Config":
         """Return a configuration to start from.
 
         Args:

@@ -23,6 +23,8 @@ class Preset:
     values: Mapping[str, Any]
 
 
+DEFAULT_PRESET = "seafront"
+
 _GROUP = "fastgen.presets"
 """Entry points by which packages offer presets."""
 

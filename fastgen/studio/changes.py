@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 
 from fastgen.config.config import Config
-from fastgen.config.presets import PRESETS
+from fastgen.config.presets import preset_names
 from fastgen.config.yaml_values import Dumper, loaded
 from fastgen.errors import ConfigError, shown
 from fastgen.render.settings import RenderSettings
@@ -47,7 +47,7 @@ def bases(preset: str, config: Config, name: str) -> dict[str, Base]:
         ConfigError: The preset is unknown.
     """
     own = {} if config == Config.preset(preset) else {name: Base(preset, config)}
-    names = sorted(PRESETS, key=lambda each: each != preset)
+    names = sorted(preset_names(), key=lambda each: each != preset)
     return own | {each: Base(each, Config.preset(each)) for each in names}
 
 
