@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 import fastgen
 from fastgen.cli.config_command import add_config_command
-from fastgen.cli.dataset_commands import add_generate, add_stats, add_verify
+from fastgen.cli.dataset_commands import add_generate, add_report, add_stats, add_verify
 from fastgen.cli.fit_command import add_fit
 from fastgen.cli.scene_commands import add_export, add_show
 from fastgen.cli.stopping import STOPPED, Terminated, interrupted_by_sigterm
@@ -88,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
     adders = (
         *(add_generate, add_config_command, add_fit, add_show, add_export, add_stats),
+        add_report,
         add_verify,
     )
     for add in adders:

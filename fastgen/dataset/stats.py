@@ -5,16 +5,14 @@ storage.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from fastgen.classes import ALL_DAMAGE_CLASSES, MARK_CLASSES, MARKER_CLASSES
-from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
-from fastgen.dataset.storage import storage_of
-from fastgen.errors import OutputError
+from fastgen.dataset.finished import open_finished
 from fastgen.formats.format import Format, Record
 from fastgen.formats.registry import formats_of
 from fastgen.sampling.scene import SPLITS
@@ -57,12 +55,13 @@ def report(out: str | Path) -> str:
 
 
 def _tables(out: str) -> Iterator[str]:
-    written, records = _contents(out)
+    dataset = open_finished(out)
+    written = dataset.manifest["formats"]
     damage, imdg = formats_of(("damage", "imdg"))
     images = dict.fromkeys(SPLITS, 0)
     damages = {split: _Labels() for split in SPLITS}
     markers = {split: _Labels() for split in SPLITS}
-    for record in records:
+    for record in (each for shard in dataset.shards for each in dataset.records(shard)):
         split = record["split"]
         images[split] += 1
         damages[split].add(damage, record)
@@ -91,29 +90,6 @@ def _tables(out: str) -> Iterator[str]:
         quantiles = ", ".join(f"{q:g}" for q in _QUANTILES)
         yield f"Fig. 8: box width and height as shares of the image, at quantiles {quantiles}"
         yield from sizes
-
-
-def _contents(out: str) -> tuple[Sequence[str], Iterator[Record]]:
-    """Return the names of a dataset's formats, and the records of its images."""
-    storage = storage_of(out)
-    try:
-        manifest = parsed(storage.read(MANIFEST))
-    except FileNotFoundError:
-        raise without_manifest(storage, out) from None
-    damaged = OutputError(f"{out}: is damaged; run fastgen verify {out}")
-    if manifest is None:
-        raise damaged
-    if "digest" not in manifest:
-        raise OutputError(f"{out}: the dataset is not finished; run generate again")
-
-    def records() -> Iterator[Record]:
-        for number in manifest["shards"]:
-            shard = read_manifest(storage, int(number))
-            if shard is None:
-                raise damaged
-            yield from shard["records"]
-
-    return manifest["formats"], records()
 
 
 def _class_table(task: Format, found: dict[str, _Labels]) -> str:
