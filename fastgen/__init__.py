@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from fastgen.export import export_glb
     from fastgen.frame import Frame
     from fastgen.generator import Generator
+    from fastgen.preview import grid
     from fastgen.render.settings import RenderSettings
     from fastgen.sample import Object, Sample
     from fastgen.scene import (
@@ -94,6 +95,7 @@ __all__ = [
     "Weather",
     "export_glb",
     "generate",
+    "grid",
 ]
 __version__ = "0.30.0"
 
@@ -108,6 +110,7 @@ _HOMES = {
     "Sample": "sample",
     "export_glb": "export",
     "generate": "dataset.generate",
+    "grid": "preview",
 }
 """Modules of public names; the other names are errors and parts of a scene."""
 

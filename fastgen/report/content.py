@@ -19,7 +19,7 @@ from fastgen.dataset.finished import FinishedDataset, open_finished
 from fastgen.dataset.job import ARCHIVE_ENDINGS
 from fastgen.errors import OutputError
 from fastgen.formats.format import Record
-from fastgen.labels.overlay import class_color
+from fastgen.overlay import class_color
 from fastgen.report.advice import SMALL_PX, advice_on
 from fastgen.report.labels import (
     GRID,

@@ -43,6 +43,7 @@ from fastgen.scene.limits import (
 )
 from fastgen.scene.optics import Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
+from fastgen.scene.tables import scene_table
 from fastgen.validation import Bounds, Flag, OneOf, Share, check_fields, from_plain, to_plain
 
 REC_709 = np.array([0.2126, 0.7152, 0.0722])
@@ -363,6 +364,10 @@ class Scene:
             if camera.name == name:
                 return camera
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
+
+    def _repr_html_(self) -> str:
+        """Return a table of what the scene shows, for notebooks."""
+        return scene_table(self)
 
     def to_json(self) -> str:
         """Return the scene as JSON text, which `from_json` reads back to an equal scene.
