@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from fastgen.dataset.generate import generate
     from fastgen.dataset.job import Job
     from fastgen.errors import AssetError, ConfigError, ContextError, FastgenError, OutputError
-    from fastgen.export import export_glb
+    from fastgen.export import export_glb, to_trimesh
     from fastgen.frame import Frame
     from fastgen.generator import Generator
     from fastgen.preview import grid
@@ -96,6 +96,7 @@ __all__ = [
     "export_glb",
     "generate",
     "grid",
+    "to_trimesh",
 ]
 __version__ = "0.30.0"
 
@@ -111,6 +112,7 @@ _HOMES = {
     "export_glb": "export",
     "generate": "dataset.generate",
     "grid": "preview",
+    "to_trimesh": "export",
 }
 """Modules of public names; the other names are errors and parts of a scene."""
 
