@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from fastgen.frame import Frame
     from fastgen.generator import Generator
     from fastgen.preview import grid
+    from fastgen.recording import export_rerun
     from fastgen.render.settings import RenderSettings
     from fastgen.sample import Object, Sample
     from fastgen.scene import (
@@ -94,6 +95,7 @@ __all__ = [
     "Wear",
     "Weather",
     "export_glb",
+    "export_rerun",
     "generate",
     "grid",
     "to_trimesh",
@@ -110,6 +112,7 @@ _HOMES = {
     "RenderSettings": "render.settings",
     "Sample": "sample",
     "export_glb": "export",
+    "export_rerun": "recording",
     "generate": "dataset.generate",
     "grid": "preview",
     "to_trimesh": "export",

@@ -48,6 +48,9 @@ SHEET_MM = 2.0
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """Rotation from z up to y up (glTF 2.0, section 3.4)."""
 
+TO_Z_UP = _Y_UP.T
+"""Rotation from the frame of exported files to that of scenes."""
+
 _IMAGE_NAMES = {"baseColorTexture": "base_color", "metallicRoughnessTexture": "surface"}
 
 _FLOOR_SLOPE = 0.7
