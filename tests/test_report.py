@@ -6,6 +6,7 @@ from collections import Counter
 from html.parser import HTMLParser
 
 import cv2
+import fsspec
 import numpy as np
 import pytest
 
@@ -182,6 +183,26 @@ def test_all_layouts_give_the_same_report(found, tmp_path):
         other = report_content(str(make_dataset(tmp_path / layout, *options)))
         for key in set(found) - {"title", "origins"}:
             assert other[key] == found[key], key
+
+
+def test_object_stores_are_read_like_folders(found, tmp_path):
+    folder = make_dataset(tmp_path / "tars", "--format", "webdataset", "--shard", "2")
+    fsspec.filesystem("memory").put(str(folder), "/report", recursive=True)
+    path, _ = write_report("memory://report", tmp_path / "page.html")
+    content = json.loads(Reader(path.read_text()).scripts[0][1])
+    assert content["sheet"] == json.loads(json.dumps(found["sheet"]))
+
+
+def test_a_scene_file_cannot_make_the_page_large(copy):
+    for path in copy.glob("scenes/*/*.json"):
+        scene = json.loads(path.read_text())
+        thing = scene["objects"][0]
+        scene["objects"] = [
+            {**thing, "class_name": f"{number}" * 99, "text": "x" * 9999} for number in range(3000)
+        ]
+        path.write_text(json.dumps(scene))
+    written, _ = write_report(str(copy))
+    assert written.stat().st_size < 5_000_000
 
 
 def test_large_datasets_are_sampled(found, monkeypatch, tmp_path):

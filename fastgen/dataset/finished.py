@@ -32,7 +32,7 @@ class FinishedDataset:
     @property
     def images(self) -> int:
         """Number of its images; those of failed scenes are missing."""
-        return sum(count["images"] for count in self.manifest["counts"].values())
+        return sum(count.get("images", 0) for count in self.manifest["counts"].values())
 
     def records(self, shard: int) -> list[Record]:
         """Return the records of one shard's images.

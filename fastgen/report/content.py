@@ -7,6 +7,7 @@ to measure them.
 import base64
 from collections import Counter
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import PurePath
 from typing import Any
 
@@ -53,6 +54,7 @@ _CROPS, _CROP_PX, _CROP_BYTES = 48, 240, 500_000
 _QUALITY = 80
 _VISIBLE_BINS = 10
 _MOST_CAMERAS, _MOST_ENVIRONMENTS = 12, 60
+_MOST_CLASSES, _MOST_BOXES = 200, 500
 _LONGEST_TEXT = 80
 
 
@@ -65,7 +67,8 @@ def report_content(out: str) -> dict[str, Any]:
     dataset = open_finished(out)
     manifest, places = dataset.manifest, list[Place]()
     try:
-        table = label_table(manifest, _noted(_records(dataset), places))
+        records = islice(_records(dataset), 2 * MOST_RECORDS)  # a manifest may give false numbers
+        table = label_table(manifest, _noted(records, places))
     except ValueError as error:
         raise OutputError(f"{out}: {error}; run fastgen verify {out}") from None
     views = _Views()
@@ -76,7 +79,8 @@ def report_content(out: str) -> dict[str, Any]:
         views.add(view, view.place in pictured)
     scale = dataset.images / max(len(places), 1)
     return {
-        "title": PurePath(out.rstrip("/")).name or out,
+        # names of folders may have bytes that are no text
+        "title": (PurePath(out).name or out).encode("utf-8", "replace").decode(),
         "splits": SPLITS,
         "scope": {"images": dataset.images, "counted": len(places), "opened": len(views.looks)},
         "origins": origins(manifest),
@@ -201,7 +205,9 @@ class _Views:
         for thing in view.objects:
             if thing.bbox is not None and not thing.background:
                 at = min(int(thing.visible_fraction * _VISIBLE_BINS), _VISIBLE_BINS - 1)
-                self.visible.setdefault(thing.class_name, Counter())[at] += 1
+                name = thing.class_name[:_LONGEST_TEXT]
+                if name in self.visible or len(self.visible) < _MOST_CLASSES:
+                    self.visible.setdefault(name, Counter())[at] += 1
         if pictured:
             source = _encoded(view.image, _SHEET_PX)
             self._sheet_bytes += len(source)
@@ -230,13 +236,13 @@ def _picture(view: LoadedView) -> dict[str, Any]:
         "size": place.size,
         "boxes": [
             {
-                "name": thing.class_name,
+                "name": thing.class_name[:_LONGEST_TEXT],
                 "box": thing.bbox,
                 "visible": round(thing.visible_fraction, 3),
                 "text": thing.text[:_LONGEST_TEXT],
                 "ignored": thing.ignored,
             }
-            for thing in view.objects
+            for thing in view.objects[:_MOST_BOXES]
             if thing.bbox is not None and not thing.background
         ],
     }

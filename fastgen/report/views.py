@@ -30,6 +30,8 @@ _LARGEST_MEMBER = 64 << 20
 _LARGEST_ROWS = 4 << 30
 """Largest row group of a Parquet file in bytes."""
 
+_LONGEST_NAME = 80
+
 T = TypeVar("T")
 
 
@@ -249,6 +251,6 @@ def _view(place: Place, jpeg: bytes, scene: bytes) -> LoadedView:
     return LoadedView(
         place=place,
         image=simplejpeg.decode_jpeg(jpeg, strict=True),
-        environment=content["scene"]["environment"]["name"],
+        environment=content["scene"]["environment"]["name"][:_LONGEST_NAME],
         objects=objects,
     )
