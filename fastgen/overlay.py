@@ -28,14 +28,14 @@ class Picture(np.ndarray[tuple[int, ...], np.dtype[np.uint8]]):
     """An sRGB image, uint8 [H, W, 3], that notebooks show. It is a NumPy array in every way."""
 
     def _repr_png_(self) -> bytes | None:
-        """Return the picture as PNG; None for parts of it that are no image."""
+        """Return the picture as PNG; None if a slice is not an image."""
         if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3 or not self.size:
             return None
         return png(self)
 
 
 class Drawn(Protocol):
-    """What `overlay` reads of an Object."""
+    """The fields of an Object that `overlay` reads."""
 
     @property
     def class_name(self) -> str: ...

@@ -65,7 +65,7 @@ def grid(
         uint8 sRGB [H, W, 3]; smaller samples have a dark margin.
 
     Raises:
-        ConfigError: There is no sample, or a number is out of range.
+        ConfigError: `samples` is empty, or a number is out of range.
     """
     if whole("columns", columns) < 1:
         raise ConfigError(f"columns: {columns} is too small; give 1 or more")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import fastgen
+from fastgen.cli.completion import add_completion
 from fastgen.cli.config_command import add_config_command
 from fastgen.cli.dataset_commands import add_generate, add_report, add_stats, add_verify
 from fastgen.cli.fit_command import add_fit
@@ -93,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     for add in adders:
         add(commands)
+    add_completion(commands, _parser)
     words = "test the OpenGL backends and devices of this machine"
     command = commands.add_parser("doctor", help=words, description=f"{words.capitalize()}.")
     command.set_defaults(run=_doctor)

@@ -79,7 +79,7 @@ def report_content(out: str) -> dict[str, Any]:
         views.add(view, view.place in pictured)
     scale = dataset.images / max(len(places), 1)
     return {
-        # names of folders may have bytes that are no text
+        # the name of a folder may contain bytes that are not text
         "title": (PurePath(out).name or out).encode("utf-8", "replace").decode(),
         "splits": SPLITS,
         "scope": {"images": dataset.images, "counted": len(places), "opened": len(views.looks)},
@@ -189,7 +189,7 @@ class _Views:
         looks: Measurements of each image.
         sheet: Images of the contact sheet with their boxes.
         crops: Text crops with their texts.
-        visible: Number of objects by class and tenth of the visible fraction.
+        visible: Histogram of the visible fraction of each class, in ten bins.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
-"""Labels of a dataset as one table, and the counts that the report shows of it.
+"""Labels of a dataset as one table, and the counts that the report shows.
 
-The labels come from the records in the shards' manifests, so this works for every layout. Whoever
-edits a manifest can also update its hash, so every value is checked.
+The labels come from the records in the shards' manifests, so this works for every layout. Every
+value is checked, because a person who edits a manifest can also update its hash.
 """
 
 import math
@@ -48,7 +48,7 @@ class LabelClass:
 
     @property
     def is_target(self) -> bool:
-        """Whether it is a damage or a dangerous-goods marker, whose size matters for training."""
+        """True for damages and dangerous-goods markers, whose size matters for training."""
         return self.name not in _BROAD
 
 
@@ -106,7 +106,7 @@ class LabelTable:
         return found
 
     def size_bins(self) -> dict[int, Ints]:
-        """Return for each class that occurs the number of boxes by width and height [B, B]."""
+        """Return a histogram [B, B] over width and height for each class that occurs."""
         bins = np.searchsorted(SIZE_EDGES_PX, self.box[:, 2:], side="right") - 1
         bins = np.clip(bins, 0, len(SIZE_EDGES_PX) - 1)
         found = {}

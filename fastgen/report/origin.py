@@ -57,7 +57,7 @@ def nearest_preset(config: Mapping[str, Any]) -> tuple[str, list[tuple[str, Any,
 
     Returns:
         Name of the preset; and the key, the preset's value and the configuration's value of each
-        difference. The value is "not set" where one of them lacks the key.
+        difference. A missing value is "not set".
     """
     found = {}
     for name in PRESETS:

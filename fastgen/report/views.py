@@ -92,7 +92,7 @@ class LoadedView:
     """An image with the objects of its scene file.
 
     Attributes:
-        place: Where it is.
+        place: Its place in the dataset.
         image: uint8 sRGB [H, W, 3].
         environment: Name of its HDRI.
         objects: Its objects.
@@ -240,7 +240,7 @@ def _view(place: Place, jpeg: bytes, scene: bytes) -> LoadedView:
     problem = unfit(scene, _SceneFile)
     if problem:
         raise ValueError(f"{place.stem}: scene file: {problem}")
-    # before decoding, because the decoder allocates whatever size the file claims
+    # before decoding, because the decoder allocates the size that the file claims
     if simplejpeg.decode_jpeg_header(jpeg)[:2] != (height, width):
         raise ValueError(f"{place.stem}: the image is not {width}x{height}")
     content: dict[str, Any] = parsed_json(scene)

@@ -366,7 +366,7 @@ class Scene:
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
 
     def _repr_html_(self) -> str:
-        """Return a table of what the scene shows, for notebooks."""
+        """Return a table of the parts of the scene, for notebooks."""
         return scene_table(self)
 
     def to_json(self) -> str:

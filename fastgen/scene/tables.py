@@ -20,7 +20,7 @@ def html_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def scene_table(scene: "Scene") -> str:
-    """Return a table of what a scene shows."""
+    """Return a table of the parts of a scene."""
     container = scene.container
     rows: list[tuple[str, str]] = [
         ("scene", f"seed {scene.seed}, index {scene.index}"),
