@@ -96,8 +96,12 @@ def test_occurrence_maps_equal_painted_boxes(dataset, found):
         canvas = np.zeros((GRID, GRID), int)
         for row in range(GRID):
             for column in range(GRID):
-                u, v = (column + 0.5) * 320 / GRID, (row + 0.5) * 320 / GRID
-                canvas[row, column] = x <= u < x + width and y <= v < y + height
+                # in units of 1 / GRID pixel, which are whole
+                left, top = column * 320, row * 320
+                across = left < (x + width) * GRID and x * GRID < left + 320
+                canvas[row, column] = across and (
+                    top < (y + height) * GRID and y * GRID < top + 320
+                )
         painted[name] = painted.get(name, 0) + canvas
     assert painted["container"].max() > 2
     for index, cells in found["maps"]["all"].items():

@@ -21,9 +21,9 @@ const percent = (value) => `${(100 * value).toFixed(value < 0.1 ? 1 : 0)} %`;
 const sum = (values) => values.reduce((total, value) => total + value, 0);
 
 // A select with a label. `choices` are pairs of value and text; `show` gets the chosen value.
-function picker(words, choices, show) {
+function picker(words, choices, show, chosen = choices[0][0]) {
   const select = el("select", { onchange: () => show(select.value) },
-    choices.map(([value, text]) => el("option", { value }, text)));
+    choices.map(([value, text]) => el("option", { value, selected: value === chosen }, text)));
   show(select.value);
   return el("label", {}, words, select);
 }

@@ -119,12 +119,12 @@ class LabelTable:
     def maps(self) -> dict[tuple[int, int], Ints]:
         """Return occurrence maps [GRID, GRID] by class and camera.
 
-        A cell, in rows from the top, has the number of boxes that cover its centre.
+        A cell, in rows from the top, has the number of boxes that reach into it.
         """
         x, y, width, height = self.shares.T * GRID
-        # cell k has its centre at k + 0.5
-        first = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, GRID)
-        last = np.ceil(np.stack([y + height, x + width]) - 0.5).astype(int).clip(0, GRID)
+        # rounding must not make a box reach into the next cell
+        first = np.floor(np.stack([y, x]) + 1e-9).astype(int).clip(0, GRID)
+        last = np.ceil(np.stack([y + height, x + width]) - 1e-9).astype(int).clip(0, GRID)
         camera = self.camera[self.image]
         found = {}
         for key in sorted(set(zip(self.label.tolist(), camera.tolist(), strict=True))):

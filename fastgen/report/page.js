@@ -62,7 +62,7 @@ function sheet() {
         el("button", { onclick: () => dialog.close() }, "Close"),
         el("span", { class: "soft" }, about(image))),
       shot(image),
-      table(["class", "text", "visible", "width x height"], image.boxes.map((box) => [
+      table(["class", "text", "visible", "size"], image.boxes.map((box) => [
         box.name, box.text, percent(box.visible),
         `${box.box[2] - box.box[0]} x ${box.box[3] - box.box[1]} px${box.ignored ? ", ignored" : ""}`,
       ]), "words"));
@@ -147,7 +147,9 @@ function sizes() {
 function places() {
   const { grid, cameras, all, cells } = report.maps;
   const place = el("div");
-  let [index, camera] = [String(occurring[0]), "all"];
+  const most = occurring.filter((each) => report.classes[each].target)
+    .sort((a, b) => sum(report.counts[b]) - sum(report.counts[a]))[0] ?? occurring[0];
+  let [index, camera] = [String(most), "all"];
   const draw = () => {
     const found = camera === "all" ? all[index]
       : (cells.find(([a, b]) => String(a) === index && String(b) === camera) || [0, 0, new Array(grid * grid).fill(0)])[2];
@@ -156,9 +158,9 @@ function places() {
     place.replaceChildren(canvas, note);
   };
   const controls = el("div", { class: "controls" },
-    picker("Class", choices, (value) => { index = value; draw(); }),
+    picker("Class", choices, (value) => { index = value; draw(); }, most),
     picker("Camera", [["all", "all"], ...Object.entries(cameras)], (value) => { camera = value; draw(); }));
-  section("places", "Where classes appear", "Number of boxes that cover each part of the image.", controls, place);
+  section("places", "Where classes appear", "Number of boxes that reach into each part of the image.", controls, place);
 }
 
 function visible() {
