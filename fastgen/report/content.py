@@ -41,7 +41,7 @@ from fastgen.report.views import (
 )
 from fastgen.sampling.scene import SPLITS
 
-MOST_RECORDS = 10_000
+MOST_RECORDS = 5_000
 """Images whose labels are counted."""
 
 MOST_VIEWS = 400
