@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastgen import Config, Generator
 from fastgen.files.images import jpeg, write
-from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors, overlay
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 from fastgen.sample import Sample
 
 CONFIG = Config.from_values(
@@ -45,7 +45,7 @@ def picture(large: NDArray[np.uint8], sample: Sample) -> NDArray[np.uint8]:
     """Return a large image at the left and four labels of the same view at the right."""
     side = sample.image.shape[0]
     parts = {
-        "boxes, texts, damage": overlay(sample),
+        "boxes, texts, damage": sample.overlay(),
         "instance ids": label_colors(sample.ids, ID_GREYS),
         "depth": depth_colors(sample.depth),
         "damage classes": label_colors(sample.damage, DAMAGE_GREYS),

@@ -8,9 +8,11 @@ if TYPE_CHECKING:
     from fastgen.dataset.generate import generate
     from fastgen.dataset.job import Job
     from fastgen.errors import AssetError, ConfigError, ContextError, FastgenError, OutputError
-    from fastgen.export import export_glb
+    from fastgen.export import export_glb, to_trimesh
     from fastgen.frame import Frame
     from fastgen.generator import Generator
+    from fastgen.preview import grid
+    from fastgen.recording import export_rerun
     from fastgen.render.settings import RenderSettings
     from fastgen.sample import Object, Sample
     from fastgen.scene import (
@@ -93,7 +95,10 @@ __all__ = [
     "Wear",
     "Weather",
     "export_glb",
+    "export_rerun",
     "generate",
+    "grid",
+    "to_trimesh",
 ]
 __version__ = "0.31.0"
 
@@ -107,7 +112,10 @@ _HOMES = {
     "RenderSettings": "render.settings",
     "Sample": "sample",
     "export_glb": "export",
+    "export_rerun": "recording",
     "generate": "dataset.generate",
+    "grid": "preview",
+    "to_trimesh": "export",
 }
 """Modules of public names; the other names are errors and parts of a scene."""
 

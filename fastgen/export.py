@@ -1,4 +1,4 @@
-"""Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools.
+"""Export of a scene as a GLB file (binary glTF 2.0) for Blender and other tools, and to trimesh.
 
 The file contains all damaged containers, the spreader, the ground and the props on it, their baked
 textures, the seals and the cameras. A container with holes also has its inside. The ground is a
@@ -9,15 +9,15 @@ environment and the Scene; those of a camera's node are its exposure and lens di
 show each camera as a pinhole.
 """
 
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, BinaryIO
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from PIL import Image
 from trimesh.exchange import gltf
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
@@ -32,6 +32,7 @@ from fastgen.geometry.damage_law import variant
 from fastgen.geometry.damaged_mesh import DamagedMesh, damaged_mesh
 from fastgen.geometry.mesh import MATERIALS, Mesh
 from fastgen.geometry.prepared_scene import Member, PreparedScene
+from fastgen.geometry.unit_solids import unit_box, unit_cylinder
 from fastgen.render.constants import GROUND_FADE_START, INSIDE_ALBEDO
 from fastgen.render.passes.bake import Atlas, atlas_size, least_texel_mm
 from fastgen.render.surface_values import SEAL_STEEL_ALBEDO
@@ -47,13 +48,13 @@ SHEET_MM = 2.0
 _Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], float)
 """Rotation from z up to y up (glTF 2.0, section 3.4)."""
 
+TO_Z_UP = _Y_UP.T
+"""Rotation from the frame of exported files to that of scenes."""
+
 _IMAGE_NAMES = {"baseColorTexture": "base_color", "metallicRoughnessTexture": "surface"}
 
 _FLOOR_SLOPE = 0.7
 """Inside faces whose normal has a larger z than this are the wooden floor."""
-
-_ROUND_SIDES = 64
-"""Sides of an exported cylinder."""
 
 _WATER_SPECULAR = 0.5
 """Reflectance of water (2 %) as a share of the 4 % of other materials; KHR_materials_specular."""
@@ -83,27 +84,78 @@ def export_glb(
         OutputError: The file cannot be written.
     """
     scene = generator.checked(scene)
-    if not (scene.container.present or scene.neighbours or scene.ground):
-        raise ConfigError(
-            f"scene {scene.index}: has no container to export; take another, or set "
-            "container.absent to 0"
-        )
     cameras = scene.cameras if cameras is None else cameras
     chosen = [check_camera(camera, scene) for camera in cameras]
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: no folder {path.parent}; make it first")
+    exported, colors = _geometry(generator, scene, texel_mm)
+    exported.metadata.update(_scene_extras(scene))
+    ground = scene.ground
+
+    def complete(tree: dict[str, Any]) -> None:
+        tree["asset"]["generator"] = f"fastgen {fastgen.__version__}"
+        _complete_materials(tree, colors)
+        if ground is not None:
+            _set_specular(tree, "ground", _WATER_SPECULAR if ground.wetness else 0.0)
+        for camera in chosen:
+            _append_camera(tree, generator, scene, camera)
+
+    write(path, gltf.export_glb(exported, include_normals=True, tree_postprocessor=complete))
+
+
+def to_trimesh(generator: Generator, scene: Scene, texel_mm: float = 4.0) -> trimesh.Scene:
+    """Return a scene with its textures for trimesh's viewer and for pyrender, without cameras.
+
+    Example:
+        to_trimesh(generator, generator.scene(17)).show()
+
+    Args:
+        generator: Bakes the textures.
+        scene: The scene.
+        texel_mm: Width of a texel of the containers' textures, in millimetres.
+
+    Returns:
+        Geometry in metres and with y up. Its names are those of `export_glb`.
+
+    Raises:
+        ConfigError: As in `export_glb`.
+    """
+    made, colors = _geometry(generator, generator.checked(scene), texel_mm)
+    for part in made.geometry.values():
+        material = part.visual.material
+        if material.name in colors:
+            material.baseColorFactor = np.array([*colors[material.name], 1.0])
+        for name in _IMAGE_NAMES:
+            texture = getattr(material, name)
+            if texture is not None:
+                setattr(material, name, Image.fromarray(texture.pixels))
+    return made
+
+
+def _geometry(
+    generator: Generator, scene: Scene, texel_mm: float
+) -> tuple[trimesh.Scene, dict[str, Color]]:
+    """Return everything of a scene except its cameras, and the colors of untextured materials.
+
+    Textures are instances of _Texture.
+    """
+    if not (scene.container.present or scene.neighbours or scene.ground):
+        raise ConfigError(
+            f"scene {scene.index}: has no container to export; take another, or set "
+            "container.absent to 0"
+        )
     prepared = PreparedScene(scene)
     present = [each for each in prepared.members if each.prepared.scene.container.present]
     for member in present:
         atlas_size(member.prepared.container, texel_mm)  # raises ConfigError before the slow steps
-    exported = trimesh.Scene(metadata=_scene_extras(scene))
+    made = trimesh.Scene()
     colors = {f"inside_{name}": albedo for name, albedo in INSIDE_ALBEDO.items()}
     colors["seal_steel"] = SEAL_STEEL_ALBEDO
 
     def add(parts: dict[str, trimesh.Trimesh], pose: Pose) -> None:
         for name, part in parts.items():
-            exported.add_geometry(part, name, name, transform=_transform(pose))
+            made.add_geometry(part, name, name, transform=_transform(pose))
 
     for member in present:
         add(_member(generator, member, texel_mm), member.pose)
@@ -122,28 +174,19 @@ def export_glb(
         baked = generator.bake_ground(scene, texel_mm)
         assert baked is not None
         add({"ground": _ground_part(ground, baked)}, Pose((0.0, 0.0, ground.height_mm)))
-
-    def complete(tree: dict[str, Any]) -> None:
-        tree["asset"]["generator"] = f"fastgen {fastgen.__version__}"
-        _complete_materials(tree, colors)
-        if ground is not None:
-            _set_specular(tree, "ground", _WATER_SPECULAR if ground.wetness else 0.0)
-        for camera in chosen:
-            _append_camera(tree, generator, scene, camera)
-
-    write(path, gltf.export_glb(exported, include_normals=True, tree_postprocessor=complete))
+    return made, colors
 
 
 class _Texture:
-    """Encoded PNG in the place of a PIL image, which takes trimesh five times as long to write."""
+    """Pixels in the place of a PIL image, which takes trimesh five times as long to write."""
 
     format = "PNG"
 
     def __init__(self, pixels: NDArray[np.uint8]) -> None:
-        self._data = png(pixels)
+        self.pixels = pixels
 
     def save(self, stream: BinaryIO, format: str) -> None:
-        stream.write(self._data)
+        stream.write(png(self.pixels))
 
 
 def _member(generator: Generator, member: Member, texel_mm: float) -> dict[str, trimesh.Trimesh]:
@@ -218,48 +261,11 @@ def _seals(mesh: Mesh, number: int) -> dict[str, trimesh.Trimesh]:
 
 def _prop(prop: Prop, name: str) -> trimesh.Trimesh:
     """Return a prop in its own frame."""
-    solid = _unit_box() if prop.shape == "box" else _unit_cylinder()
+    solid = unit_box() if prop.shape == "box" else unit_cylinder()
     half_mm = np.array(prop.size_mm) / 2
     plain = PBRMaterial(name, metallicFactor=0.0, roughnessFactor=float(prop.roughness))
     visual = TextureVisuals(material=plain)
     return _part(solid.corners * half_mm, solid.normals, solid.triangles, visual)
-
-
-class _UnitSolid(NamedTuple):
-    """A solid from -1 to 1 along each axis: corners [V, 3], normals [V, 3], triangles [T, 3]."""
-
-    corners: NDArray[np.floating]
-    normals: NDArray[np.floating]
-    triangles: NDArray[np.integer]
-
-
-def _unit_box() -> _UnitSolid:
-    """Return a box with flat faces."""
-    corners, normals = [], []
-    for axis, sign in itertools.product(range(3), (-1, 1)):
-        out, across, up = np.roll(np.eye(3), axis, axis=1)
-        turn = [(-1, -sign), (1, -sign), (1, sign), (-1, sign)]
-        corners += [sign * out + u * across + v * up for u, v in turn]
-        normals += 4 * [sign * out]
-    quad = np.array([[0, 1, 2], [0, 2, 3]])
-    triangles = np.concatenate([quad + 4 * face for face in range(6)])
-    return _UnitSolid(np.array(corners), np.array(normals), triangles)
-
-
-def _unit_cylinder() -> _UnitSolid:
-    """Return a cylinder along y with a smooth side."""
-    angle = np.linspace(0, 2 * np.pi, _ROUND_SIDES, endpoint=False)
-    out = np.stack([np.cos(angle), np.zeros(_ROUND_SIDES), -np.sin(angle)], axis=-1)
-    end = np.array([0.0, 1.0, 0.0])
-    rings = [out - end, out + end]
-    corners = np.concatenate([*rings, *rings])
-    normals = np.concatenate([out, out, np.tile(-end, (len(out), 1)), np.tile(end, (len(out), 1))])
-    i = np.arange(_ROUND_SIDES)
-    j, count = (i + 1) % _ROUND_SIDES, _ROUND_SIDES
-    side = [np.stack([i, j, j + count], axis=-1), np.stack([i, j + count, i + count], axis=-1)]
-    fan = np.stack([np.zeros_like(i[1:-1]), i[1:-1], j[1:-1]], axis=-1)
-    caps = [2 * count + fan[:, ::-1], 3 * count + fan]
-    return _UnitSolid(corners, normals, np.concatenate([*side, *caps]))
 
 
 def _ground_part(ground: Ground, atlas: Atlas) -> trimesh.Trimesh:

@@ -1,15 +1,21 @@
 """Sample: the result of one render, with the Objects that label it."""
 
+import base64
 from dataclasses import dataclass, field
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
 from fastgen.classes import ALL_DETECTION_CLASSES
+from fastgen.errors import ConfigError
+from fastgen.files.images import png
 from fastgen.frame import Frame
+from fastgen.overlay import Picture, overlay
 from fastgen.scene import Camera, Container, Damage, Scene
 from fastgen.scene.object_ids import scene_numbers
+from fastgen.scene.tables import html_table
 
 Box = tuple[int, int, int, int]
 """(x0, y0, x1, y1) in pixels, x1 and y1 exclusive."""
@@ -157,6 +163,41 @@ class Sample(Frame):
         if not self.scene.neighbours:
             return np.asarray(self.damage > 0)
         return np.isin(self.damage, self.container_at(number).damage_values)
+
+    def overlay(self, image: NDArray[np.uint8] | None = None) -> Picture:
+        """Return the image with boxes, class names and tinted damages, as `fastgen show --overlay`.
+
+        Args:
+            image: uint8 sRGB [H, W, 3] to draw on instead.
+
+        Raises:
+            ConfigError: `image` does not have the size of the sample.
+        """
+        base = self.image if image is None else image
+        if base.shape != self.image.shape or base.dtype != np.uint8:
+            raise ConfigError(
+                f"image: has shape {base.shape} and type {base.dtype}; give uint8 of shape "
+                f"{self.image.shape}"
+            )
+        return overlay(base, self.damage, self.objects)
+
+    def _repr_png_(self) -> bytes:
+        """Return the image as PNG, which notebooks show."""
+        return png(self.image)
+
+    def _repr_html_(self) -> str:
+        """Return the image with its labels and a table of the visible objects, for notebooks."""
+        source = base64.b64encode(png(self.overlay())).decode()
+        rows = [
+            (item.class_name, item.instance, item.text, item.bbox, f"{item.visible_fraction:.0%}")
+            for item in self.objects
+            if item.bbox is not None and not item.background
+        ]
+        table = html_table(("class", "instance", "text", "box", "visible"), rows)
+        return (
+            f'<img src="data:image/png;base64,{source}" alt="rendered image with its labels">'
+            f"<details><summary>{escape(repr(self))}</summary>{table}</details>"
+        )
 
     def __repr__(self) -> str:
         """Return one line, because notebooks print samples and arrays would fill pages."""

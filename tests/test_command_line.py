@@ -6,7 +6,7 @@ import pytest
 
 from fastgen.classes import CONTAINER_ID, SPREADER_ID, UNDAMAGED_CONTAINER
 from fastgen.cli.main import _parser, main
-from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
 from fastgen.preview import preview
 from fastgen.render.variant import LAYERS
 

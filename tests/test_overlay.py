@@ -6,13 +6,13 @@ import numpy as np
 from fastgen import Config
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.cli.main import main
-from fastgen.labels.overlay import class_color, overlay
+from fastgen.overlay import class_color
 
 
 def test_boxes_have_the_colours_of_their_classes(generators):
     generator = generators(Config.from_values({"damage": {"probability": 1}}), seed=3)
     sample = generator.render(index=1, camera="Cr")
-    shown = overlay(sample, np.zeros_like(sample.image)).reshape(-1, 3)
+    shown = sample.overlay(np.zeros_like(sample.image)).reshape(-1, 3)
     strong = {"container", "text", "spreader", "seal", *DAMAGE_CLASSES}
     seen = {item.class_name for item in sample.objects if item.bbox is not None}
     assert len(seen & strong) >= 3

@@ -61,6 +61,10 @@ def test_every_file_of_the_studios_page_is_in_the_wheel(names):
     assert wanted <= set(names)
 
 
+def test_the_page_of_the_report_is_in_the_wheel(names):
+    assert {f"fastgen/report/{name}" for name in ("page.css", "charts.js", "page.js")} <= set(names)
+
+
 def test_the_wheel_contains_no_tests_or_caches(names):
     assert not [n for n in names if n.startswith("tests") or "__pycache__" in n]
 

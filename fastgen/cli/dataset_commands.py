@@ -1,4 +1,4 @@
-"""Commands about whole datasets: generate, merge, stats and verify."""
+"""Commands about whole datasets: generate, merge, stats, report and verify."""
 
 import argparse
 import json
@@ -13,6 +13,7 @@ from fastgen.cli.options import (
     add_render,
     add_seed,
     config_of,
+    output_file,
     render_settings,
     summarize,
 )
@@ -175,6 +176,21 @@ def add_stats(commands: Any) -> None:
     command.set_defaults(run=_stats)
 
 
+def add_report(commands: Any) -> None:
+    """Add `fastgen report`."""
+    words = "write a page of HTML that shows what a dataset holds, with advice"
+    command = commands.add_parser("report", help=words, description=f"{words.capitalize()}.")
+    command.add_argument("out", type=_place, metavar="OUT", help=_OUT)
+    command.add_argument(
+        "-o",
+        dest="file",
+        type=output_file,
+        metavar="FILE.html",
+        help="file to write; default: OUT.report.html, beside the dataset",
+    )
+    command.set_defaults(run=_report)
+
+
 def add_verify(commands: Any) -> None:
     """Add `fastgen verify`."""
     command = commands.add_parser(
@@ -247,6 +263,15 @@ def _merge(options: argparse.Namespace) -> int:
 
 def _stats(options: argparse.Namespace) -> int:
     tell(json.dumps(statistics(options.out)) if options.json else report(options.out))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from fastgen.report.page import write_report  # here because few commands need it
+
+    path, advice = write_report(options.out, options.file)
+    found = f"{advice} pieces of advice" if advice != 1 else "1 piece of advice"
+    tell(f"{path}: {found}; open it in a browser")
     return 0
 
 

@@ -7,8 +7,15 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 import fastgen
+from fastgen.cli.completion import add_completion
 from fastgen.cli.config_command import add_config_command, add_presets
-from fastgen.cli.dataset_commands import add_generate, add_merge, add_stats, add_verify
+from fastgen.cli.dataset_commands import (
+    add_generate,
+    add_merge,
+    add_report,
+    add_stats,
+    add_verify,
+)
 from fastgen.cli.fit_command import add_fit
 from fastgen.cli.options import log_level
 from fastgen.cli.scene_commands import add_export, add_show
@@ -90,10 +97,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, title="commands", metavar="COMMAND")
     adders = (
         *(add_generate, add_config_command, add_presets, add_fit, add_studio, add_show),
-        *(add_export, add_stats, add_verify, add_merge),
+        *(add_export, add_stats, add_report, add_verify, add_merge),
     )
     for add in adders:
         add(commands)
+    add_completion(commands, _parser)
     words = "test the OpenGL backends and devices of this machine"
     command = commands.add_parser("doctor", help=words, description=f"{words.capitalize()}.")
     command.set_defaults(run=_doctor)

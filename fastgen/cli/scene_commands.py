@@ -59,10 +59,11 @@ def add_export(commands: Any) -> None:
     """Add `fastgen export`."""
     command = commands.add_parser(
         "export",
-        help="write one scene as a GLB file for Blender and other programs",
+        help="write one scene as a GLB file for Blender and other programs, or for Rerun",
         description="Write one scene as a GLB file for Blender and other programs: containers, "
         "spreader and ground with baked textures, what stands on the ground, cameras, and the name "
-        "of the environment.",
+        "of the environment. A file that ends in .rrd is a recording for the Rerun viewer. It also "
+        "has images, depth and boxes, and needs fastgen[rerun].",
     )
     add_index(command)
     add_seed(command)
@@ -75,7 +76,12 @@ def add_export(commands: Any) -> None:
         help="width of a texel of the textures in millimetres; default: %(default)g",
     )
     command.add_argument(
-        "-o", dest="file", type=output_file, required=True, metavar="FILE.glb", help="file to write"
+        "-o",
+        dest="file",
+        type=output_file,
+        required=True,
+        metavar="FILE.glb",
+        help="file to write, .glb or .rrd",
     )
     add_config(command)
     add_render(command, quality=False)
@@ -93,12 +99,16 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    if options.file.suffix.lower() != ".glb":
-        raise ConfigError(f"{options.file}: give a file name that ends in .glb")
-    from fastgen.export import export_glb  # here because trimesh takes a second to import
+    # here because trimesh takes a second to import
+    if options.file.suffix.lower() == ".glb":
+        from fastgen.export import export_glb as write_scene
+    elif options.file.suffix.lower() == ".rrd":
+        from fastgen.recording import export_rerun as write_scene
+    else:
+        raise ConfigError(f"{options.file}: give a file name that ends in .glb or .rrd")
 
     with Generator.of(config_of(options), options.seed, render_settings(options)) as generator:
         scene = generator.scene(options.index)
         cameras = None if options.camera is None else [find_camera(scene, options.camera)]
-        export_glb(generator, scene, options.file, cameras, options.texel_mm)
+        write_scene(generator, scene, options.file, cameras, options.texel_mm)
     return 0

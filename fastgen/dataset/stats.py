@@ -5,7 +5,7 @@ storage.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from fastgen.classes import ALL_SEGMENTATION_CLASSES, MARK_CLASSES, SEGMENTATION_CLASSES
-from fastgen.dataset.dataset_json import MANIFEST, parsed, read_manifest, without_manifest
-from fastgen.dataset.storage import Storage, storage_of
-from fastgen.errors import OutputError
+from fastgen.dataset.finished import open_finished
 from fastgen.formats import coco
 from fastgen.formats.format import Record
 from fastgen.formats.registry import formats_for
@@ -92,21 +90,21 @@ def statistics(out: str | Path) -> dict[str, Any]:
     Raises:
         OutputError: `out` is not a finished dataset.
     """
-    storage = storage_of(out)
-    manifest = _manifest(storage, str(out))
-    listed = manifest.get("classes", {})
-    tasks = formats_for([task for task in _TITLES if task in manifest["formats"]], listed)
+    dataset = open_finished(out)
+    listed = dataset.manifest.get("classes", {})
+    written = dataset.manifest["formats"]
+    tasks = formats_for([task for task in _TITLES if task in written], listed)
     found = {
         task.name: {split: _Labels(task.name, task.classes) for split in SPLITS} for task in tasks
     }
     images = dict.fromkeys(SPLITS, 0)
-    for record in _records(storage, manifest, str(out)):
+    for record in (each for shard in dataset.shards for each in dataset.records(shard)):
         images[record["split"]] += 1
         for labels in found.values():
             try:
                 labels[record["split"]].add(record)
             except IndexError:  # a label with a class that dataset.json does not list
-                raise _damaged(str(out)) from None
+                raise dataset.damaged() from None
     count = max(sum(images.values()), 1)
     statistics: dict[str, Any] = {"images": images}
     if damage := found.get("damage"):
@@ -146,30 +144,6 @@ def _tables(found: dict[str, Any]) -> str:
         )
         parts += [_sizes(_NAMES[task], found["box_sizes"][task]) for task in tasks]
     return "\n\n".join(parts)
-
-
-def _manifest(storage: Storage, out: str) -> dict[str, Any]:
-    try:
-        manifest = parsed(storage.read(MANIFEST))
-    except FileNotFoundError:
-        raise without_manifest(storage, out) from None
-    if manifest is None:
-        raise _damaged(out)
-    if "digest" not in manifest:
-        raise OutputError(f"{out}: the dataset is not finished; run generate again")
-    return manifest
-
-
-def _records(storage: Storage, manifest: dict[str, Any], out: str) -> Iterator[Record]:
-    for number in manifest["shards"]:
-        shard = read_manifest(storage, int(number))
-        if shard is None:
-            raise _damaged(out)
-        yield from shard["records"]
-
-
-def _damaged(out: str) -> OutputError:
-    return OutputError(f"{out}: is damaged; run fastgen verify {out}")
 
 
 def _quantiles(labels: dict[str, _Labels]) -> dict[str, list[float]]:

@@ -7,6 +7,7 @@ import contextlib
 import ctypes
 import fcntl
 import hashlib
+import io
 import os
 import shutil
 import uuid
@@ -117,12 +118,21 @@ class Folder:
         with _readable(self.root, path) as place:
             return read_plain(place, _LARGEST_READ)
 
+    @contextlib.contextmanager
+    def opened(self, path: str) -> Iterator[io.BufferedReader]:
+        """Open a file, which may be larger than memory, for reading at any position.
+
+        Raises the errors of `read`.
+        """
+        with _readable(self.root, path) as place, open_plain(place, _LARGEST_HASHED) as stream:
+            yield stream
+
     def content_hash(self, path: str) -> str:
         """Return the SHA-256 of a file in hexadecimal, without keeping its content in memory.
 
         Raises the errors of `read`.
         """
-        with _readable(self.root, path) as place, open_plain(place, _LARGEST_HASHED) as stream:
+        with self.opened(path) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
 
     def remove(self, path: str) -> None:
@@ -266,9 +276,15 @@ class Remote:
             data: bytes = self._system.cat_file(self._path(path))
         return data
 
+    @contextlib.contextmanager
+    def opened(self, path: str) -> Iterator[io.BufferedReader]:
+        """Open a file for reading at any position. Raises FileNotFoundError."""
+        with self._named(path, "read"), self._system.open(self._path(path), "rb") as stream:
+            yield stream
+
     def content_hash(self, path: str) -> str:
         """Return the SHA-256 of a file in hexadecimal, without keeping its content in memory."""
-        with self._named(path, "read"), self._system.open(self._path(path), "rb") as stream:
+        with self.opened(path) as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
 
     def remove(self, path: str) -> None:

@@ -27,8 +27,8 @@ from fastgen.formats.format import (
 )
 from fastgen.formats.item import Item
 from fastgen.labels.background import background_masks
-from fastgen.labels.overlay import draw_outline
 from fastgen.labels.visibility import mask_box, window
+from fastgen.overlay import draw_outline
 from fastgen.sample import Box, Sample
 
 

@@ -12,8 +12,8 @@ from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
 from fastgen.formats.item import Item
-from fastgen.labels.overlay import draw_box
 from fastgen.labels.visibility import window
+from fastgen.overlay import draw_box
 
 
 class _Imdg(Format):

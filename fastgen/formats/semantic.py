@@ -18,8 +18,8 @@ from fastgen.formats.damage import instances
 from fastgen.formats.format import DatasetFiles, Files, Format, Same
 from fastgen.formats.item import Item
 from fastgen.labels.background import background_masks
-from fastgen.labels.overlay import class_color
 from fastgen.labels.visibility import window
+from fastgen.overlay import class_color
 from fastgen.sample import Sample
 
 IGNORED = 255

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from fastgen.config.config import Config
 from fastgen.formats.format import DatasetFiles, Files, Format, Records, Same
 from fastgen.formats.item import Item
-from fastgen.labels.overlay import class_color
+from fastgen.overlay import class_color
 
 
 class _Voc(Format):

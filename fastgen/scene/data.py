@@ -43,6 +43,7 @@ from fastgen.scene.limits import (
 )
 from fastgen.scene.optics import ASPECT_LIMITS, PRINCIPAL_LIMITS, Lamp, Lens, Sensor, Weather
 from fastgen.scene.surface import Color, Surface, Vec2
+from fastgen.scene.tables import scene_table
 from fastgen.validation import (
     Bounds,
     Flag,
@@ -382,6 +383,10 @@ class Scene:
             if camera.name == name:
                 return camera
         raise KeyError(f"no camera {name!r}; this scene has {[c.name for c in self.cameras]}")
+
+    def _repr_html_(self) -> str:
+        """Return a table of the parts of the scene, for notebooks."""
+        return scene_table(self)
 
     def to_json(self) -> str:
         """Return the scene as JSON text, which `from_json` reads back to an equal scene.

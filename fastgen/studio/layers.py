@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.errors import ConfigError
 from fastgen.files.images import jpeg
-from fastgen.labels.overlay import DAMAGE_GREYS, ID_GREYS, class_color, label_colors
 from fastgen.light.hdri import load_radiance
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_color, label_colors
 from fastgen.sample import Sample
 from fastgen.validation import check_known, to_plain
 

@@ -1,8 +1,9 @@
-"""Drawings of labels over images."""
+"""Pictures for people: labels drawn over images, and images that notebooks show."""
 
 import colorsys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Protocol
 from zlib import crc32
 
 import cv2
@@ -19,10 +20,34 @@ from fastgen.classes import (
     SPREADER_ID,
     UNDAMAGED_CONTAINER,
 )
-from fastgen.sample import Sample
+from fastgen.files.images import png
 from fastgen.scene.limits import MAX_NEIGHBOURS
 
 Image = NDArray[np.uint8]
+
+
+class Picture(np.ndarray[tuple[int, ...], np.dtype[np.uint8]]):
+    """An sRGB image, uint8 [H, W, 3], that notebooks show. It is a NumPy array in every way."""
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the picture as PNG; None if a slice is not an image."""
+        if self.dtype != np.uint8 or self.ndim != 3 or self.shape[2] != 3 or not self.size:
+            return None
+        return png(self)
+
+
+class Drawn(Protocol):
+    """The fields of an Object that `overlay` reads."""
+
+    @property
+    def class_name(self) -> str: ...
+    @property
+    def instance(self) -> int: ...
+    @property
+    def bbox(self) -> tuple[int, int, int, int] | None: ...
+    @property
+    def background(self) -> bool: ...
+
 
 _SURROUNDINGS = (150, 150, 150)
 _LINE_PX = 1000
@@ -134,22 +159,27 @@ def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
     return _color(value, saturation, brightness)
 
 
-def overlay(sample: Sample, image: Image | None = None) -> Image:
-    """Return the sample's image, or `image`, with tinted damages and boxes of visible objects.
+def overlay(image: Image, damage: NDArray[np.uint16], objects: Sequence[Drawn]) -> Picture:
+    """Return an image with tinted damages and boxes of visible objects.
 
     Containers of the panorama have thin grey boxes without captions.
+
+    Args:
+        image: uint8 sRGB [H, W, 3].
+        damage: Damage target uint16 [H, W], see `Frame`.
+        objects: The objects in the image.
     """
-    drawn = (sample.image if image is None else image).copy()
-    damaged = sample.damage >= DAMAGE_VALUES.start
+    drawn = image.copy()
+    damaged = damage >= DAMAGE_VALUES.start
     if damaged.any():
-        tint = label_colors(sample.damage, DAMAGE_GREYS)[damaged]
+        tint = label_colors(damage, DAMAGE_GREYS)[damaged]
         drawn[damaged] = (0.55 * drawn[damaged] + 0.45 * tint).astype(np.uint8)
-    for item in sample.objects:
+    for item in objects:
         if item.bbox is not None and item.background:
             x0, y0, x1, y1 = item.bbox
             cv2.rectangle(drawn, (x0, y0), (x1 - 1, y1 - 1), _SURROUNDINGS, 1)
-    for item in sample.objects:
+    for item in objects:
         if item.bbox is not None and not item.background:
             caption = f"{item.class_name} {item.instance}"
             draw_box(drawn, item.bbox, item.class_name, caption)
-    return drawn
+    return drawn.view(Picture)

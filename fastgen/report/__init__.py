@@ -1,0 +1,1 @@
+"""Report: one page of HTML that shows what a finished dataset holds."""
