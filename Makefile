@@ -60,7 +60,7 @@ test: glslang lint
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: setup
-	$(BIN)/mkdocs build --quiet
+	$(BIN)/mkdocs build
 	@echo 'Open build/docs/index.html; search needs a server: $(PYTHON) -m http.server -d build/docs'
 
 clean:
