@@ -7,7 +7,7 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
 APT_INSTALL := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends
 SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
 
-.PHONY: setup install dataset test lint docs clean system glslang
+.PHONY: setup dataset test lint clean system glslang
 
 setup: $(VENV)/.dev
 
@@ -41,6 +41,8 @@ $(BIN)/python: | system
 $(VENV)/.installed: $(SOURCES) | $(BIN)/python
 	$(BIN)/pip install --quiet --disable-pip-version-check .
 	@touch $@
+
+.PHONY: install docs
 
 install: $(VENV)/.installed
 
