@@ -7,7 +7,7 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
 APT_INSTALL := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends
 SOURCES := $(shell find fastgen shaders assets setup.cfg pyproject.toml -type f -not -path '*/__pycache__/*')
 
-.PHONY: setup dataset test lint docs clean system glslang chromium
+.PHONY: setup dataset test lint clean system glslang chromium
 
 setup: $(VENV)/.dev
 
@@ -51,6 +51,10 @@ $(VENV)/.installed: $(SOURCES) | $(BIN)/python
 	$(BIN)/pip install --quiet --disable-pip-version-check .
 	@touch $@
 
+.PHONY: install docs
+
+install: $(VENV)/.installed
+
 # what the tests need is much larger than the package: PyTorch, Ray and other libraries' readers
 $(VENV)/.dev: $(SOURCES) | $(BIN)/python
 	$(BIN)/pip install --quiet --disable-pip-version-check '.[dev]'
@@ -69,7 +73,7 @@ test: glslang chromium lint
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 docs: setup
-	$(BIN)/mkdocs build --quiet
+	$(BIN)/mkdocs build
 	@echo 'Open build/docs/index.html; search needs a server: $(PYTHON) -m http.server -d build/docs'
 
 clean:

@@ -1,6 +1,5 @@
 """Relative links of the documentation, on a code host and in the documentation site."""
 
-import os
 import re
 import subprocess
 import sys
@@ -67,10 +66,11 @@ def test_links_without_a_file_or_an_anchor_are_found(tmp_path):
 
 
 def test_the_site_builds_without_a_warning_and_loads_nothing_from_other_hosts(tmp_path):
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-d", tmp_path]
-    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
-    run = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True)
-    assert (run.returncode, run.stdout + run.stderr) == (0, "")
+    # with --quiet, --strict would not count warnings
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert "INFO" in run.stderr
     pages = {path.relative_to(tmp_path).as_posix(): path for path in tmp_path.rglob("*.html")}
     assert 'id="fastgen.Generator.render"' in pages["api/generator.html"].read_text()
     assert 'href="docs/stability.html#files-and-input"' in pages["SECURITY.html"].read_text()
