@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import yaml
@@ -63,7 +63,8 @@ def _below(
     if "$ref" in schema:
         schema = {**models[schema["$ref"].rpartition("/")[2]], **schema}
     if is_dataclass(value) and "properties" in schema:
-        for name, part in schema["properties"].items():
+        for name in (each.name for each in fields(value)):  # files have shorthands as well
+            part = schema["properties"][name]
             yield from _below(part, getattr(value, name), (*path, name), models)
     elif "patternProperties" in schema:
         (part,) = schema["patternProperties"].values()
@@ -94,9 +95,9 @@ def _kind(key: str, schema: Schema, value: Any) -> dict[str, Any]:
             return {"kind": "number", "value": value, **_limits(schema, [value])}
         case "string" if _is_color(schema):
             return {"kind": "color", "value": value}
-        case "array" if _is_color(schema["items"]):
+        case "array" if _is_color(schema.get("items", {})):
             return {"kind": "colors", "value": value}
-        case "array" if "enum" in schema["items"]:
+        case "array" if "enum" in schema.get("items", {}):
             return {"kind": "choices", "value": value, "choices": schema["items"]["enum"]}
         case "object" if _is_weights(schema):
             names = schema["propertyNames"]["enum"]
