@@ -203,6 +203,12 @@ def add_verify(commands: Any) -> None:
         help="make damaged and missing files again; the other options apply to this",
     )
     command.add_argument(
+        "--run-postprocess",
+        action="store_true",
+        help="call the function that postprocess in dataset.json names; only for datasets that you "
+        "trust",
+    )
+    command.add_argument(
         "--workers", type=int, metavar="K", help="number of processes; default: one per core"
     )
     add_hdri(command, ", if the dataset was made with such a folder")
@@ -278,7 +284,13 @@ def _report(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     repaired: list[str] = []
     if options.repair:
-        repaired, found = repair(options.out, options.workers, options.hdri, options.device_index)
+        repaired, found = repair(
+            options.out,
+            options.workers,
+            options.hdri,
+            options.device_index,
+            options.run_postprocess,
+        )
     else:
         found = examine(options.out)
     lines = [f"repaired: {fault}" for fault in repaired] + found.faults

@@ -12,7 +12,7 @@ from fastgen.dataset.manifest_types import Started, unfit
 from fastgen.dataset.settings import check_count
 from fastgen.dataset.storage import storage_of
 from fastgen.dataset.verify import Findings, examine
-from fastgen.errors import OutputError
+from fastgen.errors import OutputError, shown
 from fastgen.render.settings import RenderSettings
 
 
@@ -21,6 +21,7 @@ def repair(
     worker_count: int | None = None,
     hdri_dir: str | Path | None = None,
     device_index: int | None = None,
+    run_postprocess: bool = False,
 ) -> tuple[list[str], Findings]:
     """Make every shard again that has a changed or missing file or a failed scene.
 
@@ -31,6 +32,8 @@ def repair(
         worker_count: Number of processes; by default one per core.
         hdri_dir: Folder of the HDRIs that the dataset was made with; None for the bundled ones.
         device_index: EGL device to draw with; None takes the first that works.
+        run_postprocess: Call the function that `postprocess` in dataset.json names. It may be any
+            function of any installed package, so the dataset has to be trusted.
 
     Returns:
         The faults that were repaired, and the findings that are left.
@@ -53,6 +56,12 @@ def repair(
             "datasets it was merged from, and merge them again"
         )
     job = _job(out, found.manifest, hdri_dir, device_index)
+    function = job.config.postprocess
+    if function and not run_postprocess:
+        raise OutputError(
+            f"{out}: was made with the function {shown(function)}, which a repair would call; give "
+            "--run-postprocess if you trust the dataset"
+        )
     check_resumable(job, worker_count)  # before anything is removed
     storage = storage_of(out)
     with storage.locked():

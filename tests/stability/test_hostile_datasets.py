@@ -155,3 +155,25 @@ def test_the_commands_end_with_their_own_code(made, tmp_path, capsys, command, v
     said = capsys.readouterr()
     assert "Traceback" not in said.err
     assert said.err.count("\n") <= 1
+
+
+def test_a_repair_calls_no_function_that_a_dataset_names(restored, tmp_path, monkeypatch, capsys):
+    """Not even its module is imported, and the damaged file stays."""
+    called = tmp_path / "called"
+    (tmp_path / "trap.py").write_text(f"open({str(called)!r}, 'w')\n\ndef spring(*_): pass\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    manifest = json.loads((restored / "dataset.json").read_bytes())
+    manifest["config"]["postprocess"] = "trap:spring"
+    del manifest["digest"]
+    (restored / "dataset.json").write_bytes(sealed(manifest))
+    (image,) = sorted(restored.glob("images/*/*.jpg"))[:1]
+    whole = image.read_bytes()
+    image.write_bytes(b"damaged")
+    try:
+        assert main(["verify", str(restored), "--repair"]) == 2
+        words = "was made with the function 'trap:spring', which a repair would call; give --run-"
+        assert words in capsys.readouterr().err
+        assert image.read_bytes() == b"damaged"
+        assert not called.exists()
+    finally:
+        image.write_bytes(whole)
