@@ -197,11 +197,15 @@ GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
             "calibration: {folder}/c.yaml: holds 'a'; give a calibration",
         ),
         ("{calibration: c.yaml}", "a: [", "calibration: {folder}/c.yaml: not a YAML file ("),
-        ("{calibration: c.yaml}", "K: []", "calibration: {folder}/c.yaml: has no image size; add"),
         (
             "{calibration: c.yaml}",
-            GOOD[:36] + "K: [1]",
-            "calibration: {folder}/c.yaml: camera_matrix",
+            "K: []",
+            "calibration: {folder}/c.yaml: has no width; name it",
+        ),
+        (
+            "{calibration: c.yaml}",
+            GOOD[:35] + "KK: [1]",
+            "calibration: {folder}/c.yaml: has no matrix; name it camera_matrix or cameraMatrix or",
         ),
         (
             "{calibration: c.yaml}",

@@ -152,8 +152,10 @@ def _of_file(path: Path, sensor_mm: float) -> dict[str, Any]:
         part: next((data[name] for name in names if name in data), None)
         for part, names in _NAMES.items()
     }
-    if found["width"] is None or found["height"] is None:
-        raise ConfigError("has no image size; add image_width and image_height")
+    missing = [part for part in ("width", "height", "matrix") if found[part] is None]
+    if missing:
+        names = " or ".join(_NAMES[missing[0]])
+        raise ConfigError(f"has no {missing[0]}; name it {names}")
     entries = _numbers("camera_matrix", found["matrix"])
     if len(entries) != 9:
         raise ConfigError(f"camera_matrix has {len(entries)} numbers; give 9")

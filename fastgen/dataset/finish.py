@@ -127,7 +127,7 @@ def _say_what_is_empty(
         folders = [folder for split in used for each in formats for folder in each.folders(split)]
         bare = [folder for folder in folders if folder not in filled]
         if bare:
-            hint(f"empty, because no image shows what they are for: {', '.join(bare)}")
+            hint(f"empty, because no image has a label for them: {', '.join(bare)}")
 
 
 def _count(formats: Iterable[Format], records: list[Record]) -> Counter[str]:

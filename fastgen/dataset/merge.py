@@ -258,7 +258,7 @@ def _check_alike(parts: Sequence[_Part]) -> Config:
         )
     config, classes = first.config(), _classes(first)
     for part in parts[1:]:
-        for key, option in (("format", "--format"), ("formats", "--also")):
+        for key, option in (("format", "--format"), ("formats", "--tasks and --also")):
             ours, theirs = first.manifest[key], part.manifest[key]
             if ours != theirs:
                 raise OutputError(
