@@ -334,7 +334,7 @@ def test_sky_visibility_of_reflections_is_close_to_ray_casts(
 ):
     """Rays from visible points are spread by about 17 degrees around the mirror direction."""
     size = (96, 72)
-    monkeypatch.setattr(settings, "FAR_PIXEL_MM", np.inf)  # one sample per pixel
+    monkeypatch.setattr(settings.Quality, "samples_for", lambda *_: (1, 1))
     drawn = []
     monkeypatch.setattr(VisibilityBuffer, "end", lambda buffer: drawn.append(buffer.textures))
     undamaged = Config.from_values({"damage": {"probability": 0.0}})
