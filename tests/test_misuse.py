@@ -182,7 +182,7 @@ def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
         *("formats", "seed", "size", "quality"),
         "and 4 more",  # shard_scenes, config.split.test, .train, .val
     ]
-    options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, or give"
+    options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, --set, or"
     assert told[2].startswith(options)
 
 

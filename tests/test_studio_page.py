@@ -27,7 +27,14 @@ def address():
     words = ["studio", "--no-browser", "--seed", "7", "--size", size]
     command = [sys.executable, "-m", "fastgen", *words]
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as server:
+    with subprocess.Popen(
+        command,
+        stdout=pipe,
+        stderr=pipe,
+        text=True,
+        # background jobs of a shell, such as this test run, may ignore SIGINT
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as server:
         try:
             yield re.search(r"http://127\.0\.0\.1:\d+/\S+/", server.stdout.readline())[0]
         finally:

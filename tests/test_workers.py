@@ -175,7 +175,7 @@ def test_idle_workers_are_reported(tmp_path, monkeypatch, capsys, scenes, count,
     small = RenderSettings((64, 64))
     job = Job(str(tmp_path / "out"), scenes, cameras=("A",), render=small, shard_scenes=2)
     generate(job, count)
-    said = [line for line in capsys.readouterr().err.splitlines() if "images" not in line]
+    said = [line for line in capsys.readouterr().err.splitlines() if "workers have" in line]
     assert len(said) == bool(words)
     for line in said:
         assert line.startswith(f"fastgen: {words}")

@@ -189,7 +189,9 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
     aspect, (shift_x, shift_y) = camera.pixel_aspect, camera.principal_point
-    principal_px = (size[0] / 2 + shift_x * size[0], size[1] / 2 + shift_y * size[0])
+    principal_px = None
+    if shift_x or shift_y:
+        principal_px = (size[0] / 2 + shift_x * size[0], size[1] / 2 + shift_y * size[0])
     distortion = None
     if camera.lens is not None:
         # the farther border on each axis
