@@ -40,6 +40,7 @@ from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.light.octahedral import sample_octahedral
 from fastgen.scene import Camera, Spreader
 from fastgen.srgb import DECODED, encoded
+from tests.sky_samples import even_directions
 
 Array = NDArray[np.float64]
 
@@ -51,14 +52,6 @@ TIMES = 4
 """Size of the larger images of `motion_with_pyrender.py`, too, relative to SIZE."""
 HALF_MAX = 65504.0
 PEER = Path(__file__).with_name("peer_renderers") / "motion_with_pyrender.py"
-
-
-def even_directions(count: int) -> Array:
-    """Return directions [count, 3] of a Fibonacci sphere."""
-    k = np.arange(count) + 0.5
-    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
-    r = np.sqrt(1 - z**2)
-    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1)
 
 
 def exact(radiance: Array, normals: Array, masked: bool) -> Array:

@@ -24,8 +24,8 @@ from trimesh.visual.material import PBRMaterial
 
 import fastgen
 from fastgen.camera.projection import view_of
-from fastgen.errors import ConfigError, OutputError
-from fastgen.files.images import png, write
+from fastgen.errors import ConfigError
+from fastgen.files.images import check_folder, png, write
 from fastgen.formats.scene_file import view_values
 from fastgen.generator import Generator
 from fastgen.geometry.damage_law import variant
@@ -87,8 +87,7 @@ def export_glb(
     cameras = scene.cameras if cameras is None else cameras
     chosen = [check_camera(camera, scene) for camera in cameras]
     path = Path(path)
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: no folder {path.parent}; make it first")
+    check_folder(path)
     exported, colors = _geometry(generator, scene, texel_mm)
     exported.metadata.update(_scene_extras(scene))
     ground = scene.ground

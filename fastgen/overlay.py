@@ -72,9 +72,14 @@ def class_color(name: str) -> tuple[int, int, int]:
     strong colours that differ clearly.
     """
     if name not in _STRONG and name not in _PALE:
-        return _color(crc32(name.encode()), 0.4, 1.0)
+        return _color(crc32(name.encode(errors="replace")), 0.4, 1.0)
     names, saturation = (_STRONG, 0.85) if name in _STRONG else (_PALE, 0.4)
     return _color(names.index(name), saturation, 1.0)
+
+
+def class_hex(name: str) -> str:
+    """Return the colour of a class as pages write it, #rrggbb."""
+    return "#{:02x}{:02x}{:02x}".format(*class_color(name))
 
 
 def _color(number: int, saturation: float, brightness: float) -> tuple[int, int, int]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from fastgen.errors import ConfigError, OutputError
+from fastgen.errors import ConfigError
 from fastgen.export import TO_Z_UP, to_trimesh
-from fastgen.files.images import png, write
+from fastgen.files.images import check_folder, png, write
 from fastgen.generator import Generator
 from fastgen.overlay import class_color
 from fastgen.sample import Sample
@@ -52,8 +52,7 @@ def export_rerun(
         ) from None
     scene, path = generator.checked(scene), Path(path)
     chosen = [check_camera(each, scene) for each in (scene.cameras if cameras is None else cameras)]
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: no folder {path.parent}; make it first")
+    check_folder(path)
     name = f"fastgen seed {scene.seed} index {scene.index}"
     recording = rr.RecordingStream("fastgen", recording_id=name, send_properties=False)
     stream = rr.binary_stream(recording)

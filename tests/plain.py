@@ -1,4 +1,6 @@
-"""Configuration values that switch effects off."""
+"""Configuration values that switch effects off, and scenes without surroundings."""
+
+from dataclasses import replace
 
 EVEN_PAINT = {
     "rust_coverage": 0,
@@ -30,3 +32,16 @@ FEW_DECALS = {
     "height_marks": 0,
 }
 """Values of `markings` that halve the time to sample a scene, and change nothing else in it."""
+
+
+def bare(scene):
+    """Return a scene with its first container, and nothing on or around it."""
+    return replace(
+        scene,
+        decals=(),
+        seals=(),
+        neighbours=(),
+        props=(),
+        ground=None,
+        spreader=replace(scene.spreader, present=False),
+    )

@@ -10,7 +10,7 @@ from fastgen.decals.artwork import glyph_tiles
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Camera, Decal
 from fastgen.scene.faces import FACE_AXES, SHEET_FACES
-from tests.plain import EVEN_PAINT
+from tests.plain import EVEN_PAINT, bare
 
 CONFIG = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
 SIZE = (480, 480)
@@ -60,16 +60,7 @@ def overhanging(mesh, face):
 def seen(request, generators):
     """Face, mesh, a scene with decals over the borders of its sheet, and the scene's sample."""
     generator = generators(CONFIG, seed=4, size=SIZE, quality="draft")
-    plain = generator.scene(0)
-    plain = replace(
-        plain,
-        decals=(),
-        seals=(),
-        neighbours=(),
-        props=(),
-        ground=None,
-        spreader=replace(plain.spreader, present=False),
-    )
+    plain = bare(generator.scene(0))
     mesh = PreparedScene(plain).container
     face = request.param
     scene = replace(plain, decals=overhanging(mesh, face))

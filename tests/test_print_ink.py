@@ -14,7 +14,7 @@ from fastgen.decals.artwork import glyph_tiles
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Camera, Decal
 from fastgen.scene.faces import FACE_AXES
-from tests.plain import EVEN_PAINT
+from tests.plain import EVEN_PAINT, bare
 
 CONFIG = Config.from_values({"surface": EVEN_PAINT, "damage": {"probability": 0}})
 SIDE, SCALE = 28, 16
@@ -59,16 +59,7 @@ def plain(generators):
     """A scene with one black container and nothing else."""
     scene = generators(CONFIG, seed=4, size=(64, 64), quality="draft").scene(0)
     paint = replace(scene.surface.paint, albedo=(0.01, 0.01, 0.01))
-    return replace(
-        scene,
-        surface=replace(scene.surface, paint=paint),
-        decals=(),
-        seals=(),
-        neighbours=(),
-        props=(),
-        ground=None,
-        spreader=replace(scene.spreader, present=False),
-    )
+    return replace(bare(scene), surface=replace(scene.surface, paint=paint))
 
 
 def watching(scene, decal, pixel_mm, shift, turn_deg=0.0):

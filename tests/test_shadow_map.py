@@ -90,9 +90,10 @@ def test_the_outline_casts_the_shadow_of_the_whole_mesh(shadow):
 
 def check_against_rays(container, spreader, toward, depth, matrix, eye_m, texel_mm):
     lit = np.flatnonzero(container.normals @ toward > 0.1)
-    picked = np.random.default_rng(0).choice(lit, 3000, replace=False)
-    at = (probe_points(container)[picked] / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
-    assert agreement(container, spreader, toward, depth, picked, at, texel_mm) > 0.97
+    at = (probe_points(container)[lit] / 1000 - eye_m) @ matrix[:3, :3].T + matrix[:3, 3]
+    # under the lowest sun, 2 % of the door's vertices are nearer to a shadow than the map resolves
+    least = 0.975 if toward[2] < 0.2 else 0.98
+    assert agreement(container, spreader, toward, depth, lit, at, texel_mm) > least
 
 
 def agreement(container, spreader, toward, depth, picked, at, texel_mm):

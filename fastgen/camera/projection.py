@@ -31,7 +31,7 @@ class View:
         size: (width, height) in pixels.
         distortion: Lens distortion, None for a pinhole.
         pixel_aspect: Focal length along y relative to that along x.
-        principal_px: Principal point (x, y) in pixels; None for the centre of the image.
+        shift_px: Distance of the principal point from the centre of the image, in pixels.
     """
 
     rotation: NDArray[np.float64]
@@ -40,12 +40,12 @@ class View:
     size: tuple[int, int]
     distortion: Distortion | None = None
     pixel_aspect: float = 1.0
-    principal_px: tuple[float, float] | None = None
+    shift_px: tuple[float, float] = (0.0, 0.0)
 
     @property
     def center_px(self) -> tuple[float, float]:
         """Principal point (x, y) in pixels."""
-        return self.principal_px or (self.size[0] / 2, self.size[1] / 2)
+        return self.size[0] / 2 + self.shift_px[0], self.size[1] / 2 + self.shift_px[1]
 
     @property
     def focals_px(self) -> NDArray[np.float64]:
@@ -188,20 +188,18 @@ def view_of(camera: Camera, size: tuple[int, int]) -> View:
     rolled_right = np.cos(roll) * right - np.sin(roll) * down
     rolled_down = np.sin(roll) * right + np.cos(roll) * down
     focal_px = camera.focal_mm / camera.sensor_width_mm * size[0]
-    aspect, (shift_x, shift_y) = camera.pixel_aspect, camera.principal_point
-    principal_px = None
-    if shift_x or shift_y:
-        principal_px = (size[0] / 2 + shift_x * size[0], size[1] / 2 + shift_y * size[0])
+    aspect, (right_share, down_share) = camera.pixel_aspect, camera.principal_point
+    shift_px = right_share * size[0], down_share * size[0]
     distortion = None
     if camera.lens is not None:
         # the farther border on each axis
-        half = (abs(shift_x) * size[0] + size[0] / 2, abs(shift_y) * size[0] + size[1] / 2)
+        half = abs(shift_px[0]) + size[0] / 2, abs(shift_px[1]) + size[1] / 2
         try:
             distortion = _distortion(camera.lens, (half[0] / focal_px, half[1] / aspect / focal_px))
         except ConfigError as error:
             raise ConfigError(f"cameras.{camera.name}.{error}") from None
     rotation = np.stack([rolled_right, rolled_down, forward])
-    return View(rotation, position, focal_px, size, distortion, aspect, principal_px)
+    return View(rotation, position, focal_px, size, distortion, aspect, shift_px)
 
 
 @lru_cache(maxsize=64)

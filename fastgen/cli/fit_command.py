@@ -10,7 +10,7 @@ from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
 from fastgen.dataset.console import say, tell
 from fastgen.errors import ConfigError, OutputError
-from fastgen.files.images import write
+from fastgen.files.images import check_folder, write
 
 _FIT = """\
 Propose a configuration whose pictures resemble photographs in measured statistics: exposure,
@@ -78,8 +78,7 @@ def _fit(options: argparse.Namespace) -> int:
         raise OutputError(f"{options.file}: exists; give another name with -o, or --force")
     if options.file.is_dir():
         raise OutputError(f"{options.file}: is a folder; give a file with -o")
-    if not options.file.absolute().parent.is_dir():
-        raise OutputError(f"{options.file}: no folder {options.file.parent}; make it first")
+    check_folder(options.file)
     optimizer()  # refuses a missing one before minutes of rendering
     preset = Config.preset(options.preset)
     photographs = read_photographs(options.photos, options.longest)

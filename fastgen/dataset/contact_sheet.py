@@ -1,6 +1,5 @@
 """Contact sheet: small copies of a dataset's images with the labels from its files drawn on."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,9 +14,6 @@ from fastgen.files.images import decode
 from fastgen.formats.format import Format
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
-
-_CAMERA = re.compile("(?:s[0-9]+_)?[0-9]+_")
-"""Part of a stem before the name of the camera."""
 
 
 def contact_sheet(

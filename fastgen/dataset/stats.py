@@ -24,15 +24,15 @@ _TITLES = {
     "imdg": "Table 3: instances in the marker task",
 }
 
-_NOT_MEASURED = ("container", "text", *MARK_CLASSES)
+NOT_MEASURED = ("container", "text", *MARK_CLASSES)
 """Classes that are neither damages nor dangerous-goods markers."""
 
 _NAMES = {"damage": "damage", "imdg": "markers"}
 
-_RARE = (*MARK_CLASSES, *ALL_SEGMENTATION_CLASSES[len(SEGMENTATION_CLASSES) :])
+RARE = (*MARK_CLASSES, *ALL_SEGMENTATION_CLASSES[len(SEGMENTATION_CLASSES) :])
 """Classes that most datasets of versions without class lists do not have."""
 
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @dataclass
@@ -63,7 +63,7 @@ class _Labels:
         labels = coco.labels(record["facts"].get(self.task, ()), self.classes)
         for name, (_, _, width, height) in labels:
             self.by_class[name] += 1
-            if name not in _NOT_MEASURED:
+            if name not in NOT_MEASURED:
                 self.sizes.append((width / image_width, height / image_height))
         self.images += 1
         self.images_with += len(self.sizes) > before
@@ -114,7 +114,7 @@ def statistics(out: str | Path) -> dict[str, Any]:
             name: {split: each.by_class[name] for split, each in labels.items()}
             for name in labels[SPLITS[0]].classes
         }
-        usual = listed.get(task, [name for name in rows if name not in _RARE])
+        usual = listed.get(task, [name for name in rows if name not in RARE])
         statistics[task] = {n: row for n, row in rows.items() if n in usual or any(row.values())}
     if imdg := found.get("imdg"):
         markers = sum(len(each.sizes) for each in imdg.values())
@@ -122,7 +122,7 @@ def statistics(out: str | Path) -> dict[str, Any]:
         texts = sum(each.by_class["text"] for each in imdg.values())
         statistics["texts_per_image"] = texts / count
     sizes = {task: _quantiles(labels) for task, labels in found.items()}
-    return {**statistics, "box_sizes": {"quantiles": list(_QUANTILES), **sizes}}
+    return {**statistics, "box_sizes": {"quantiles": list(QUANTILES), **sizes}}
 
 
 def _tables(found: dict[str, Any]) -> str:
@@ -151,7 +151,7 @@ def _quantiles(labels: dict[str, _Labels]) -> dict[str, list[float]]:
     if not shares:
         return {}
     return {
-        axis: np.quantile(values, _QUANTILES).tolist()
+        axis: np.quantile(values, QUANTILES).tolist()
         for axis, values in zip(("width", "height"), np.array(shares).T, strict=True)
     }
 

@@ -124,6 +124,12 @@ def decode(data: bytes) -> NDArray[Any]:
         raise ValueError(f"not a complete image ({error})") from None
 
 
+def check_folder(path: Path) -> None:
+    """Raise OutputError if the folder of a file to write is missing."""
+    if not path.absolute().parent.is_dir():
+        raise OutputError(f"{path}: no folder {path.parent}; make it first")
+
+
 def write(path: Path, data: bytes | str) -> None:
     """Write a file completely or not at all.
 

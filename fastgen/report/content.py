@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from fastgen.dataset.finished import FinishedDataset, open_finished
 from fastgen.dataset.job import ARCHIVE_ENDINGS
+from fastgen.dataset.stats import QUANTILES
 from fastgen.errors import OutputError
 from fastgen.formats.format import Record
-from fastgen.overlay import class_color
+from fastgen.overlay import class_hex
 from fastgen.report.advice import SMALL_PX, advice_on
 from fastgen.report.labels import (
     GRID,
-    QUANTILES,
     SIZE_EDGES_PX,
     LabelTable,
     label_table,
@@ -99,7 +99,7 @@ def report_content(out: str) -> dict[str, Any]:
             "environments": ranges(views.looks, lambda look: look.environment)[:_MOST_ENVIRONMENTS],
         },
         "colors": {
-            name: _hex(name)
+            name: class_hex(name)
             for name in sorted(
                 {each.name for each in table.classes}
                 | {box["name"] for image in views.sheet for box in image["boxes"]}
@@ -258,10 +258,3 @@ def _encoded(image: NDArray[np.uint8], longest: int) -> str:
         )
     data = simplejpeg.encode_jpeg(np.ascontiguousarray(image), quality=_QUALITY)
     return "data:image/jpeg;base64," + base64.b64encode(data).decode()
-
-
-def _hex(name: str) -> str:
-    try:
-        return "#{:02x}{:02x}{:02x}".format(*class_color(name))
-    except ValueError:  # a class of a configuration that is not known here
-        return "#9a9a9a"

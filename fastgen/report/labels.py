@@ -12,8 +12,8 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.classes import MARK_CLASSES
 from fastgen.dataset.job import scene_and_camera
+from fastgen.dataset.stats import NOT_MEASURED, RARE
 from fastgen.formats.format import Record
 from fastgen.formats.registry import known_formats
 from fastgen.sampling.scene import SPLITS
@@ -26,14 +26,6 @@ GRID = 24
 
 SIZE_EDGES_PX = (1, *(round(2 ** (step / 2)) for step in range(1, 25)))
 """Limits of the bins of box sizes in pixels; each is about 1.4 times the one before."""
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-
-_BROAD = ("container", "text", *MARK_CLASSES)
-"""Classes that are neither damages nor dangerous-goods markers."""
-
-_UNUSUAL = (*MARK_CLASSES, "scrape")
-"""Classes that most configurations do not draw, so that their absence needs no mention."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,7 +41,7 @@ class LabelClass:
     @property
     def is_target(self) -> bool:
         """True for damages and dangerous-goods markers, whose size matters for training."""
-        return self.name not in _BROAD
+        return self.name not in NOT_MEASURED
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +145,7 @@ class LabelTable:
         """Indices of the classes to show: all, except unusual ones without labels."""
         occurs = np.bincount(self.label, minlength=len(self.classes)) > 0
         return self.places(
-            bool(any_) or each.name not in _UNUSUAL
+            bool(any_) or each.name not in RARE
             for each, any_ in zip(self.classes, occurs, strict=True)
         )
 
@@ -181,7 +173,8 @@ def label_table(manifest: Mapping[str, Any], records: Iterable[Record]) -> Label
         ValueError: A record does not have the facts of its formats.
     """
     tasks = [task for task in TASKS if task in manifest["formats"]]
-    classes = [LabelClass(task, name) for task in tasks for name in class_names(manifest, task)]
+    names = {task: class_names(manifest, task) for task in tasks}
+    classes = [LabelClass(task, name) for task in tasks for name in names[task]]
     start = {task: [each.task for each in classes].index(task) for task in tasks}
     cameras: dict[str, int] = {}
     images: list[tuple[int, int]] = []
@@ -193,8 +186,7 @@ def label_table(manifest: Mapping[str, Any], records: Iterable[Record]) -> Label
         images.append((SPLITS.index(record["split"]), cameras.setdefault(camera, len(cameras))))
         sizes.append(record["size"])
         for task in tasks:
-            limit = len(class_names(manifest, task))
-            for category, box in _checked(record, task, limit):
+            for category, box in _checked(record, task, len(names[task])):
                 rows.append((number, start[task] + category - 1))
                 boxes.append(box)
     image_rows = np.array(images, np.int64).reshape(-1, 2)

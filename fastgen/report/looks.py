@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.report.labels import QUANTILES
+from fastgen.dataset.stats import QUANTILES
 from fastgen.report.views import LoadedView, Place
 from fastgen.scene.data import REC_709
 from fastgen.srgb import DECODED

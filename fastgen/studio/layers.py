@@ -11,7 +11,7 @@ from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.errors import ConfigError
 from fastgen.files.images import jpeg
 from fastgen.light.hdri import load_radiance
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_color, label_colors
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_hex, label_colors
 from fastgen.sample import Sample
 from fastgen.validation import check_known, to_plain
 
@@ -74,10 +74,7 @@ def pixel_values(sample: Sample) -> bytes:
 
 def object_records(sample: Sample) -> list[dict[str, Any]]:
     """Return the objects of a sample in plain JSON, each with the colour of its box."""
-    return [
-        {**to_plain(item), "color": "#{:02x}{:02x}{:02x}".format(*class_color(item.class_name))}
-        for item in sample.objects
-    ]
+    return [{**to_plain(item), "color": class_hex(item.class_name)} for item in sample.objects]
 
 
 def depth_range(sample: Sample) -> tuple[float, float] | None:
