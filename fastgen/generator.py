@@ -112,7 +112,7 @@ class Generator:
                 Renderer,
                 light=partial(_load_light, self._hdris),
                 quality=QUALITY[quality],
-                mask_threshold_mm=self.config.damage.mask_threshold_mm,
+                damage=self.config.damage,
                 own_art={name: art_of(text) for name, text in own_art.items()},
             ),
         )

@@ -237,9 +237,11 @@ def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
         damage_law.deform(scene.damages, hits.rest_mm) - hits.rest_mm, axis=-1
     )
     target[hits.hit & (together < threshold_mm)] = 101
-    for damage, value in zip(scene.damages, values, strict=True):
-        scraped = hits.hit & (hits.hole < 0) & damage_law.is_marked(damage, hits.rest_mm)
-        target[scraped & (target == 101)] = value
+    marks = zip(scene.damages, values, strict=True)
+    # marks of later kinds cover those of earlier ones
+    for damage, value in sorted(marks, key=lambda mark: -(mark[1] // 100)):
+        marked = hits.hit & (hits.hole < 0) & damage_law.is_marked(damage, hits.rest_mm)
+        target[marked & (target == 101)] = value
     for i, value in enumerate(values):
         target[hits.hole == i] = value
     return target

@@ -10,11 +10,10 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen.classes import ALL_DAMAGE_CLASSES
 from fastgen.config.config import Config
+from fastgen.damages.plain import fold_path_mm
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
-from fastgen.geometry.damage_forms import FORMS
-from fastgen.geometry.damage_forms.plain import fold_path_mm
 from fastgen.geometry.door_gear import BAR_Y_MM
 from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
@@ -22,6 +21,7 @@ from fastgen.scene import Damage, Scene, Spreader
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
+from tests.random_damages import FORM_NAMES
 
 SIZE = (256, 256)
 DAMAGED = Config.from_values({"damage": {"probability": 1.0, "kinds": list(ALL_DAMAGE_CLASSES)}})
@@ -128,7 +128,7 @@ def scene_with(generator, kind, form=None):
     )
 
 
-@pytest.mark.parametrize(("kind", "form"), [(form.kind, form.name) for form in FORMS])
+@pytest.mark.parametrize(("kind", "form"), FORM_NAMES)
 def test_every_form_matches_rays_from_close_by(generator, kind, form):
     scene = scene_with(generator, kind, form)
     damage = next(d for d in scene.damages if (d.kind, d.form) == (kind, form))

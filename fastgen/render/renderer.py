@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
+from fastgen.config.damage import DamageConfig
 from fastgen.decals.artwork import art_layers
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
@@ -51,6 +52,7 @@ from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.boxes import back_to_front
+from fastgen.scene.damage_kinds import program_kinds
 from fastgen.scene.limits import MAX_NEIGHBOURS, MM
 
 _CONTAINERS = 2 + MAX_NEIGHBOURS
@@ -69,7 +71,7 @@ class Renderer:
         gl: GLContext,
         light: Callable[[str], EnvironmentLight],
         quality: Quality,
-        mask_threshold_mm: float = 5.0,
+        damage: DamageConfig | None = None,
         read: Read = shader_text,
         without: tuple[str, ...] = (),
         own_art: Mapping[str, NDArray[np.uint8]] = MappingProxyType({}),
@@ -81,7 +83,8 @@ class Renderer:
             light: Returns the prefiltered environment of a name, such as `load_environment`.
             quality: Samples, lookups and light. Images whose samples do not fit the driver's
                 textures get fewer samples. A traced quality needs `ray_bodies.check_rays`.
-            mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
+            damage: Threshold of masks, and kinds to compile programs for; None for the defaults. A
+                scene with other kinds takes time to compile theirs.
             read: Returns the text of a shader file by its name.
             without: Material layers of LAYERS to leave out of images.
             own_art: Artwork of a configuration by name, see own_art.art_of.
@@ -89,10 +92,12 @@ class Renderer:
         self._gl = gl
         self.ctx = gl.ctx
         self._quality = quality
-        self._mask_threshold_mm = mask_threshold_mm
+        damage = damage or DamageConfig()
+        self._mask_threshold_mm = damage.mask_threshold_mm
         self._without = without
         self._programs = programs = Programs(self.ctx, read)
-        self._geometry = GeometryPass(self.ctx, programs)
+        self._kinds = program_kinds(damage.kinds)
+        self._geometry = GeometryPass(self.ctx, programs, self._kinds)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
         self._ground = GroundPass(self.ctx, programs, self.ambient)
         self._shading = ShadingPass(self.ctx, programs)
@@ -163,6 +168,7 @@ class Renderer:
         Containers do not overlap. Several are drawn over one another from back to front.
         """
         scene = prepared.scene
+        self._compile_for(prepared)
         exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)
@@ -190,6 +196,17 @@ class Renderer:
                 self._trace(inputs, member.prepared)
                 self._shade(inputs, member, exposure, normals)
         return inputs.targets
+
+    def _compile_for(self, prepared: PreparedScene) -> None:
+        """Compile programs for kinds of damage that the renderer could not draw so far."""
+        members = (member.prepared.scene.damages for member in prepared.members)
+        kinds = {damage.kind for damages in members for damage in damages}
+        if not kinds <= set(self._kinds):
+            self._kinds = program_kinds(kinds.union(self._kinds))
+            self._geometry.release()
+            self._shapes.release()
+            self._geometry = GeometryPass(self.ctx, self._programs, self._kinds)
+            self._shapes = Shapes(self.ctx, self._geometry.programs)
 
     def _shade(
         self,
@@ -243,7 +260,8 @@ class Renderer:
         self._set(SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values})
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, samples.inner_row
-            self._set(DAMAGE_BLOCK, damage_values(prepared, damages, threshold_mm, row))
+            values = damage_values(prepared, damages, self._kinds, threshold_mm, row)
+            self._set(DAMAGE_BLOCK, values)
         return DrawInputs(
             view=view,
             damages=damages,
@@ -260,6 +278,7 @@ class Renderer:
                 lookups=self._quality.lookups,
                 layer=options.layer,
                 damage=damage,
+                kinds=self._kinds,
                 lights=shader_lights(ambient.lights),
                 traced=light.sky_rays is not None and options.layer == "all",
                 radiance=options.radiance,
@@ -357,15 +376,16 @@ class Renderer:
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""
+        self._compile_for(prepared)
         scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
         if damage != "undamaged":
-            values = damage_values(prepared, scene.damages, self._mask_threshold_mm, 0)
+            values = damage_values(prepared, scene.damages, self._kinds, self._mask_threshold_mm, 0)
             self._set(DAMAGE_BLOCK, values)
         decals = self._resources(prepared).decals()
         self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         textures = self._material_textures(decals, mesh, None)
-        program = bake_program(self._programs, damage)
+        program = bake_program(self._programs, damage, self._kinds)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
 
     def bake_spreader(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
@@ -377,7 +397,7 @@ class Renderer:
         self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         container = self._shapes.container(prepared)
         textures = self._material_textures(decals, container, spreader)
-        program = bake_program(self._programs, "undamaged")
+        program = bake_program(self._programs)
         return bake_atlas(
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )

@@ -138,7 +138,7 @@ class Decal:
 
 @dataclass(frozen=True)
 class Damage:
-    """One damage: a displacement field, see geometry/damage_law.py for its formula.
+    """One damage, see damage_kinds.py; geometry/damage_law.py has the formula of its displacement.
 
     Attributes:
         kind: One of classes.ALL_DAMAGE_CLASSES.
@@ -150,8 +150,8 @@ class Damage:
         size_mm: Full length along and full width across. For a star both are the mean diameter;
             for an axis damage the width is twice the reach from the edge.
         depth_mm: Nominal depth: the largest displacement, if the form had no rounded folds.
-        shape: Further parameters, those of damage_shapes.SHAPES[kind, form] in this order.
-        form: One of the forms of the kind in damage_shapes.SHAPES.
+        shape: Further parameters, those of its form in damage_kinds.py in this order.
+        form: Name of one of the forms of the kind.
         paint_loss: Share of the worst places that is bare of paint, 0..1.
         fresh: Share of the bare places that has not rusted yet, 0..1.
         bare_albedo: Linear color of the fresh share: steel, primer, or paint of what scraped it.
