@@ -19,6 +19,7 @@ struct DamageMark {
     float wear;    // Share of the surface that it covers, 0..1; 0 outside the mask.
     float fresh;   // Share of that which has not rusted.
     vec3 albedo;   // Of the fresh share.
+    bool covers;   // Hides the marks of earlier kinds below it.
 };
 
 float damage_fresh(int i) { return damage_shape[3 * i + 2].w; }

@@ -50,5 +50,5 @@ DamageMark graffiti_mark(int i, vec3 q) {
                   in_contact(q.z, damage_shape[3 * i + 1].z);
     // The paint of a spray can thins toward the edges of the line.
     float wear = mix(0.6, 1.0, smoothstep(0.0, 0.15 * damage_shape[3 * i].x, -outside));
-    return DamageMark(within && outside < 0.0, wear, damage_fresh(i), damage_bare[i].rgb);
+    return DamageMark(within && outside < 0.0, wear, damage_fresh(i), damage_bare[i].rgb, true);
 }

@@ -97,9 +97,11 @@ DamageSample damage_at(vec3 p) {
     }
     EACH_DAMAGE(SAMPLE)
     if (length(moved) < damage_threshold_mm) d.value = 0u;
-#define SAMPLE_MARK(i, mark)                                             \
-    if (mark.here && d.value == 0u) d.value = uint(damage_reach[i].w); \
-    add_scar(d.scar, i, mark.here ? mark.wear : 0.0, mark.fresh, mark.albedo, true);
+    bool covered = false;
+#define SAMPLE_MARK(i, mark)                                                                        \
+    if (mark.here && d.value == 0u) d.value = uint(damage_reach[i].w);                              \
+    add_scar(d.scar, i, mark.here && !covered ? mark.wear : 0.0, mark.fresh, mark.albedo, true);    \
+    covered = covered || (mark.here && mark.covers);
     EACH_MARK(SAMPLE_MARK)
     return d;
 }

@@ -16,5 +16,5 @@ DamageMark missing_paint_mark(int i, vec3 q) {
     float edge = mix(0.7, 1.0, smoothstep(0.0, 0.05, inside));
     return DamageMark(inside > 0.0 && in_contact(q.z, damage_shape[3 * i + 1].x), 1.0,
                       mix(1.0, damage_fresh(i), steel),
-                      edge * mix(damage_bare[i].rgb, STEEL_ALBEDO, steel));
+                      edge * mix(damage_bare[i].rgb, STEEL_ALBEDO, steel), true);
 }

@@ -13,5 +13,5 @@ DamageMark rust_through_mark(int i, vec3 q) {
     float pit = smoothstep(0.0, 0.1, 0.8 * thick + 0.9 * grain - 1.35 + 0.8 * shape.w);
     float wear = smoothstep(0.0, 0.35, thick + 0.2 * grain * step(0.1, thick));
     return DamageMark(thick > 0.0 && in_contact(q.z, damage_shape[3 * i + 1].x), max(wear, 0.25),
-                      pit, PIT_ALBEDO);
+                      pit, PIT_ALBEDO, true);
 }

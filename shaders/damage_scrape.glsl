@@ -36,5 +36,5 @@ float scrape_wear(int i, vec3 q) {
 }
 
 DamageMark scrape_mark(int i, vec3 q) {
-    return DamageMark(scraped(i, q), scrape_wear(i, q), damage_fresh(i), damage_bare[i].rgb);
+    return DamageMark(scraped(i, q), scrape_wear(i, q), damage_fresh(i), damage_bare[i].rgb, false);
 }

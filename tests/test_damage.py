@@ -144,6 +144,36 @@ def test_every_form_matches_rays_from_close_by(generator, kind, form):
     assert item.bbox == oracle.box_of(sample.damage == value)
 
 
+@pytest.mark.parametrize("kind", ["rust_through", "missing_paint", "graffiti"])
+def test_a_mark_changes_the_image_in_its_mask_and_nowhere_else(generator, kind):
+    scene = close_up(scene_with(generator, kind), kind)
+    marked = generator.render(scene=scene, camera="close")
+    bare = generator.render(scene=replace(scene, damages=()), camera="close")
+    changed = np.abs(marked.image.astype(int) - bare.image).max(axis=2) > 2
+    mask, border = marked.damage > 200, oracle.near_edge(marked.damage)
+    assert mask.sum() > 200
+    assert changed[mask & ~border].mean() > 0.7
+    assert not changed[~mask & ~border].any()
+
+
+def test_marks_of_later_kinds_cover_those_of_earlier_ones(generator):
+    scene = close_up(scene_with(generator, "graffiti"), "graffiti", away_mm=1500)
+    (tag,) = scene.damages
+    flaked = replace(
+        tag, kind="missing_paint", shape=(30.0, 0.5, 2.0, 0.5, 90.0), fresh=1.0,
+        bare_albedo=(0.27, 0.09, 0.05),
+    )  # fmt: skip
+    alone = generator.render(scene=scene, camera="close")
+    both = generator.render(scene=replace(scene, damages=(flaked, tag)), camera="close")
+    sprayed = alone.damage == mask_values((tag,))[0]
+    np.testing.assert_array_equal(both.damage == mask_values((tag,))[0], sprayed)
+    inside = ~oracle.near_edge(both.damage)
+    np.testing.assert_array_equal(both.image[sprayed & inside], alone.image[sprayed & inside])
+    below = both.damage == mask_values((flaked,))[0]
+    assert below.sum() > 500
+    assert (both.image != alone.image)[below & inside].any(axis=1).mean() > 0.9
+
+
 @pytest.mark.parametrize(
     ("kind", "ranges"),
     [

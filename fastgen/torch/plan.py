@@ -182,8 +182,8 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
         )
     if made.damage.segmentation_classes != base.damage.segmentation_classes:
         raise ConfigError(
-            f"curriculum: epoch {epoch} changes which classes there are; list scrape in "
-            "damage.kinds in every epoch or in none"
+            f"curriculum: epoch {epoch} changes which classes there are; list the "
+            "same last kind in damage.kinds of every epoch"
         )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")

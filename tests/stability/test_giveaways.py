@@ -126,7 +126,7 @@ def separation(scores, marked):
 
 def classes_of(sample):
     """Return the class of each pixel [H, W]: a damage class, plain, text, marker or other."""
-    names = np.full(sample.ids.shape, "other", "<U12")
+    names = np.full(sample.ids.shape, "other", object)
     names[(sample.ids == CONTAINER_ID) & (sample.damage == UNDAMAGED_CONTAINER)] = "plain"
     for value, name in enumerate(ALL_DAMAGE_CLASSES, start=2):
         names[(sample.ids == CONTAINER_ID) & (sample.damage // 100 == value)] = name
