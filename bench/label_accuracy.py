@@ -1,6 +1,6 @@
 """Check that the labels are exact, and measure the cost of the paper's way to make them.
 
-    python bench/label_accuracy.py [--scenes 500] [--size 256]
+    python bench/label_accuracy.py [--scenes 100] [--size 256]
     python bench/label_accuracy.py --redraw     # docs/label_accuracy.png from the stored results
 
 Compares ids, damage and depth with rays that Embree casts through every pixel centre, over random
@@ -247,7 +247,7 @@ def draw(figures: charts.Figures) -> Figure:
 def main() -> None:
     """Print both comparisons and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=500)
+    parser.add_argument("--scenes", type=int, default=100)
     parser.add_argument("--size", type=int, default=256)
     charts.add_options(parser, "label_accuracy")
     options = parser.parse_args()
