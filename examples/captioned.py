@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP_PX, _STRIP_PX = 6, 34
+_GAP_PX, _STRIP_PX = 6, 42
 """Gap between pictures, and height of captions."""
 
 _MARGIN = 255
@@ -17,8 +17,8 @@ _MARGIN = 255
 def captioned(image: NDArray[np.uint8], words: str) -> NDArray[np.uint8]:
     """Return an image uint8 [H, W, 3] with a caption below."""
     strip = np.full((_STRIP_PX, image.shape[1], 3), _MARGIN, np.uint8)
-    place, black = (2, _STRIP_PX - 11), (30, 30, 30)
-    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.75, black, 1, cv2.LINE_AA)
+    place, black = (2, _STRIP_PX - 13), (30, 30, 30)
+    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.95, black, 1, cv2.LINE_AA)
     return np.concatenate([image, strip])
 
 

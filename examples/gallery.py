@@ -1,4 +1,4 @@
-"""Pictures of what a scene may look like, for docs/gallery.md: docs/gallery/NAME.jpg.
+"""Pictures of scenes under many settings, for docs/gallery.md: docs/gallery/NAME.jpg.
 
 python examples/gallery.py [presets light ...]
 """
@@ -150,7 +150,7 @@ SECTIONS = {
     ),
     "damage": Section(
         (
-            _damage("axis: a pushed-in edge", "axis", 2, kinked=1.0),
+            _damage("axis: a pushed-in edge", "axis", 9, kinked=0.0),
             _damage("concave: a bowed wall", "concave", 1, outward=0.0, creased=1.0),
             _damage("dented: a fold", "dented", 2, marks={"probability": 0.0}),
             _damage("dented: crush marks", "dented", 11, marks={"probability": 1.0}),
@@ -241,7 +241,7 @@ def tiles(section: Section) -> Iterator[np.ndarray]:
             w, h = (side // section.zoom for side in size)
             x, y = (size[0] - w) // 2, (size[1] - h) // 2
             part = image[y : y + h, x : x + w]
-            image = cv2.resize(part, size, interpolation=cv2.INTER_NEAREST)
+            image = np.asarray(cv2.resize(part, size, interpolation=cv2.INTER_NEAREST), np.uint8)
         yield captioned(image, tile.caption)
 
 

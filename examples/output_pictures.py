@@ -119,7 +119,7 @@ def main() -> None:
     for name, picture in pictures(options.dataset).items():
         height = round(picture.shape[0] * WIDTH_PX / picture.shape[1])
         scaled = cv2.resize(picture, (WIDTH_PX, height), interpolation=cv2.INTER_AREA)
-        write_jpeg(FOLDER / f"{name}.jpg", scaled, QUALITY)
+        write_jpeg(FOLDER / f"{name}.jpg", np.asarray(scaled, np.uint8), QUALITY)
 
 
 if __name__ == "__main__":

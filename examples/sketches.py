@@ -6,7 +6,6 @@ Positions are computed with the functions of fastgen, so the sketches agree with
 """
 
 import math
-from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
@@ -27,6 +26,7 @@ AZIMUTH_DEG, ELEVATION_DEG, ROLL_DEG, FOCAL_MM, SENSOR_MM = 30.0, 25.0, 10.0, 28
 _INK, _FAINT, _FILL, _MARK = "#222222", "#8a8a8a", "#dfe8f1", "#b3261e"
 
 Point = ArrayLike
+"""x and y in pixels, or x, y and z in mm."""
 
 
 class Sketch:
@@ -44,13 +44,13 @@ class Sketch:
         ]
 
     def shape(
-        self, points: Sequence[Point], fill: str = "none", name: str = "", dashed: bool = False
+        self, points: ArrayLike, fill: str = "none", name: str = "", dashed: bool = False
     ) -> None:
         """Add a closed polygon."""
         places = " ".join(f"{x:.1f},{y:.1f}" for x, y in np.asarray(points, float).tolist())
         self._add("polygon", f'points="{places}" fill="{fill}" stroke="{_INK}"', name, dashed)
 
-    def line(self, points: Sequence[Point], color: str = _INK, dashed: bool = False) -> None:
+    def line(self, points: ArrayLike, color: str = _INK, dashed: bool = False) -> None:
         """Add a line through points."""
         places = " ".join(f"{x:.1f},{y:.1f}" for x, y in np.asarray(points, float).tolist())
         self._add("polyline", f'points="{places}" fill="none" stroke="{color}"', "", dashed)
@@ -135,8 +135,8 @@ def faces() -> Sketch:
         start = np.array(at) + ((70, 6) if name != "underside" else (80, -16))
         sketch.line([start, seen(middle)], _FAINT, dashed=True)
     origin = np.array([60.0, 320.0])
-    for name, way in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1))):
-        end = origin + seen(1000 * np.array(way)) - seen((0, 0, 0))
+    for name, direction in (("x", (1, 0, 0)), ("y", (0, 1, 0)), ("z", (0, 0, 1))):
+        end = origin + seen(1000 * np.array(direction)) - seen((0, 0, 0))
         sketch.arrow(origin, end, both=False)
         sketch.text(end + (5, 4), name, color=_MARK)
     sketch.text((20, 30), "front (-y), door (+x), roof (+z); grey: hidden faces")
@@ -204,14 +204,14 @@ def _side(sketch: Sketch) -> None:
 def _roll(sketch: Sketch) -> None:
     """Draw the door in two images, without and with roll."""
     sketch.text((20, 370), "Image, camera at the door")
-    height, width = KINDS[KIND].size_mm[2], KINDS[KIND].size_mm[1]
+    _, width, height = KINDS[KIND].size_mm
     middle = face_frame("door", KIND).middle_mm
-    for roll, left in ((0.0, 20), (ROLL_DEG, 180)):
+    for roll, left in ((0.0, 20.0), (ROLL_DEG, 180.0)):
         size = (145, 145)
         position = middle + np.array([5500.0, 0.0, 0.0])
         camera = Camera("", tuple(position.tolist()), tuple(middle.tolist()), 50.0, roll_deg=roll)
-        corners = [middle + (0, y, z) for y, z in ((-1, 1), (1, 1), (1, -1), (-1, -1))
-                   for y, z in ((y * width / 2, z * height / 2),)]  # fmt: skip
+        signs = ((0, -1, 1), (0, 1, 1), (0, 1, -1), (0, -1, -1))
+        corners = [middle + np.array(sign) * (0, width / 2, height / 2) for sign in signs]
         pixels, _ = view_of(camera, size).project(np.array(corners))
         at = np.array([left, 385])
         sketch.shape(at + np.array([(0, 0), (size[0], 0), size, (0, size[1])]))
