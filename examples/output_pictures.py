@@ -1,7 +1,7 @@
 """Pictures of the label files of one image, for docs/output_pictures.md: docs/outputs/NAME.jpg.
 
 fastgen generate OUT --preset gate --seed 3 --images 2 --cameras rear --quality fine \
-    --set damage.probability=1 --set markings.marked_containers=1 \
+    --set damage.probability=1 --set markings.marked_containers=1 --set seals.probability=1 \
     --also obb,semantic,depth,normals,ids,text_parts
 python examples/output_pictures.py OUT
 """
