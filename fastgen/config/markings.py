@@ -14,8 +14,8 @@ from fastgen.config.own_decals import (
     StickerConfig,
     check_class_names,
 )
-from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.artwork import stickers as bundled_stickers
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.validation import (
     LENGTH,

@@ -8,7 +8,7 @@ from annotated_types import MinLen
 
 from fastgen.classes import CLASS_NAME, OTHER_CLASSES
 from fastgen.config.fields import ArtFile, Weight
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.faces import SHEET_FACES

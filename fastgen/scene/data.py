@@ -16,7 +16,7 @@ from annotated_types import MaxLen
 from numpy.typing import NDArray
 
 from fastgen.classes import ALL_DAMAGE_CLASSES, CLASS_NAME
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
