@@ -145,4 +145,5 @@ def _check_text(name: str, text: str) -> None:
     wrong = [char for char in text if char not in known]
     if wrong or not text.strip():
         signs = "".join(sorted(char for char in known if char.isprintable() and len(char) == 1))
-        raise ConfigError(f"{name}: {text!r} has other characters than the fonts, {signs!r}")
+        lacking = f"the fonts lack {''.join(dict.fromkeys(wrong))!r}" if wrong else "is blank"
+        raise ConfigError(f"{name}: {text!r}: {lacking}; give characters of {signs!r}")
