@@ -242,6 +242,25 @@ def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
     return palette[inverse.reshape(labels.shape)]
 
 
+def depth_colors(depth_m: NDArray[np.float32]) -> Image:
+    """Show a depth image in colours, in equal steps of its logarithm.
+
+    Args:
+        depth_m: Depth [H, W] in metres, infinite where void.
+
+    Returns:
+        uint8 [H, W, 3]. The nearest pixel is bright; the farthest 2% are dark, and void is black.
+    """
+    seen = np.isfinite(depth_m)
+    if not seen.any():
+        return np.zeros((*depth_m.shape, 3), np.uint8)
+    near, far = np.log(np.quantile(depth_m[seen], [0.0, 0.98]))
+    share = (far - np.log(np.where(seen, depth_m, 1.0))) / max(float(far - near), 1e-6)
+    levels = (np.clip(share, 0, 1) * 255).astype(np.uint8)
+    colors = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[..., ::-1], np.uint8)
+    return np.where(seen[..., None], colors, np.uint8(0))
+
+
 def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
     """Return a colour of `_color` in one of nine alternating tones."""
     if value == 0 or value in greys:

@@ -1,6 +1,7 @@
 """Damage: the shader compared with Embree rays on its numpy twin, and sampled proportions."""
 
 from dataclasses import replace
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -120,11 +121,21 @@ def close_up(scene: Scene, kind: str, form: str | None = None, away_mm: float = 
     return replace(scene, damages=(damage,), cameras=(camera,))
 
 
+@lru_cache(500)  # tests search the same scenes for different damages
+def scene_of(generator, index):
+    return generator.scene(index)
+
+
+def damages_of(generator):
+    """Yield each damage of the first scenes, with its scene."""
+    for index in range(200):
+        scene = scene_of(generator, index)
+        yield from ((scene, damage) for damage in scene.damages)
+
+
 def scene_with(generator, kind, form=None):
     return next(
-        scene
-        for scene in map(generator.scene, range(200))
-        if any(d.kind == kind and form in (None, d.form) for d in scene.damages)
+        scene for scene, d in damages_of(generator) if d.kind == kind and form in (None, d.form)
     )
 
 
@@ -209,8 +220,7 @@ def test_a_hole_shows_the_inside_and_never_the_sky(paper):
 def test_a_hole_shows_brown_floor_boards_and_grey_walls(paper):
     scene, damage = next(
         (scene, damage)
-        for scene in map(paper.scene, range(200))
-        for damage in scene.damages
+        for scene, damage in damages_of(paper)
         if damage.kind == "perforation" and damage.face == "front"
     )
     x, y, _ = damage.origin_mm
@@ -275,9 +285,9 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
 def test_a_hole_behind_rods_and_handles_shows_no_sky(generators):
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
     generator = generators(Config.from_values({"damage": values}), 77, (256, 256))
-    samples = [generator.render(index, "Cr") for index in range(12)]
+    samples = [generator.render(index, "Cr") for index in range(7)]
     holes = [sample.damage == 501 for sample in samples]
-    assert sum(int(hole.sum()) for hole in holes) > 1000
+    assert sum(int(hole.sum()) for hole in holes) > 600
     for sample, hole in zip(samples, holes, strict=True):
         assert (sample.ids[hole] > 0).all()
         assert np.isfinite(sample.depth[hole]).all()
@@ -359,7 +369,7 @@ def test_a_dented_leaf_stays_behind_its_locking_gear(generators):
 
     count = 0
     generator = generators(Config.from_values(doors), seed=3, size=(64, 64))
-    for scene in map(generator.scene, range(40)):
+    for scene in map(generator.scene, range(16)):
         mesh = build_container(scene.container.kind, scene.container.profiles)
         names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
         is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
@@ -374,7 +384,7 @@ def test_a_dented_leaf_stays_behind_its_locking_gear(generators):
         assert (leaf < gear)[plate].mean() > 0.9
         assert plate.sum() > 200
         count += (seen & ~plate).sum()
-    assert count > 40 * 200
+    assert count > 16 * 200
 
 
 def test_undamaged_places_do_not_change(generator):

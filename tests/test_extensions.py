@@ -13,7 +13,9 @@ import pytest
 import yaml
 from PIL import Image
 
+from fastgen import plugins
 from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+from fastgen.cli.main import main
 
 PAGE = Path(__file__).parent.parent / "docs/extend.md"
 PARTS = re.compile(r"^`([\w./]+)`[^\n]*\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -231,6 +233,14 @@ def test_wrong_values_of_a_kind_are_named(value, words, site):
     assert words in said
 
 
+@pytest.fixture
+def reread():
+    """Let this process see packages that the test installs, and forget them afterwards."""
+    plugins._offered.cache_clear()
+    yield
+    plugins._offered.cache_clear()
+
+
 @pytest.mark.parametrize(
     ("groups", "arguments", "words"),
     [
@@ -271,11 +281,16 @@ def test_wrong_values_of_a_kind_are_named(value, words, site):
         ),
     ],
 )
-def test_a_broken_package_is_named(groups, arguments, words, site, tmp_path):
+def test_a_broken_package_is_named(
+    groups, arguments, words, site, tmp_path, monkeypatch, capsys, reread
+):
     install(tmp_path, "other", groups)
+    for folder in (site, tmp_path):
+        monkeypatch.syspath_prepend(folder)
     given = [each.format(out=tmp_path / "out") for each in arguments]
-    assert fastgen(*given, path=[tmp_path, site], code=2).startswith(f"fastgen: {words}")
-    assert fastgen("presets", path=[tmp_path, site])
+    assert main(given) == 2
+    assert capsys.readouterr().err.startswith(f"fastgen: {words}")
+    assert main(["presets"]) == 0
 
 
 FAULTY = """
@@ -288,6 +303,15 @@ def smaller(sample, rng):
     return replace(sample, image=sample.image[1:])
 NUMBER = 1
 """
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory):
+    """A folder with a module of functions that cannot be used."""
+    folder = tmp_path_factory.mktemp("faulty")
+    (folder / "faulty.py").write_text(FAULTY)
+    yield folder
+    sys.modules.pop("faulty", None)
 
 
 @pytest.mark.parametrize(
@@ -305,9 +329,10 @@ NUMBER = 1
         ),
     ],
 )
-def test_an_unusable_function_gets_one_line(name, words, tmp_path):
-    (tmp_path / "faulty.py").write_text(FAULTY)
-    given = ["show", "--index", "0", "-o", tmp_path / "x.png", *SIZE]
-    said = fastgen(*given, "--set", f"postprocess={name}", path=[tmp_path], code=2)
-    assert said.startswith(f"fastgen: {words}")
-    assert not (tmp_path / "x.png").exists()
+def test_an_unusable_function_gets_one_line(name, words, faulty, tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(faulty)
+    picture = str(tmp_path / "x.png")
+    given = ["show", "--index", "0", "-o", picture, *SIZE, "--set", f"postprocess={name}"]
+    assert main(given) == 2
+    assert capsys.readouterr().err.startswith(f"fastgen: {words}")
+    assert not Path(picture).exists()

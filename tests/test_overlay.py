@@ -2,11 +2,14 @@
 
 import cv2
 import numpy as np
+import pytest
 
 from fastgen import Config
 from fastgen.classes import DAMAGE_CLASSES
 from fastgen.cli.main import main
 from fastgen.overlay import Outline, class_color, draw_outlines
+
+pytestmark = pytest.mark.usefixtures("no_workers")
 
 
 def test_boxes_have_the_colours_of_their_classes(generators):

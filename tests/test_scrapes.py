@@ -16,6 +16,8 @@ from fastgen.generator import Generator
 from fastgen.scene.object_ids import scene_numbers
 from fastgen.torch.targets import class_names
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 
 def config_with(*kinds):
     return {"damage": {"probability": 1, "count": [4, 4], "kinds": list(kinds)}}

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastgen.classes import ALL_DETECTION_CLASSES
-from fastgen.decals.artwork import art_layers, glyph_tiles
+from fastgen.decals.artwork import art_layers
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box

@@ -91,3 +91,4 @@ FARTHEST = 1e6
 Number = Annotated[float, Bounds(-FARTHEST, FARTHEST)]
 Degrees = Annotated[float, Bounds(-FARTHEST, FARTHEST, "degrees")]
 Millimetres = Annotated[float, Bounds(-FARTHEST, FARTHEST, "mm")]
+Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
