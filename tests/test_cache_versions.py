@@ -6,7 +6,7 @@ import pytest
 from fastgen.decals import artwork
 from fastgen.files import disk_cache
 from fastgen.geometry import chart_sheet, container, mesh, sheet_folds, spreader
-from fastgen.light import environment, indirect_light, reflectance
+from fastgen.light import container_map, environment, indirect_light, reflectance
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.sky_visibility import Sky
 from fastgen.render import noise, rust, sky_visibility_probe
@@ -15,6 +15,7 @@ from fastgen.render.gl import open_context
 TABLE = {
     "art": (artwork, 6, 18.11144, 41.92986, 36.3485),
     "container": (container, 9, 12.77836, 33.3579, 30.57862),
+    "container-map": (container_map, 1, 0, 0, 0),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
     "folds": (sheet_folds, 1, 0, 0, 0),
@@ -72,6 +73,7 @@ def summaries(tmp_path_factory):
         noise.noise_tiles.__wrapped__()
         artwork.art_levels.__wrapped__()
         artwork.glyph_ink.__wrapped__()
+        container_map.load_container_map.__wrapped__(bundled_hdris()["port_morning"])
         ambient = environment.load_environment(bundled_hdris()["night_2"])
         body = container.build_container("20")
         body.prepare(damages=True)

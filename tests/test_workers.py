@@ -53,7 +53,7 @@ class Reports:
 
 
 class TellsItsThreads:
-    """Worker that reports the number of threads not started by Python after a product of matrices."""
+    """Worker that reports the number of threads that a product of matrices leaves."""
 
     def __init__(self, report):
         self._report = report
