@@ -36,7 +36,7 @@ MADE_BY = ("backend", "renderer")
 _REPORT_S = 0.25
 """Shortest time between two reports of images: each report wakes the parent on a busy core."""
 
-_TRIM_IMAGES = 256
+_TRIM_IMAGES = 64
 """Freed memory goes back to the system after this many images, because the system must clear each
 page before it is used again."""
 

@@ -167,7 +167,7 @@ def _spread(share: Array, reach: float, softness: float) -> Array:
     return np.asarray(1 / (1 + np.exp(-x * (1.5976 + 0.070566 * x * x))))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=128)  # all containers and spreaders of a ShapeLibrary
 def _points(mesh: Mesh) -> _Points:
     """Return the classes of points on a mesh, from the disk cache if possible."""
     inputs = mesh.atlas_digest, sorted(mesh.flats.items())
