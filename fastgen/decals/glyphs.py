@@ -1,5 +1,6 @@
 """Glyphs of the packaged fonts: tiles of signed distances, metrics and ink coverage."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,7 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.decals.asset_files import asset_image, asset_json
+from fastgen.files import disk_cache
 from fastgen.resources import asset_path
+
+VERSION = 1  # raise when the stored arrays change
 
 GLYPH_TILE_SIZE = 64
 """Width and height of a glyph tile, texels."""
@@ -83,7 +87,6 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
     return np.ascontiguousarray(tiles[: data["tiles"]]), MappingProxyType(fonts)
 
 
-@lru_cache(maxsize=1)
 def glyph_coverage() -> NDArray[np.uint8]:
     """Return the share of ink in each texel of `glyph_tiles`, read-only.
 
@@ -93,9 +96,7 @@ def glyph_coverage() -> NDArray[np.uint8]:
     Raises:
         AssetError: A file is missing or broken.
     """
-    ink = np.stack([_ink(tile) for tile in glyph_tiles()[0]])
-    ink.flags.writeable = False  # all callers share it
-    return ink
+    return glyph_ink()["coverage"]
 
 
 @lru_cache(maxsize=1)
@@ -112,7 +113,6 @@ def glyph_extents() -> NDArray[np.int64]:
     return np.ceil(np.stack(reach, axis=1) * steps).astype(np.int64)
 
 
-@lru_cache(maxsize=1)
 def glyph_sums() -> NDArray[np.uint16]:
     """Return summed-area tables of the ink of `glyph_tiles` (Crow 1984), read-only.
 
@@ -120,10 +120,24 @@ def glyph_sums() -> NDArray[np.uint16]:
         uint16 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE]: the ink of the texels up to and including a
         row and column, in units of GLYPH_MOST_INK / 65535 texels.
     """
-    sums = (glyph_coverage() / 255).cumsum(axis=1).cumsum(axis=2)
-    found: NDArray[np.uint16] = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
-    found.flags.writeable = False  # all callers share it
-    return found
+    return glyph_ink()["sums"]
+
+
+@lru_cache(maxsize=1)
+def glyph_ink() -> disk_cache.Arrays:
+    """Return the arrays of `glyph_coverage` and `glyph_sums`, from the disk cache if possible."""
+    tiles, _ = glyph_tiles()
+
+    def make() -> disk_cache.Arrays:
+        coverage = np.stack([_ink(tile) for tile in tiles])
+        sums = (coverage / 255).cumsum(axis=1).cumsum(axis=2)
+        scaled = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
+        return {"coverage": coverage, "sums": scaled}
+
+    shape = " ".join(map(str, tiles.shape))
+    layout = {"coverage": f"uint8 {shape}", "sums": f"uint16 {shape}"}
+    digest = hashlib.sha256(tiles.data).hexdigest()
+    return disk_cache.cached("glyph-ink", VERSION, digest, make, layout=layout)
 
 
 def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:

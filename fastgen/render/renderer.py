@@ -44,7 +44,7 @@ from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes
-from fastgen.render.surface_values import damage_values, scene_values
+from fastgen.render.surface_values import SceneMaterials, damage_values, scene_values
 from fastgen.render.uniforms import BlockBuffers
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.view_values import view_values
@@ -323,6 +323,7 @@ class Renderer:
             damages: Prepare for damaged scenes too.
         """
         prepared.prepare_shapes(lens, damages)
+        _ = SceneMaterials(prepared).reflectances
         self._shapes.preload(prepared, lens, damages)
 
     def preload_environment(self, name: str) -> None:
