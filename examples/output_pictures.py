@@ -14,11 +14,17 @@ import cv2
 import numpy as np
 from captioned import beside, write_jpeg
 from numpy.typing import NDArray
-from overview import depth_colors
 from PIL import Image
 
 from fastgen.formats import yolo
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, Outline, draw_outlines, label_colors
+from fastgen.overlay import (
+    DAMAGE_GREYS,
+    ID_GREYS,
+    Outline,
+    depth_colors,
+    draw_outlines,
+    label_colors,
+)
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "outputs"
 NAME = "train/s3_000001_rear"

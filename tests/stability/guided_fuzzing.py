@@ -14,6 +14,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
@@ -53,7 +54,7 @@ def in_file(path: Path, *readers: Callable[[Path], object]) -> Reader:
     def write_and_read(data: bytes) -> None:
         path.write_bytes(data)
         for read in readers:
-            refused_clearly(lambda read=read: read(path))
+            refused_clearly(partial(read, path))
 
     return write_and_read
 
