@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fastgen.decals import artwork
+from fastgen.decals import artwork, glyphs
 from fastgen.files import disk_cache
 from fastgen.geometry import chart_sheet, container, mesh, sheet_folds, spreader
 from fastgen.light import container_map, environment, indirect_light, reflectance
@@ -20,7 +20,7 @@ TABLE = {
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
     "folds": (sheet_folds, 1, 9.39366, 27.73207, 25.70046),
     "form-factors": (indirect_light, 1, 11.68769, 47.98914, 44.6162),
-    "glyph-ink": (artwork, 6, 15.25896, 11.61372, 10.31897),
+    "glyph-ink": (glyphs, 1, 15.25896, 11.61372, 10.31897),
     "hull": (mesh, 1, 2.07944, 8.72429, 8.38627),
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
     "rust-points": (rust, 1, 8.83054, 14.69861, 12.84232),
@@ -72,7 +72,7 @@ def summaries(tmp_path_factory):
         reflectance.dfg_table.__wrapped__()
         noise.noise_tiles.__wrapped__()
         artwork.art_levels.__wrapped__()
-        artwork.glyph_ink.__wrapped__()
+        glyphs.glyph_ink.__wrapped__()
         container_map.load_container_map.__wrapped__(bundled_hdris()["port_morning"])
         ambient = environment.load_environment(bundled_hdris()["night_2"])
         body = container.build_container("20")

@@ -7,7 +7,7 @@ import gc
 
 from fastgen.config.config import Config
 from fastgen.dataset import shards as shards
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.validation import adapter
 
 adapter(Config)
