@@ -33,7 +33,7 @@ _LEAST_WORKER_MB = 150.0
 
 
 class Run(NamedTuple):
-    """What one run took: seconds of wall and CPU time, and MB of its largest worker."""
+    """Wall and CPU time of one run in seconds, and memory of its largest worker in MB."""
 
     wall_s: float
     cpu_s: float

@@ -1,4 +1,4 @@
-"""What every worker needs, loaded once in the server process that workers are forked from.
+"""Imports and tables of every worker, loaded once in the process that workers are forked from.
 
 Nothing here depends on environment variables or opens OpenGL.
 """
@@ -12,4 +12,4 @@ from fastgen.validation import adapter
 
 adapter(Config)
 glyph_tiles()
-gc.freeze()  # the collector would write to the shared pages of these objects
+gc.freeze()  # otherwise the garbage collector writes to pages that workers share

@@ -20,7 +20,7 @@ _OUT_OF_REACH_MM = 1e6
 """Rest position, along each axis, of samples that no damage touches."""
 
 _STEP_ROWS = 240
-"""Rows by which textures grow; no multiple of it is a power of two, see textures.data_texture.
+"""Rows by which textures grow. No multiple is a power of two, see textures.data_texture.
 
 Cables and distant containers of `draft`, which get more samples than the rest of the image, are
 usually far above its lower edge."""
