@@ -184,7 +184,8 @@ from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from tests import oracle
 
-config = Config.from_values({"damage": {"probability": 1, "count": 3, "kinds": ["buckle"]}})
+damage = {"probability": 1, "count": 6, "kinds": ["buckle"], "faces": ["front", "back"]}
+config = Config.from_values({"damage": damage})
 with Generator(config, seed=5, size=(256, 192)) as generator:
     sample = generator.render(1, "A")
 # a generator that does not list the kind compiles it for the scene
@@ -257,7 +258,7 @@ def test_wrong_values_of_a_kind_are_named(value, words, site):
         (
             {"fastgen.damages": {"scrape": "quaytools.buckle:KIND"}},
             ["config"],
-            "damage.kinds: scrape is offered by fastgen and other; uninstall one or rename its",
+            "preset seafront: kinds: scrape is offered by fastgen and other; uninstall one or",
         ),
         (
             {"fastgen.damages": {"mine": "quaytools.buckle:KIND"}},
