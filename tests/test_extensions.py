@@ -186,7 +186,8 @@ from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from tests import oracle
 
-config = Config.from_values({"damage": {"probability": 1, "count": 3, "kinds": ["buckle"]}})
+damage = {"probability": 1, "count": 6, "kinds": ["buckle"], "faces": ["front", "back"]}
+config = Config.from_values({"damage": damage})
 with Generator(config, seed=5, size=(256, 192)) as generator:
     sample = generator.render(1, "A")
 # a generator that does not list the kind compiles it for the scene
@@ -267,7 +268,7 @@ def reread():
         (
             {"fastgen.damages": {"scrape": "quaytools.buckle:KIND"}},
             ["config"],
-            "damage.kinds: scrape is offered by fastgen and other; uninstall one or rename its",
+            "preset seafront: kinds: scrape is offered by fastgen and other; uninstall one or",
         ),
         (
             {"fastgen.damages": {"mine": "quaytools.buckle:KIND"}},
