@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from scipy.ndimage import distance_transform_edt
 
-from fastgen.decals.artwork import GLYPH_TILE_SIZE as TILE
+from fastgen.decals.glyphs import GLYPH_TILE_SIZE as TILE
 from fastgen.decals.lettering import (
     BOX,
     BOX_MARGIN_CAPS,

@@ -2,13 +2,13 @@
 
     python bench/growth.py [--images 400] [--parts pixels,markers,damages,hdri,workers,length]
     python bench/growth.py --parts length --images 20000     # a long run: rate and memory
+    python bench/growth.py --redraw     # docs/growth.png from the stored results
 
 Times are medians of `Generator.render`, labels included, in one process. bench/results/growth.json
 keeps the latest results of every part, and docs/growth.png shows them all.
 """
 
 import argparse
-import json
 import os
 import statistics
 import subprocess
@@ -18,16 +18,16 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+import charts
 import cv2
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from reporting import RESULTS, ROOT, machine, origin, parse_size, save
+from matplotlib.figure import Figure
+from reporting import RESULTS, ROOT, machine, origin, parse_size, save, stored
 from throughput import fill_caches, generate_command, whole_run
 
 from fastgen import Config, Generator
@@ -233,9 +233,9 @@ def drift(table: Table) -> str:
     return words
 
 
-def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
-    """Draw a chart with a panel for each part."""
-    figure, panels = plt.subplots(2, 3, figsize=(12, 7))
+def draw(parts: charts.Figures) -> Figure:
+    """Return a chart with a panel for each part."""
+    figure, axes = charts.panels(3, 2, 8.0)
     painters: dict[str, Callable[[Axes, Table], None]] = {
         "pixels": _draw_pixels,
         "markers": lambda axes, t: _draw_ms(axes, t["markers"], t["ms"], "markers on the door"),
@@ -244,23 +244,33 @@ def draw(parts: dict[str, dict[str, Any]], chart: Path) -> None:
         "workers": _draw_workers,
         "length": _draw_length,
     }
-    for axes, (name, paint) in zip(panels.flat, painters.items(), strict=True):
+    for panel, (name, paint) in zip(axes.flat, painters.items(), strict=True):
         if name in parts:
-            paint(axes, parts[name]["table"])
+            paint(panel, parts[name]["table"])
             if "size" in parts[name]:
-                axes.set_xlabel(f"images made, {parts[name]['size']}")
+                panel.set_xlabel(f"images made, {parts[name]['size']}")
         else:
-            axes.set_title(f"{name}: not measured")
-    machines = "; ".join(sorted({part["machine"] for part in parts.values()}))
-    figure.text(0.5, 0.005, f"{machines}; 640x640 unless stated otherwise", ha="center", fontsize=8)
-    figure.tight_layout(rect=(0, 0.02, 1, 1))
-    chart.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(chart, dpi=110)
+            panel.set_title(f"{name}: not measured")
+    measured = {
+        key: ", ".join(sorted({part[key] for part in parts.values()}))
+        for key in ("machine", "fastgen")
+    }
+    charts.caption(figure, measured, "640x640 unless stated otherwise")
+    return figure
+
+
+def _from_zero(axes: Axes, *ways: str) -> None:
+    """Begin axes at zero, with room between the outermost points and the frame."""
+    for way in ways:
+        low, high = axes.dataLim.get_points()[:, "xy".index(way)]
+        room = 0.06 * (high - min(low, 0))
+        axes.set(**{f"{way}lim": (-room if low <= 0 else 0, high + room)})
 
 
 def _draw_ms(axes: Axes, x: list[float], ms: list[float], label: str) -> None:
     axes.plot(x, ms, "o-")
-    axes.set(xlabel=label, ylabel="ms per labelled image", ylim=(0, None), xlim=(0, None))
+    axes.set(xlabel=label, ylabel="ms per labelled image")
+    _from_zero(axes, "x", "y")
 
 
 def _draw_pixels(axes: Axes, table: Table) -> None:
@@ -274,22 +284,25 @@ def _draw_hdri(axes: Axes, table: Table) -> None:
     axes.set(xlabel="width of the HDRI in texels", ylabel="ms", xscale="log", yscale="log")
     axes.set_xticks(table["width"], [f"{w:.0f}" for w in table["width"]])
     axes.minorticks_off()
-    axes.legend(fontsize=8)
+    axes.legend(loc="upper left")
+    axes.set_ylim(top=1e5)  # room for the legend
 
 
 def _draw_workers(axes: Axes, table: Table) -> None:
     axes.plot(table["workers"], table["images_per_s"], "o-")
-    axes.set(xlabel="workers", ylabel="images per second, start-up included")
-    axes.set(ylim=(0, None), xlim=(0, None))
+    axes.set(xlabel="workers", ylabel="images per second,\nstart-up included")
+    axes.set_xticks(table["workers"])
+    _from_zero(axes, "x", "y")
 
 
 def _draw_length(axes: Axes, table: Table) -> None:
     counts, seconds = np.array(table["images"]), np.array(table["seconds"])
     axes.plot(counts[1:], np.diff(counts) / np.diff(seconds), ".", ms=3)
-    axes.set(xlabel="images made", ylabel="images per second", ylim=(0, None), xlim=(0, None))
+    axes.set(xlabel="images made", ylabel="images per second")
+    _from_zero(axes, "x", "y")
     memory = axes.twinx()
     memory.plot(counts, table["resident_mb"], "C1")
-    memory.set_ylim(0, None)
+    memory.set_ylim(0, 1.3 * max(table["resident_mb"]))
     memory.set_ylabel("resident MB, all processes", color="C1")
 
 
@@ -303,8 +316,10 @@ def main() -> None:
         "--run-images", type=int, default=200, help="images per run of the part `workers`"
     )
     parser.add_argument("--rounds", type=int, default=5, help="draws per view")
-    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "growth.png")
+    charts.add_options(parser, "growth")
     options = parser.parse_args()
+    if charts.redrawn(options, "growth", draw):
+        return
     measures: dict[str, Callable[[], Table]] = {
         "pixels": lambda: pixels(options.rounds),
         "markers": lambda: markers(options.rounds),
@@ -317,10 +332,7 @@ def main() -> None:
     for name in wanted:
         if name not in measures:
             parser.error(f"--parts: {name!r} is unknown; use {', '.join(measures)}")
-    stored = RESULTS / "growth.json"
-    parts: dict[str, dict[str, Any]] = (
-        json.loads(stored.read_text(encoding="utf-8")) if stored.exists() else {}
-    )
+    parts = stored("growth") if (RESULTS / "growth.json").exists() else {}
     print(machine())
     for name in wanted:
         table = measures[name]()
@@ -329,7 +341,7 @@ def main() -> None:
             parts[name]["size"] = options.size
         show(name, table)
         save("growth", parts)
-    draw(parts, options.chart)
+    charts.write(draw(parts), options.chart)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Check that the labels are exact, and measure the cost of the paper's way to make them.
 
-    python bench/label_accuracy.py [--scenes 500] [--size 256] [--chart docs/label_accuracy.png]
+    python bench/label_accuracy.py [--scenes 100] [--size 256]
+    python bench/label_accuracy.py --redraw     # docs/label_accuracy.png from the stored results
 
 Compares ids, damage and depth with rays that Embree casts through every pixel centre, over random
 scenes and difficult views. The rays hit the mesh deformed in numpy (tests/oracle.py). A pixel may
@@ -16,6 +17,7 @@ import argparse
 import os
 import statistics
 import sys
+import textwrap
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -26,10 +28,11 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+import charts
 import cv2
-import matplotlib.pyplot as plt
 import numpy as np
-from reporting import ROOT, origin, save
+from matplotlib.figure import Figure
+from reporting import origin, save
 
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
@@ -169,10 +172,10 @@ def masks_one_by_one(
     return found
 
 
-def against_the_paper(scenes: int, chart: Path) -> dict[str, Any]:
-    """Compare time and boxes with the paper's way; print and draw the results."""
-    ours: dict[int, float] = {}
-    theirs: dict[int, float] = {}
+def against_the_paper(scenes: int) -> dict[str, Any]:
+    """Compare time and boxes with the paper's way; print and return the results."""
+    ours: dict[str, float] = {}
+    theirs: dict[str, float] = {}
     with Generator(Config.preset(), seed=5, size=(640, 640)) as generator:
         bases = [generator.scene(i) for i in range(3)]
         for count in COUNTS:
@@ -185,17 +188,16 @@ def against_the_paper(scenes: int, chart: Path) -> dict[str, Any]:
                 masks_one_by_one(generator, view, "Cr")
                 taken["ours"].append(middle - began)
                 taken["theirs"].append(time.perf_counter() - began)
-            ours[count] = statistics.median(taken["ours"]) * 1e3
-            theirs[count] = statistics.median(taken["theirs"]) * 1e3
+            ours[str(count)] = statistics.median(taken["ours"]) * 1e3
+            theirs[str(count)] = statistics.median(taken["theirs"]) * 1e3
     print(f"\n{'markers':>8}{'one draw, ms':>14}{'draw per marker, ms':>21}")
     for count in COUNTS:
-        print(f"{count:8d}{ours[count]:14.1f}{theirs[count]:21.1f}")
+        print(f"{count:8d}{ours[str(count)]:14.1f}{theirs[str(count)]:21.1f}")
     outcomes = component_outcomes(scenes)
     total = sum(outcomes.values())
     print(f"\nboxes from connected components, {total} visible markers in {scenes} scenes")
     for name, number in outcomes.most_common():
         print(f"{name:34}{number:7d}  {number / total:.2%}")
-    _draw(ours, theirs, outcomes, chart)
     return {"one_draw_ms": ours, "a_draw_a_marker_ms": theirs, "components": outcomes}
 
 
@@ -219,36 +221,44 @@ def component_outcomes(scenes: int) -> Counter[str]:
     return outcomes
 
 
-def _draw(
-    ours: dict[int, float], theirs: dict[int, float], outcomes: Counter[str], chart: Path
-) -> None:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4))
-    left.plot(list(ours), list(ours.values()), "o-", label="ids in the same draw")
-    left.plot(list(theirs), list(theirs.values()), "s-", label="one mask render per marker")
-    left.set(xlabel="markers in the image", ylabel="ms per image, 640x640", ylim=(0, None))
-    left.legend()
-    total = sum(outcomes.values())
-    names = list(outcomes)
-    right.barh(names, [100 * outcomes[name] / total for name in names])
-    right.set(xlabel="% of visible markers, box from connected components")
-    figure.tight_layout()
-    chart.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(chart, dpi=110)
+def draw(figures: charts.Figures) -> Figure:
+    """Return the time against the number of markers, and the share of correct boxes."""
+    figure, (left, right) = charts.panels(1, 2, 3.0, width_ratios=(3, 2))
+    for key, mark, name in (
+        ("one_draw_ms", "o-", "ids in the same draw"),
+        ("a_draw_a_marker_ms", "s-", "one mask render per marker"),
+    ):
+        left.plot(
+            [int(count) for count in figures[key]], list(figures[key].values()), mark, label=name
+        )
+    left.set(xlabel="markers in the image", ylabel="ms per image, 640x640")
+    left.set_ylim(0, 1.35 * left.get_ylim()[1])  # room for the legend
+    left.legend(loc="upper left")
+    total = sum(figures["components"].values())
+    names = [textwrap.fill(name, 14) for name in figures["components"]]
+    shares = [100 * count / total for count in figures["components"].values()]
+    bars = right.barh(names, shares, height=0.5)
+    right.bar_label(bars, fmt="%.0f %%", padding=3)
+    right.set(title="boxes from connected components", xlabel="% of visible markers", xlim=(0, 100))
+    charts.caption(figure, figures, f"{figures['scenes']} scenes")
+    return figure
 
 
 def main() -> None:
     """Print both comparisons and draw the chart."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=500)
+    parser.add_argument("--scenes", type=int, default=100)
     parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "label_accuracy.png")
+    charts.add_options(parser, "label_accuracy")
     options = parser.parse_args()
+    if charts.redrawn(options, "label_accuracy", draw):
+        return
     counts = exactness(options.scenes, options.size)
-    ways = against_the_paper(max(options.scenes // 10, 2), options.chart)
-    save(
-        "label_accuracy",
-        {**origin(), "scenes": options.scenes, "size": options.size, "views": counts, **ways},
-    )
+    ways = against_the_paper(max(options.scenes // 10, 2))
+    asked = {"scenes": options.scenes, "size": options.size}
+    figures = {**origin(), **asked, "views": counts, **ways}
+    save("label_accuracy", figures)
+    charts.write(draw(figures), options.chart)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Measure what accuracy costs: images per second against the error to the path tracer.
 
     python bench/pareto.py [--cases 8] [--repeats 3]
+    python bench/pareto.py --redraw     # docs/pareto.png from the stored results
 
 Renders the same cases of bench/references at 320x320 with several variants of fastgen, each with
 one feature removed, simplified or refined. The error is FLIP over the pixels of objects against
@@ -34,6 +35,7 @@ from unittest import mock
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+import charts
 import numpy as np
 import peers
 import trimesh
@@ -43,7 +45,7 @@ from image_error import displayed, flip, srgb_decode, srgb_encode
 from pareto_chart import Point, draw, front
 from peer_jobs import shot
 from reference_set import FILTERS, SEED, SIZE, Case, Reference, load, traced
-from reporting import ROOT, machine, origin, save, write_section
+from reporting import origin, save, write_section
 
 from fastgen import Config, Generator
 from fastgen.camera.projection import view_of
@@ -274,27 +276,29 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=8)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--only", default="", help="measure only variants whose name contains this")
-    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "pareto.png")
+    charts.add_options(parser, "pareto")
     options = parser.parse_args()
+    if charts.redrawn(options, "pareto", draw):
+        return
     chosen = traced(options.cases)
-    about = machine()
-    caption = f"{len(chosen)} cases, {SIZE[0]}x{SIZE[1]}, {about}"
     variants = [variant for variant in VARIANTS if options.only in variant.name]
     points = ours(variants, chosen, options.repeats)
     points += cycles(chosen, Figures.load()) + pyrender(chosen, options.repeats)
     best = front(points)
+    figures = {**origin(), "cases": len(chosen), "size": f"{SIZE[0]}x{SIZE[1]}"}
     lines = [
-        f"{caption}, no GPU.",
+        f"{figures['cases']} cases, {figures['size']}, {figures['machine']}, no GPU.",
         "",
         "| renderer | setting | images/s per core | FLIP of objects | on the Pareto front |",
         "| --- | --- | --- | --- | --- |",
     ]
     for point in points:
-        figures = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
-        lines.append(f"| {point.renderer} | {point.setting} | {figures} |")
+        cells = f"{point.rate:.3g} | {point.error:.3f} | {'yes' if point in best else ''}"
+        lines.append(f"| {point.renderer} | {point.setting} | {cells} |")
     write_section("pareto", lines)
-    save("pareto", {**origin(), "points": [vars(point) for point in points]})
-    draw(points, caption, options.chart)
+    figures["points"] = [vars(point) for point in points]
+    save("pareto", figures)
+    charts.write(draw(figures), options.chart)
 
 
 if __name__ == "__main__":

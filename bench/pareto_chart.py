@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-import matplotlib.pyplot as plt
+import charts
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, NullLocator
 
 MARKS = {
@@ -44,15 +44,23 @@ def front(points: Sequence[Point]) -> list[Point]:
     return found
 
 
-def draw(points: Sequence[Point], caption: str, path: Path) -> None:
-    """Write the chart as PNG.
+def draw(figures: charts.Figures) -> Figure:
+    """Return the chart of the stored figures of pareto.py.
 
-    The left panel shows all points on logarithmic axes. The right panel shows fastgen's own again,
-    with names. Better is down and to the right.
+    The upper panel shows all points on logarithmic axes; better is down and to the right. The lower
+    panel lists fastgen's settings with error and rate.
     """
-    figure, (whole, near) = plt.subplots(1, 2, figsize=(13, 6.5), width_ratios=(3, 2))
+    points = [Point(**point) for point in figures["points"]]
+    figure, (whole, ours) = charts.panels(2, 1, 8.2, height_ratios=(3, 2))
+    _draw_all(points, whole)
+    _list_ours([p for p in points if p.renderer == "fastgen"], ours)
+    charts.caption(figure, figures, f"{figures['cases']} cases, {figures['size']}")
+    return figure
+
+
+def _draw_all(points: Sequence[Point], axes: Axes) -> None:
     best = front(points)
-    whole.plot(
+    axes.plot(
         [p.rate for p in best],
         [p.error for p in best],
         color="#999999",
@@ -66,55 +74,55 @@ def draw(points: Sequence[Point], caption: str, path: Path) -> None:
         mine = [p for p in points if p.renderer == renderer]
         if not mine:
             continue
-        line = "-" if renderer.startswith("Cycles") else "none"
+        traced = renderer.startswith("Cycles")
+        line = "-" if traced else "none"
+        label = "fastgen (settings below)" if renderer == "fastgen" else renderer
         rates, errors = [p.rate for p in mine], [p.error for p in mine]
-        whole.plot(rates, errors, ls=line, marker=marker, color=color, label=renderer, ms=6, lw=1.2)
-        if renderer.startswith("Cycles"):
-            for point in mine:
-                _note(whole, point, point.setting, color)
-    whole.set(xscale="log", yscale="log")
-    whole.set_xlabel(f"images per second of one core (Cycles: colour only)\n{caption}")
-    whole.set_ylabel("FLIP of objects against Cycles at 1,024 samples")
+        axes.plot(rates, errors, ls=line, marker=marker, color=color, label=label, ms=5, lw=1.2)
+        for point in mine:
+            if traced or "," not in point.setting:
+                side = -1 if renderer == "Cycles, denoised" else 1  # the two curves cross
+                axes.annotate(
+                    point.setting,
+                    (point.rate, point.error),
+                    xytext=(5 * side, 4 * -side),
+                    textcoords="offset points",
+                    ha="right" if side < 0 else "left",
+                    va="bottom" if side < 0 else "top",
+                    fontsize=7,
+                    color=color,
+                )
+    axes.set(xscale="log", yscale="log")
+    axes.set_xlabel("images per second of one core (Cycles: colour only)")
+    axes.set_ylabel("FLIP of objects against Cycles\nat 1,024 samples per pixel")
     ticks = [0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7]
-    low, high = min(p.error for p in points) / 1.2, max(p.error for p in points) * 1.2
+    low, high = min(p.error for p in points) / 1.25, max(p.error for p in points) * 1.25
     shown = [tick for tick in ticks if low < tick < high]
-    whole.set_yticks(shown, [f"{tick:g}" for tick in shown])
-    whole.yaxis.set_minor_locator(NullLocator())
-    whole.set_ylim(low, high)
-    whole.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    whole.grid(alpha=0.3)
-    whole.legend(loc="upper left", title="numbers: samples per pixel", fontsize=9)
-    _name_ours([p for p in points if p.renderer == "fastgen"], near)
-    figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    axes.set_yticks(shown, [f"{tick:g}" for tick in shown])
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.set_ylim(low, high)
+    axes.margins(x=0.08)
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper left", title="numbers: samples per pixel", title_fontsize=8)
 
 
-def _note(axes: Axes, point: Point, text: str, color: str) -> None:
-    axes.annotate(
-        text,
-        (point.rate, point.error),
-        xytext=(5, 4),
-        textcoords="offset points",
-        fontsize=8,
-        color=color,
-    )
-
-
-def _name_ours(points: Sequence[Point], axes: Axes) -> None:
-    """Draw numbered points on linear axes, with their settings listed below."""
+def _list_ours(points: Sequence[Point], axes: Axes) -> None:
+    """Draw a row for each setting: its name, error and rate."""
     marker, color = MARKS["fastgen"]
     ranked = sorted(points, key=lambda p: p.error)
-    for number, point in enumerate(ranked, 1):
-        axes.plot(point.rate, point.error, marker=marker, color=color, ms=6)
-        _note(axes, point, str(number), "black")
-    names = [f"{number}  {point.setting}" for number, point in enumerate(ranked, 1)]
-    half = -(-len(names) // 2)
-    columns = ["\n".join(names[:half]), "\n".join(names[half:])]
-    for x, text in zip((0.0, 0.56), columns, strict=True):
-        axes.text(x, -0.16, text, transform=axes.transAxes, fontsize=8, va="top")
-    axes.set_title("fastgen only", fontsize=10, color=color)
-    axes.set_xlabel("labelled images per second of one core")
-    axes.margins(0.1)
-    axes.grid(alpha=0.3)
+    axes.hlines(range(len(ranked)), 0, [p.error for p in ranked], color="#bbbbbb", lw=1)
+    axes.plot([p.error for p in ranked], range(len(ranked)), ls="none", marker=marker, color=color)
+    for row, point in enumerate(ranked):
+        axes.annotate(
+            f"{point.rate:.3g} images/s",
+            (point.error, row),
+            xytext=(7, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+        )
+    axes.set_yticks(range(len(ranked)), [p.setting for p in ranked])
+    axes.invert_yaxis()
+    axes.set_xlim(0, max(p.error for p in ranked) * 1.25)
+    axes.set_xlabel("FLIP of objects; settings of fastgen, images per second of one core")

@@ -19,6 +19,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,13 @@ from typing import Any
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import matplotlib.pyplot as plt
+import charts
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 from peer_jobs import with_effort, write_jobs
-from reporting import ROOT, machine, origin, parse_size, save
+from reporting import ROOT, origin, parse_size, save
 
 from fastgen import Config, Generator
 
@@ -217,24 +220,24 @@ def show(found: dict[str, dict[str, Any]]) -> None:
     print("cores: CPU time per image. overlap: IoU of container/markers with fastgen's ids.")
 
 
-def draw(found: dict[str, dict[str, Any]], caption: str, chart: Path) -> None:
-    """Draw bars of wall and CPU time per labelled image on a logarithmic axis."""
-    rows = {name: row for name, row in found.items() if "failed" not in row}
-    figure, axes = plt.subplots(figsize=(9, 0.7 * len(rows) + 1.6))
+def draw(figures: charts.Figures) -> Figure:
+    """Return bars of wall and CPU time per labelled image on a logarithmic axis."""
+    rows = {name: row for name, row in figures["peers"].items() if "failed" not in row}
+    figure, axes = charts.panels(1, 1, 0.55 * len(rows) + 1.0)
     for shift, key, label in ((-0.2, "image", "wall time"), (0.2, "cores", "CPU time")):
         places = np.arange(len(rows)) + shift
         values = [row[key] for row in rows.values()]
         bars = axes.barh(places, values, height=0.38, label=label)
         axes.bar_label(bars, fmt=lambda v: f"{v:,.0f} ms", padding=3, fontsize=8)
-    axes.set_yticks(np.arange(len(rows)), list(rows))
+    axes.set_yticks(np.arange(len(rows)), [textwrap.fill(name, 22) for name in rows])
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.set_xlim(1, axes.get_xlim()[1] * 5)
-    axes.set_xlabel(f"ms per labelled image (median)\n{caption}")
+    axes.set_xlabel("ms per labelled image (median)")
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
     axes.legend(loc="upper right")
-    figure.tight_layout()
-    chart.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(chart, dpi=110)
+    charts.caption(figure, figures, f"{figures['size']}, {figures['views']} views")
+    return figure
 
 
 def main() -> None:
@@ -251,8 +254,10 @@ def main() -> None:
     parser.add_argument(
         "--samples", type=int, help="samples per pixel of Cycles, instead of 16 and 128"
     )
-    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "peers.png")
+    charts.add_options(parser, "peers")
     options = parser.parse_args()
+    if charts.redrawn(options, "peers", draw):
+        return
     peers = [peer for peer in PEERS if options.only.lower() in peer.name.lower()]
     if options.install:
         for peer in {peer.environment: peer for peer in peers if peer.environment}.values():
@@ -271,14 +276,14 @@ def main() -> None:
             result = run(peer, job, out)
             found[peer.name] = result if "failed" in result else summary(result, out, truths)
             print(f"{peer.name}: {found[peer.name]}", file=sys.stderr, flush=True)
-    about = machine()
-    caption = f"{options.size}, {len(truths)} views, {about}"
-    if options.samples:
-        caption += f"; trial run: Cycles at {options.samples} spp"
-    print(caption)
+    figures = {**origin(), "size": options.size, "views": len(truths), "peers": found}
+    print(f"{options.size}, {len(truths)} views, {figures['machine']}")
     show(found)
-    save("peers", {**origin(), "size": options.size, "views": len(truths), "peers": found})
-    draw(found, caption, options.chart)
+    if options.samples:
+        print(f"trial run with {options.samples} samples per pixel in Cycles: nothing is stored")
+        return
+    save("peers", figures)
+    charts.write(draw(figures), options.chart)
 
 
 if __name__ == "__main__":

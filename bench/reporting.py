@@ -43,10 +43,23 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def save(name: str, figures: dict[str, Any]) -> None:
-    """Write bench/results/NAME.json, from which the charts in docs/ can be drawn again."""
+    """Write bench/results/NAME.json, from which `--redraw` draws the chart again."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+
+
+def stored(name: str) -> dict[str, Any]:
+    """Return the figures that `save` wrote.
+
+    Raises:
+        SystemExit: There are none.
+    """
+    path = RESULTS / f"{name}.json"
+    if not path.exists():
+        raise SystemExit(f"{path}: no such results; run python bench/{name}.py first")
+    figures: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return figures
 
 
 def write_section(

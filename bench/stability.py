@@ -38,8 +38,9 @@ from fastgen.light import prefilter
 from fastgen.light.environment import ROUGHNESS_LEVELS, EnvironmentLight, prefilter_environment
 from fastgen.light.hdri import bundled_hdris, load_radiance
 from fastgen.light.octahedral import sample_octahedral
-from fastgen.scene import Camera, Spreader
+from fastgen.scene import Spreader
 from fastgen.srgb import DECODED, encoded
+from tests.panned_camera import panned
 from tests.sky_samples import even_directions
 
 Array = NDArray[np.float64]
@@ -207,7 +208,7 @@ def of_fastgen(
             images = []
             for size in (SIZE, large):
                 frames = []
-                for view in (camera, panned(camera)):
+                for view in (camera, panned(camera, SIZE[0])):
                     frame = generator.gpu.renderer().render(
                         PreparedScene(scene), view, size, radiance=True
                     )
@@ -215,16 +216,6 @@ def of_fastgen(
                     frames.append(np.clip(frame.radiance, 0, 1))
                 images.append(np.stack(frames).astype(np.float64))
             yield images[0], images[1], ids > 0
-
-
-def panned(camera: Camera) -> Camera:
-    """Return a camera that is turned to the side by half a pixel."""
-    target = np.array(camera.target_mm)
-    ahead = target - camera.position_mm
-    side = np.cross(ahead, (0, 0, 1))
-    half_pixel = 0.5 * camera.sensor_width_mm / (SIZE[0] * camera.focal_mm) * np.linalg.norm(ahead)
-    x, y, z = target + half_pixel * side / np.linalg.norm(side)
-    return replace(camera, target_mm=(float(x), float(y), float(z)))
 
 
 def main() -> None:

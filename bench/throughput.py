@@ -2,6 +2,7 @@
 
     python bench/throughput.py [--images 200] [--scenes 12] [--sizes 320x320,640x640,...]
         [--long 2000]
+    python bench/throughput.py --redraw     # docs/throughput.png from the stored results
 
 Runs every size on EGL and OSMesa, and every quality at 640x640. Stages are timed in one process
 with warm caches, so every HDRI and mesh was used before. The rate of `fastgen generate` is given
@@ -29,8 +30,9 @@ from typing import Any, NamedTuple
 os.environ.setdefault("LP_NUM_THREADS", "0")
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import matplotlib.pyplot as plt
+import charts
 import numpy as np
+from matplotlib.figure import Figure
 from reporting import ROOT, machine, origin, parse_size, save, write_section
 
 import fastgen
@@ -233,29 +235,31 @@ def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, 
     return lines
 
 
-def draw(rows: list[dict[str, Any]], caption: str, chart: Path) -> None:
-    """Draw the stages stacked on the left and the images per second on the right."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(15, 4.6))
-    names = [f"{row['size']}\n{row['backend']}\n{row['quality']}" for row in rows]
+def draw(figures: charts.Figures) -> Figure:
+    """Return the stages stacked on the left and the images per second on the right."""
+    rows = figures["rows"]
+    figure, (left, right) = charts.panels(1, 2, 0.36 * len(rows) + 1.6, sharey=True)
     places = np.arange(len(rows))
-    below = np.zeros(len(rows))
+    before = np.zeros(len(rows))
     for stage in STAGES:
         values = np.array([row["stages_ms"][stage] for row in rows])
-        left.bar(places, values, bottom=below, label=stage)
-        below += values
-    left.set(ylabel="CPU ms per labelled image", title="one process, by stage")
+        left.barh(places, values, left=before, label=stage)
+        before += values
+    left.set(xlabel="CPU ms per labelled image", title="one process, by stage")
+    left.set_yticks(places, [f"{row['quality']}, {row['size']}, {row['backend']}" for row in rows])
     for shift, workers in zip((-0.2, 0.2), WORKERS, strict=True):
         rates = [row["images_per_s"][str(workers)] for row in rows]
-        bars = right.bar(places + shift, rates, width=0.38, label=f"{workers} worker(s)")
-        right.bar_label(bars, fmt="%.1f", fontsize=7)
-    right.set(ylabel="images per second", title="fastgen generate, start-up included")
-    for axes in (left, right):
-        axes.set_xticks(places, names, fontsize=7)
-        axes.legend(fontsize=8)
-    figure.text(0.5, 0.005, caption, ha="center", fontsize=8)
-    figure.tight_layout(rect=(0, 0.03, 1, 1))
-    chart.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(chart, dpi=110)
+        name = f"{workers} worker" + "s" * (workers > 1)
+        bars = right.barh(places + shift, rates, height=0.38, label=name)
+        right.bar_label(bars, fmt="%.1f", fontsize=7, padding=2)
+    right.set(xlabel="images per second", title="fastgen generate, start-up included")
+    right.margins(x=0.15)
+    left.invert_yaxis()
+    left.legend(loc="upper right")
+    right.legend(loc="lower right")
+    driver = ", ".join(sorted({row["driver"] for row in rows}))
+    charts.caption(figure, figures, f"{driver}; {figures['images']} images per run")
+    return figure
 
 
 def main() -> None:
@@ -267,8 +271,10 @@ def main() -> None:
     )
     parser.add_argument("--sizes", default=SIZES)
     parser.add_argument("--long", type=int, default=2000, help="images of the long runs")
-    parser.add_argument("--chart", type=Path, default=ROOT / "docs" / "throughput.png")
+    charts.add_options(parser, "throughput")
     options = parser.parse_args()
+    if charts.redrawn(options, "throughput", draw):
+        return
     about = machine()
     print(f"{about}, no GPU unless the driver says so; {options.images} images per run\n")
     rates = "".join(f"{f'{w} work.':>9}{'steady':>9}" for w in WORKERS)
@@ -284,12 +290,12 @@ def main() -> None:
         for size, backend, quality in ways
     ]
     driver = ", ".join(sorted({row["driver"] for row in rows}))
-    caption = f"{about}; {driver}; {options.images} images per run"
     print(f"\n{driver}; N work.: images per second with N workers; steady: last two thirds")
     long = options.long, long_runs(options.long)
     told = {"images": long[0], "images_per_s": long[1].whole, "steady_images_per_s": long[1].steady}
-    save("throughput", {**origin(), "images": options.images, "rows": rows, "long_runs": told})
-    draw(rows, caption, options.chart)
+    figures = {**origin(), "images": options.images, "rows": rows, "long_runs": told}
+    save("throughput", figures)
+    charts.write(draw(figures), options.chart)
     lines = table(rows, about, options.images, long)
     write_section("throughput", lines, ROOT / "docs" / "benchmarks.md")
 

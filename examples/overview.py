@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fastgen import Config, Generator
 from fastgen.files.images import jpeg, write
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, label_colors
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, depth_colors, label_colors
 from fastgen.sample import Sample
 
 CONFIG = Config.from_values(
@@ -21,15 +21,6 @@ CONFIG = Config.from_values(
 SEED, INDEX, CAMERA = 3, 1, "rear"
 SIDE, GAP, STRIP = 640, 6, 34
 """Pixels: side of the large image, gap between images, and height of the captions."""
-
-
-def depth_colors(depth_m: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Show depth [H, W] in m as colours [H, W, 3]; near is bright, and void is black."""
-    seen = np.isfinite(depth_m)
-    near, far = np.log(np.quantile(depth_m[seen], [0.0, 0.98]))
-    share = np.clip((far - np.log(np.where(seen, depth_m, 1.0))) / (far - near), 0, 1)
-    colors = cv2.applyColorMap((share * 255).astype(np.uint8), cv2.COLORMAP_VIRIDIS)
-    return np.where(seen[..., None], colors[..., ::-1], 0).astype(np.uint8)
 
 
 def captioned(image: NDArray[np.uint8], side: int, words: str) -> NDArray[np.uint8]:

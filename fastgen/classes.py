@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
+from fastgen import plugins
+
 MARKER_CLASSES = (
     *("C1.1", "C1.2", "C1.3", "C1.4", "C2.1", "C2.2", "C2.3", "C2.4", "C2.5", "C3.1", "C3.2"),
     *("C4.1", "C4.2", "C4.3", "C4.4", "C5.1", "C5.2", "C5.3", "C6.1", "C6.2"),
@@ -31,8 +33,21 @@ ALL_DETECTION_CLASSES = (*DETECTION_CLASSES, *MARK_CLASSES)
 DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
 """The four kinds of the SeaFront paper, section 3.3.2."""
 
-ALL_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
-"""The paper's kinds, and scrapes, which are drawn only if `damage.kinds` lists them."""
+DRAWN_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
+"""Kinds that every renderer can draw. It compiles others if a configuration or scene has them."""
+
+BUNDLED_DAMAGE_CLASSES = (*DRAWN_DAMAGE_CLASSES, "rust_through", "missing_paint", "graffiti")
+"""Kinds of fastgen; each is a module of fastgen.damages. New ones are appended."""
+
+DAMAGE_GROUP = "fastgen.damages"
+"""Entry points by which packages offer kinds of damage."""
+
+PACKAGE_DAMAGE_CLASSES = tuple(plugins.names(DAMAGE_GROUP))
+"""Kinds of installed packages, which are not loaded for their names."""
+
+ALL_DAMAGE_CLASSES = tuple(dict.fromkeys((*BUNDLED_DAMAGE_CLASSES, *PACKAGE_DAMAGE_CLASSES)))
+"""All kinds: those of fastgen, then those of packages in alphabetical order. Only the paper's are
+drawn unless `damage.kinds` lists others."""
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 """The five classes of the damage task, in the order of YOLO labels."""
@@ -40,6 +55,10 @@ SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 ALL_SEGMENTATION_CLASSES = ("container", *ALL_DAMAGE_CLASSES)
 """COCO category i + 1 is ALL_SEGMENTATION_CLASSES[i]; mask value is category * 100 + instance. The
 first five are SEGMENTATION_CLASSES."""
+
+MOST_DAMAGE_CLASSES = 250
+"""Most kinds that labels can number: semantic masks have 8 bits, and mask values stay below
+SPREADER_ID."""
 
 
 def segmentation_classes(kinds: Iterable[str]) -> tuple[str, ...]:
@@ -56,6 +75,9 @@ UNDAMAGED_CONTAINER = 101
 
 DAMAGE_VALUES = range(200, (len(ALL_SEGMENTATION_CLASSES) + 1) * 100)
 """Mask values of damages: category * 100 + instance. They are also the ids of damages."""
+
+UNDAMAGED_CLASSES = ("container", "text", "spreader", "seal")
+"""Classes of labels that are neither damages nor decals with artwork."""
 
 OTHER_CLASSES = frozenset({*ALL_DAMAGE_CLASSES, "spreader", "seal"})
 """Classes of labels that do not belong to the marker task."""

@@ -1,6 +1,8 @@
 """Errors that a user can act on: they name the file, field or value and say what to do."""
 
+import difflib
 import reprlib
+from collections.abc import Iterable
 from typing import Any
 
 from fastgen.redaction import without_secrets
@@ -10,6 +12,9 @@ _LONGEST = 4000
 
 _LONGEST_NAME = 80
 """Most characters of a name or key."""
+
+_MOST_CHOICES = 60
+"""Most names that a message lists."""
 
 
 def one_line(text: str) -> str:
@@ -36,6 +41,25 @@ def shown_name(name: object) -> str:
     """Return a name or key as it is, or quoted and cut if it is long or not printable."""
     text = name if isinstance(name, str) else shown(name)
     return text if text.isprintable() and len(text) <= _LONGEST_NAME else shown(text)
+
+
+def did_you_mean(word: Any, choices: Iterable[str]) -> str:
+    """Return the hint ' (did you mean X?)' for a mistyped word; '' if it resembles no choice."""
+    names = sorted(choices)
+    text = word if isinstance(word, str) else shown(word)
+    alike = [name for name in names if name.casefold() == text.casefold()]
+    close = alike or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def nearest(word: Any, choices: Iterable[str]) -> str:
+    """Return the hint ' (did you mean X?)' for a mistyped word, or the list of choices."""
+    names = sorted(choices)
+    hint = did_you_mean(word, names)
+    if hint:
+        return hint
+    more = f" and {len(names) - _MOST_CHOICES} more" if len(names) > _MOST_CHOICES else ""
+    return f" (choose from {', '.join(names[:_MOST_CHOICES])}{more})"
 
 
 class _Short(reprlib.Repr):

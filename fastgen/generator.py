@@ -11,7 +11,7 @@ from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
 from fastgen.classes import with_marks
 from fastgen.config.config import Config, LabelConfig
 from fastgen.decals.own_art import art_of
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, nearest
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.background import background_objects
 from fastgen.labels.objects import label
@@ -34,7 +34,7 @@ from fastgen.sampling.lens_check import check_lenses
 from fastgen.sampling.scene import sample_scene, stream
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import OwnDecals, check_camera, check_scene
-from fastgen.validation import check_fields, check_known, nearest, whole
+from fastgen.validation import check_fields, check_known, whole
 
 
 def find_camera(scene: Scene, name: str | None = None) -> Camera:
@@ -112,7 +112,7 @@ class Generator:
                 Renderer,
                 light=partial(_load_light, self._hdris),
                 quality=QUALITY[quality],
-                mask_threshold_mm=self.config.damage.mask_threshold_mm,
+                damage=self.config.damage,
                 own_art={name: art_of(text) for name, text in own_art.items()},
             ),
         )

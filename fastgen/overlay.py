@@ -2,6 +2,7 @@
 
 import colorsys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol
 from zlib import crc32
@@ -53,6 +54,15 @@ _SURROUNDINGS = (150, 150, 150)
 _LINE_PX = 1000
 """Image side in pixels for each pixel of line width."""
 
+_FONT, _LETTERS = cv2.FONT_HERSHEY_SIMPLEX, 0.36
+"""Font of captions, and its scale for lines of one pixel."""
+
+_REACH = 10
+"""Distance in line heights up to which a caption may be moved."""
+
+_HIDING, _COVERING = 30.0, 60.0
+"""Distance in line heights that is as bad as hiding a whole box, or as covering a caption."""
+
 ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
 DAMAGE_GREYS = MappingProxyType(
     {UNDAMAGED_CONTAINER + k: 200 - 8 * k for k in range(1 + MAX_NEIGHBOURS)}
@@ -89,55 +99,131 @@ def _color(number: int, saturation: float, brightness: float) -> tuple[int, int,
     return r, g, b
 
 
-def draw_box(
-    image: Image, box: tuple[float, float, float, float], class_name: str, caption: str = ""
-) -> None:
-    """Draw a box in the colour of its class.
+@dataclass(frozen=True)
+class Outline:
+    """An outline to draw in the colour of its class, with a caption.
 
-    Lines and letters are larger in large images, so that they are visible in the whole image.
+    Attributes:
+        points: Polygon [N, 2] in pixels along the outer borders of pixels.
+        class_name: Class, which decides the colour.
+        caption: Text at the outline.
+    """
+
+    points: NDArray[np.floating]
+    class_name: str
+    caption: str
+
+    @staticmethod
+    def of_box(
+        box: tuple[float, float, float, float], class_name: str, caption: str = ""
+    ) -> "Outline":
+        """Return the outline of a box (x0, y0, x1, y1) in pixels, where x1 and y1 are exclusive."""
+        x0, y0, x1, y1 = box
+        x1, y1 = x1 - 1, y1 - 1
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], float)
+        return Outline(corners, class_name, caption or class_name)
+
+
+def draw_outlines(image: Image, outlines: Sequence[Outline]) -> None:
+    """Draw outlines with captions that cover other outlines as little as possible.
+
+    A caption without room beside its outline is moved away and connected to it by a line. Lines and
+    letters are larger in large images, so that they are visible in the whole image.
 
     Args:
         image: uint8 RGB [H, W, 3], changed in place.
-        box: (x0, y0, x1, y1) in pixels; x1 and y1 are exclusive.
-        class_name: Class, which decides the colour.
-        caption: Text at the box; by default the class name.
+        outlines: Outlines; later ones are drawn over earlier ones.
     """
-    x0, y0, x1, y1 = (round(v) for v in box)
-    color = class_color(class_name)
-    cv2.rectangle(image, (x0, y0), (x1 - 1, y1 - 1), color, _line(image))
-    _write(image, x0, y0, caption or class_name, color)
+    if not outlines:
+        return
+    line = _line(image)
+    most = np.array(image.shape[1::-1]) - 1
+    boxes = np.array([(*each.points.min(axis=0), *each.points.max(axis=0)) for each in outlines])
+    for outline in outlines:
+        pixels = np.clip(np.rint(outline.points), 0, most).astype(np.int32)
+        smooth = cv2.LINE_AA if len(pixels) > 4 else cv2.LINE_8
+        cv2.polylines(image, [pixels], True, class_color(outline.class_name), line, smooth)
+    taken = np.zeros((0, 4))
+    captions = []
+    for i in np.argsort(_areas(boxes), kind="stable"):  # small objects have the least choice
+        text = cv2.getTextSize(outlines[i].caption, _FONT, _LETTERS * line, line)
+        (width, height), base = text
+        place = caption_place(boxes, int(i), (width, height + base), taken, image.shape[1::-1])
+        taken = np.concatenate([taken, place[None]])
+        captions.append((outlines[i], boxes[i], place, base))
+    for outline, box, place, _ in captions:
+        start, end = _gap(box, place)
+        if np.abs(end - start).max() > 2 * line:
+            a, b = np.rint([start, end]).astype(int).tolist()
+            cv2.line(image, a, b, class_color(outline.class_name), line, cv2.LINE_AA)
+    for outline, _, place, base in captions:
+        x0, y0, x1, y1 = np.rint(place).astype(int).tolist()
+        cv2.rectangle(image, (x0, y0), (x1, y1), class_color(outline.class_name), -1)
+        scale, black = _LETTERS * line, (0, 0, 0)
+        cv2.putText(image, outline.caption, (x0, y1 - base), _FONT, scale, black, line, cv2.LINE_AA)
 
 
-def draw_outline(image: Image, points: NDArray[np.floating], class_name: str) -> None:
-    """Draw a closed polygon in the colour of its class, with the class name.
+def caption_place(
+    boxes: NDArray[np.floating],
+    index: int,
+    size: tuple[int, int],
+    taken: NDArray[np.floating],
+    image_size: Sequence[int],
+) -> NDArray[np.float64]:
+    """Return the place of a caption near its box: a compromise of closeness and what it covers.
 
     Args:
-        image: uint8 RGB [H, W, 3], changed in place.
-        points: Polygon [N, 2] along the outer borders of pixels.
-        class_name: Class, which decides the colour.
+        boxes: x0, y0, x1 and y1 of all boxes [N, 4] in pixels.
+        index: Box of the caption.
+        size: Width and height of the caption.
+        taken: Places of the captions so far [K, 4], which it avoids.
+        image_size: Width and height of the image.
+
+    Returns:
+        x0, y0, x1 and y1, float64 [4].
     """
-    pixels = np.rint(np.minimum(points, np.array(image.shape[1::-1]) - 1)).astype(np.int32)
-    color = class_color(class_name)
-    cv2.polylines(image, [pixels], True, color, _line(image), cv2.LINE_AA)
-    left, top = pixels.min(axis=0).tolist()
-    _write(image, left, top, class_name, color)
+    width, height = size
+    x0, y0, x1, y1 = boxes[index]
+    steps = np.arange(-_REACH, _REACH + 1) * height
+    x = np.concatenate([x0 + steps, [x1, x0 - width, x1 - width]])
+    y = np.concatenate([y0 - height + steps, [y0, y1, y1 - height]])
+    x = np.clip(x, 0, max(image_size[0] - width - 1, 0))
+    y = np.clip(y, 0, max(image_size[1] - height - 1, 0))
+    corners = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    places = np.concatenate([corners, corners + (width, height)], axis=1)
+    hidden = _overlaps(places, boxes) / _areas(boxes)
+    covered = _overlaps(places, taken) / (width * height)
+    away = np.linalg.norm(np.subtract(*_gap(boxes[index], places)), axis=-1) / height
+    # ties go to the caption above the left corner
+    usual = np.linalg.norm(corners - (x0, y0 - height), axis=1) / height
+    cost = _HIDING * hidden.sum(axis=1) + _COVERING * covered.sum(axis=1) + away + 0.1 * usual
+    return np.asarray(places[int(cost.argmin())])
+
+
+def _areas(boxes: NDArray[np.floating]) -> NDArray[np.float64]:
+    sides = np.maximum(boxes[:, 2:] - boxes[:, :2], 1.0)
+    return np.asarray(sides.prod(axis=1))
+
+
+def _overlaps(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the areas [A, B] that boxes [A, 4] and [B, 4] share."""
+    low = np.maximum(a[:, None, :2], b[None, :, :2])
+    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+    return np.asarray(np.maximum(high - low, 0).prod(axis=-1))
+
+
+def _gap(
+    a: NDArray[np.floating], b: NDArray[np.floating]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the points [..., 2] of boxes [..., 4] a and b that are nearest to each other."""
+    middle = (np.maximum(a[..., :2], b[..., :2]) + np.minimum(a[..., 2:], b[..., 2:])) / 2
+    return tuple(np.clip(middle, box[..., :2], box[..., 2:]) for box in (a, b))
 
 
 def _line(image: Image) -> int:
     """Return the width of lines in pixels."""
     width: int = max(round(max(image.shape[:2]) / _LINE_PX), 1)
     return width
-
-
-def _write(image: Image, left: int, bottom: int, text: str, color: tuple[int, int, int]) -> None:
-    """Write on a background of `color`, above a row if there is space, else below it."""
-    line, font = _line(image), cv2.FONT_HERSHEY_SIMPLEX
-    (width, height), base = cv2.getTextSize(text, font, 0.36 * line, line)
-    top = bottom - height - base if bottom - height - base >= 0 else bottom
-    left = max(min(left, image.shape[1] - width), 0)
-    cv2.rectangle(image, (left, top), (left + width, top + height + base), color, -1)
-    place = left, top + height
-    cv2.putText(image, text, place, font, 0.36 * line, (0, 0, 0), line, cv2.LINE_AA)
 
 
 def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
@@ -154,6 +240,25 @@ def label_colors(labels: NDArray[np.uint16], greys: Mapping[int, int]) -> Image:
     values, inverse = np.unique(labels, return_inverse=True)
     palette = np.array([_label_color(int(value), greys) for value in values], np.uint8)
     return palette[inverse.reshape(labels.shape)]
+
+
+def depth_colors(depth_m: NDArray[np.float32]) -> Image:
+    """Show a depth image in colours, in equal steps of its logarithm.
+
+    Args:
+        depth_m: Depth [H, W] in metres, infinite where void.
+
+    Returns:
+        uint8 [H, W, 3]. The nearest pixel is bright; the farthest 2% are dark, and void is black.
+    """
+    seen = np.isfinite(depth_m)
+    if not seen.any():
+        return np.zeros((*depth_m.shape, 3), np.uint8)
+    near, far = np.log(np.quantile(depth_m[seen], [0.0, 0.98]))
+    share = (far - np.log(np.where(seen, depth_m, 1.0))) / max(float(far - near), 1e-6)
+    levels = (np.clip(share, 0, 1) * 255).astype(np.uint8)
+    colors = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS)[..., ::-1], np.uint8)
+    return np.where(seen[..., None], colors, np.uint8(0))
 
 
 def _label_color(value: int, greys: Mapping[int, int]) -> tuple[int, ...]:
@@ -183,8 +288,10 @@ def overlay(image: Image, damage: NDArray[np.uint16], objects: Sequence[Drawn]) 
         if item.bbox is not None and item.background:
             x0, y0, x1, y1 = item.bbox
             cv2.rectangle(drawn, (x0, y0), (x1 - 1, y1 - 1), _SURROUNDINGS, 1)
-    for item in objects:
-        if item.bbox is not None and not item.background:
-            caption = f"{item.class_name} {item.instance}"
-            draw_box(drawn, item.bbox, item.class_name, caption)
+    outlines = [
+        Outline.of_box(item.bbox, item.class_name, f"{item.class_name} {item.instance}")
+        for item in objects
+        if item.bbox is not None and not item.background
+    ]
+    draw_outlines(drawn, outlines)
     return drawn.view(Picture)

@@ -1,7 +1,8 @@
 """Presets and formats of other packages, which they offer as entry points (PyPA specification)."""
 
 from collections.abc import Mapping
-from importlib.metadata import EntryPoint, entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import TypeVar
 
 from fastgen.errors import ConfigError
@@ -12,7 +13,7 @@ T = TypeVar("T")
 
 def names(group: str) -> list[str]:
     """Return the names of the entry points of a group in alphabetical order; loads no package."""
-    return sorted(entry_points(group=group).names)
+    return sorted(_offered(group).names)
 
 
 def chosen(field: str, name: str, own: Mapping[str, T], group: str, kind: type[T]) -> T:
@@ -29,7 +30,7 @@ def chosen(field: str, name: str, own: Mapping[str, T], group: str, kind: type[T
         ConfigError: The name is unknown or given twice, or the entry point cannot be used.
     """
     check_known(field, name, {*own, *names(group)})
-    found = list(entry_points(group=group, name=name))
+    found = list(_offered(group).select(name=name))
     if name not in own and len(found) == 1:
         return _loaded(field, found[0], kind)
     if name in own and not found:
@@ -39,6 +40,12 @@ def chosen(field: str, name: str, own: Mapping[str, T], group: str, kind: type[T
         f"{field}: {name} is offered by {' and '.join(owners)}; uninstall one or rename its entry "
         f"point of the group {group}"
     )
+
+
+@cache
+def _offered(group: str) -> EntryPoints:
+    """Return the entry points of a group, read once: there is a file for each installed package."""
+    return entry_points(group=group)
 
 
 def _loaded(field: str, entry: EntryPoint, kind: type[T]) -> T:

@@ -2,17 +2,14 @@
 
 The type of a dataclass field declares its limits, for example `Annotated[Range, Bounds(0, 1)]` or
 `Annotated[str, OneOf(FACES)]`. pydantic enforces these types; the YAML comments and the JSON Schema
-of configurations show them. This module translates pydantic's errors to ConfigError.
+of configurations show them. `validation_messages` translates pydantic's errors to ConfigError.
 
 Importing pydantic takes about 0.1 s. The first validation does it, not the import of this module.
 """
 
 import dataclasses
-import difflib
 import functools
-import math
 import numbers
-import types
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
@@ -20,23 +17,17 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from fastgen.errors import ConfigError, shown, shown_name
+from fastgen.errors import ConfigError, nearest, shown
+from fastgen.validation_messages import NUMBER, PAIR, in_words, is_number
 
 if typing.TYPE_CHECKING:
     from pydantic import TypeAdapter
-    from pydantic_core import CoreSchema, ErrorDetails
+    from pydantic_core import CoreSchema
 
 T = TypeVar("T")
 
-_PAIR = "[lowest, highest]"
-_NUMBER = "[number]"
-"""Tags in the location of pydantic's errors, for the two ways to write a range."""
-
 FOLDER = "folder"
 """Key of the folder of relative paths in the context of pydantic's validators."""
-
-_MOST_CHOICES = 60
-"""Most names that a message lists."""
 
 
 class Range(NamedTuple):
@@ -74,8 +65,8 @@ class Bounds(NamedTuple):
         make, kind = (Range._make, float) if source is Range else (tuple, int)
         number = self._number_schema(kind)
         pair = core_schema.tagged_union_schema(
-            {_NUMBER: number, _PAIR: core_schema.tuple_schema([number, number])},
-            lambda value: _NUMBER if _is_number(value) else _PAIR,
+            {NUMBER: number, PAIR: core_schema.tuple_schema([number, number])},
+            lambda value: NUMBER if is_number(value) else PAIR,
         )
         return core_schema.no_info_after_validator_function(
             functools.partial(self._ordered, make), pair
@@ -142,7 +133,7 @@ class _Strict:
 
 
 def _refusing(kind: str, schema: "CoreSchema", **context: Any) -> "CoreSchema":
-    """Return a schema whose errors have type `kind` and the `context` for `_in_words`."""
+    """Return a schema whose errors have type `kind` and the `context` for `in_words`."""
     from pydantic_core import core_schema
 
     return core_schema.custom_error_schema(
@@ -158,18 +149,6 @@ LENGTH = Bounds(0.0, 20000.0, "mm")
 
 Flag = Annotated[bool, _Strict()]
 Share = Annotated[float, UNIT]
-
-
-def nearest(word: Any, choices: Iterable[str]) -> str:
-    """Return the hint ' (did you mean X?)' for a mistyped word, or the list of choices."""
-    names = sorted(choices)
-    text = word if isinstance(word, str) else shown(word)
-    alike = [name for name in names if name.casefold() == text.casefold()]
-    close = alike or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
-    if close:
-        return f" (did you mean {close[0]}?)"
-    more = f" and {len(names) - _MOST_CHOICES} more" if len(names) > _MOST_CHOICES else ""
-    return f" (choose from {', '.join(names[:_MOST_CHOICES])}{more})"
 
 
 def check_known(name: str, value: Any, choices: Collection[str]) -> None:
@@ -199,10 +178,10 @@ def whole(name: str, value: Any, least: int = 0, most: int = 2**63 - 1) -> int:
         ConfigError: otherwise; the message starts with `name`.
     """
     value = value.item() if isinstance(value, np.generic) else value  # float16 ends at 65504
-    is_number = _is_number(value)
-    if is_number and least <= value <= most and value == int(value):
+    numeric = is_number(value)
+    if numeric and least <= value <= most and value == int(value):
         return int(value)
-    too_large = is_number and value > most
+    too_large = numeric and value > most
     wanted = f"{least} to {most}" if too_large or most < 2**63 - 1 else f"{least} or more"
     raise ConfigError(f"{name}: {shown(value)} is not a whole number of {wanted}")
 
@@ -239,7 +218,7 @@ def from_plain(
         values = _over(base, data)
     except RecursionError:  # a value contains itself, so no field accepts it
         values = data
-    made: T = _validated(cls, values, path, strict=None, folder=folder)
+    made: T = _validated(cls, values, path, strict=None, folder=folder, base=base)
     return made
 
 
@@ -277,7 +256,7 @@ def _over(base: Any, new: Any) -> Any:
     old = base if isinstance(base, Mapping) else inherited
     # YAML reads the name 20 as a number. Names like no or ~ become other types and are refused.
     named = {
-        str(key) if _is_number(key) else key: _over(old.get(key), item) for key, item in new.items()
+        str(key) if is_number(key) else key: _over(old.get(key), item) for key, item in new.items()
     }
     return {**inherited, **named}
 
@@ -287,10 +266,6 @@ def _integral(value: Any) -> Any:
     if isinstance(value, (bool, str, bytes)):
         raise ValueError
     return int(value) if isinstance(value, numbers.Integral) else value
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 @functools.cache
@@ -303,7 +278,12 @@ def adapter(cls: type) -> "TypeAdapter[Any]":
 
 
 def _validated(
-    cls: type, value: Any, path: str, strict: bool | None, folder: Path | None = None
+    cls: type,
+    value: Any,
+    path: str,
+    strict: bool | None,
+    folder: Path | None = None,
+    base: Any = None,
 ) -> Any:
     from pydantic import ValidationError
 
@@ -311,109 +291,4 @@ def _validated(
         context = {FOLDER: folder or Path()}
         return adapter(cls).validate_python(value, strict=strict, context=context)
     except ValidationError as error:
-        raise _in_words(cls, error.errors(include_url=False), path) from None
-
-
-def _in_words(cls: type, errors: "list[ErrorDetails]", root: str) -> ConfigError:
-    """Return the first of pydantic's errors as a ConfigError.
-
-    Unknown keys come first, because a misspelt key also leaves a field missing.
-    """
-    error = min(errors, key=lambda each: each["type"] != "unexpected_keyword_argument")
-    kind, loc, value, context = error["type"], error["loc"], error["input"], error.get("ctx", {})
-    if kind == "missing":
-        loc = loc[:-1]
-        missing = [e["loc"][-1] for e in errors if e["type"] == kind and e["loc"][:-1] == loc]
-    if kind == "invalid_key":
-        loc = (*loc, "[key]")
-    is_key = loc[-1:] == ("[key]",)
-    path = _path(root, loc[:-2] if is_key else loc)
-    got = f"got {shown(value)}"
-    match kind:
-        case "value_error":  # from __post_init__; its message begins with the field
-            return ConfigError(f"{path}.{context['error']}" if path else str(context["error"]))
-        case "words":
-            words = context["words"]
-        case "unexpected_keyword_argument":
-            words = f"unknown key{nearest(loc[-1], _fields_at(cls, loc[:-1]))}"
-        case "tuple_type" | "too_long" | "missing" if loc[-1:] == (_PAIR,):
-            words = f"expected {_PAIR} or one number, {got}{_unquoted(value)}"
-        case "missing" if isinstance(missing[0], int):
-            words = f"expected {int(missing[-1]) + 1} values, got {missing[0]}"
-        case "missing":
-            words = f"missing {', '.join(map(str, missing))}"
-        case "too_long":
-            words = f"expected at most {context['max_length']} values, got {len(value)}"
-        case "too_short":
-            words = f"{shown(value)} is empty; give at least one"
-        case "tuple_type":
-            instead = f"; write [{shown(value)}]" if isinstance(value, str) else ""
-            words = f"expected a {'tuple' if isinstance(value, list) else 'list'}, {got}{instead}"
-        case "dict_type":
-            words = f"expected a mapping, {got}"
-        case "dataclass_type":
-            instead = "; remove the key, or write {}" if value is None and path else ""
-            words = f"expected a mapping of fields, {got}{instead}"
-        case "dataclass_exact_type":
-            words = f"expected a {context['class_name']}, {got}"
-        case "bool_type":
-            words = f"expected true or false, {got}"
-        case "number" if not _is_number(value):
-            words = f"expected a number, {got}{_unquoted(value)}"
-        case "number" if not context["bounds"].lo <= value <= context["bounds"].hi:
-            words = f"{shown(value)} is out of range; give {context['bounds'].words}"
-        case "number":
-            words = f"expected a whole number, {got}"
-        case "choice":
-            words = f"{shown(value)} is unknown{nearest(value, context['choices'])}"
-        case "text" if isinstance(value, str):
-            words = f"{shown(value)} {context['otherwise']}"
-        case _ if is_key:
-            words = f"expected a name, {got}; put it in quotes"
-        case "text" | "string_type":
-            words = f"expected text, {got}{_quoted(value)}"
-        case _:
-            words = f"{error['msg']}, {got}"
-    return ConfigError(f"{path or cls.__name__}: {words}")
-
-
-def _path(root: str, loc: tuple[int | str, ...]) -> str:
-    """Return a location as users write it, for example 'cameras.A.lens.k1'."""
-    path = root
-    for step in loc:
-        if step in (_PAIR, _NUMBER):
-            break
-        name = f"[{step}]" if isinstance(step, int) else shown_name(step)
-        path += f".{name}" if path and isinstance(step, str) else name
-    return path
-
-
-def _fields_at(cls: type, loc: tuple[int | str, ...]) -> list[str]:
-    """Return the field names of the dataclass at a location below `cls`."""
-    hint: Any = cls
-    for step in (*loc, None):
-        if isinstance(hint, types.UnionType):
-            hint = typing.get_args(hint)[0]
-        if step is None:
-            break
-        if dataclasses.is_dataclass(hint):
-            hint = typing.get_type_hints(hint)[str(step)]
-        else:
-            hint = typing.get_args(hint)[0 if isinstance(step, int) else 1]
-    return [field.name for field in dataclasses.fields(hint)]
-
-
-def _quoted(value: Any) -> str:
-    """Return a hint for text that YAML read as another type."""
-    if value is None:
-        return "; if it began with #, quote it, because # begins a comment in YAML"
-    return "; put it in quotes" if _is_number(value) else ""
-
-
-def _unquoted(value: Any) -> str:
-    """Return a hint for a number that was given as text."""
-    try:
-        number = float(value) if isinstance(value, str) else math.nan
-    except ValueError:
-        return ""
-    return f" (text; write {number:g} without quotes)" if math.isfinite(number) else ""
+        raise in_words(cls, error.errors(include_url=False), path, base) from None

@@ -1,5 +1,5 @@
 // DamageField creased_field(int i, vec3 q): flat parts between sharp folds, at local coordinates q.
-// Twin of fastgen/geometry/damage_forms/creased.py.
+// Twin of fastgen/damages/creased.py.
 
 #include "units.constants"
 #include "damage.constants"

@@ -1,7 +1,9 @@
-// DamageField: displacement of one damage. float sheet_fade(float w): weight of its field.
-// Functions for the forms of damage in damage_*.glsl. Twin of fastgen/geometry/damage_forms/form.py.
+// DamageField: displacement of one damage. DamageMark: what a damage without displacement changes.
+// float sheet_fade(float w): weight of a field. float damage_fresh(int i): Damage.fresh of damage i.
+// Functions for the forms of damage in damage_*.glsl. Twin of fastgen/damages/fields.py.
 
 #include "damage.constants"
+#include "damage.block"
 
 struct DamageField {
     float amount;   // Displacement along the inward axis, mm.
@@ -11,6 +13,16 @@ struct DamageField {
     // Wear of the bent steel, 0..1. Its weights are artistic choices.
     float scar;
 };
+
+struct DamageMark {
+    bool here;     // In the mask of the damage.
+    float wear;    // Share of the surface that it covers, 0..1; 0 outside the mask.
+    float fresh;   // Share of that which has not rusted.
+    vec3 albedo;   // Of the fresh share.
+    bool covers;   // Hides the marks of earlier kinds below it.
+};
+
+float damage_fresh(int i) { return damage_shape[3 * i + 2].w; }
 
 // A smooth hill, (1 - t^2)^2 up to |t| = 1 and 0 beyond, and its derivative.
 float bump(float t) { float s = max(1.0 - t * t, 0.0); return s * s; }
@@ -35,4 +47,28 @@ vec3 lesser(vec3 a, vec3 b, float softness) {
 // Weight of a field at w mm behind its face: a damage must not move the opposite wall.
 float sheet_fade(float w) {
     return 1.0 - smoothstep(DAMAGE_FADE_START_MM, DAMAGE_FADE_END_MM, abs(w));
+}
+
+// Whether a surface w mm behind its face is near enough to be marked.
+bool in_contact(float w, float contact_mm) { return w < contact_mm && w > -DAMAGE_PROUD_MM; }
+
+// Smooth noise between -1 and 1, a sum of waves.
+float ripples(vec2 at, float scale_mm, float phase) {
+    vec2 p = at / scale_mm;
+    p += 0.7 * vec2(sin(1.3 * p.y + phase), sin(1.1 * p.x - 2.0 * phase));
+    float total = 0.0, size = 0.327;
+    for (int k = 0; k < 5; ++k) {
+        float turn = 2.4 * float(k) + phase, c = cos(turn), s = sin(turn);
+        total += size * sin(c * p.x - s * p.y + 1.7 * float(k)) * cos(s * p.x + c * p.y + phase);
+        p *= 1.53;
+        size *= 0.75;
+    }
+    return total;
+}
+
+// Above 0 in a patch with a ragged outline.
+float patch_field(int i, vec2 at) {
+    vec4 shape = damage_shape[3 * i];   // Scale, phase, height.
+    vec2 t = at / vec2(damage_along[i].w, damage_across[i].w);
+    return ripples(at, shape.x, shape.y) - 1.0 + (1.0 + shape.z) * (1.0 - dot(t, t));
 }

@@ -1,5 +1,5 @@
 // DamageField kinked_field(int i, vec3 q): a notch of an edge, at local coordinates q.
-// Twin of fastgen/geometry/damage_forms/kinked.py.
+// Twin of fastgen/damages/kinked.py.
 
 #include "damage.block"
 #include "damage_field.glsl"

@@ -7,13 +7,8 @@
 #include "damage.constants"
 #include "damage.block"
 #include "damage_field.glsl"
-#include "damage_plain.glsl"
-#include "damage_torn.glsl"
-#include "damage_ribs.glsl"
-#include "damage_creased.glsl"
-#include "damage_kinked.glsl"
-#include "damage_scraped.glsl"
 #include "scar.glsl"
+#include "damage.forms"
 
 // Coordinates of p along, across and inward from the origin of damage i, in mm.
 vec3 damage_local(int i, vec3 p) {
@@ -55,14 +50,15 @@ bool within_reach(int i, vec3 p) {
     return all(lessThan(abs(damage_local(i, p)), damage_reach[i].xyz + REACH_MARGIN_MM));
 }
 
-// Runs USE(i, field) for all damages of one form that may act on p. EACH_DAMAGE(USE) of damage.constants
-// has such a loop for each form: one loop with branches would cost the work of all forms per damage on
-// llvmpipe, which executes both sides of every branch.
-#define EACH_NEAR(FROM, END, FIELD, USE)                      \
+// Runs USE(i, change) for all damages of one form that may act on p. EACH_DAMAGE(USE) of damage.constants
+// has such a loop for each form that moves sheet, EACH_MARK(USE) for each that does not: one loop with
+// branches would cost the work of all forms per damage on llvmpipe, which executes both sides of every
+// branch.
+#define EACH_NEAR(FROM, END, TYPE, CHANGE, USE)               \
     for (int i = next_damage_near(FROM, END, p); i < END;     \
          i = next_damage_near(i + 1, END, p)) {               \
-        DamageField field = FIELD(i, damage_local(i, p));     \
-        USE(i, field);                                        \
+        TYPE change = CHANGE(i, damage_local(i, p));          \
+        USE(i, change);                                       \
     }
 
 vec3 deformed(vec3 p) {
@@ -80,10 +76,9 @@ struct DamageSample {
     uint value;
 };
 
-void add_scar(inout Scar scar, int i, float wear) {
+void add_scar(inout Scar scar, int i, float wear, float fresh, vec3 albedo, bool over_repairs) {
     wear *= damage_bare[i].w;
-    if (wear > scar.wear)
-        scar = Scar(wear, damage_shape[3 * i + 2].w, damage_bare[i].rgb, i >= FIRST_SCRAPE);
+    if (wear > scar.wear) scar = Scar(wear, fresh, albedo, over_repairs);
 }
 
 DamageSample damage_at(vec3 p) {
@@ -95,20 +90,19 @@ DamageSample damage_at(vec3 p) {
                  field.slope.z * damage_inward[i].xyz;                                      \
     d.bend += outerProduct(damage_inward[i].xyz, slope);                                    \
     moved += field.amount * damage_inward[i].xyz;                                           \
-    add_scar(d.scar, i, field.scar);                                                        \
+    add_scar(d.scar, i, field.scar, damage_fresh(i), damage_bare[i].rgb, false);            \
     if (abs(field.amount) > most) {                                                         \
         most = abs(field.amount);                                                           \
         d.value = uint(damage_reach[i].w);                                                  \
     }
     EACH_DAMAGE(SAMPLE)
     if (length(moved) < damage_threshold_mm) d.value = 0u;
-    for (int i = next_damage_near(FIRST_SCRAPE, scrape_plain_end, p); i < scrape_plain_end;
-         i = next_damage_near(i + 1, scrape_plain_end, p)) {
-        vec3 q = damage_local(i, p);
-        bool here = scraped(i, q);
-        if (here && d.value == 0u) d.value = uint(damage_reach[i].w);
-        add_scar(d.scar, i, here ? scrape_wear(i, q) : 0.0);
-    }
+    bool covered = false;
+#define SAMPLE_MARK(i, mark)                                                                        \
+    if (mark.here && d.value == 0u) d.value = uint(damage_reach[i].w);                              \
+    add_scar(d.scar, i, mark.here && !covered ? mark.wear : 0.0, mark.fresh, mark.albedo, true);    \
+    covered = covered || (mark.here && mark.covers);
+    EACH_MARK(SAMPLE_MARK)
     return d;
 }
 

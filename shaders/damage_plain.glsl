@@ -1,6 +1,6 @@
 // DamageField star_field, fold_field, bow_field and edge_field(int i, vec3 q): the four kinds of section
 // 3.3.2 of the SeaFront paper, at local coordinates q of damage i. float outside_star(int i, vec2 q):
-// distance in mm from its hole. Twin of fastgen/geometry/damage_forms/plain.py.
+// distance in mm from its hole. Twin of fastgen/damages/plain.py.
 
 #include "units.constants"
 #include "damage.block"

@@ -1,5 +1,5 @@
 // DamageField ribs_field(int i, vec3 q): crush marks on the outer ribs, at local coordinates q.
-// Twin of fastgen/geometry/damage_forms/ribs.py.
+// Twin of fastgen/damages/ribs.py.
 
 #include "units.constants"
 #include "damage.block"

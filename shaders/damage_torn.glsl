@@ -1,6 +1,6 @@
 // DamageField torn_field(int i, vec3 q): lips of torn sheet, at local coordinates q.
 // float outside_torn(int i, vec2 q): about the distance from its hole in mm, negative within.
-// Twin of fastgen/geometry/damage_forms/torn.py.
+// Twin of fastgen/damages/torn.py.
 
 #include "units.constants"
 #include "damage.constants"

@@ -122,7 +122,7 @@ SurfacePoint surface_at(uint zone, vec2 atlas_mm, float footprint_mm, Scar scar,
     // Bent steel has dull paint first, then rust where the noise is rustiest. Rubber does not rust, and
     // door gear in front of the sheet is not scarred. Repairs are painted over bent steel.
     float worn = scar.wear * ((code & ZONE_GEAR) == 0 ? step(1e-4, trait.y) : 0.0) *
-                 (scar.scraped ? 1.0 : 1.0 - patched);
+                 (scar.over_repairs ? 1.0 : 1.0 - patched);
     albedo = mix(albedo, mix(rust_albedo * 0.7, scar.albedo, scar.fresh), mix(0.5, 0.9, scar.fresh) * worn);
     rusty = max(rusty, normal_covered(coarse.value.y, normal_threshold(worn), coarse.lost.y, 0.3) *
                        step(0.01, worn) * (1.0 - scar.fresh));

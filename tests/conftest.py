@@ -7,6 +7,8 @@ from collections import OrderedDict
 import pytest
 
 from fastgen import Config, Generator
+from tests import in_process
+from tests.report_makers import make_dataset
 
 OPEN_GENERATORS = 4
 """Generators that are kept open; each holds a GL context and its textures."""
@@ -41,6 +43,20 @@ def copy(dataset, tmp_path):
     """A copy of the dataset from the test file's `dataset` fixture, which the test may damage."""
     shutil.copytree(dataset, tmp_path / "out")
     return tmp_path / "out"
+
+
+@pytest.fixture(scope="module")
+def no_workers():
+    """Datasets of the test file are made without worker processes, see in_process.py."""
+    with in_process.no_workers():
+        yield
+
+
+@pytest.fixture(scope="session")
+def report_dataset(tmp_path_factory):
+    """The dataset of the report's tests, which they only read."""
+    with in_process.no_workers():
+        return make_dataset(tmp_path_factory.mktemp("report") / "out")
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fastgen.classes import DRAWN_DAMAGE_CLASSES
 from fastgen.render.blocks import BLOCKS
 from fastgen.render.constants import CONSTANTS
 from fastgen.render.program import expand, shader_text
@@ -13,7 +14,7 @@ HEAD = "#version 430 core\n" + "".join(
 )
 
 
-def run(gl, body, inputs, textures=None, damage="undamaged"):
+def run(gl, body, inputs, textures=None, damage="undamaged", kinds=DRAWN_DAMAGE_CLASSES):
     """Return `vec4 f(vec4 x)`, defined in GLSL `body`, at each row of inputs [N, 4] as [N, 4]."""
     ctx = gl.ctx
     main = (
@@ -22,7 +23,7 @@ def run(gl, body, inputs, textures=None, damage="undamaged"):
     )
     program = ctx.program(
         vertex_shader=expand(shader_text("fullscreen.vert"), ShaderVariant()),
-        fragment_shader=expand(HEAD + body + main, ShaderVariant(damage=damage)),
+        fragment_shader=expand(HEAD + body + main, ShaderVariant(damage=damage, kinds=kinds)),
     )
     rows = np.ascontiguousarray(inputs, np.float32)
     held = {

@@ -223,6 +223,8 @@ def object_ids(scene: Scene, mesh: Mesh, hits: Hits) -> np.ndarray:
 def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
     """Return the damage target expected from the rays, uint16 [H, W]."""
     order = {"axis": 2, "concave": 3, "dented": 4, "perforation": 5, "scrape": 6}
+    order |= {"rust_through": 7, "missing_paint": 8, "graffiti": 9}
+    order |= {"buckle": 10}  # of the package in docs/extend.md
     values, counts = [], dict.fromkeys(order, 0)
     for damage in scene.damages:
         counts[damage.kind] += 1
@@ -237,9 +239,11 @@ def damage_values(scene: Scene, hits: Hits, threshold_mm: float) -> np.ndarray:
         damage_law.deform(scene.damages, hits.rest_mm) - hits.rest_mm, axis=-1
     )
     target[hits.hit & (together < threshold_mm)] = 101
-    for damage, value in zip(scene.damages, values, strict=True):
-        scraped = hits.hit & (hits.hole < 0) & damage_law.is_marked(damage, hits.rest_mm)
-        target[scraped & (target == 101)] = value
+    marks = zip(scene.damages, values, strict=True)
+    # marks of later kinds cover those of earlier ones
+    for damage, value in sorted(marks, key=lambda mark: -(mark[1] // 100)):
+        marked = hits.hit & (hits.hole < 0) & damage_law.is_marked(damage, hits.rest_mm)
+        target[marked & (target == 101)] = value
     for i, value in enumerate(values):
         target[hits.hole == i] = value
     return target

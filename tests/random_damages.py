@@ -2,15 +2,23 @@
 
 import numpy as np
 
-from fastgen.geometry.damage_forms import FORMS
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES
 from fastgen.geometry.damage_law import reach_mm
 from fastgen.scene import Damage
-from fastgen.scene.damage_shapes import SHAPES
+from fastgen.scene.damage_kinds import forms_of, kind_named
 
 LONGEST_MM = 2000.0
 """Largest size, depth and parameter in millimetres; scenes may have longer ones."""
 
-FORM_NAMES = [(form.kind, form.name) for form in FORMS]
+_NAMES = {
+    form.glsl: (kind, form.name)
+    for kind in BUNDLED_DAMAGE_CLASSES
+    for form in kind_named(kind).forms
+}
+FORMS = {_NAMES[form.glsl]: form for form in forms_of(BUNDLED_DAMAGE_CLASSES)}
+"""Forms by kind and name, in the order in which the shaders go through them."""
+
+FORM_NAMES = list(FORMS)
 AXES = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 
 
@@ -25,7 +33,7 @@ def random_damage(rng, kind, form):
         inward=AXES[2],
         size_mm=(_length(rng, 5.0), _length(rng, 5.0)),
         depth_mm=float(rng.choice([-1, 1, 1])) * _length(rng, 1.0),
-        shape=tuple(_drawn(rng, each.low, each.high) for each in SHAPES[kind, form]),
+        shape=tuple(_drawn(rng, each.low, each.high) for each in FORMS[kind, form].parameters),
         form=form,
     )
 

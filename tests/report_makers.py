@@ -1,6 +1,7 @@
-"""Datasets for tests of the report, and changes to them that keep their hashes right."""
+"""Datasets for tests of the report, changes that keep their hashes right, and a page parser."""
 
 import json
+from html.parser import HTMLParser
 
 from fastgen.cli.main import main
 from fastgen.dataset.seal import digest, seal
@@ -35,3 +36,24 @@ def change_shard(folder, change):
         folder / "dataset.json",
         lambda content: content["shards"].update({"0": digest(path.read_bytes())}),
     )
+
+
+class Reader(HTMLParser):
+    """Elements of a page with their attributes, and the text of each script."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.scripts, self._script = [], [], None
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        self._script = dict(attributes) if tag == "script" else None
+
+    def handle_endtag(self, tag):
+        self._script = None
+
+    def handle_data(self, text):
+        if self._script is not None:
+            self.scripts.append((self._script, text))

@@ -18,6 +18,8 @@ from fastgen.sampling.scene import without_container
 from fastgen.scene import Scene
 from tests.plain import FEW_DECALS
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 SIZE = (320, 240)
 EMPTY = Config.from_values({"container": {"absent": 1.0}})
 

@@ -13,6 +13,8 @@ from fastgen.dataset.storage import Folder, Remote, storage_of
 from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.redaction import without_secrets
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 ARGUMENTS = ["--images", "1", "--size", "64x64", "--cameras", "A", "--workers", "1"]
 
 MISTYPED = {

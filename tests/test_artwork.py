@@ -12,18 +12,15 @@ from PIL import Image, ImageDraw, ImageFont
 from fastgen.classes import MARKER_CLASSES
 from fastgen.decals.artwork import (
     ART_SIZE,
-    GLYPH_MOST_INK,
     art_images,
     art_layers,
     brands,
-    glyph_coverage,
-    glyph_sums,
-    glyph_tiles,
     marker_prints,
     mip_levels,
     premultiplied,
     stickers,
 )
+from fastgen.decals.glyphs import GLYPH_MOST_INK, glyph_coverage, glyph_sums, glyph_tiles
 from fastgen.render.gl import open_context
 from fastgen.render.textures import levelled_texture
 from fastgen.resources import asset_path

@@ -3,23 +3,27 @@
 import numpy as np
 import pytest
 
-from fastgen.decals import artwork
+from fastgen.decals import artwork, glyphs
 from fastgen.files import disk_cache
-from fastgen.geometry import chart_sheet, container, mesh, spreader
-from fastgen.light import environment, indirect_light, reflectance
+from fastgen.geometry import chart_sheet, container, mesh, sheet_folds, spreader
+from fastgen.light import container_map, environment, indirect_light, reflectance
 from fastgen.light.hdri import bundled_hdris
 from fastgen.light.sky_visibility import Sky
-from fastgen.render import noise, sky_visibility_probe
+from fastgen.render import noise, rust, sky_visibility_probe
 from fastgen.render.gl import open_context
 
 TABLE = {
     "art": (artwork, 6, 18.11144, 41.92986, 36.3485),
     "container": (container, 9, 12.77836, 33.3579, 30.57862),
+    "container-map": (container_map, 1, 14.74129, 12.30284, 4.79345),
     "dfg": (reflectance, 1, 7.62462, 0.34701, 0.17011),
     "environment": (environment, 1, 14.18415, 21.35128, 20.6178),
+    "folds": (sheet_folds, 1, 9.39366, 27.73207, 25.70046),
     "form-factors": (indirect_light, 1, 11.68769, 47.98914, 44.6162),
+    "glyph-ink": (glyphs, 1, 15.25896, 11.61372, 10.31897),
     "hull": (mesh, 1, 2.07944, 8.72429, 8.38627),
     "noise": (noise, 1, 16.23007, 52.29057, 44.10587),
+    "rust-points": (rust, 1, 8.83054, 14.69861, 12.84232),
     "sheet": (chart_sheet, 1, 12.78655, 221.09107, 198.36012),
     "sky-directions": (sky_visibility_probe, 1, 13.55746, 19.84805, 17.15882),
     "sky-visibility": (sky_visibility_probe, 1, 13.17265, 58.18403, 51.17683),
@@ -68,10 +72,13 @@ def summaries(tmp_path_factory):
         reflectance.dfg_table.__wrapped__()
         noise.noise_tiles.__wrapped__()
         artwork.art_levels.__wrapped__()
+        glyphs.glyph_ink.__wrapped__()
+        container_map.load_container_map.__wrapped__(bundled_hdris()["port_morning"])
         ambient = environment.load_environment(bundled_hdris()["night_2"])
         body = container.build_container("20")
         body.prepare(damages=True)
-        _ = body.hull
+        _ = body.hull, body.folds
+        rust.rate_of(0.1, body)
         held = spreader.build_spreader("20")
         sky = Sky(ambient, 0.0)
         with open_context() as gl:

@@ -182,7 +182,11 @@ GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
             "fov_deg: 180 is not a field of view; give degrees between 0 and 180",
         ),
         ("{fov_deg: x}", "", "fov_deg: 'x' is not a field of view"),
-        ("{fov_deg: 90, focal_mm: 20}", "", " fov_deg and focal_mm are given; give one of them"),
+        (
+            "{fov_deg: 90, focal_mm: 20}",
+            "",
+            " fov_deg and focal_mm each give the focal length",
+        ),
         ("{matrix: {fx: 1}}", "", "matrix: expected fx, fy, cx, cy, width, height, got {'fx': 1}"),
         ("{calibration: 5}", "", "calibration: expected the path of a file, got 5"),
         (
@@ -190,7 +194,11 @@ GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
             "",
             "calibration: {folder}/gone.yaml: cannot be read (No such",
         ),
-        ("{calibration: c.yaml, lens: null}", GOOD, " calibration and lens are given; give one"),
+        (
+            "{calibration: c.yaml, lens: null}",
+            GOOD,
+            " calibration and lens each give the",
+        ),
         (
             "{calibration: c.yaml}",
             "a",

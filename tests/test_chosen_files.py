@@ -19,6 +19,8 @@ from fastgen.formats.semantic import IGNORED, class_map
 from fastgen.sample import Object
 from tests.folders import content
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 ARGUMENTS = ["--images", "4", "--size", "96x80", "--quality", "draft", "--workers", "1"]
 
 

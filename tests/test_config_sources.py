@@ -7,6 +7,7 @@ from fastgen.cli.main import main
 from fastgen.config.assignments import assigned
 from fastgen.config.config import Config
 from fastgen.config.presets import PRESETS
+from fastgen.errors import ConfigError
 
 
 def printed(capsys, *arguments):
@@ -53,8 +54,21 @@ def test_a_table_as_value_inherits_as_in_a_file():
 
 
 def test_the_last_of_equal_keys_wins():
-    config = assigned(Config.preset(), ["damage.count=1", "damage={count: 3}", "damage.count=2"])
+    config = assigned(Config.preset(), ["damage.count=1", "damage.count=2"])
     assert config.damage.count == (2, 2)
+
+
+def test_a_field_of_view_replaces_the_focal_length():
+    config = assigned(Config.preset(), ["cameras.A.fov_deg=90"])
+    assert config.cameras["A"].focal_mm == pytest.approx(18)  # of a sensor of 36 mm
+    assert config.cameras["B"] == Config.preset().cameras["B"]
+
+
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_key_inside_of_another_is_refused(turn):
+    texts = ["damage.count=1", "damage={}"][::turn]
+    with pytest.raises(ConfigError, match=r"--set: damage\.count: damage is changed as a whole"):
+        assigned(Config.preset(), texts)
 
 
 @pytest.mark.parametrize(
@@ -67,6 +81,13 @@ def test_the_last_of_equal_keys_wins():
         ("damage.probability", "--set 'damage.probability': give a key and its value"),
         ("=1", "--set '=1': give a key and its value"),
         ("damage.kinds=[axis", "--set damage.kinds: the value is not YAML ("),
+        ("cameras.Ad.focal_mm=20", "--set: cameras.Ad: missing face, distance_mm (did you mean A?"),
+        ("cameras.new.focal_mm=20", "--set: cameras.new: missing face, distance_mm\n"),
+        (
+            "markings.markers={C3_1: {weight: 2}}",
+            "--set: markings.markers.C3_1.art: is missing, and fastgen has no such marker (did you "
+            "mean C3.1?)",
+        ),
         ("preset=gate", "--set: preset: another configuration to start from is given already"),
     ],
 )

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.labels.crops import text_crops
 

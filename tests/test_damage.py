@@ -1,6 +1,7 @@
 """Damage: the shader compared with Embree rays on its numpy twin, and sampled proportions."""
 
 from dataclasses import replace
+from functools import lru_cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +11,10 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from fastgen.classes import ALL_DAMAGE_CLASSES
 from fastgen.config.config import Config
+from fastgen.damages.plain import fold_path_mm
 from fastgen.generator import Generator
 from fastgen.geometry import damage_law
 from fastgen.geometry.container import build_container
-from fastgen.geometry.damage_forms import FORMS
-from fastgen.geometry.damage_forms.plain import fold_path_mm
 from fastgen.geometry.door_gear import BAR_Y_MM
 from fastgen.render.settings import QUALITY, Quality
 from fastgen.render.visibility_buffer import VisibilityBuffer
@@ -22,6 +22,7 @@ from fastgen.scene import Damage, Scene, Spreader
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.object_ids import mask_values
 from tests import oracle
+from tests.random_damages import FORM_NAMES
 
 SIZE = (256, 256)
 DAMAGED = Config.from_values({"damage": {"probability": 1.0, "kinds": list(ALL_DAMAGE_CLASSES)}})
@@ -120,15 +121,25 @@ def close_up(scene: Scene, kind: str, form: str | None = None, away_mm: float = 
     return replace(scene, damages=(damage,), cameras=(camera,))
 
 
+@lru_cache(500)  # tests search the same scenes for different damages
+def scene_of(generator, index):
+    return generator.scene(index)
+
+
+def damages_of(generator):
+    """Yield each damage of the first scenes, with its scene."""
+    for index in range(200):
+        scene = scene_of(generator, index)
+        yield from ((scene, damage) for damage in scene.damages)
+
+
 def scene_with(generator, kind, form=None):
     return next(
-        scene
-        for scene in map(generator.scene, range(200))
-        if any(d.kind == kind and form in (None, d.form) for d in scene.damages)
+        scene for scene, d in damages_of(generator) if d.kind == kind and form in (None, d.form)
     )
 
 
-@pytest.mark.parametrize(("kind", "form"), [(form.kind, form.name) for form in FORMS])
+@pytest.mark.parametrize(("kind", "form"), FORM_NAMES)
 def test_every_form_matches_rays_from_close_by(generator, kind, form):
     scene = scene_with(generator, kind, form)
     damage = next(d for d in scene.damages if (d.kind, d.form) == (kind, form))
@@ -142,6 +153,36 @@ def test_every_form_matches_rays_from_close_by(generator, kind, form):
     assert (sample.damage != expected).mean() < 2e-3
     item = next(o for o in sample.objects if o.class_name == kind)
     assert item.bbox == oracle.box_of(sample.damage == value)
+
+
+@pytest.mark.parametrize("kind", ["rust_through", "missing_paint", "graffiti"])
+def test_a_mark_changes_the_image_in_its_mask_and_nowhere_else(generator, kind):
+    scene = close_up(scene_with(generator, kind), kind)
+    marked = generator.render(scene=scene, camera="close")
+    bare = generator.render(scene=replace(scene, damages=()), camera="close")
+    changed = np.abs(marked.image.astype(int) - bare.image).max(axis=2) > 2
+    mask, border = marked.damage > 200, oracle.near_edge(marked.damage)
+    assert mask.sum() > 200
+    assert changed[mask & ~border].mean() > 0.7
+    assert not changed[~mask & ~border].any()
+
+
+def test_marks_of_later_kinds_cover_those_of_earlier_ones(generator):
+    scene = close_up(scene_with(generator, "graffiti"), "graffiti", away_mm=1500)
+    (tag,) = scene.damages
+    flaked = replace(
+        tag, kind="missing_paint", shape=(30.0, 0.5, 2.0, 0.5, 90.0), fresh=1.0,
+        bare_albedo=(0.27, 0.09, 0.05),
+    )  # fmt: skip
+    alone = generator.render(scene=scene, camera="close")
+    both = generator.render(scene=replace(scene, damages=(flaked, tag)), camera="close")
+    sprayed = alone.damage == mask_values((tag,))[0]
+    np.testing.assert_array_equal(both.damage == mask_values((tag,))[0], sprayed)
+    inside = ~oracle.near_edge(both.damage)
+    np.testing.assert_array_equal(both.image[sprayed & inside], alone.image[sprayed & inside])
+    below = both.damage == mask_values((flaked,))[0]
+    assert below.sum() > 500
+    assert (both.image != alone.image)[below & inside].any(axis=1).mean() > 0.9
 
 
 @pytest.mark.parametrize(
@@ -179,8 +220,7 @@ def test_a_hole_shows_the_inside_and_never_the_sky(paper):
 def test_a_hole_shows_brown_floor_boards_and_grey_walls(paper):
     scene, damage = next(
         (scene, damage)
-        for scene in map(paper.scene, range(200))
-        for damage in scene.damages
+        for scene, damage in damages_of(paper)
         if damage.kind == "perforation" and damage.face == "front"
     )
     x, y, _ = damage.origin_mm
@@ -245,9 +285,9 @@ def test_outer_and_inner_view_may_share_two_texture_rows(generator, monkeypatch)
 def test_a_hole_behind_rods_and_handles_shows_no_sky(generators):
     values = {"probability": 1.0, "count": [1, 1], "kinds": ["perforation"], "faces": ["door"]}
     generator = generators(Config.from_values({"damage": values}), 77, (256, 256))
-    samples = [generator.render(index, "Cr") for index in range(12)]
+    samples = [generator.render(index, "Cr") for index in range(7)]
     holes = [sample.damage == 501 for sample in samples]
-    assert sum(int(hole.sum()) for hole in holes) > 1000
+    assert sum(int(hole.sum()) for hole in holes) > 600
     for sample, hole in zip(samples, holes, strict=True):
         assert (sample.ids[hole] > 0).all()
         assert np.isfinite(sample.depth[hole]).all()
@@ -329,7 +369,7 @@ def test_a_dented_leaf_stays_behind_its_locking_gear(generators):
 
     count = 0
     generator = generators(Config.from_values(doors), seed=3, size=(64, 64))
-    for scene in map(generator.scene, range(40)):
+    for scene in map(generator.scene, range(16)):
         mesh = build_container(scene.container.kind, scene.container.profiles)
         names = [chart.name.startswith(("door.bar", "door.handle")) for chart in mesh.charts]
         is_gear = np.array(names)[mesh.chart[mesh.triangles[:, 0]]]
@@ -344,7 +384,7 @@ def test_a_dented_leaf_stays_behind_its_locking_gear(generators):
         assert (leaf < gear)[plate].mean() > 0.9
         assert plate.sum() > 200
         count += (seen & ~plate).sum()
-    assert count > 40 * 200
+    assert count > 16 * 200
 
 
 def test_undamaged_places_do_not_change(generator):

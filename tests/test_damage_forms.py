@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config, Generator
-from fastgen.geometry.damage_forms import FORMS
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES
 from fastgen.geometry.damage_law import (
     amount_mm,
     in_hole,
@@ -23,8 +23,9 @@ from fastgen.render.constants import constants_text
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
 from fastgen.render.variant import ShaderVariant
+from fastgen.scene.damage_kinds import forms_of
 from tests.glsl import blocks, run
-from tests.random_damages import AXES, FORM_NAMES, points_around, random_damage
+from tests.random_damages import AXES, FORM_NAMES, FORMS, points_around, random_damage
 
 ONE_DAMAGE = """
 #include "damage_law.glsl"
@@ -35,7 +36,8 @@ vec4 f(vec4 x) {
 #define PICK(i, field) if (i == number) changed.x = field.amount
     EACH_DAMAGE(PICK)
     changed.y = float(number < hole_count && in_hole(number, p));
-    changed.z = float(number >= FIRST_SCRAPE && scraped(number, damage_local(number, p)));
+#define PICK_MARK(i, mark) if (i == number) changed.z = float(mark.here)
+    EACH_MARK(PICK_MARK)
     return changed;
 }
 """
@@ -50,17 +52,20 @@ def gl():
 
 def test_the_shaders_loop_over_the_forms_in_their_order():
     """Damages of a form lie between the end of the form before and its own."""
-    text = constants_text("damage", ShaderVariant())
-    (each,) = re.findall(r"#define EACH_DAMAGE\(USE\) (.*)", text)
-    loops = re.findall(r"EACH_NEAR\((\w+), (\w+), (\w+)_field, USE\)", each)
-    moving = [form for form in FORMS if form.kind != "scrape"]
-    assert [name for _, _, name in loops] == [form.glsl for form in moving]
-    ends = [f"{form.kind}_{form.name}_end" for form in moving]
+    forms = forms_of(BUNDLED_DAMAGE_CLASSES)
+    assert {form.glsl for form in forms} == {form.glsl for form in FORMS.values()}
+    text = constants_text("damage", ShaderVariant(kinds=BUNDLED_DAMAGE_CLASSES))
+    loops = []
+    for macro, suffix in (("EACH_DAMAGE", "field"), ("EACH_MARK", "mark")):
+        (each,) = re.findall(rf"#define {macro}\(USE\) (.*)", text)
+        loops += re.findall(rf"EACH_NEAR\((\w+), (\w+), \w+, (\w+)_{suffix}, USE\)", each)
+    assert [name for _, _, name in loops] == [form.glsl for form in forms]
+    ends = [f"form_{number}_end" for number in range(len(forms))]
     assert [loop[:2] for loop in loops] == list(zip(["0", *ends[:-1]], ends, strict=True))
-    assert f"#define FIRST_SCRAPE {ends[-1]}\n" in text
-    # loops over holes begin at 0, and scrapes follow all forms that move the sheet
-    assert [bool(form.outline) for form in FORMS] == [True] * 2 + [False] * 7
-    assert [form for form in FORMS if form.marked] == [FORMS[-1]]
+    # loops over holes begin at 0, and marks follow all forms that move the sheet
+    order = [0 if form.outline else 2 if form.marked else 1 for form in forms]
+    assert order == sorted(order)
+    assert order.count(2) == 4
 
 
 def displacements(damage, low, high, count):
@@ -75,7 +80,7 @@ def displacements(damage, low, high, count):
 
 
 @pytest.mark.parametrize(
-    ("kind", "form"), [name for name in FORM_NAMES if name[0] not in ("perforation", "scrape")]
+    ("kind", "form"), [name for name, form in FORMS.items() if form.amount and not form.outline]
 )
 def test_severity_is_the_largest_displacement(kind, form):
     """The largest one is looked for on a grid, and on finer grids around the places found."""
@@ -112,7 +117,7 @@ def test_sheet_that_moves_outward_may_be_seen_from_behind(kind, form):
         outward += front < -1.0
         if low == 0.0:
             assert not seen
-    assert outward > 10 or kind == "scrape" or form == "ribs"
+    assert outward > 10 or FORMS[kind, form].marked or form == "ribs"
 
 
 @pytest.mark.parametrize(("kind", "form"), FORM_NAMES)
@@ -137,16 +142,20 @@ def test_the_shaders_change_nothing_outside_the_reach(gl):
     scene = Generator(Config(), seed=1).scene(0)
     inside = np.zeros(len(FORM_NAMES), int)
     for _ in range(8):
-        damages = tuple(random_damage(rng, *name) for name in FORM_NAMES for _ in range(12))
+        damages = tuple(random_damage(rng, *name) for name in FORM_NAMES for _ in range(9))
         local, points = zip(*(points_around(rng, each, 100) for each in damages), strict=True)
         number = np.repeat(np.arange(len(damages)), 100)
         drawn = replace(scene, damages=damages)
-        kept = blocks(gl, **damage_values(PreparedScene(drawn), damages, 5.0, 0))
+        kept = blocks(
+            gl, **damage_values(PreparedScene(drawn), damages, BUNDLED_DAMAGE_CLASSES, 5.0, 0)
+        )
         rows = np.column_stack([np.concatenate(points), number])
-        changed = (run(gl, ONE_DAMAGE, rows, damage="holed") != 0).any(axis=1)
+        changed = (run(gl, ONE_DAMAGE, rows, None, "holed", BUNDLED_DAMAGE_CLASSES) != 0).any(
+            axis=1
+        )
         del kept
         reach = np.array([reach_mm(each) for each in damages])[number]
         outside = (np.abs(np.concatenate(local)) > reach).any(axis=1)
         assert not changed[outside].any()
-        inside += np.bincount(number[changed] // 12, minlength=len(FORM_NAMES))
+        inside += np.bincount(number[changed] // 9, minlength=len(FORM_NAMES))
     assert (inside > 20).all()

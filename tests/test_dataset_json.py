@@ -9,6 +9,8 @@ import pytest
 from fastgen.cli.main import main
 from tests.folders import content
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 ONE_BY_ONE = ["--shard", "1", "--workers", "1"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fastgen import Config
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Camera, Decal
 from fastgen.scene.faces import FACE_AXES, SHEET_FACES

@@ -1,4 +1,4 @@
-"""The package of docs/extend.md, installed beside fastgen, adds a marker, a format and a preset."""
+"""The package of docs/extend.md adds a marker, a format, a preset and a kind of damage."""
 
 import json
 import os
@@ -12,6 +12,10 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
+
+from fastgen import plugins
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+from fastgen.cli.main import main
 
 PAGE = Path(__file__).parent.parent / "docs/extend.md"
 PARTS = re.compile(r"^`([\w./]+)`[^\n]*\n\n```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -38,7 +42,8 @@ def site(tmp_path_factory):
     parts = dict(PARTS.findall(PAGE.read_text(encoding="utf-8")))
     assert set(parts) == {
         "pyproject.toml",
-        *(f"quaytools/{name}.py" for name in ("presets", "boxes", "dust")),
+        *(f"quaytools/{name}.py" for name in ("presets", "boxes", "dust", "buckle")),
+        "quaytools/buckle.glsl",
     }
     (site / "quaytools").mkdir()
     (site / "quaytools/__init__.py").touch()
@@ -133,6 +138,110 @@ def test_a_changed_function_is_refused_when_a_dataset_is_continued(dataset, site
     assert "was made with other settings (postprocess.sha256 was" in said
 
 
+BUCKLED = "damage={probability: 1, count: 3, kinds: [buckle], ranges: {buckle: {depth_mm: 90}}}"
+
+
+@pytest.fixture(scope="module")
+def buckled(site, tmp_path_factory):
+    """A dataset with the kind of damage of the package."""
+    out = tmp_path_factory.mktemp("buckled") / "out"
+    given = ["--images", "8", "--size", "256x256", "--quality", "draft", "--set", BUCKLED]
+    fastgen("generate", out, *given, path=[site])
+    return out
+
+
+def test_masks_and_categories_have_the_kind(buckled):
+    first = 100 * (len(BUNDLED_DAMAGE_CLASSES) + 2)  # after the container and fastgen's kinds
+    values = set()
+    for path in (buckled / "damage/masks").rglob("*.png"):
+        values |= set(np.unique(np.array(Image.open(path))).tolist())
+    assert values & set(range(first + 1, first + 100))
+    assert values <= {0, 101, *range(first + 1, first + 100)}
+    found = set()
+    for path in (buckled / "damage").glob("coco_*.json"):
+        coco = json.loads(path.read_text())
+        names = {each["id"]: each["name"] for each in coco["categories"]}
+        found |= {names[each["category_id"]] for each in coco["annotations"]}
+    assert found == {"container", "buckle"}
+    names = yaml.safe_load((buckled / "damage/data.yaml").read_text())["names"]
+    assert names[len(names) - 1] == "buckle"
+    depths = {
+        damage["depth_mm"]
+        for path in (buckled / "scenes").rglob("*.json")
+        for damage in json.loads(path.read_text())["scene"]["damages"]
+    }
+    assert depths == {90.0}
+
+
+def test_the_dataset_is_whole_and_its_statistics_name_the_kind(buckled, site):
+    assert "whole and consistent" in fastgen("verify", buckled, path=[site])
+    table = fastgen("stats", buckled, path=[site])
+    (row,) = (line for line in table.splitlines() if line.startswith("buckle"))
+    assert sum(map(int, row.split()[1:])) > 0
+
+
+DEPTHS = """
+import numpy as np
+from fastgen import Config, Generator
+from fastgen.geometry.prepared_scene import PreparedScene
+from tests import oracle
+
+damage = {"probability": 1, "count": 6, "kinds": ["buckle"], "faces": ["front", "back"]}
+config = Config.from_values({"damage": damage})
+with Generator(config, seed=5, size=(256, 192)) as generator:
+    sample = generator.render(1, "A")
+# a generator that does not list the kind compiles it for the scene
+with Generator(Config(), seed=5, size=(256, 192)) as generator:
+    generator.render(0, "A")
+    again = generator.render(scene=sample.scene, camera="A")
+np.testing.assert_array_equal(again.image, sample.image)
+mesh = PreparedScene(sample.scene).container
+hits = oracle.cast(mesh, sample.view, sample.scene)
+assert (oracle.object_ids(sample.scene, mesh, hits) != sample.ids).mean() < 2e-4
+assert (oracle.damage_values(sample.scene, hits, 5.0) != sample.damage).mean() < 2e-3
+assert (sample.damage > 200).mean() > 0.01
+print("equal")
+"""
+
+
+def test_drawn_ids_are_those_of_rays_at_the_mesh_that_numpy_deforms(site):
+    root = Path(__file__).parent.parent
+    paths = [str(site), str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
+    done = subprocess.run(
+        [sys.executable, "-c", DEPTHS],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout) == (0, "equal\n"), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("{kinds: [buckel]}", "damage.kinds[0]: 'buckel' is unknown (did you mean buckle?)"),
+        (
+            "{ranges: {buckle: {depth_mm: -1}}}",
+            "damage.ranges.buckle.depth_mm: -1 is out of range; give 0 to 2400 mm",
+        ),
+        ("{ranges: {dented: {}}}", "damage.ranges.dented: write the ranges under damage.dented"),
+        ("{ranges: {hole: {}}}", "damage.ranges: 'hole' is unknown (choose from buckle)"),
+        ("{kinds: [buckle], faces: []}", "damage.faces: the list is empty"),
+    ],
+)
+def test_wrong_values_of_a_kind_are_named(value, words, site):
+    said = fastgen("config", "--set", f"damage={value}", path=[site], code=2)
+    assert words in said
+
+
+@pytest.fixture
+def reread():
+    """Let this process see packages that the test installs, and forget them afterwards."""
+    plugins._offered.cache_clear()
+    yield
+    plugins._offered.cache_clear()
+
+
 @pytest.mark.parametrize(
     ("groups", "arguments", "words"),
     [
@@ -156,13 +265,33 @@ def test_a_changed_function_is_refused_when_a_dataset_is_continued(dataset, site
             ["generate", "{out}", "--images", "1", "--also", "mine"],
             "also: the format mine calls itself 'boxes'; give both the same name",
         ),
+        (
+            {"fastgen.damages": {"scrape": "quaytools.buckle:KIND"}},
+            ["config"],
+            "preset seafront: kinds: scrape is offered by fastgen and other; uninstall one or",
+        ),
+        (
+            {"fastgen.damages": {"mine": "quaytools.buckle:KIND"}},
+            ["config", "--set", "damage.kinds=[mine]"],
+            "--set: damage.kinds: the kind mine calls itself 'buckle'; give both the same name",
+        ),
+        (
+            {"fastgen.damages": {"mine": "broken:NONE"}},
+            ["config", "--set", "damage.kinds=[mine]"],
+            "--set: damage.kinds: mine of the package other cannot be loaded from broken:NONE",
+        ),
     ],
 )
-def test_a_broken_package_is_named(groups, arguments, words, site, tmp_path):
+def test_a_broken_package_is_named(
+    groups, arguments, words, site, tmp_path, monkeypatch, capsys, reread
+):
     install(tmp_path, "other", groups)
+    for folder in (site, tmp_path):
+        monkeypatch.syspath_prepend(folder)
     given = [each.format(out=tmp_path / "out") for each in arguments]
-    assert fastgen(*given, path=[tmp_path, site], code=2).startswith(f"fastgen: {words}")
-    assert fastgen("presets", path=[tmp_path, site])
+    assert main(given) == 2
+    assert capsys.readouterr().err.startswith(f"fastgen: {words}")
+    assert main(["presets"]) == 0
 
 
 FAULTY = """
@@ -175,6 +304,15 @@ def smaller(sample, rng):
     return replace(sample, image=sample.image[1:])
 NUMBER = 1
 """
+
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory):
+    """A folder with a module of functions that cannot be used."""
+    folder = tmp_path_factory.mktemp("faulty")
+    (folder / "faulty.py").write_text(FAULTY)
+    yield folder
+    sys.modules.pop("faulty", None)
 
 
 @pytest.mark.parametrize(
@@ -192,9 +330,10 @@ NUMBER = 1
         ),
     ],
 )
-def test_an_unusable_function_gets_one_line(name, words, tmp_path):
-    (tmp_path / "faulty.py").write_text(FAULTY)
-    given = ["show", "--index", "0", "-o", tmp_path / "x.png", *SIZE]
-    said = fastgen(*given, "--set", f"postprocess={name}", path=[tmp_path], code=2)
-    assert said.startswith(f"fastgen: {words}")
-    assert not (tmp_path / "x.png").exists()
+def test_an_unusable_function_gets_one_line(name, words, faulty, tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(faulty)
+    picture = str(tmp_path / "x.png")
+    given = ["show", "--index", "0", "-o", picture, *SIZE, "--set", f"postprocess={name}"]
+    assert main(given) == 2
+    assert capsys.readouterr().err.startswith(f"fastgen: {words}")
+    assert not Path(picture).exists()

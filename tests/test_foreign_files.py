@@ -8,6 +8,8 @@ from fastgen.cli.main import main
 from fastgen.dataset.seal import seal
 from tests.folders import content
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 LEFT_BEHIND = (
     ".DS_Store",
     "images/train/.DS_Store",

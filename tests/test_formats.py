@@ -22,6 +22,8 @@ from fastgen.labels.objects import CASTINGS
 from fastgen.scene import Scene
 from fastgen.validation import from_plain
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 SPLITS = ("train", "val", "test")
 SIZE = (320, 240)
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import pytest
 
+from fastgen.classes import ALL_DAMAGE_CLASSES, DRAWN_DAMAGE_CLASSES
 from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render import settings
 from fastgen.render.blocks import BLOCKS
@@ -100,9 +101,13 @@ def add_all(programs, variant):
 
 def test_all_other_shaders_are_standard_glsl(programs):
     for damage in DAMAGE_VARIANTS:
-        programs.add(("geometry.vert", "geometry.frag"), ShaderVariant(damage=damage))
+        for kinds in (DRAWN_DAMAGE_CLASSES, ALL_DAMAGE_CLASSES):
+            drawn = ShaderVariant(damage=damage, kinds=kinds)
+            programs.add(("geometry.vert", "geometry.frag"), drawn)
         of_points = ShaderVariant(
-            pixel_class="decal" if damage == "undamaged" else "damaged", damage=damage
+            pixel_class="decal" if damage == "undamaged" else "damaged",
+            damage=damage,
+            kinds=ALL_DAMAGE_CLASSES,
         )
         for samples in (1, 2, 3, 5):
             variant = replace(of_points, samples_per_axis=samples)
@@ -133,7 +138,7 @@ def test_a_shader_file_includes_the_constants_and_blocks_that_it_uses(path):
     text = path.read_text()
     included = set(re.findall(r'#include "(\w+\.(?:constants|block))"', text))
     used = set(re.findall(r"\b[A-Za-z_]\w*\b", re.sub(r"//.*|#include.*", "", text)))
-    everything = [ShaderVariant(samples_per_axis=n) for n in (1, 3)]
+    everything = [ShaderVariant(samples_per_axis=n, kinds=ALL_DAMAGE_CLASSES) for n in (1, 3)]
     for group, constants in CONSTANTS.items():
         names = {name.split("(")[0] for variant in everything for name in constants(variant)}
         assert bool(names & used) == (f"{group}.constants" in included), group

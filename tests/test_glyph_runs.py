@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from fastgen.decals.artwork import (
-    GLYPH_EXTENT_STEPS,
-    GLYPH_TILE_SIZE,
-    glyph_coverage,
-    glyph_tiles,
-)
+from fastgen.decals.glyphs import GLYPH_EXTENT_STEPS, GLYPH_TILE_SIZE, glyph_coverage, glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.render.glyph_runs import glyph_run
 from fastgen.scene.limits import GLYPH_RANGE

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fastgen.config.config import Config
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.identifier_layout import LAYOUTS, TYPE_PLACES, Form, identifier_parts
 from fastgen.decals.iso6346 import Identifier, check_digit, sample_identifier
 from fastgen.decals.lettering import layout

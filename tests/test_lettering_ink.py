@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.decals.artwork import glyph_sums, glyph_tiles
+from fastgen.decals.glyphs import glyph_sums, glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.render.gl import open_context
 from fastgen.render.glyph_runs import glyph_run

@@ -9,7 +9,8 @@ import pytest
 
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config.config import Config
-from fastgen.decals.artwork import brands, glyph_tiles, marker_prints
+from fastgen.decals.artwork import brands, marker_prints
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.decals.weights import weight_lines
 from fastgen.errors import AssetError, ConfigError

@@ -22,6 +22,8 @@ from fastgen.dataset.seal import seal
 from fastgen.dataset.storage import Folder
 from tests.folders import content
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 SPLITS = ("train", "val", "test")
 ALSO = ["--also", "voc,text_parts,kitti"]
 COUNTS = {1: 6, 2: 9}
@@ -265,7 +267,10 @@ def flipped(copy):
         (lambda c: changed(c, formats=["damage", "imdg"]), "{copy}: has the formats damage, imdg,"),
         (lambda c: changed(c, format="webdataset"), "{copy}: has the format webdataset, {other}"),
         (lambda c: (c / "dataset.json").unlink(), "{copy}: no readable dataset.json"),
-        (lambda c: (c / "dataset.json").write_text("{"), "{copy}: dataset.json is damaged"),
+        (
+            lambda c: (c / "dataset.json").write_text("{"),
+            "{copy}: is damaged; run fastgen verify",
+        ),
         (lambda c: (c / "dataset.json").write_text("{}"), "{copy}: the dataset is not finished"),
         (lambda c: next(c.glob("images/*/*")).unlink(), "{copy}: images/.* is missing or was chan"),
         (

@@ -20,6 +20,8 @@ from fastgen.formats.registry import SEAFRONT, formats_of
 from fastgen.light.hdri import bundled_hdris
 from tests.folders import content
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 ARGUMENTS = ["--images", "6", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 
 
@@ -175,14 +177,17 @@ def test_changed_settings_are_reported_with_both_values(copy, tmp_path, capsys):
 
 def test_all_changed_settings_are_reported_with_their_options(copy, capsys):
     more = ["--seed", "4", "--quality", "draft", "--also", "ids", "--shard", "2", "--split", "val"]
+    more += ["--set", "weather={fog_probability: 1, rain_probability: 1, wetness: 0.8}"]
     assert main(["generate", str(copy), *ARGUMENTS, *more, "--size", "80x64"]) == 2
     error = capsys.readouterr().err
     told = error.partition("(")[2].partition("); to resume, repeat the old ")
     assert [each.split(" was ")[0] for each in told[0].split("; ")] == [
-        *("formats", "seed", "size", "quality"),
-        "and 4 more",  # shard_scenes, config.split.test, .train, .val
+        *("formats", "seed", "size", "quality", "shard_scenes"),
+        *(f"config.split.{split}" for split in ("test", "train", "val")),
+        *("config.weather.fog_probability", "config.weather.rain_probability"),
+        "and 1 more",  # config.weather.wetness
     ]
-    options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, --set, or"
+    options = "--tasks, --also, --seed, --size, --quality, --shard, --split, --config, --set"
     assert told[2].startswith(options)
 
 

@@ -18,7 +18,7 @@ from fastgen.dataset.job import Job
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.storage import Folder
 from fastgen.dataset.workers import in_words
-from fastgen.decals import artwork
+from fastgen.decals.asset_files import asset_image
 from fastgen.errors import AssetError
 from fastgen.files import cache_folder, disk_cache
 from fastgen.light.hdri import bundled_hdris
@@ -167,11 +167,11 @@ def test_art_is_read_from_a_folder_whose_name_is_not_utf8(tmp_path):
     folder = tmp_path / os.fsdecode(b"inst\xe9")
     folder.mkdir()
     copy = shutil.copy(source, folder)
-    ours = artwork._image(Path(copy), 4, None)
-    assert (ours == artwork._image(source, 4, None)).all()
+    ours = asset_image(Path(copy), 4, None)
+    assert (ours == asset_image(source, 4, None)).all()
     Path(copy).write_bytes(b"")
     with pytest.raises(AssetError, match="not a PNG"):
-        artwork._image(Path(copy), 4, None)
+        asset_image(Path(copy), 4, None)
 
 
 class FullLog:

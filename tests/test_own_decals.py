@@ -20,6 +20,8 @@ from fastgen.errors import ConfigError
 from fastgen.generator import Generator
 from fastgen.torch import class_counts, class_names
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 CONFIG = """
 preset: seafront
 damage: {probability: 0}
@@ -306,7 +308,10 @@ def test_text_in_an_svg_is_refused(tmp_path):
         ("other_marker_weight: 0", "markings.markers: all weights are 0; give one above 0, or"),
         ("bundled_brand_weight: 0", "markings.brands: all weights are 0"),
         ("brands: {X: {wordmark: Y}}", "markings.brands.X.emblem: is missing"),
-        ("brands: {X: {emblem: wide.png, wordmark: é}}", "markings.brands.X.wordmark: 'é' has"),
+        (
+            "brands: {X: {emblem: wide.png, wordmark: é}}",
+            "markings.brands.X.wordmark: 'é': the fonts lack 'é'; give",
+        ),
         ("stickers: {X: {faces: [door]}}", "markings.stickers.X.art: is missing"),
         (
             "stickers: {washed: {art: wide.png}}",

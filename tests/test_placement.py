@@ -101,14 +101,14 @@ def filled(solid):
 
 @pytest.fixture(scope="module")
 def mixed():
-    """500 scenes of all arrangements."""
+    """200 scenes of all arrangements."""
     kinds = {"20": 1, "40": 0.5, "40HC": 0.5, "45HC": 0.2}
     config = config_of(
         dict.fromkeys(ARRANGEMENTS, 1.0),
         placement={"neighbours": [0, 6], "yaw_deg": [-3, 3]},
         container={"kinds": kinds},
     )
-    return places(config, 500)
+    return places(config, 200)
 
 
 def test_containers_never_overlap(mixed):
@@ -121,7 +121,7 @@ def test_containers_never_overlap(mixed):
                 assert not contains(other, points).any()
                 assert not contains(one, filled(other)).any()
             touched += len(found) > 1
-    assert touched > 100
+    assert touched > 40
 
 
 def test_cameras_are_outside_all_containers_and_above_the_ground(mixed):

@@ -165,12 +165,11 @@ def run_alone(out, *more):
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_ray_and_the_folder_is_left_clean(tmp_path, monkeypatch, stop):
-    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-    monkeypatch.setenv("RAY_AUTH_TOKEN", secrets.token_hex(32))
-    monkeypatch.setenv("PYTHONPATH", ROOT, prepend=os.pathsep)
+def test_a_signal_stops_ray_and_the_folder_is_left_clean(cluster, tmp_path, stop):
+    """SIGTERM ends the Ray that the run started; SIGINT a run on the cluster."""
     out = tmp_path / "out"
-    process = run_alone(out, "--ray", "--workers", "1", "--shard", "1")
+    where = ["--ray"] if stop == signal.SIGTERM else ["--ray", cluster.address]
+    process = run_alone(out, *where, "--workers", "1", "--shard", "1")
     while not list(out.glob("shards/*.json")) and process.poll() is None:
         time.sleep(0.05)
     # Ctrl-C reaches the whole process group, docker signals only the first process

@@ -11,6 +11,8 @@ from pycocotools import mask as coco_mask
 
 from fastgen.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 PAGE = (Path(__file__).parents[1] / "docs/recipes.md").read_text()
 SIZE = (320, 240)
 ARGUMENTS = ["--images", "8", "--size", "320x240", "--seed", "5", "--split", "0.5,0.5,0"]

@@ -17,8 +17,8 @@ from fastgen.geometry.damage_law import amount_mm, in_hole
 from fastgen.render.decal_tables import SceneError
 from fastgen.scene import Camera, Scene
 from fastgen.scene.check import check_camera, check_scene
-from fastgen.scene.damage_shapes import SHAPES
 from fastgen.scene.optics import Defocus, Lens, Noise, Rain, Sensor, Stamp, Weather
+from tests.random_damages import FORMS
 
 SIZE = (64, 64)
 
@@ -203,6 +203,9 @@ def test_out_of_range_values_are_named(full, path, value):
     with pytest.raises(ConfigError) as caught:
         check_scene(spoilt(full, path, value))
     assert str(caught.value).startswith(f"{name(path)}: ")
+
+
+SHAPES = {name: form.parameters for name, form in FORMS.items()}
 
 
 def shaped(full, kind, form, shape):

@@ -19,6 +19,8 @@ from fastgen.render.settings import RenderSettings
 from fastgen.scene import Camera, Seal
 from fastgen.torch import ContainerDataset, class_names, collate_seal
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 SEALS = (Seal("bolt", 0), Seal("cable", 1), Seal("bolt", 2, "hanging"))
 
 CLOSE = {

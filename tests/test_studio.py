@@ -21,8 +21,9 @@ from starlette.testclient import TestClient
 from fastgen import Config, ConfigError, Generator, OutputError, RenderSettings
 from fastgen.classes import BACKGROUND_ID
 from fastgen.cli.main import main
+from fastgen.config.assignments import changed
 from fastgen.light.hdri import bundled_hdris
-from fastgen.studio.changes import bases, changed
+from fastgen.studio.changes import bases, values_of
 from fastgen.studio.drawing import Drawing, Superseded, Wanted
 from fastgen.studio.server import Studio, listening
 
@@ -130,7 +131,7 @@ def test_a_changed_mask_threshold_changes_the_damage_image(client):
         changes = {**damaged, "damage.mask_threshold_mm": str(threshold)}
         drawn = draw(client, index=17, camera="A", changes=changes)
         masks.append((pixels(client, drawn["number"])["damage"] >= 201).sum())
-        config = changed(Config.preset(), changes)
+        config = changed(Config.preset(), values_of(changes))
         with Generator(config, 7, SIZE, quality="draft") as generator:
             assert (generator.render(17, "A").damage >= 201).sum() == masks[-1]
     assert masks[0] > masks[1]
@@ -235,7 +236,7 @@ def test_the_command_and_the_file_make_the_shown_configuration(client, tmp_path)
     file = tmp_path / options["--config"]
     file.write_text(drawn["yaml"], encoding="utf-8")
     loaded = Config.load(file, Config.preset(options["--preset"]))
-    assert loaded == changed(Config.preset(), FOG)
+    assert loaded == changed(Config.preset(), values_of(FOG))
     weather = {"fog_probability": 1.0, "visibility_mm": 20000.0}
     assert yaml.safe_load(drawn["yaml"]) == {"weather": weather}
     plain = draw(client)

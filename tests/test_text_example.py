@@ -19,7 +19,7 @@ from common.reader import (
     whole_canvas,
 )
 
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.identifier_layout import TYPE_PLACES, Form, identifier_parts
 from fastgen.decals.iso6346 import Identifier, check_digit
 from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS, layout

@@ -78,11 +78,11 @@ def test_locate_refuses_positions_that_are_no_whole_numbers(position):
         ),
         (
             {"curriculum": lambda epoch: {"damage": {"kinds": ["axis", "scrape"]}}},
-            "curriculum: epoch 0 changes which classes there are; list scrape in damage.kinds in",
+            "curriculum: epoch 0 changes which classes there are; list the same last kind in",
         ),
         (
             {"config": SCRAPED, "curriculum": lambda epoch: {"damage": {"kinds": ["axis"]}}},
-            "curriculum: epoch 0 changes which classes there are; list scrape in damage.kinds in",
+            "curriculum: epoch 0 changes which classes there are; list the same last kind in",
         ),
         (
             {"split": "val", "config": Config.from_values({"split": {"val": 0.0}})},

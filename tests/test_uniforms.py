@@ -7,7 +7,6 @@ import pytest
 from fastgen.render.blocks import BLOCKS
 from fastgen.render.gl import open_context
 from fastgen.render.uniforms import Block
-from fastgen.scene.damage_shapes import SHAPES
 
 BLOCK = Block(
     "Probe",
@@ -69,7 +68,3 @@ def test_a_missing_member_raises_an_assertion_error():
 def test_every_driver_has_room_for_a_block(name):
     """MAX_UNIFORM_BLOCK_SIZE is at least 16384 (OpenGL 4.5 core specification, chapter 23)."""
     assert BLOCKS[name].size <= 16384
-
-
-def test_the_numbers_of_every_form_of_damage_fit_beside_its_freshness():
-    assert max(len(shape) for shape in SHAPES.values()) <= 11

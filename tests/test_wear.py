@@ -1,6 +1,7 @@
 """Wear where it happens: rust, streaks of dirt, scrapes, bleaching and repainted patches."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -41,10 +42,15 @@ def worn(scene, **parts):
     return replace(scene, surface=replace(scene.surface, **changed))
 
 
+@lru_cache(4)  # tests compare several scenes with one of them
+def colors_of(generator, scene):
+    return generator.bake(scene, TEXEL_MM).base_color[::-1]
+
+
 def baked(generator, scene, *faces):
     """Return the linear albedo [H, W, 3] of the sheet of each face; row 0 is the lowest."""
     mesh = PreparedScene(scene).container
-    colors = generator.bake(scene, TEXEL_MM).base_color[::-1]
+    colors = colors_of(generator, scene)
     found = []
     for face in faces:
         chart = mesh.charts[mesh.chart_index(face)]

@@ -17,6 +17,8 @@ from s3fs import S3FileSystem
 from fastgen.cli.main import main
 from fastgen.dataset.storage import storage_of
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 ARGUMENTS = ["--images", "12", "--size", "96x80", "--seed", "3", "--format", "webdataset"]
 
 

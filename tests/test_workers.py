@@ -2,6 +2,8 @@
 
 import contextlib
 import os
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -51,7 +53,7 @@ class Reports:
 
 
 class TellsItsThreads:
-    """Worker that reports OPENBLAS_NUM_THREADS and the number of threads not started by Python."""
+    """Worker that reports the number of threads that a product of matrices leaves."""
 
     def __init__(self, report):
         self._report = report
@@ -61,45 +63,53 @@ class TellsItsThreads:
 
         square = np.ones((600, 600))
         _ = square @ square
-        foreign = len(os.listdir("/proc/self/task")) - threading.active_count()
-        self._report("threads", (os.environ.get("OPENBLAS_NUM_THREADS"), foreign))
+        self._report("threads", len(os.listdir("/proc/self/task")) - threading.active_count())
 
 
-def threads_of_a_worker(whole_machine):
-    """Return what a TellsItsThreads worker reports."""
+class TellsItsVariable:
+    """Worker that reports the environment variable FASTGEN_TEST."""
+
+    def __init__(self, report):
+        self._report = report
+
+    def __call__(self, _task):
+        self._report("variable", os.environ.get("FASTGEN_TEST"))
+
+
+def heard_from(setup):
+    """Return what a worker reports."""
     heard = []
 
     def on_death(task, place, ended):
         raise AssertionError(ended)
 
-    workers.run(
-        TellsItsThreads,
-        [1],
-        1,
-        lambda _, value: heard.append(value),
-        on_death,
-        whole_machine=whole_machine,
-    )
+    workers.run(setup, [1], 1, lambda _, value: heard.append(value), on_death)
     return heard[0]
 
 
-def test_workers_that_fill_the_machine_start_no_matrix_threads(monkeypatch):
-    for name in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
-        monkeypatch.delenv(name, raising=False)
-    before = dict(os.environ)
-    assert threads_of_a_worker(True) == ("1", 0)
-    assert threads_of_a_worker(False)[0] is None
-    assert dict(os.environ) == before
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core has no matrix threads")
+@pytest.mark.parametrize(
+    ("variables", "threads"),
+    [({}, 0), ({"OPENBLAS_NUM_THREADS": "2"}, 1), ({"OMP_NUM_THREADS": "2"}, 1)],
+)
+def test_workers_start_no_matrix_threads_unless_the_user_asks_for_them(variables, threads):
+    names = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS")
+    others = {name: value for name, value in os.environ.items() if name not in names}
+    # a process of its own, because the server of workers keeps its number of threads
+    code = "from tests import test_workers as t; print(t.heard_from(t.TellsItsThreads))"
+    said = subprocess.run(
+        [sys.executable, "-c", code], env={**others, **variables}, capture_output=True, check=True
+    )
+    assert int(said.stdout) == threads
 
 
-@pytest.mark.parametrize("name", ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"])
-def test_thread_counts_set_by_the_user_are_kept(monkeypatch, name):
-    for other in ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"):
-        monkeypatch.delenv(other, raising=False)
-    monkeypatch.setenv(name, "2")
-    expected = "2" if name == "OPENBLAS_NUM_THREADS" else None
-    assert threads_of_a_worker(True)[0] == expected
-    assert os.environ[name] == "2"
+def test_workers_have_the_environment_of_the_time_of_their_start(monkeypatch):
+    for value in ("first", "second", None):
+        if value is None:
+            monkeypatch.delenv("FASTGEN_TEST")
+        else:
+            monkeypatch.setenv("FASTGEN_TEST", value)
+        assert heard_from(TellsItsVariable) == value
 
 
 @pytest.mark.parametrize("speaks", [True, False])

@@ -28,7 +28,7 @@ from fastgen.dataset.repair import repair
 from fastgen.dataset.settings import parse_split
 from fastgen.dataset.stats import report, statistics
 from fastgen.dataset.verify import examine
-from fastgen.formats.registry import SEAFRONT, format_names
+from fastgen.formats.registry import SEAFRONT, format_names, known_formats
 
 _GENERATE = """\
 Generate a labelled dataset, or continue one that was stopped.
@@ -105,12 +105,13 @@ def add_generate(commands: Any) -> None:
         help="tasks to write, separated by commas, out of these and those of --also; images and "
         "scene files are always written; default: all of these",
     )
+    unpacked = [name for name, each in known_formats().items() if not each.fits_archives]
     output.add_argument(
         "--also",
         default="",
         metavar=",".join(name for name in format_names() if name not in SEAFRONT),
-        help="label files to write in addition to --tasks, separated by commas; bop and coco need "
-        "the seafront format",
+        help="label files to write in addition to --tasks, separated by commas; "
+        f"{', '.join(unpacked)} need the seafront format",
     )
     output.add_argument(
         "--stems",

@@ -85,7 +85,10 @@ def _plain(
     """Return the values of one camera without the shorthand that it uses."""
     given = [key for key in (*SHORTHANDS, "focal_mm") if key in values]
     if len(given) > 1:
-        raise ConfigError(f"{path}: {' and '.join(given)} are given; give one of them")
+        raise ConfigError(
+            f"{path}: {' and '.join(given)} each give the focal length; remove all but one"
+            + (", focal_mm for example" if "focal_mm" in given else "")
+        )
     key = given[0]
     rest = {name: value for name, value in values.items() if name != key}
     sensor_mm = rest.get("sensor_width_mm", base.sensor_width_mm if base else SENSOR_WIDTH_MM)
@@ -100,7 +103,7 @@ def _plain(
     if not isinstance(values[key], str):
         raise ConfigError(f"{path}.{key}: expected the path of a file, got {shown(values[key])}")
     if "lens" in rest:
-        raise ConfigError(f"{path}: calibration and lens are given; give one of them")
+        raise ConfigError(f"{path}: calibration and lens each give the lens; remove one of them")
     file = folder / values[key]
     try:
         return {**_of_file(file, sensor_mm), **rest}

@@ -14,9 +14,9 @@ from fastgen.config.own_decals import (
     StickerConfig,
     check_class_names,
 )
-from fastgen.decals.artwork import glyph_tiles
 from fastgen.decals.artwork import stickers as bundled_stickers
-from fastgen.errors import ConfigError
+from fastgen.decals.glyphs import glyph_tiles
+from fastgen.errors import ConfigError, did_you_mean
 from fastgen.validation import (
     LENGTH,
     UNIT,
@@ -210,9 +210,10 @@ class MarkingsConfig:
         check_distinct("marker_faces", self.marker_faces, "increase markers_per_face instead")
         for name, marker in self.markers.items():
             if not marker.art and name not in MARKER_CLASSES:
+                hint = did_you_mean(name, MARKER_CLASSES)
                 raise ConfigError(
-                    f"markers.{name}.art: is missing, and fastgen has no such marker; give the "
-                    "path of a square PNG or SVG image"
+                    f"markers.{name}.art: is missing, and fastgen has no such marker{hint}; give "
+                    "the path of a square PNG or SVG image"
                 )
         hint = "give one above 0, or marked_containers: 0"
         check_weights("markers", self.marker_weights.values(), hint)

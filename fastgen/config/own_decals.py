@@ -8,7 +8,7 @@ from annotated_types import MinLen
 
 from fastgen.classes import CLASS_NAME, OTHER_CLASSES
 from fastgen.config.fields import ArtFile, Weight
-from fastgen.decals.artwork import glyph_tiles
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.faces import SHEET_FACES
@@ -145,4 +145,5 @@ def _check_text(name: str, text: str) -> None:
     wrong = [char for char in text if char not in known]
     if wrong or not text.strip():
         signs = "".join(sorted(char for char in known if char.isprintable() and len(char) == 1))
-        raise ConfigError(f"{name}: {text!r} has other characters than the fonts, {signs!r}")
+        lacking = f"the fonts lack {''.join(dict.fromkeys(wrong))!r}" if wrong else "is blank"
+        raise ConfigError(f"{name}: {text!r}: {lacking}; give characters of {signs!r}")

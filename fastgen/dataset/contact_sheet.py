@@ -1,6 +1,7 @@
 """Contact sheet: small copies of a dataset's images with the labels from its files drawn on."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import cv2
@@ -12,6 +13,7 @@ from fastgen.dataset.storage import Folder
 from fastgen.errors import OutputError
 from fastgen.files.images import decode
 from fastgen.formats.format import Format
+from fastgen.overlay import draw_outlines
 
 _COLUMNS, _ROWS, _TILE_PX = 6, 4, 400
 
@@ -69,6 +71,7 @@ def _tile(out: Path, path: Path, formats: Sequence[Format]) -> NDArray[np.uint8]
     scale = _TILE_PX / max(image.shape[:2])
     size = (max(round(image.shape[1] * scale), 1), max(round(image.shape[0] * scale), 1))
     tile = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
-    for each in reversed(formats):
-        each.draw(tile, storage.read, f"{path.parent.name}/{path.stem}")
+    name = f"{path.parent.name}/{path.stem}"
+    found = [each.outlines(size, storage.read, name) for each in reversed(formats)]
+    draw_outlines(tile, list(chain.from_iterable(found)))
     return tile

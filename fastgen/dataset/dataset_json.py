@@ -21,7 +21,7 @@ _words.maxlist = _words.maxdict = 100  # cameras, formats, HDRIs: the last may b
 
 _MISSING = object()
 
-_SHOWN = 4
+_SHOWN = 10
 """Number of differing settings that an error message lists with their values."""
 
 _OPTIONS = {

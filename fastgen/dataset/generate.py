@@ -132,7 +132,7 @@ def run_here(
     def run(job: Job, tasks: Iterable[Task], on_report: Callable[[str, Any], None]) -> None:
         whole = worker_count >= default_workers()
         setup = partial(maker, job, whole)
-        workers.run(setup, tasks, worker_count, on_report, Strikes(job), hang_s, whole)
+        workers.run(setup, tasks, worker_count, on_report, Strikes(job), hang_s)
 
     return run
 

@@ -20,8 +20,9 @@ import orjson
 
 from fastgen.config.config import Config
 from fastgen.dataset.addresses import place_of
-from fastgen.dataset.dataset_json import MANIFEST, parsed, shard_manifest
+from fastgen.dataset.dataset_json import shard_manifest
 from fastgen.dataset.finish import finish
+from fastgen.dataset.finished import open_finished
 from fastgen.dataset.job import Job, manifest_path
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest, seal
@@ -208,21 +209,14 @@ class _Renaming:
 
 
 def _part(out: str) -> _Part:
+    """Open one of the datasets to merge."""
     place = place_of(out)
     if "://" in place:
         raise OutputError(
             f"{out}: is an address; merge works on folders, so copy the dataset first"
         )
-    storage = Folder(Path(place))
-    try:
-        manifest = parsed(storage.read(MANIFEST))
-    except FileNotFoundError:
-        raise OutputError(f"{out}: no readable {MANIFEST}; give a dataset's folder") from None
-    if manifest is None:
-        raise OutputError(f"{out}: {MANIFEST} is damaged; run fastgen verify {out}")
-    if "digest" not in manifest:
-        raise OutputError(f"{out}: the dataset is not finished; run generate again")
-    return _Part(out, storage, manifest)
+    dataset = open_finished(out)
+    return _Part(out, Folder(Path(place)), dataset.manifest)
 
 
 def _new_place(out: str, parts: Sequence[_Part]) -> Path:

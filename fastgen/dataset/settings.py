@@ -12,13 +12,13 @@ from fastgen.dataset.dataset_json import unsealed
 from fastgen.dataset.job import COCO_MASKS, LAYOUTS, STEMS, Job
 from fastgen.dataset.progress import Progress
 from fastgen.dataset.seal import digest
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, nearest
 from fastgen.formats.registry import formats_of
 from fastgen.light.environment import load_environment
 from fastgen.light.hdri import find_hdris
 from fastgen.postprocess import source_hash
 from fastgen.sampling.scene import SPLITS
-from fastgen.validation import check_known, nearest
+from fastgen.validation import check_known
 
 _MOST = 10**9
 """Limit of counts. Epochs of fastgen.torch also have this many scene indices."""

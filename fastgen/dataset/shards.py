@@ -30,16 +30,13 @@ from fastgen.formats.parquet import parquet_files
 from fastgen.formats.registry import formats_for
 from fastgen.sampling.scene import split_of
 
-_PRELOAD_IMAGES = 1000
-"""Runs with more images load all lights and shapes first, so that memory does not grow later."""
-
 MADE_BY = ("backend", "renderer")
 """Keys of a manifest that describe the process that made the shard."""
 
 _REPORT_S = 0.25
 """Shortest time between two reports of images: each report wakes the parent on a busy core."""
 
-_TRIM_IMAGES = 256
+_TRIM_IMAGES = 64
 """Freed memory goes back to the system after this many images, because the system must clear each
 page before it is used again."""
 
@@ -123,8 +120,6 @@ class Maker:
         self._formats = formats_for(job.formats, job.config.classes)
         self._storage = storage_of(job.out)
         self._generator = job.generator()
-        if job.images > _PRELOAD_IMAGES:
-            self._generator.preload(lambda: report("busy", None))
         names = (self._generator.used_backend, self._generator.renderer_name)
         self._made_by = dict(zip(MADE_BY, names, strict=True))
 

@@ -1,6 +1,10 @@
 """Processes that work on tasks and are replaced if they crash or hang.
 
 Each process has its own pipe. A shared queue has a lock, which stays locked if its holder dies.
+
+Workers are forked from a server process that has imported the package, so they start at once and
+share the memory of its modules. The server has no OpenGL context; a context that was opened before
+a fork hangs the child.
 """
 
 import contextlib
@@ -11,9 +15,9 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -40,6 +44,9 @@ _MATRIX_THREADS = ("OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "OMP_NUM_THREADS"
 OpenBLAS reads them when NumPy is imported, which is before any of our code runs in a new process.
 """
 
+_WARM_START = "fastgen.dataset.warm_start"
+"""Module that the server imports."""
+
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
@@ -64,9 +71,9 @@ def undisturbed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _one_matrix_thread() -> Iterator[None]:
-    """Let processes started in the block use one OpenBLAS thread, unless the user has set a number.
+    """Let a process started in the block use one OpenBLAS thread, unless the user has set a number.
 
-    Further threads spin while they wait, on the cores of other workers.
+    Further threads spin while they wait, on the cores of other workers, and do not survive a fork.
     """
     set_by_user = any(name in os.environ for name in _MATRIX_THREADS)
     if not set_by_user:
@@ -76,6 +83,20 @@ def _one_matrix_thread() -> Iterator[None]:
     finally:
         if not set_by_user:
             os.environ.pop(_MATRIX_THREADS[0], None)
+
+
+def start_server() -> None:
+    """Start the process that workers are forked from, unless it runs. Does not wait for it."""
+    # Ctrl-C reaches the whole process group, but the parent decides what happens. The server and
+    # its workers inherit this mask until they are ready. Starting the tracker would lift the mask.
+    resource_tracker.ensure_running()
+    with undisturbed(), _one_matrix_thread():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
+        try:
+            forkserver.set_forkserver_preload([_WARM_START])
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class Waiting:
@@ -106,20 +127,14 @@ class Waiting:
 class _Worker:
     """One process, its current task, and the time of its last report."""
 
-    def __init__(self, setup: Setup, whole_machine: bool) -> None:
-        # an OpenGL context made before a fork hangs the child
-        context = multiprocessing.get_context("spawn")
+    def __init__(self, setup: Setup) -> None:
+        context = multiprocessing.get_context("forkserver")
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, setup), name=_NAME, daemon=True)
-        # Ctrl-C reaches the whole process group, but the parent decides what happens. The worker
-        # inherits this mask until it is ready. Starting the tracker here would lift the mask.
-        resource_tracker.ensure_running()
-        with undisturbed(), _one_matrix_thread() if whole_machine else contextlib.nullcontext():
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
-            try:
-                self.process.start()
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        arguments = theirs, setup, dict(os.environ)
+        self.process = context.Process(target=_work, args=arguments, name=_NAME, daemon=True)
+        with undisturbed():
+            start_server()
+            self.process.start()
         theirs.close()
         self.task: Any = None
         self.place: Any = None
@@ -155,9 +170,8 @@ def run(
     on_report: Callable[[str, Any], None],
     on_death: Callable[[Any, Any, str], Any],
     hang_s: float = HANG_S,
-    whole_machine: bool = False,
 ) -> None:
-    """Let `count` processes do all tasks. No process outlives the call.
+    """Let `count` processes do all tasks. No worker outlives the call.
 
     Args:
         setup: Called in each process; it must be picklable.
@@ -168,7 +182,6 @@ def run(
         on_death: Called with the task of a worker that crashed or hung, its place, and how it
             ended. Returns the task to try instead, or raises.
         hang_s: Seconds without a report after which a worker is replaced.
-        whole_machine: There is a process on every core, so matrices need no threads.
 
     Raises:
         OutputError: A worker met an error that another attempt cannot fix, in its words; or the
@@ -178,7 +191,7 @@ def run(
     workers: list[_Worker] = []
     try:
         while waiting and len(workers) < count:
-            workers.append(_Worker(setup, whole_machine))
+            workers.append(_Worker(setup))
             workers[-1].give(waiting.take())
         while busy := [worker for worker in workers if worker.task is not None]:
             wait([worker.pipe for worker in busy], timeout=_POLL_S)
@@ -191,7 +204,7 @@ def run(
                     workers.remove(worker)
                     if not waiting:
                         continue
-                    worker = _Worker(setup, whole_machine)
+                    worker = _Worker(setup)
                     workers.append(worker)
                 if worker.task is None and waiting:
                     worker.give(waiting.take())
@@ -238,8 +251,10 @@ def in_words(error: Exception, place: str) -> str:
     return f"{place}: {error!r} (this is a bug in fastgen: please report it)"
 
 
-def _work(pipe: Connection, setup: Setup) -> None:
+def _work(pipe: Connection, setup: Setup, environment: Mapping[str, str]) -> None:
     """Main function of a worker: do tasks from the pipe until the parent kills it or exits."""
+    os.environ.clear()  # those of the server may be older
+    os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
     threading.Thread(target=_end_with_parent, daemon=True).start()

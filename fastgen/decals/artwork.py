@@ -1,7 +1,6 @@
-"""Markers, stickers, emblems and glyphs as arrays, read from the packaged assets."""
+"""Markers, stickers and emblems as arrays, read from the packaged assets."""
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import MARKER_CLASSES
-from fastgen.errors import AssetError
+from fastgen.decals.asset_files import asset_image, asset_json
 from fastgen.files import disk_cache
 from fastgen.resources import asset_path
 from fastgen.srgb import DECODED, ENCODED
@@ -23,43 +22,6 @@ VERSION = 6  # raise when the stored arrays change
 
 ART_SIZE = 256
 """Width and height of an artwork image, texels."""
-
-GLYPH_TILE_SIZE = 64
-"""Width and height of a glyph tile, texels."""
-
-GLYPH_MOST_INK = GLYPH_TILE_SIZE**2 / 2
-"""Upper limit of the ink in a glyph tile, in full texels."""
-
-GLYPH_EXTENT_STEPS = 128
-"""Steps along a side of a glyph tile in which `glyph_extents` are given."""
-
-_INK_SAMPLES = 8
-"""Samples per texel and axis from which ink coverage is computed."""
-
-
-@dataclass(frozen=True)
-class Glyph:
-    """Tile and metrics of one character; lengths are in cap heights from the pen position.
-
-    Attributes:
-        tile: Index into the tiles of `glyph_tiles`.
-        ink_left: Left end of the ink.
-        ink_right: Right end of the ink.
-        advance: Distance to the next pen position.
-    """
-
-    tile: int
-    ink_left: float
-    ink_right: float
-    advance: float
-
-
-@dataclass(frozen=True, eq=False)
-class Font:
-    """Glyphs of a font by character; two fonts are equal only if they are the same object."""
-
-    name: str
-    glyphs: Mapping[str, Glyph]
 
 
 @dataclass(frozen=True)
@@ -137,7 +99,7 @@ def marker_prints() -> Mapping[str, tuple[str, ...]]:
 
     The first variant has the name of its class.
     """
-    prints = _json("markers", "index.json")
+    prints = asset_json("markers", "index.json")
     return MappingProxyType(
         {
             name: tuple(art for art, about in prints.items() if about["class"] == name)
@@ -152,7 +114,7 @@ def un_numbers() -> Mapping[str, tuple[str, tuple[str, ...]]]:
 
     The hazard identification number is that of ADR 5.3.2.3; it is empty for class 1.
     """
-    numbers = _json("markers", "un_numbers.json")
+    numbers = asset_json("markers", "un_numbers.json")
     return MappingProxyType({name: (row[0], tuple(row[1])) for name, row in numbers.items()})
 
 
@@ -166,7 +128,7 @@ def art_layers() -> Mapping[str, int]:
 def _marker_art() -> list[str]:
     """Return the names of the artwork in assets/markers, markers first."""
     markers = [art for prints in marker_prints().values() for art in prints]
-    return markers + sorted(set(_json("markers", "index.json")) - set(markers))
+    return markers + sorted(set(asset_json("markers", "index.json")) - set(markers))
 
 
 def art_images() -> NDArray[np.uint8]:
@@ -179,7 +141,7 @@ def art_images() -> NDArray[np.uint8]:
     Raises:
         AssetError: A file is missing or broken.
     """
-    images = np.stack([_image(path, 4, ART_SIZE) for path in _art_paths()])
+    images = np.stack([asset_image(path, 4, ART_SIZE) for path in _art_paths()])
     return np.ascontiguousarray(images[..., [2, 1, 0, 3]])
 
 
@@ -270,89 +232,6 @@ _LIGHT_AND_ALPHA = np.stack([DECODED] * 3 + [np.linspace(0, 1, 256)], axis=1)[No
 
 
 @lru_cache(maxsize=1)
-def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
-    """Return the glyphs of all fonts as signed-distance tiles.
-
-    `lettering.TILE_CAPS` and its neighbours define the area and the value range of a tile.
-
-    Returns:
-        Tiles, uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], row 0 at the top, above 127 inside the
-        outline; and the fonts by name.
-
-    Raises:
-        AssetError: A file is missing or broken.
-    """
-    data = _json("fonts", "glyphs.json")
-    mosaic = _image(asset_path("fonts", "glyphs.png"), 1, None)
-    side = GLYPH_TILE_SIZE
-    rows, columns = mosaic.shape[0] // side, mosaic.shape[1] // side
-    tiles = mosaic.reshape(rows, side, columns, side).swapaxes(1, 2).reshape(-1, side, side)
-    fonts = {
-        name: Font(
-            name,
-            MappingProxyType(
-                {
-                    c: Glyph(g["tile"], g["ink"][0], g["ink"][1], g["advance"])
-                    for c, g in glyphs.items()
-                }
-            ),
-        )
-        for name, glyphs in data["fonts"].items()
-    }
-    return np.ascontiguousarray(tiles[: data["tiles"]]), MappingProxyType(fonts)
-
-
-@lru_cache(maxsize=1)
-def glyph_coverage() -> NDArray[np.uint8]:
-    """Return the share of ink in each texel of `glyph_tiles`, read-only.
-
-    Returns:
-        uint8 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE], 255 for full ink.
-
-    Raises:
-        AssetError: A file is missing or broken.
-    """
-    ink = np.stack([_ink(tile) for tile in glyph_tiles()[0]])
-    ink.flags.writeable = False  # all callers share it
-    return ink
-
-
-@lru_cache(maxsize=1)
-def glyph_extents() -> NDArray[np.int64]:
-    """Return how far the ink of each glyph reaches from the middle of its tile.
-
-    Returns:
-        int64 [G, 2], half width and half height in GLYPH_EXTENT_STEPS per tile, rounded up.
-    """
-    ink = glyph_coverage() > 0
-    texel = np.abs(np.arange(GLYPH_TILE_SIZE) + 0.5 - GLYPH_TILE_SIZE / 2) + 0.5
-    reach = [(ink.any(axis=axis) * texel).max(axis=1) for axis in (1, 2)]
-    steps = GLYPH_EXTENT_STEPS / GLYPH_TILE_SIZE
-    return np.ceil(np.stack(reach, axis=1) * steps).astype(np.int64)
-
-
-@lru_cache(maxsize=1)
-def glyph_sums() -> NDArray[np.uint16]:
-    """Return summed-area tables of the ink of `glyph_tiles` (Crow 1984), read-only.
-
-    Returns:
-        uint16 [G, GLYPH_TILE_SIZE, GLYPH_TILE_SIZE]: the ink of the texels up to and including a
-        row and column, in units of GLYPH_MOST_INK / 65535 texels.
-    """
-    sums = (glyph_coverage() / 255).cumsum(axis=1).cumsum(axis=2)
-    found: NDArray[np.uint16] = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
-    found.flags.writeable = False  # all callers share it
-    return found
-
-
-def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    side = GLYPH_TILE_SIZE
-    fine = cv2.resize(distances, (side * _INK_SAMPLES,) * 2, interpolation=cv2.INTER_LINEAR)
-    _, ink = cv2.threshold(fine, 127, 255, cv2.THRESH_BINARY)
-    return np.asarray(cv2.resize(ink, (side, side), interpolation=cv2.INTER_AREA), np.uint8)
-
-
-@lru_cache(maxsize=1)
 def stickers() -> Mapping[str, Sticker]:
     """Return all plates and stickers by name; markers, marks and emblems are not included."""
     return MappingProxyType(
@@ -373,7 +252,7 @@ def brands() -> tuple[Brand, ...]:
     """Return the invented shipping lines."""
     return tuple(
         Brand(name, b["emblem"], tuple(b["owner_codes"]), b["wordmark"], tuple(b["main_texts"]))
-        for name, b in _json("stickers", "brands.json").items()
+        for name, b in asset_json("stickers", "brands.json").items()
     )
 
 
@@ -392,24 +271,4 @@ def _with_role(role: str) -> dict[str, dict[str, Any]]:
 
 @lru_cache(maxsize=1)
 def _index() -> dict[str, Any]:
-    return _json("stickers", "index.json")
-
-
-def _json(*parts: str) -> dict[str, Any]:
-    path = asset_path(*parts)
-    try:
-        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise AssetError(f"{path}: cannot be read ({error}); reinstall fastgen") from None
-    return data
-
-
-def _image(path: Path, channels: int, size: int | None) -> NDArray[np.uint8]:
-    # cv2.imread cannot open every path that Python can, so decode the bytes instead.
-    data = np.frombuffer(path.read_bytes() if path.exists() else b"", np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    found = 0 if image is None else image.shape[2] if image.ndim == 3 else 1
-    if image is None or found != channels or (size and image.shape[:2] != (size, size)):
-        wanted = f"{size}x{size}, " if size else ""
-        raise AssetError(f"{path}: not a PNG of {wanted}{channels} channels; reinstall fastgen")
-    return np.asarray(image, np.uint8)
+    return asset_json("stickers", "index.json")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fastgen.decals.artwork import Font
+from fastgen.decals.glyphs import Font
 from fastgen.decals.iso6346 import Identifier
 from fastgen.decals.lettering import (
     BOX,

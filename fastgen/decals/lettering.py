@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, NamedTuple
 
-from fastgen.decals.artwork import Font
+from fastgen.decals.glyphs import Font
 from fastgen.errors import AssetError
 from fastgen.validation import Bounds, Flag, OneOf
 

@@ -28,7 +28,7 @@ from fastgen.formats.format import (
 from fastgen.formats.item import Item
 from fastgen.labels.background import background_masks
 from fastgen.labels.visibility import mask_box, window
-from fastgen.overlay import draw_outline
+from fastgen.overlay import Outline
 from fastgen.sample import Box, Sample
 
 
@@ -120,11 +120,12 @@ class _Damage(Format):
     def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
         return yolo.task_files("damage", config.damage.segmentation_classes, splits)
 
-    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
-        size = picture.shape[1::-1]
-        for index, values in yolo.finite_rows(read(f"damage/yolo/{name}.txt")):
-            if index:  # the container shows as a box already
-                draw_outline(picture, np.reshape(values, (-1, 2)) * size, self.classes[index])
+    def outlines(self, size: tuple[int, int], read: Read, name: str) -> list[Outline]:
+        return [
+            Outline(np.reshape(values, (-1, 2)) * size, self.classes[index], self.classes[index])
+            for index, values in yolo.finite_rows(read(f"damage/yolo/{name}.txt"))
+            if index  # the container shows as a box already
+        ]
 
     def check(self, record: Record, read: Read) -> Iterator[str]:
         name = f"{record['split']}/{record['stem']}"

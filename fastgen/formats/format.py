@@ -5,13 +5,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastgen.config.config import Config
 from fastgen.formats import coco
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import scene_file
+from fastgen.overlay import Outline
 
 
 @dataclass(frozen=True)
@@ -126,17 +124,18 @@ class Format(ABC):
         """
         return {}
 
-    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:  # noqa: B027
-        """Draw the labels of one image, as its label file has them, into `picture` in place.
+    def outlines(self, size: tuple[int, int], read: Read, name: str) -> list[Outline]:
+        """Return the labels of one image, as its label file has them, for the contact sheet.
 
         Args:
-            picture: uint8 RGB [H, W, 3], the image at any scale.
+            size: Width and height of the drawn image in pixels, at any scale.
             read: Returns the content of a file of the dataset by its path.
             name: SPLIT/STEM of the image.
 
         Raises:
             ValueError, IndexError: The label file cannot be read.
         """
+        return []
 
     def check(self, record: Record, read: Read) -> Iterable[str]:
         """Return a line "PATH: FAULT" for each label file of one image that contradicts others."""

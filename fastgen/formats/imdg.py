@@ -4,16 +4,13 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fastgen.classes import ALL_DETECTION_CLASSES, is_detection, with_marks
 from fastgen.config.config import Config
 from fastgen.formats import coco, yolo
 from fastgen.formats.format import DatasetFiles, Files, Format, Label, Read, Record, Records
 from fastgen.formats.item import Item
 from fastgen.labels.visibility import window
-from fastgen.overlay import draw_box
+from fastgen.overlay import Outline
 
 
 class _Imdg(Format):
@@ -65,10 +62,11 @@ class _Imdg(Format):
     def shared_files(self, splits: Sequence[str], config: Config) -> DatasetFiles:
         return yolo.task_files("imdg", config.markings.detection_classes, splits)
 
-    def draw(self, picture: NDArray[np.uint8], read: Read, name: str) -> None:
-        height, width = picture.shape[:2]
-        for index, values in yolo.finite_rows(read(f"imdg/labels/{name}.txt")):
-            draw_box(picture, yolo.pixel_box(values, (width, height)), self.classes[index])
+    def outlines(self, size: tuple[int, int], read: Read, name: str) -> list[Outline]:
+        return [
+            Outline.of_box(yolo.pixel_box(values, size), self.classes[index])
+            for index, values in yolo.finite_rows(read(f"imdg/labels/{name}.txt"))
+        ]
 
     def check(self, record: Record, read: Read) -> Iterator[str]:
         name = f"{record['split']}/{record['stem']}"

@@ -1,17 +1,17 @@
 """Damages as displacement fields with a few parameters each; meshes keep their triangles.
 
 A damage moves a point p at rest (mm, container frame) by amount(p) along its `inward` direction.
-The fields of all forms are in the package damage_forms. shaders/damage_law.glsl is the GLSL twin;
+The fields of all forms are in the package damages. shaders/damage_law.glsl is the GLSL twin;
 this module serves labels, tests and the exporter.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.damage_forms import form_of
-from fastgen.geometry.damage_forms.form import FADE_END_MM, FADE_START_MM, smoothstep
+from fastgen.damages.fields import FADE_END_MM, FADE_START_MM, smoothstep
 from fastgen.geometry.mesh import UNIT_CUBE
 from fastgen.scene import Damage, Vec3
+from fastgen.scene.damage_kinds import form_of
 
 Array = NDArray[np.floating]
 
@@ -38,6 +38,8 @@ def amount_mm(damage: Damage, points_mm: Array) -> NDArray[np.float64]:
     """
     u, v, w = local_coordinates(damage, points_mm)
     form = form_of(damage)
+    if form.amount is None:
+        return np.zeros(np.shape(u))
     amount = np.asarray(form.amount(damage, u, v, w), np.float64)
     if form.along_edge:
         return amount

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.damage_forms import form_of
-from fastgen.geometry.damage_forms.form import FADE_START_MM
+from fastgen.damages.fields import FADE_START_MM
 from fastgen.geometry.damage_law import deform, local_coordinates, reach_mm
 from fastgen.geometry.door_gear import is_gear
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import form_of
 
 BENT_EDGE_MM = 45.0
 """Longest edge near a damage; a fold is about 60 mm wide."""

@@ -18,7 +18,8 @@ from fastgen.geometry.chart_sheet import LAYOUT as SHEET_LAYOUT
 from fastgen.geometry.chart_sheet import VERSION as SHEET_VERSION
 from fastgen.geometry.chart_sheet import ChartSheet
 from fastgen.geometry.distinct_rows import distinct_rows
-from fastgen.geometry.sheet_folds import SheetFolds
+from fastgen.geometry.sheet_folds import VERSION as FOLDS_VERSION
+from fastgen.geometry.sheet_folds import SheetFolds, corrugated_axis
 from fastgen.scene.faces import FACES, SHEET_FACES
 from fastgen.scene.limits import HASPS
 
@@ -155,7 +156,14 @@ class Mesh:
     @cached_property
     def folds(self) -> Mapping[str, SheetFolds]:
         """Slopes of those SHEET_FACES that the mesh has, by face."""
-        return {face: SheetFolds.of(self, face) for face in self.panels}
+
+        def make() -> disk_cache.Arrays:
+            return {face: SheetFolds.of(self, face).sums for face in self.panels}
+
+        inputs = self.shape_digest, self.atlas_digest
+        layout = {face: f"float64 {face} 2" for face in self.panels}
+        stored = disk_cache.cached("folds", FOLDS_VERSION, inputs, make, layout=layout)
+        return {face: SheetFolds(corrugated_axis(face), sums) for face, sums in stored.items()}
 
     def _sheet(self, number: int) -> ChartSheet:
         index = np.flatnonzero(self.chart[self.triangles[:, 0]] == number)
@@ -167,7 +175,7 @@ class Mesh:
         def make() -> disk_cache.Arrays:
             return vars(self._sheet(number))
 
-        inputs = self._atlas_digest, number
+        inputs = self.atlas_digest, number
         stored = disk_cache.cached("sheet", SHEET_VERSION, inputs, make, layout=SHEET_LAYOUT)
         return ChartSheet(**stored)
 
@@ -288,7 +296,7 @@ class Mesh:
         return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
     @cached_property
-    def _atlas_digest(self) -> str:
+    def atlas_digest(self) -> str:
         """SHA-256 of everything that places the triangles on the sheets."""
         digest = hashlib.sha256(repr((self.charts, self.zones)).encode())
         for array in (self.atlas_mm, self.zone, self.triangles):

@@ -11,10 +11,17 @@ from fastgen.scene.faces import FACE_AXES
 if TYPE_CHECKING:
     from fastgen.geometry.mesh import Mesh
 
+VERSION = 1  # raise when the stored arrays change
+
 _STEP_MM = 4.0
 
 CORRUGATED_ALONG_Y = "door"
 """Face whose corrugation runs along sheet y; that of the others runs along sheet x."""
+
+
+def corrugated_axis(face: str) -> int:
+    """Return the sheet axis along which the corrugation of a face runs, 0 or 1."""
+    return int(face == CORRUGATED_ALONG_Y)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +40,7 @@ class SheetFolds:
     @classmethod
     def of(cls, mesh: "Mesh", face: str) -> Self:
         """Return the folds of a sheet, along a line through its middle."""
-        axis = int(face == CORRUGATED_ALONG_Y)
+        axis = corrugated_axis(face)
         *_, width, height = mesh.charts[mesh.chart_index(face)].rect_mm
         places = np.arange(0.5 * _STEP_MM, (width, height)[axis], _STEP_MM)
         points = np.full((len(places), 2), (width / 2, height / 2))

@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import DAMAGE_VALUES
-from fastgen.geometry.damage_forms import form_of
 from fastgen.geometry.damage_law import amount_mm, in_hole, is_marked, largest_mm, may_be_seen
 from fastgen.labels.coverage import project
 from fastgen.labels.surface_points import Points, surface_points
 from fastgen.labels.visibility import Shot, float_boxes, visibility
 from fastgen.sample import Box, Object
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.limits import MM
 
 _DEPTH_SLACK = 1e-3
@@ -21,7 +21,7 @@ def damage_objects(shot: Shot) -> list[Object]:
     """Return the damages of a scene; their ids are their values in the damage target.
 
     A damage covers the places where it alone moves the sheet farther than the mask threshold, tears
-    it away, or scrapes it. Its amodal box is that of the pixels there, None if the damage faces
+    it away, or marks it. Its amodal box is that of the pixels there, None if the damage faces
     away from the camera.
     """
     damages = shot.scene.damages
@@ -52,7 +52,7 @@ def damage_objects(shot: Shot) -> list[Object]:
 
 
 def severity_mm(damage: Damage) -> float:
-    """Return the largest displacement by a damage, or the length of a hole or scrape, in mm.
+    """Return the largest displacement by a damage, or the length of a hole or mark, in mm.
 
     Other damages at the same place do not count. Forms with rounded folds do not reach their
     nominal depth, and flattened corrugation adds to the displacement.

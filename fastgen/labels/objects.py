@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.camera.projection import View
-from fastgen.classes import DAMAGE_VALUES, SPREADER_ID
+from fastgen.classes import ALL_DAMAGE_CLASSES, SPREADER_ID
 from fastgen.geometry.decal_facets import DecalSurface
 from fastgen.geometry.decal_outlines import EDGE_POINTS
 from fastgen.geometry.facets import Facets, mesh_facets
@@ -68,7 +68,8 @@ def label(shot: Shot) -> list[Object]:
                 item,
                 container=member.number,
                 # instances of damages count up over the scene already
-                instance=item.instance + before[item.class_name] * (item.id not in DAMAGE_VALUES),
+                instance=item.instance
+                + before[item.class_name] * (item.class_name not in ALL_DAMAGE_CLASSES),
             )
             for item in _label(shot.of_member(member))
         ]

@@ -6,6 +6,7 @@ values number the containers from 1; 0 is everything else. The bundled ports hav
 assets/build_panoramas.py renders from the same model as the panorama.
 """
 
+import hashlib
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,9 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastgen.errors import AssetError
+from fastgen.files import disk_cache
 from fastgen.files.plain_file import read_plain
 from fastgen.light.environment import to_map_frame
 from fastgen.light.hdri import LARGEST_FILE, MAX_WIDTH, MIN_WIDTH
+
+VERSION = 1  # raise when the stored arrays change
 
 _PNG_START = struct.Struct(">8s8xIIBB")
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -28,6 +32,9 @@ It is checked first, because a decoder allocates whatever size the file claims."
 
 POINTS = 64
 """Directions per container in ContainerMap.points."""
+
+_LAYOUT = {"rows": "uint16 R W", "first_row": "int64 1", "points": f"float32 N {POINTS} 3"}
+"""Layout of a ContainerMap in the disk cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +91,8 @@ def container_map_path(hdri: Path) -> Path:
 def load_container_map(hdri: Path) -> ContainerMap | None:
     """Return the container map beside a panorama, None if there is none, as for photographs.
 
+    A map takes 6 MB, which processes share, because it is mapped from the disk cache.
+
     Raises:
         AssetError: The file is not a 16-bit grey PNG that is twice as wide as high.
     """
@@ -94,6 +103,19 @@ def load_container_map(hdri: Path) -> ContainerMap | None:
         return None
     except OSError as error:
         raise AssetError(f"{path}: cannot be read ({error.strerror})") from None
+    stored = disk_cache.cached(
+        "container-map",
+        VERSION,
+        hashlib.sha256(data).hexdigest(),
+        lambda: _decoded(data, path),
+        layout=_LAYOUT,
+        what=f"container map {path.name}",
+    )
+    return ContainerMap(stored["rows"], int(stored["first_row"][0]), stored["points"])
+
+
+def _decoded(data: bytes, path: Path) -> disk_cache.Arrays:
+    """Return the fields of a ContainerMap from the content of its file."""
     start = data[: _PNG_START.size].ljust(_PNG_START.size, b"\0")
     signature, width, height, *kind = _PNG_START.unpack(start)
     if signature != _PNG_SIGNATURE or kind != _GREY_16:
@@ -110,7 +132,11 @@ def load_container_map(hdri: Path) -> ContainerMap | None:
     first, limit = (int(used[0]), int(used[-1]) + 1) if len(used) else (0, 0)
     rows = np.zeros((limit - first + 2, width), np.uint16)
     rows[1:-1] = numbers[first:limit]
-    return ContainerMap(rows, first - 1, _points(rows, first - 1))
+    return {
+        "rows": rows,
+        "first_row": np.array([first - 1], np.int64),
+        "points": _points(rows, first - 1),
+    }
 
 
 def _points(rows: NDArray[np.uint16], first_row: int) -> NDArray[np.float32]:

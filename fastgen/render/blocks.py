@@ -5,12 +5,11 @@ A shader declares a block with `#include "NAME.block"`.
 
 from collections.abc import Mapping
 
-from fastgen.geometry.damage_forms import FORMS
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.light.directional_lights import MAX_LIGHTS
 from fastgen.render.noise import NOISE_LEVELS
 from fastgen.render.uniforms import Block
-from fastgen.scene.limits import MAX_DAMAGES, MAX_NEIGHBOURS, MAX_PROPS
+from fastgen.scene.limits import MAX_DAMAGES, MAX_FORMS, MAX_NEIGHBOURS, MAX_PROPS
 
 SCENE_BLOCK = Block(
     "SceneBlock",
@@ -95,8 +94,8 @@ DAMAGE_BLOCK = Block(
         ("vec4", "damage_reach", MAX_DAMAGES),  # along, across, inward; mask value
         ("vec4", "damage_bare", MAX_DAMAGES),  # Damage.bare_albedo; paint_loss
         ("int", "damage_count"),
-        # damages are sorted by form, in the order of damage_forms.FORMS
-        *(("int", f"{form.kind}_{form.name}_end") for form in FORMS),
+        # damages are sorted by form, in the order of damage_kinds.forms_of
+        *(("int", f"form_{number}_end") for number in range(MAX_FORMS)),
         ("int", "hole_count"),
         ("float", "damage_threshold_mm"),
         ("int", "inner_row"),  # first row of the interior in the visibility buffer

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from fastgen.camera import tone_curve
 from fastgen.classes import SPREADER_ID
+from fastgen.damages import fields
 from fastgen.decals.artwork import ART_SIZE
-from fastgen.geometry.damage_forms import FORMS, creased, form, scraped, torn
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.seals import PARTS
 from fastgen.geometry.sheet_folds import CORRUGATED_ALONG_Y
@@ -42,6 +42,7 @@ from fastgen.render.zone_codes import (
     ZONE_SMALL,
     ZONE_TURN,
 )
+from fastgen.scene.damage_kinds import forms_of
 from fastgen.scene.limits import DECAL_KINDS, GROUNDS, MIN_ROUGHNESS
 
 LIST_GROUP = 64
@@ -216,21 +217,35 @@ def _ground(v: ShaderVariant) -> Defines:
     }
 
 
-def _damage_loops() -> Defines:
-    """Return macros over all forms of damage; damages are sorted in the order of FORMS."""
-    ends = [f"{each.kind}_{each.name}_end" for each in FORMS]
+def _damage(v: ShaderVariant) -> Defines:
+    """Return the constants of all forms of damage, and macros that loop over the forms.
+
+    Damages are sorted in the order of the forms.
+    """
+    forms = forms_of(v.kinds)
+    ends = [f"form_{number}_end" for number in range(len(forms))]
+    parts = list(zip(forms, ["0", *ends], ends, strict=False))
     moving = [
-        f"EACH_NEAR({first}, {end}, {each.glsl}_field, USE)"
-        for each, first, end in zip(FORMS, ["0", *ends], ends, strict=False)
-        if each.marked is None
+        f"EACH_NEAR({first}, {end}, DamageField, {each.glsl}_field, USE)"
+        for each, first, end in parts
+        if each.amount
     ]
-    holes = [(f"outside_{each.glsl}(i, q)", end)
-             for each, end in zip(FORMS, ends, strict=True) if each.outline]  # fmt: skip
+    marks = [
+        f"EACH_NEAR({first}, {end}, DamageMark, {each.glsl}_mark, USE)"
+        for each, first, end in parts
+        if each.marked
+    ]
+    holes = [(f"outside_{each.glsl}(i, q)", end) for each, _, end in parts if each.outline]
     outside = "".join(f"(i) < {end} ? {distance} : " for distance, end in holes[:-1])
     return {
+        "DAMAGE_FADE_START_MM": f"{fields.FADE_START_MM:.1f}",
+        "DAMAGE_FADE_END_MM": f"{fields.FADE_END_MM:.1f}",
+        "DAMAGE_PROUD_MM": f"{fields.PROUD_MM:.1f}",
+        "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
+        **{name: value for form in forms for name, value in form.constants.items()},
         "EACH_DAMAGE(USE)": " ".join(moving),
+        "EACH_MARK(USE)": " ".join(marks),
         "OUTSIDE_HOLE(i, q)": f"({outside}{holes[-1][0]})",
-        "FIRST_SCRAPE": ends[len(moving) - 1],
     }
 
 
@@ -265,21 +280,7 @@ CONSTANTS: Mapping[str, Callable[[ShaderVariant], Defines]] = {
         "ZONE_SHEET": ZONE_SHEET,
         "CORRUGATED_ALONG_Y": f"{SHEET_NUMBERS[CORRUGATED_ALONG_Y]}",
     },
-    "damage": lambda _: {
-        "DAMAGE_FADE_START_MM": f"{form.FADE_START_MM:.1f}",
-        "DAMAGE_FADE_END_MM": f"{form.FADE_END_MM:.1f}",
-        "REACH_MARGIN_MM": f"{REACH_MARGIN_MM:.1f}",
-        "CREASED_EDGE": f"{creased.EDGE_STEEPNESS:.1f}",
-        "CREASED_FLATTENED_AT": f"{creased.FLATTENED_AT:g}",
-        "CREASED_LEVEL_MM": f"{creased.LEVEL_MM:.1f}",
-        "CREASED_DEEPEST_MM": f"{creased.DEEPEST_MM:.1f}",
-        "SCRAPED_PROUD_MM": f"{scraped.PROUD_MM:.1f}",
-        "TORN_WEDGE_END": f"{torn.WEDGE_END:.1f}",
-        "TORN_LONG_TEETH_MM": f"{torn.TEETH_MM[0]:.1f}",
-        "TORN_SHORT_TEETH_MM": f"{torn.TEETH_MM[1]:.1f}",
-        "TORN_ARM_GAPE": f"{torn.ARM_GAPE:g}",
-        **_damage_loops(),
-    },
+    "damage": _damage,
     "ground": _ground,
     "inside": lambda _: {
         "INSIDE_LIGHT": _INSIDE_LIGHT,

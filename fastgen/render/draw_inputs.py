@@ -28,6 +28,7 @@ from fastgen.render.sky_visibility_probe import LitMesh
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.visibility_buffer import VisibilityBuffer
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.faces import FACE_AXES
 from fastgen.scene.limits import MM
 
@@ -61,7 +62,7 @@ class Regions:
         surfaces: Disjoint rectangles; outside them the image shows only sky. A scene without a
             container has none.
         near_damage: Disjoint rectangles that damages may touch.
-        holes: Disjoint rectangles that perforations may touch.
+        holes: Disjoint rectangles that holes may touch.
         cables: Rectangles, outside all others, that show only the upper parts of a spreader.
     """
 
@@ -117,7 +118,7 @@ def regions_of(
     if not prepared.scene.container.present:
         return Regions(())
     touched = [region_of(view, corners_mm(item)) for item in damages]
-    torn = [part for part, d in zip(touched, damages, strict=True) if d.kind == "perforation"]
+    torn = [part for part, d in zip(touched, damages, strict=True) if form_of(d).outline]
     boxes = [box_corners(prepared.container.bounds_mm, damages)]
     if prepared.spreader is not None:
         frame, *above = map(box_corners, prepared.spreader.tier_bounds_mm)

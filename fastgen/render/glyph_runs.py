@@ -5,12 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.artwork import (
-    GLYPH_EXTENT_STEPS,
-    GLYPH_MOST_INK,
-    GLYPH_TILE_SIZE,
-    glyph_extents,
-)
+from fastgen.decals.glyphs import GLYPH_EXTENT_STEPS, GLYPH_MOST_INK, GLYPH_TILE_SIZE, glyph_extents
 from fastgen.decals.lettering import TILE_CAPS, TILE_RANGE_CAPS, Lettering
 from fastgen.scene.limits import GLYPH_RANGE
 

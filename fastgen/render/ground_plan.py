@@ -17,6 +17,7 @@ from fastgen.render.tiles import Mask, Tiles, bit_masks
 from fastgen.render.variant import GroundVariant
 from fastgen.scene import Ground, Prop
 from fastgen.scene.boxes import OrientedBox, prop_box
+from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.limits import MM
 
 _SHADED_MM = 600.0
@@ -159,7 +160,7 @@ def _solid_mm(member: Member) -> Array | None:
     damages = member.prepared.scene.damages
     skin_mm = _SKIN_MM + sum(map(inward_mm, damages))
     half = member.box.half_mm - skin_mm
-    if half.min() <= 0 or any(damage.kind == "perforation" for damage in damages):
+    if half.min() <= 0 or any(form_of(damage).outline for damage in damages):
         return None
     return OrientedBox(member.box.center_mm, half, member.box.rotation).corners_mm
 

@@ -6,13 +6,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.artwork import (
-    art_levels,
-    glyph_sums,
-    glyph_tiles,
-    mip_levels,
-    premultiplied,
-)
+from fastgen.decals.artwork import art_levels, mip_levels, premultiplied
+from fastgen.decals.glyphs import glyph_sums, glyph_tiles
 from fastgen.files import disk_cache
 from fastgen.light.reflectance import dfg_table
 from fastgen.render.gl import GLContext

@@ -10,6 +10,7 @@ from fastgen.render.blocks import BLOCKS
 from fastgen.render.constants import constants_text
 from fastgen.render.variant import ShaderVariant
 from fastgen.resources import shader_path
+from fastgen.scene.damage_kinds import forms_of
 
 _INCLUDE = re.compile(r'#include "([^"]+)"\n')
 _VERSION = re.compile(r"#version .*\n")
@@ -24,7 +25,7 @@ Textures = Mapping[str, moderngl.Texture | moderngl.TextureArray]
 
 @cache  # the programs of one renderer include some files a hundred times
 def shader_text(name: str) -> str:
-    """Return the text of a shader file that ships with the package.
+    """Return the text of a shader file that ships with fastgen, or of one with an absolute path.
 
     Raises:
         AssetError: The file does not exist.
@@ -38,6 +39,7 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     `#include "NAME.glsl"` is replaced by that file where it first occurs. `#include
     "NAME.constants"` and `#include "NAME.block"` say that a file needs a group of constants
     (constants.py) or a uniform block (blocks.py); each is declared behind the #version line.
+    `#include "damage.forms"` stands for the files of all forms of damage that the variant draws.
     Nothing is included twice, so an include inside an #if must not be the first of a file that code
     outside needs too.
 
@@ -55,6 +57,9 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
         needed[name] = None
         if name.endswith((".constants", ".block")):
             return ""
+        if name == "damage.forms":
+            files = (form.shader for form in forms_of(variant.kinds))
+            return _INCLUDE.sub(included, "".join(f'#include "{file}"\n' for file in files))
         return _INCLUDE.sub(included, read(name))
 
     body = _INCLUDE.sub(included, text)

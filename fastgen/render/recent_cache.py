@@ -4,6 +4,11 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
+from fastgen.scene.limits import MAX_NEIGHBOURS
+
+CACHED_CONTAINERS = 2 + MAX_NEIGHBOURS
+"""Containers whose tables are cached: those of one scene, and one more."""
+
 
 class _Releasable(Protocol):
     def release(self) -> None: ...

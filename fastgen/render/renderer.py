@@ -12,16 +12,16 @@ from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
+from fastgen.config.damage import DamageConfig
 from fastgen.decals.artwork import art_layers
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
-from fastgen.light.ray_bodies import RayBodies
 from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.decal_tables import scale_for
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
@@ -34,27 +34,25 @@ from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
 from fastgen.render.passes.ground import GroundPass
 from fastgen.render.passes.normals import NormalsPass
-from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
-from fastgen.render.recent_cache import RecentCache, ReleasingCache
+from fastgen.render.ray_light import RayLight
+from fastgen.render.recent_cache import CACHED_CONTAINERS, ReleasingCache
 from fastgen.render.recent_targets import RecentTargets
 from fastgen.render.scene_lights import Around, SceneLights
 from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
-from fastgen.render.shapes import Shapes, ray_bodies
-from fastgen.render.surface_values import damage_values, scene_values
-from fastgen.render.uniforms import Block
+from fastgen.render.shapes import Shapes
+from fastgen.render.surface_values import SceneMaterials, damage_values, scene_values
+from fastgen.render.uniforms import BlockBuffers
 from fastgen.render.variant import ShaderVariant
 from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.boxes import back_to_front
-from fastgen.scene.limits import MAX_NEIGHBOURS, MM
-
-_CONTAINERS = 2 + MAX_NEIGHBOURS
-"""Containers whose tables are cached: those of one scene, and one more."""
+from fastgen.scene.damage_kinds import program_kinds
+from fastgen.scene.limits import MM
 
 
 class Renderer:
@@ -69,7 +67,7 @@ class Renderer:
         gl: GLContext,
         light: Callable[[str], EnvironmentLight],
         quality: Quality,
-        mask_threshold_mm: float = 5.0,
+        damage: DamageConfig | None = None,
         read: Read = shader_text,
         without: tuple[str, ...] = (),
         own_art: Mapping[str, NDArray[np.uint8]] = MappingProxyType({}),
@@ -81,7 +79,8 @@ class Renderer:
             light: Returns the prefiltered environment of a name, such as `load_environment`.
             quality: Samples, lookups and light. Images whose samples do not fit the driver's
                 textures get fewer samples. A traced quality needs `ray_bodies.check_rays`.
-            mask_threshold_mm: Displacement in mm above which a surface counts as damaged.
+            damage: Threshold of masks, and kinds to compile programs for; None for the defaults. A
+                scene with other kinds takes time to compile theirs.
             read: Returns the text of a shader file by its name.
             without: Material layers of LAYERS to leave out of images.
             own_art: Artwork of a configuration by name, see own_art.art_of.
@@ -89,26 +88,22 @@ class Renderer:
         self._gl = gl
         self.ctx = gl.ctx
         self._quality = quality
-        self._mask_threshold_mm = mask_threshold_mm
+        damage = damage or DamageConfig()
+        self._mask_threshold_mm = damage.mask_threshold_mm
         self._without = without
         self._programs = programs = Programs(self.ctx, read)
-        self._geometry = GeometryPass(self.ctx, programs)
+        self._kinds = program_kinds(damage.kinds)
+        self._geometry = GeometryPass(self.ctx, programs, self._kinds)
         self._background = BackgroundPass(self.ctx, programs, by_compute=not gl.software)
         self._ground = GroundPass(self.ctx, programs, self.ambient)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
-        self._rays: ReleasingCache[RayPass] = ReleasingCache(2)
+        self._rays = RayLight(gl, programs)
         self._targets = RecentTargets(gl, quality)
-        self._bodies: RecentCache[RayBodies] = RecentCache(_CONTAINERS)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights = SceneLights(gl, light, quality)
-        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(_CONTAINERS)
-        self._blocks = {
-            block.name: self.ctx.buffer(reserve=block.size)
-            for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK)
-        }
-        for block in (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK):  # some shaders declare all three
-            self._blocks[block.name].bind_to_uniform_block(block.binding)
+        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(CACHED_CONTAINERS)
+        self._blocks = BlockBuffers(self.ctx, (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK))
         bundled = art_layers()
         own_layers = {name: len(bundled) + i for i, name in enumerate(own_art)}
         self._art_layers = {**bundled, **own_layers}
@@ -163,6 +158,7 @@ class Renderer:
         Containers do not overlap. Several are drawn over one another from back to front.
         """
         scene = prepared.scene
+        self._compile_for(prepared)
         exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)
@@ -190,6 +186,17 @@ class Renderer:
                 self._trace(inputs, member.prepared)
                 self._shade(inputs, member, exposure, normals)
         return inputs.targets
+
+    def _compile_for(self, prepared: PreparedScene) -> None:
+        """Compile programs for kinds of damage that the renderer could not draw so far."""
+        members = (member.prepared.scene.damages for member in prepared.members)
+        kinds = {damage.kind for damages in members for damage in damages}
+        if not kinds <= set(self._kinds):
+            self._kinds = program_kinds(kinds.union(self._kinds))
+            self._geometry.release()
+            self._shapes.release()
+            self._geometry = GeometryPass(self.ctx, self._programs, self._kinds)
+            self._shapes = Shapes(self.ctx, self._geometry.programs)
 
     def _shade(
         self,
@@ -231,19 +238,19 @@ class Renderer:
         environment = scene.environment
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
         resources = self._resources(prepared)
+        near = None if around is None else around[prepared]
         container, spreader, lit = self._shapes.of(
-            prepared,
-            resources.materials,
-            lens,
-            ambient,
-            None if around is None else around[prepared],
+            prepared, resources.materials, lens, ambient, near
         )
         seals = self._shapes.seals(prepared, lit[0])
         decals = resources.decals(scale_for(prepared.container, view))
-        self._set(SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values})
+        self._blocks.fill(
+            SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values}
+        )
         if damage != "undamaged":
             threshold_mm, row = self._mask_threshold_mm, samples.inner_row
-            self._set(DAMAGE_BLOCK, damage_values(prepared, damages, threshold_mm, row))
+            values = damage_values(prepared, damages, self._kinds, threshold_mm, row)
+            self._blocks.fill(DAMAGE_BLOCK, values)
         return DrawInputs(
             view=view,
             damages=damages,
@@ -260,6 +267,7 @@ class Renderer:
                 lookups=self._quality.lookups,
                 layer=options.layer,
                 damage=damage,
+                kinds=self._kinds,
                 lights=shader_lights(ambient.lights),
                 traced=light.sky_rays is not None and options.layer == "all",
                 radiance=options.radiance,
@@ -296,22 +304,15 @@ class Renderer:
     def _set_view(self, inputs: DrawInputs, member: Member, exposure: float) -> None:
         """Fill the uniform block of the view for the samples of `inputs`."""
         values = view_values(member.prepared.scene, inputs.view, inputs.samples, exposure)
-        self._set(VIEW_BLOCK, {**values, **inputs.lights})
+        self._blocks.fill(VIEW_BLOCK, {**values, **inputs.lights})
 
     def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
         environment = prepared.scene.environment
         light = self._lights.of(environment.name)
-        if not inputs.variant.traced or light.sky_rays is None or not inputs.regions.surfaces:
-            return
-        size, lens = inputs.view.size, inputs.view.distortion is not None
-        rays = self._rays.get(size, lambda: RayPass(self._gl, self._programs, size))
-        materials = self._resources(prepared).materials
-        bodies = self._bodies.get(
-            (prepared, lens),
-            lambda: ray_bodies(prepared, materials, lens, inputs.lit, self.ambient(environment)),
-        )
-        rays.run(inputs, bodies, light.sky_rays, environment.yaw_deg)
+        if inputs.variant.traced and light.sky_rays is not None and inputs.regions.surfaces:
+            materials = self._resources(prepared).materials
+            self._rays.run(inputs, prepared, materials, light.sky_rays, self.ambient(environment))
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Prepare the shapes of a scene, so that drawing them takes no more time or memory.
@@ -322,6 +323,7 @@ class Renderer:
             damages: Prepare for damaged scenes too.
         """
         prepared.prepare_shapes(lens, damages)
+        _ = SceneMaterials(prepared).reflectances
         self._shapes.preload(prepared, lens, damages)
 
     def preload_environment(self, name: str) -> None:
@@ -357,15 +359,16 @@ class Renderer:
 
     def bake(self, prepared: PreparedScene, texel_mm: float) -> Atlas:
         """Bake the material of a scene's container, damage included, see bake.Atlas."""
+        self._compile_for(prepared)
         scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
         if damage != "undamaged":
-            values = damage_values(prepared, scene.damages, self._mask_threshold_mm, 0)
-            self._set(DAMAGE_BLOCK, values)
+            values = damage_values(prepared, scene.damages, self._kinds, self._mask_threshold_mm, 0)
+            self._blocks.fill(DAMAGE_BLOCK, values)
         decals = self._resources(prepared).decals()
-        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         textures = self._material_textures(decals, mesh, None)
-        program = bake_program(self._programs, damage)
+        program = bake_program(self._programs, damage, self._kinds)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
 
     def bake_spreader(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
@@ -374,10 +377,10 @@ class Renderer:
         if spreader is None:
             return None
         decals = self._resources(prepared).decals()
-        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         container = self._shapes.container(prepared)
         textures = self._material_textures(decals, container, spreader)
-        program = bake_program(self._programs, "undamaged")
+        program = bake_program(self._programs)
         return bake_atlas(
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
         )
@@ -385,7 +388,7 @@ class Renderer:
     def bake_ground(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None where it has none."""
         decals = self._resources(prepared).decals()
-        self._set(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
         return self._ground.bake(prepared.scene, self._tables, texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
@@ -404,16 +407,10 @@ class Renderer:
         zones = self._shapes.zone_table(mesh, spreader)
         return {**self._tables, "zone_table": zones, **decals.textures}
 
-    def _set(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
-        """Fill a uniform block for the draws that follow, and bind it."""
-        buffer = self._blocks[block.name]
-        buffer.write(block.pack(values))
-        buffer.bind_to_uniform_block(block.binding)
-
     def release(self) -> None:
         """Free every GL object of this renderer."""
         owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
-        owners += [self._geometry, self._ground, self._programs, *self._blocks.values()]
+        owners += [self._geometry, self._ground, self._programs, self._blocks]
         for item in [*owners, *self._tables.values()]:
             item.release()
 

@@ -8,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.files import disk_cache
 from fastgen.geometry.mesh import MATERIALS, Chart, Mesh, Zone
+
+VERSION = 1  # raise when the stored arrays change
 
 Array = NDArray[np.floating]
 Flats = Mapping[str, tuple[tuple[float, float], ...]]
@@ -86,6 +89,10 @@ class _Points(NamedTuple):
     level: Array
 
 
+_LAYOUT = {"material": "int64 N", **dict.fromkeys(_Points._fields[1:], "float64 N")}
+"""Layout of _Points in the disk cache."""
+
+
 @lru_cache(maxsize=256)
 def rate_of(coverage: float, mesh: Mesh) -> float:
     """Return the shader's rust_rate at which rust covers a share of a container's sheet.
@@ -160,9 +167,17 @@ def _spread(share: Array, reach: float, softness: float) -> Array:
     return np.asarray(1 / (1 + np.exp(-x * (1.5976 + 0.070566 * x * x))))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=128)  # all containers and spreaders of a ShapeLibrary
 def _points(mesh: Mesh) -> _Points:
-    """Return the classes of points on a mesh."""
+    """Return the classes of points on a mesh, from the disk cache if possible."""
+    inputs = mesh.atlas_digest, sorted(mesh.flats.items())
+    stored = disk_cache.cached(
+        "rust-points", VERSION, inputs, lambda: _found(mesh)._asdict(), layout=_LAYOUT
+    )
+    return _Points(**stored)
+
+
+def _found(mesh: Mesh) -> _Points:
     found = []
     for zone, area in zip(mesh.zones, mesh.zone_areas_mm2, strict=True):
         part, weight, run_weight = _weights(zone, _fold_mean(mesh, zone))

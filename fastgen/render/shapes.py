@@ -1,18 +1,15 @@
 """Containers, seals and spreaders on the GPU, with the light at their vertices."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.geometry.damage_law import deform
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.seals import nearest_gear, seal_charts
-from fastgen.light.environment import Ambient, to_map_frame
-from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
+from fastgen.light.environment import Ambient
 from fastgen.light.sky_visibility import Sky
 from fastgen.light.surrounding_light import SurroundingLight
 from fastgen.render.gpu_mesh import GpuMesh, zone_rows, zone_table
@@ -142,46 +139,3 @@ class Shapes:
         """Free all GL objects."""
         for kept in (self._containers, self._seals, self._spreaders, self._zones, self._probe):
             kept.release()
-
-
-def ray_bodies(
-    prepared: PreparedScene,
-    materials: SceneMaterials,
-    lens: bool,
-    lit: Sequence[LitMesh],
-    light: Ambient,
-) -> RayBodies:
-    """Return the bodies of a scene that rays can hit.
-
-    The container is damaged but has no holes, and carries the light of the undamaged one.
-
-    Args:
-        prepared: The scene.
-        materials: Its materials.
-        lens: Whether the image has lens distortion.
-        lit: Light at the vertices of container and spreader, from Shapes.of.
-        light: Light of the scene's environment.
-    """
-    scene, shape = prepared.scene, prepared.spreader
-    meshes = [prepared.container] if shape is None else [prepared.container, shape.drawn(lens)]
-    paints = np.array(materials.reflectances, np.float32)
-    bodies = [
-        LitBody(
-            mesh.positions_mm,
-            mesh.triangles,
-            paints[[chart.material_index for chart in mesh.charts]][mesh.chart],
-            one.without_lights,
-        )
-        for mesh, one in zip(meshes, lit, strict=True)
-    ]
-    if scene.damages:
-        moved = deform(scene.damages, bodies[0].positions_mm).astype(np.float32)
-        bodies[0] = replace(bodies[0], positions_mm=moved)
-    suns = [
-        DistantLight(
-            to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
-            np.array(sun.light, np.float32),
-        )
-        for sun in light.lights
-    ]
-    return RayBodies(bodies, suns)

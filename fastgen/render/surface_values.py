@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastgen.geometry.damage_forms import FORMS, form_of
 from fastgen.geometry.damage_law import reach_mm
 from fastgen.geometry.mesh import MATERIALS
 from fastgen.geometry.prepared_scene import PreparedScene
@@ -15,7 +14,8 @@ from fastgen.render.constants import REACH_MARGIN_MM
 from fastgen.render.noise import noise_tiles
 from fastgen.render.rust import rate_of, rusted
 from fastgen.scene import Color, Damage, Scene
-from fastgen.scene.limits import HASPS
+from fastgen.scene.damage_kinds import form_of, forms_of
+from fastgen.scene.limits import HASPS, MAX_FORMS
 
 _TILE_OF_SCALE = 4.0
 """Typical lengths of a noise pattern in one tile."""
@@ -131,13 +131,18 @@ def scene_values(prepared: PreparedScene, background_size: int) -> Mapping[str, 
 
 
 def damage_values(
-    prepared: PreparedScene, shown: tuple[Damage, ...], threshold_mm: float, inner_row: int
+    prepared: PreparedScene,
+    shown: tuple[Damage, ...],
+    kinds: tuple[str, ...],
+    threshold_mm: float,
+    inner_row: int,
 ) -> Mapping[str, ArrayLike]:
     """Return the members of DAMAGE_BLOCK.
 
     Args:
         prepared: The scene.
         shown: Those of its damages that are drawn, at least one.
+        kinds: Kinds that the program can draw, see ShaderVariant.
         threshold_mm: Displacement above which a surface counts as damaged.
         inner_row: First row of the interior in the visibility buffer.
     """
@@ -146,17 +151,17 @@ def damage_values(
         for damage, value in zip(prepared.scene.damages, prepared.numbers.damages, strict=True)
         if damage in shown
     ]
-    valued.sort(key=lambda pair: FORMS.index(form_of(pair[0])))
+    forms = forms_of(kinds)
+    valued.sort(key=lambda pair: forms.index(form_of(pair[0])))
     damages = [damage for damage, _ in valued]
     shape = np.zeros((len(damages), 12), np.float32)
     for row, damage in zip(shape, damages, strict=True):
         row[: len(damage.shape)] = damage.shape
         row[-1] = damage.fresh
-    counts = [sum(form_of(damage) is form for damage in damages) for form in FORMS]
-    ends = {
-        f"{form.kind}_{form.name}_end": int(end)
-        for form, end in zip(FORMS, np.cumsum(counts), strict=True)
-    }
+    counts = np.zeros(MAX_FORMS, int)
+    for damage in damages:
+        counts[forms.index(form_of(damage))] += 1
+    ends = {f"form_{number}_end": end for number, end in enumerate(np.cumsum(counts).tolist())}
     return {
         "damage_origin": [(*d.origin_mm, _squared_reach(d)) for d in damages],
         "damage_along": [(*d.along, d.size_mm[0] / 2) for d in damages],

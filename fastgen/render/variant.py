@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from fastgen.classes import DRAWN_DAMAGE_CLASSES
+
 LAYERS = (
     *("all", "base", "tone", "ageing", "dirt", "rust", "scratches", "decals", "reflection"),
     "normals",
@@ -9,7 +11,7 @@ LAYERS = (
 """Material layers that can be rendered. `ids` and `damage` of `fastgen show` are label targets."""
 
 DAMAGE_VARIANTS = ("undamaged", "damaged", "holed")
-"""Programs for scenes without damage, with damage, and with at least one perforation."""
+"""Programs for scenes without damage, with damage, and with at least one hole."""
 
 PIXEL_CLASSES: dict[str, tuple[str, ...]] = {
     "plain": (),
@@ -64,6 +66,7 @@ class ShaderVariant:
         layer: One of LAYERS.
         pixel_class: A key of PIXEL_CLASSES.
         damage: One of DAMAGE_VARIANTS.
+        kinds: Kinds of damage that it can draw, see damage_kinds.program_kinds.
         lights: Directional lights that the program can shade: 0, 1 or MAX_LIGHTS.
         traced: Read indirect light that rays found instead of the vertices' light.
         radiance: Write exposed linear radiance instead of tone-mapped and encoded colour.
@@ -77,6 +80,7 @@ class ShaderVariant:
     layer: str = "all"
     pixel_class: str = "plain"
     damage: str = "undamaged"
+    kinds: tuple[str, ...] = DRAWN_DAMAGE_CLASSES
     lights: int = 0
     traced: bool = False
     radiance: bool = False

@@ -44,7 +44,7 @@ def advice_on(
     found = [
         _failed(manifest),
         _empty_splits(manifest),
-        *_under_represented(table, scale),
+        *_under_represented(manifest, table, scale),
         _too_small(table),
         _duplicates(looks),
         *_exposure(looks),
@@ -73,7 +73,9 @@ def _empty_splits(manifest: Mapping[str, Any]) -> Advice | None:
     )
 
 
-def _under_represented(table: LabelTable, scale: float) -> list[Advice]:
+def _under_represented(
+    manifest: Mapping[str, Any], table: LabelTable, scale: float
+) -> list[Advice]:
     counts = table.counts() * scale
     train = counts[:, SPLITS.index("train")]
     found = []
@@ -89,12 +91,12 @@ def _under_represented(table: LabelTable, scale: float) -> list[Advice]:
             for i in targets
             if counts[i].sum() and (train[i] < _FEW or train[i] < _RARE * usual)
         ]
-        key = "damage.probability" if task == "damage" else "markings.marked_containers"
+        raised = _raised(manifest, task)
         if absent:
             found.append(
                 Advice(
                     f"{task}: no label at all of {_list(absent)}.",
-                    f"Generate more images, raise {key}, or leave the classes out of the training.",
+                    f"Generate more images, {raised}, or leave the classes out of the training.",
                 )
             )
         if rare:
@@ -102,10 +104,19 @@ def _under_represented(table: LabelTable, scale: float) -> list[Advice]:
                 Advice(
                     f"{task}: few training labels of {_list(rare)}.",
                     f"Fewer than {_FEW} labels, or a tenth of the usual class, are hardly learned. "
-                    f"Generate more images, or raise {key}.",
+                    f"Generate more images, or {raised}.",
                 )
             )
     return found
+
+
+def _raised(manifest: Mapping[str, Any], task: str) -> str:
+    """Return how the configuration can give more labels of a task."""
+    part, key = ("damage", "probability") if task == "damage" else ("markings", "marked_containers")
+    if manifest.get("config", {}).get(part, {}).get(key) != 1:
+        return f"raise {part}.{key}"
+    more = "damage.count" if task == "damage" else "markings.markers_per_face"
+    return f"raise {more} ({part}.{key} is 1 already)"
 
 
 def _too_small(table: LabelTable) -> Advice | None:

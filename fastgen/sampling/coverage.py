@@ -11,6 +11,7 @@ from fastgen.config.fields import linear_color
 from fastgen.config.sensor import LensConfig
 from fastgen.sampling.scene import rounded_gap_mm
 from fastgen.scene import Container, Spreader
+from fastgen.scene.damage_kinds import kind_named
 from fastgen.scene.optics import Lens
 
 
@@ -72,9 +73,9 @@ def damage_variant_configs(config: Config) -> Iterator[Config]:
     config = replace(config, container=replace(config.container, absent=0.0))
     damage = config.damage
     yield replace(config, damage=replace(damage, probability=0.0))
-    holes = ("perforation",)
+    holes = tuple(k for k in damage.kinds if any(form.outline for form in kind_named(k).forms))
     for kinds in (tuple(k for k in damage.kinds if k not in holes), holes):
-        if damage.probability > 0 and set(kinds) & set(damage.kinds):
+        if damage.probability > 0 and kinds:
             yield replace(config, damage=replace(damage, probability=1.0, kinds=kinds))
 
 

@@ -3,40 +3,22 @@
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from fastgen.config.damage import DamageConfig
-from fastgen.sampling.damage_forms import (
-    FRAME_MM,
-    SHEET_FORMS,
-    SheetForm,
-    draw,
-    draw_scrape,
-    draw_wear,
-    turned,
-)
+from fastgen.damages.draws import FRAME_MM, rounded_vector, turned
 from fastgen.sampling.streams import Streams
 from fastgen.scene import Damage, Vec3
+from fastgen.scene.damage_kinds import SheetForm, kind_named
 from fastgen.scene.limits import MAX_INSTANCES
-from fastgen.validation import Range
 
 _CASTING_MM = 350.0
 """Distance from the frame within which the rim of a hole near a casting ends."""
 
 _SHEET_MM = 15.0
 """Approximate depth of the sheet's outer flats behind the outermost plane of the castings."""
-
-
-_KINK_APEX = Range(-0.5, 0.5)
-"""Place of a kink's deepest point, in half lengths from its middle."""
-
-_KINK_SOFTNESS = Range(0.03, 0.15)
-"""Rounding of a kink's folds, as a share of its depth."""
-
-_KINKS_ABOVE = 0.25
-"""Share of the kinks in posts that are just below the upper casting; others are above the lower."""
 
 
 @dataclass(frozen=True)
@@ -82,18 +64,19 @@ def sample_damages(
     planes = _planes(size_mm)
     damages: list[Damage] = []
     beside: list[Damage] = []
-    for i, kind in enumerate(kinds):
-        rng = streams(f"damage.{i}")
-        if kind == "axis":
-            damages.append(_axis(config, size_mm, rng))
+    for i, kind in enumerate(map(kind_named, kinds)):
+        rng, ranges = streams(f"damage.{i}"), config.ranges_of(kind.name)
+        if kind.place is not None:
+            damages.append(kind.place(ranges, size_mm, rng))
             continue
+        assert kind.draw is not None, "a kind has either draw or place"
         plane = planes[str(rng.choice(config.faces))]
-        form = SHEET_FORMS[kind](config, plane.face, plane.size, rng)
-        damages.append(_on_sheet(kind, form, plane, rng))
-        scraped = "scrape" in config.kinds and kind in ("concave", "dented")
+        form = kind.draw(ranges, plane.face, plane.size, rng)
+        damages.append(_on_sheet(kind.name, form, plane, rng))
         rng = streams(f"damage.{i}.scrape")
+        scraped = "scrape" in config.kinds and kind.rubbed
         room = len(beside) + len(kinds) < MAX_INSTANCES
-        if scraped and rng.random() < config.scrape.beside and room:
+        if scraped and rng.random() < config.ranges_of("scrape").beside and room:
             beside.append(_beside(damages[-1], config, plane, rng))
     return (*damages, *beside)
 
@@ -171,11 +154,6 @@ def _place(
     return plane.size[0] / 2 + x, plane.size[1] / 2 + y
 
 
-def _vector(v: np.ndarray, digits: int = 6) -> Vec3:
-    x, y, z = (round(float(c), digits) + 0.0 for c in v)
-    return x, y, z
-
-
 def _on_sheet(kind: str, form: SheetForm, plane: _Plane, rng: np.random.Generator) -> Damage:
     """Place a damage at a random position of the sheet."""
     half = turned(form.half_mm or (form.size_mm[0] / 2, form.size_mm[1] / 2), form.turn_deg)
@@ -187,7 +165,9 @@ def _beside(
     damage: Damage, config: DamageConfig, plane: _Plane, rng: np.random.Generator
 ) -> Damage:
     """Sample a scrape across a damage or just beside it, and move it inside the frame."""
-    form = draw_scrape(config, plane.face, plane.size, rng)
+    draw_scrape = kind_named("scrape").draw
+    assert draw_scrape is not None
+    form = draw_scrape(config.ranges_of("scrape"), plane.face, plane.size, rng)
     shift = [0.5 * extent * float(rng.uniform(-1, 1)) for extent in damage.size_mm]
     moved = (
         np.array(damage.origin_mm)
@@ -207,55 +187,13 @@ def _placed(kind: str, form: SheetForm, plane: _Plane, origin: np.ndarray) -> Da
     return Damage(
         kind=kind,
         face=plane.face,
-        origin_mm=_vector(origin, 1),
-        along=_vector(math.cos(turn) * plane.right + math.sin(turn) * plane.up),
-        across=_vector(math.cos(turn) * plane.up - math.sin(turn) * plane.right),
-        inward=_vector(plane.inward),
+        origin_mm=rounded_vector(origin, 1),
+        along=rounded_vector(math.cos(turn) * plane.right + math.sin(turn) * plane.up),
+        across=rounded_vector(math.cos(turn) * plane.up - math.sin(turn) * plane.right),
+        inward=rounded_vector(plane.inward),
         size_mm=form.size_mm,
         depth_mm=form.depth_mm,
         shape=form.shape,
         form=form.name,
         **asdict(form.wear),
     )
-
-
-def _axis(config: DamageConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
-    """Sample a dent of one of the twelve edges, pushed in diagonally and clear of the castings."""
-    c = config.axis
-    half = np.array(size_mm) / 2
-    kinked = bool(rng.random() < c.kinked)
-    post = kinked and bool(rng.random() < c.kinked_posts)
-    axis = 2 if post else int(rng.integers(3))
-    others = [i for i in range(3) if i != axis]
-    signs = rng.choice([-1.0, 1.0], size=2)
-    inward, middle = np.zeros(3), np.array([0.0, 0.0, half[2]])
-    for i, sign in zip(others, signs, strict=True):
-        inward[i] = -sign / math.sqrt(2)
-        middle[i] += sign * half[i]
-    along = np.eye(3)[axis]
-    room = 2 * half[axis] - 2 * FRAME_MM
-    length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
-    slack = (room - length) / 2
-    at = float(rng.uniform(-slack, slack))
-    if post:
-        at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
-    damage = Damage(
-        kind="axis",
-        face=_edge_name(others, signs),
-        origin_mm=_vector(middle + along * at, 1),
-        along=_vector(along),
-        across=_vector(np.cross(inward, along)),
-        inward=_vector(inward),
-        size_mm=(length, 2 * draw(rng, c.kink_reach_mm if kinked else c.reach_mm)),
-        depth_mm=draw(rng, c.kink_depth_mm if kinked else c.depth_mm),
-    )
-    if not kinked:
-        return damage
-    shape = (draw(rng, _KINK_APEX, digits=3), draw(rng, _KINK_SOFTNESS, digits=4))
-    return replace(damage, form="kinked", shape=shape, **asdict(draw_wear(rng)))
-
-
-def _edge_name(others: list[int], signs: np.ndarray) -> str:
-    """Return the two faces that meet at an edge, for example 'front.door'."""
-    names = (("no_door", "door"), ("front", "back"), ("underside", "roof"))
-    return ".".join(names[i][int(sign > 0)] for i, sign in zip(others, signs, strict=True))

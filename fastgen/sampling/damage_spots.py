@@ -7,6 +7,7 @@ import numpy as np
 
 from fastgen.geometry.mesh import Mesh
 from fastgen.scene import Damage, Vec2
+from fastgen.scene.damage_kinds import form_of
 from fastgen.scene.faces import FACE_AXES, SHEET_FACES
 
 
@@ -17,13 +18,13 @@ class Spot(NamedTuple):
         face: Face of the sheet.
         center_mm: Centre, in sheet coordinates.
         size_mm: Width and height.
-        kind: Kind of the damage, '' without one.
+        hole: Whether the damage may be a hole.
     """
 
     face: str
     center_mm: Vec2
     size_mm: Vec2
-    kind: str = ""
+    hole: bool = False
 
 
 def damage_spots(mesh: Mesh, damages: Sequence[Damage]) -> list[Spot]:
@@ -39,7 +40,8 @@ def damage_spots(mesh: Mesh, damages: Sequence[Damage]) -> list[Spot]:
         turn = np.array([axes.right, axes.up]) @ np.transpose([damage.along, damage.across])
         width, height = np.abs(turn) @ damage.size_mm
         place = _sheet_place(mesh, damage)
-        made.append(Spot(damage.face, place, (float(width), float(height)), damage.kind))
+        hole = form_of(damage).outline is not None
+        made.append(Spot(damage.face, place, (float(width), float(height)), hole))
     return made
 
 

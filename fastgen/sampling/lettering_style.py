@@ -6,7 +6,8 @@ import numpy as np
 
 from fastgen.config.identifiers import IdentifierConfig
 from fastgen.config.markings import MarkingsConfig
-from fastgen.decals.artwork import Brand, Font, brands, glyph_tiles
+from fastgen.decals.artwork import Brand, brands
+from fastgen.decals.glyphs import Font, glyph_tiles
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.sampling.sheet import Sheet

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from fastgen.config.markings import MarkingsConfig
-from fastgen.decals.artwork import glyph_tiles, un_numbers
+from fastgen.decals.artwork import un_numbers
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.sampling.sheet import GAP_MM, Sheet, between, tenth
 from fastgen.sampling.streams import Streams

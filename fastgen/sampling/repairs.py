@@ -167,7 +167,7 @@ def _placed(
 def _near(spot: Spot, size: Vec2, rng: np.random.Generator) -> Vec2:
     """Return a place over or beside a damage. Nothing is put over holes."""
     shift = rng.uniform(-0.4, 0.4, 2) * spot.size_mm
-    over = rng.random() < _OVER and spot.kind != "perforation"
+    over = rng.random() < _OVER and not spot.hole
     axis, sign, gap = int(rng.integers(2)), rng.choice((-1, 1)), rng.uniform(0, _BESIDE_MM)
     if not over:
         shift[axis] = sign * ((spot.size_mm[axis] + size[axis]) / 2 + gap)

@@ -11,6 +11,7 @@ from fastgen.sampling.damage_spots import damage_spots
 from fastgen.sampling.sheet import has_slots, tenth
 from fastgen.sampling.streams import Streams
 from fastgen.scene import Color, Damage, Decal, Surface
+from fastgen.scene.damage_kinds import kind_named
 from fastgen.scene.limits import COMPUTED_ART
 
 _WALLS = ("front", "back", "door", "no_door")
@@ -19,9 +20,6 @@ _THIN_ART = ("run_thin_1", "run_thin_2")
 
 _FITTINGS = "marker_"
 """Begin of the names of holders and rivets, which share their place with a marker."""
-
-_LEAKY = ("perforation", "dented", "scrape")
-"""Kinds of damage that lose their paint on a small part of the sheet."""
 
 _WIDE_MM = 100.0
 """Least width of a run that consists of several streaks."""
@@ -132,7 +130,7 @@ def _below_decal(decal: Decal, rng: np.random.Generator) -> _Source:
 
 
 def _rusts(damage: Damage) -> bool:
-    return damage.kind in _LEAKY and damage.paint_loss > 0 and damage.fresh < 1
+    return kind_named(damage.kind).leaks and damage.paint_loss > 0 and damage.fresh < 1
 
 
 def _below_damage(mesh: Mesh, damage: Damage) -> _Source:

@@ -17,7 +17,7 @@ from fastgen.camera.projection import view_of
 from fastgen.config.cameras import CameraConfig, direction_from, face_frame
 from fastgen.config.config import Config, SpreaderConfig
 from fastgen.config.fields import linear_color
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, nearest
 from fastgen.light.hdri import hours_of, illuminance_of
 from fastgen.sampling.contents import of_neighbours, sample_contents
 from fastgen.sampling.damage import listed_kinds, within_limit
@@ -39,7 +39,7 @@ from fastgen.scene import (
     Vec3,
 )
 from fastgen.scene.limits import MAX_INSTANCES
-from fastgen.validation import check_weights, nearest
+from fastgen.validation import check_weights
 
 SPLITS = ("train", "val", "test")
 

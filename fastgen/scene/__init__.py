@@ -5,7 +5,6 @@ from fastgen.scene.data import (
     Camera,
     Container,
     Damage,
-    Decal,
     EnvironmentView,
     Ground,
     Neighbour,
@@ -16,6 +15,7 @@ from fastgen.scene.data import (
     Spreader,
     Vec3,
 )
+from fastgen.scene.decal import Decal
 from fastgen.scene.optics import (
     ChromaNoise,
     Defocus,

@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastgen.classes import ALL_DETECTION_CLASSES
-from fastgen.decals.artwork import art_layers, glyph_tiles
+from fastgen.decals.artwork import art_layers
+from fastgen.decals.glyphs import glyph_tiles
 from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box
-from fastgen.scene.damage_shapes import SHAPES
+from fastgen.scene.damage_kinds import form_of, kind_named
 from fastgen.scene.limits import (
     CAMERA_REACH_MM,
     COMPUTED_ART,
@@ -195,9 +196,9 @@ def _check_damage(damage: Damage, path: str) -> None:
                 raise ConfigError(
                     f"{path}.along, across, inward: these must be three orthogonal unit vectors"
                 )
-    forms = [form for kind, form in SHAPES if kind == damage.kind]
+    forms = [form.name for form in kind_named(damage.kind).forms]
     check_known(f"{path}.form", damage.form, forms)
-    wanted = SHAPES[damage.kind, damage.form]
+    wanted = form_of(damage).parameters
     if len(damage.shape) != len(wanted):
         given = f"{len(damage.shape)} number{'s' * (len(damage.shape) != 1)}"
         numbers = f"{len(wanted)} ({'; '.join(each.name for each in wanted)}); give these"

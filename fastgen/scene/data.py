@@ -2,9 +2,7 @@
 
 Lengths are in millimetres and angles in degrees. The container frame is the world frame: right-
 handed, z up, origin at the centre of the footprint, z = 0 at the bottom of the castings, +x toward
-the door. Colors are linear Rec. 709 albedo in 0..1. Decals are placed in sheet coordinates of their
-face: origin at the lower left corner of the face's chart seen from outside, x to the right, y up,
-measured along the unfolded sheet.
+the door. Colors are linear Rec. 709 albedo in 0..1.
 """
 
 import json
@@ -13,17 +11,12 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import MaxLen
-from numpy.typing import NDArray
 
-from fastgen.classes import ALL_DAMAGE_CLASSES, CLASS_NAME
-from fastgen.decals.artwork import glyph_tiles
-from fastgen.decals.lettering import Lettering, TextPart, layout
+from fastgen.classes import ALL_DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS, WallProfiles
-from fastgen.scene.faces import SHEET_FACES
+from fastgen.scene.decal import Decal
 from fastgen.scene.limits import (
-    COMPUTED_ART,
-    DECAL_KINDS,
     GAP_LIMITS_MM,
     GROUNDS,
     HASPS,
@@ -38,6 +31,7 @@ from fastgen.scene.limits import (
     OVERCAST_LX,
     WHOLE,
     Degrees,
+    Length,
     Millimetres,
     Number,
 )
@@ -47,7 +41,6 @@ from fastgen.scene.tables import scene_table
 from fastgen.validation import (
     Bounds,
     Flag,
-    Matching,
     OneOf,
     Share,
     check_fields,
@@ -60,85 +53,12 @@ REC_709 = np.array([0.2126, 0.7152, 0.0722])
 
 Vec3 = tuple[Number, Number, Number]
 
-_Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]
 _Shift = Annotated[float, Bounds(*PRINCIPAL_LIMITS)]
 
 
 @dataclass(frozen=True)
-class Decal:
-    """One thing printed or stuck on the sheet.
-
-    Attributes:
-        kind: 'marker', 'text', 'sticker', 'triangle' or 'emblem'.
-        class_name: Label class; '' for decals without a label.
-        face: Face that it lies on.
-        center_mm: Centre in sheet coordinates. What reaches beyond the sheet is cut off.
-        size_mm: Width and height of the drawn rectangle before its rotation. For a marker this is
-            the square that stands on its corner, for a text the tight box around its ink. A
-            triangle has its tip in the middle of the upper side.
-        rotation_deg: Counter-clockwise rotation on the sheet.
-        art: Name of the marker, sticker or emblem, as in `artwork.art_layers`, or in
-            `MarkingsConfig.own_art` for one of the configuration; 'stripes' for the bands of high
-            cubes, 'patch' for a repainted rectangle.
-        lines: Text, one string per line. In vertical text the letters of a line are below one
-            another, and lines are columns from left to right.
-        parts: Parts of a text with places of their own; they decide the layout if there are any,
-            and hold the letters of `lines` in the same order.
-        font: Name of the font of a text.
-        vertical: Whether a text is vertical.
-        cap_mm: Height of the capitals of a text.
-        albedo: Linear color of texts, emblems, stripes and patches.
-        wear: Wear of the print. Texts, emblems, stripes and patches lose this share of their ink
-            in flakes.
-            Markers and stickers are scratched and dirty, and peel off in patches.
-        tint: Linear color that multiplies the artwork of markers, stickers and triangles.
-        fade: Bleaching of markers, stickers and triangles.
-        torn: Shares of the half width and half height that are torn off a marker or sticker at its
-            left, right, top and bottom. The label keeps the whole decal.
-    """
-
-    kind: Annotated[str, OneOf(tuple(kind for kind in DECAL_KINDS if kind not in COMPUTED_ART))]
-    class_name: Annotated[
-        str,
-        Matching(f"{CLASS_NAME}|", "is not a class name; give a class of the marker task or ''"),
-    ]
-    face: Annotated[str, OneOf(SHEET_FACES)]
-    center_mm: Vec2
-    size_mm: tuple[_Length, _Length]
-    rotation_deg: Degrees = 0.0
-    art: str = ""
-    lines: tuple[str, ...] = ()
-    parts: tuple[TextPart, ...] = ()
-    font: str = ""
-    vertical: Flag = False
-    cap_mm: Millimetres = 0.0
-    albedo: Color = (0.8, 0.8, 0.8)
-    wear: Share = 0.0
-    tint: Color = (1.0, 1.0, 1.0)
-    fade: Share = 0.0
-    torn: tuple[Share, Share, Share, Share] = (0.0, 0.0, 0.0, 0.0)
-
-    @property
-    def text(self) -> str:
-        """The lines joined by single spaces; '' for markers and stickers."""
-        return " ".join(self.lines)
-
-    @property
-    def lettering(self) -> Lettering:
-        """Size of a text, and position of each of its glyphs and parts."""
-        font = glyph_tiles()[1][self.font]
-        return layout(self.lines, font, self.cap_mm, self.vertical, self.parts)
-
-    @property
-    def turn(self) -> NDArray[np.float64]:
-        """Rotation [2, 2] from the decal's axes to its sheet's: columns are its right and up."""
-        angle = np.deg2rad(self.rotation_deg)
-        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-@dataclass(frozen=True)
 class Damage:
-    """One damage: a displacement field, see geometry/damage_law.py for its formula.
+    """One damage, see damage_kinds.py; geometry/damage_law.py has the formula of its displacement.
 
     Attributes:
         kind: One of classes.ALL_DAMAGE_CLASSES.
@@ -150,8 +70,8 @@ class Damage:
         size_mm: Full length along and full width across. For a star both are the mean diameter;
             for an axis damage the width is twice the reach from the edge.
         depth_mm: Nominal depth: the largest displacement, if the form had no rounded folds.
-        shape: Further parameters, those of damage_shapes.SHAPES[kind, form] in this order.
-        form: One of the forms of the kind in damage_shapes.SHAPES.
+        shape: Further parameters, those of its form in damage_kinds.py in this order.
+        form: Name of one of the forms of the kind.
         paint_loss: Share of the worst places that is bare of paint, 0..1.
         fresh: Share of the bare places that has not rusted yet, 0..1.
         bare_albedo: Linear color of the fresh share: steel, primer, or paint of what scraped it.
@@ -163,7 +83,7 @@ class Damage:
     along: Vec3
     across: Vec3
     inward: Vec3
-    size_mm: tuple[_Length, _Length]
+    size_mm: tuple[Length, Length]
     depth_mm: Millimetres
     shape: tuple[Number, ...] = ()
     form: str = "plain"
@@ -260,7 +180,7 @@ class Prop:
 
     shape: Annotated[str, OneOf(("box", "cylinder"))]
     pose: Pose
-    size_mm: tuple[_Length, _Length, _Length]
+    size_mm: tuple[Length, Length, Length]
     albedo: Color
     roughness: Share = 0.7
 
@@ -291,8 +211,8 @@ class Ground:
     line_albedo: Color = (0.6, 0.6, 0.58)
     lines: Share = 0.0
     line_yaw_deg: Degrees = 0.0
-    line_spacing_mm: _Length = 3500.0
-    reach_mm: _Length = 40000.0
+    line_spacing_mm: Length = 3500.0
+    reach_mm: Length = 40000.0
     noise_offset_mm: Vec2 = (0.0, 0.0)
 
 
@@ -336,9 +256,9 @@ class Camera:
     name: str
     position_mm: Vec3
     target_mm: Vec3
-    focal_mm: _Length
+    focal_mm: Length
     roll_deg: Degrees = 0.0
-    sensor_width_mm: _Length = 36.0
+    sensor_width_mm: Length = 36.0
     exposure_ev: Annotated[float, Bounds(-30.0, 30.0, "stops")] = 0.0
     lens: Lens | None = None
     sensor: Sensor | None = None

@@ -17,6 +17,10 @@ CAMERA_REACH_MM = (FAR_M - 20.0) / MM
 MAX_DAMAGES = 112
 """Damages per scene; they fit the 16 KiB that every driver grants a uniform block."""
 
+MAX_FORMS = 48
+"""Forms of damage that one program of the renderer can draw; their ends share the block of the
+damages."""
+
 MAX_DECALS = 4096
 """Decals per scene; a texture has a row for each, and every driver supports several times more."""
 
@@ -56,17 +60,6 @@ COMPUTED_ART = ("stripes", "patch")
 HASPS = 4
 """Hasps of a door, one at the end of each locking bar's handle. Each can carry a seal."""
 
-LOBES = 5
-"""Harmonics of a hole's outline; higher ones would be finer than the mesh and most pixels."""
-
-LOBE_LIMIT = 0.19
-"""Largest amplitude of each harmonic, as a share of the mean radius. The sum of all harmonics then
-stays below the radius, so the outline runs once around its centre."""
-
-MOST_CONTACT_MM = 200.0
-"""Largest depth behind the face up to which a scrape marks the sheet. Corrugation is a quarter as
-deep; a limit a few times larger would reach the opposite wall."""
-
 GAP_LIMITS_MM = (0.0, 200.0)
 """Distance between container and spreader; a wider gap would not look connected."""
 
@@ -98,3 +91,4 @@ FARTHEST = 1e6
 Number = Annotated[float, Bounds(-FARTHEST, FARTHEST)]
 Degrees = Annotated[float, Bounds(-FARTHEST, FARTHEST, "degrees")]
 Millimetres = Annotated[float, Bounds(-FARTHEST, FARTHEST, "mm")]
+Length = Annotated[float, Bounds(1e-3, 1e6, "mm")]

@@ -11,7 +11,8 @@ from fastgen.classes import (
     UNDAMAGED_CONTAINER,
     segmentation_classes,
 )
-from fastgen.scene.data import Damage, Decal, Scene, Seal
+from fastgen.scene.data import Damage, Scene, Seal
+from fastgen.scene.decal import Decal
 from fastgen.scene.limits import HASPS
 
 

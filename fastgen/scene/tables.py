@@ -5,7 +5,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fastgen.scene.data import Decal, Scene
+    from fastgen.scene.data import Scene
+    from fastgen.scene.decal import Decal
 
 
 def html_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -51,30 +51,13 @@ def bases(preset: str, config: Config, name: str) -> dict[str, Base]:
     return own | {each: Base(each, Config.preset(each)) for each in names}
 
 
-def changed(base: Config, changes: Mapping[str, Any]) -> Config:
-    """Return a configuration with changed values.
-
-    Args:
-        base: Configuration to start from.
-        changes: New values as YAML text by key, such as {"surface.rust_coverage": "[0.1, 0.2]"}.
+def values_of(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values that the page sends as YAML text, such as {"damage.count": "[1, 2]"}.
 
     Raises:
-        ConfigError: A key or value is not valid. The message begins with the key.
+        ConfigError: A value is not YAML text. The message begins with the key.
     """
-    values: dict[str, Any] = {}
-    for key, text in changes.items():
-        *path, last = key.split(".")
-        inside = values
-        for step in path:
-            inside = inside.setdefault(step, {})
-            if not isinstance(inside, dict):
-                break
-        if not isinstance(inside, dict) or last in inside:
-            raise ConfigError(f"{key}: a key above or below it is changed, too; change only one")
-        inside[last] = _value(key, text)
-    if isinstance(values.get("cameras"), dict):  # a file that lists cameras leaves out all others
-        values["cameras"] = {name: {} for name in base.cameras} | values["cameras"]
-    return Config.from_values(values, base)
+    return {key: _value(key, text) for key, text in changes.items()}
 
 
 def _value(key: str, text: Any) -> Any:

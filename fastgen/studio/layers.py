@@ -11,7 +11,7 @@ from fastgen.camera.tone_curve import tone_map_and_encode
 from fastgen.errors import ConfigError
 from fastgen.files.images import jpeg
 from fastgen.light.hdri import load_radiance
-from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_hex, label_colors
+from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_hex, depth_colors, label_colors
 from fastgen.sample import Sample
 from fastgen.validation import check_known, to_plain
 
@@ -49,7 +49,7 @@ def layer_image(sample: Sample, layer: str) -> Image:
         case "damage":
             return _with_alpha(label_colors(sample.damage, DAMAGE_GREYS), sample.damage > 0)
         case "depth":
-            return _with_alpha(_depth_colors(sample.depth), np.asarray(np.isfinite(sample.depth)))
+            return _with_alpha(depth_colors(sample.depth), np.asarray(np.isfinite(sample.depth)))
         case "normals" if sample.normals is not None:
             codes = np.rint(127.5 * (sample.normals + 1)).astype(np.uint8)
             return _with_alpha(codes, np.asarray(sample.normals.any(axis=2)))
@@ -96,13 +96,3 @@ def thumbnail(path: Path) -> bytes:
 
 def _with_alpha(colors: Image, known: NDArray[np.bool_]) -> Image:
     return np.dstack([colors, np.where(known, np.uint8(255), np.uint8(0))])
-
-
-def _depth_colors(depth: NDArray[np.float32]) -> Image:
-    """Return the depth in colours from near (dark) to far (light), equal steps of its logarithm."""
-    known = np.isfinite(depth)
-    level = np.zeros(depth.shape, np.uint8)
-    if known.any():
-        log = np.log(depth[known])
-        level[known] = 255 * (log - log.min()) / max(float(np.ptp(log)), 1e-6)
-    return np.asarray(cv2.applyColorMap(level, cv2.COLORMAP_VIRIDIS)[..., ::-1], np.uint8)

@@ -23,13 +23,14 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from fastgen.classes import BACKGROUND_ID
+from fastgen.config.assignments import changed
 from fastgen.errors import ConfigError, FastgenError, OutputError
 from fastgen.generator import Generator
 from fastgen.light.hdri import bundled_hdris, hdris_by_name
 from fastgen.render.settings import QUALITY, RenderSettings
 from fastgen.render.variant import LAYERS
 from fastgen.sample import Sample
-from fastgen.studio.changes import Base, as_file, changed, command
+from fastgen.studio.changes import Base, as_file, command, values_of
 from fastgen.studio.controls import MOST_USED, controls
 from fastgen.studio.drawing import Drawing, Superseded, Wanted
 from fastgen.studio.guard import Guard
@@ -198,7 +199,7 @@ def _wanted(base: Base, data: Mapping[str, Any]) -> Wanted:
     if not isinstance(changes, dict):
         raise ConfigError("changes: expected a mapping of keys to YAML text")
     return Wanted(
-        config=changed(base.config, changes),
+        config=changed(base.config, values_of(changes)),
         seed=whole("seed", data.get("seed")),
         index=whole("index", data.get("index")),
         camera=data.get("camera"),

@@ -9,11 +9,11 @@ import torch
 
 from fastgen.config.cameras import CameraConfig
 from fastgen.config.config import Config
-from fastgen.errors import ConfigError
+from fastgen.errors import ConfigError, nearest
 from fastgen.formats.door import always_at_an_end
 from fastgen.sampling.scene import SPLITS, split_of
 from fastgen.torch.targets import class_names
-from fastgen.validation import check_known, nearest, whole
+from fastgen.validation import check_known, whole
 
 EPOCH_SCENES = 10**9
 """Epoch e starts at scene index e times this, so that no two epochs share a scene."""
@@ -182,8 +182,8 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
         )
     if made.damage.segmentation_classes != base.damage.segmentation_classes:
         raise ConfigError(
-            f"curriculum: epoch {epoch} changes which classes there are; list scrape in "
-            "damage.kinds in every epoch or in none"
+            f"curriculum: epoch {epoch} changes which classes there are; list the "
+            "same last kind in damage.kinds of every epoch"
         )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")

@@ -7,7 +7,6 @@ import pytest
 from playwright.sync_api import sync_playwright
 
 from fastgen.report.page import write_report
-from tests.report_makers import make_dataset
 
 FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
@@ -16,8 +15,8 @@ FLAGS = (
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
-    out = make_dataset(tmp_path_factory.mktemp("browser") / "out")
+def report(report_dataset, tmp_path_factory):
+    out = shutil.copytree(report_dataset, tmp_path_factory.mktemp("browser") / "out")
     path, _ = write_report(str(out))
     shutil.rmtree(out)  # the page needs nothing of it
     return path
@@ -38,10 +37,10 @@ def chromium():
     return str(path)
 
 
-@pytest.fixture(params=[(1280, "light"), (400, "dark")], ids=["wide", "narrow"])
+@pytest.fixture
 def page(browser, report, request):
     """The report, open in a window; the test fails if the page logs anything."""
-    width, scheme = request.param
+    width, scheme = getattr(request, "param", (1280, "light"))
     opened = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     said = []
     opened.on("console", lambda message: said.append(message.text))
@@ -51,6 +50,11 @@ def page(browser, report, request):
     yield opened
     opened.close()
     assert said == []
+
+
+wide_and_narrow = pytest.mark.parametrize(
+    "page", [(1280, "light"), (400, "dark")], indirect=True, ids=["wide", "narrow"]
+)
 
 
 def web(url):
@@ -65,6 +69,7 @@ def shown_boxes(page, name):
     )
 
 
+@wide_and_narrow
 def test_the_page_fits_its_window(page):
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     loaded = "[...document.images].every((image) => image.naturalWidth > 0)"
@@ -84,6 +89,7 @@ def test_boxes_of_a_class_toggle(page):
     assert shown_boxes(page, "container") == before
 
 
+@wide_and_narrow
 def test_images_open_large_and_keys_turn_the_pages(page):
     tile = page.locator(".tile").first
     small = tile.locator("img").bounding_box()["width"]
@@ -99,6 +105,7 @@ def test_images_open_large_and_keys_turn_the_pages(page):
     assert not dialog.is_visible()
 
 
+@wide_and_narrow
 def test_boxes_lie_over_what_they_label(page):
     frame = page.locator(".tile img").first.bounding_box()
     for box in page.locator(".tile").first.locator("rect").all():
@@ -135,6 +142,7 @@ def test_cells_of_maps_say_their_value(page):
     assert note.endswith(": 8 boxes")
 
 
+@wide_and_narrow
 def test_bars_have_lengths_of_their_counts(page):
     widths = "[...document.querySelectorAll('#classes .bars')].at(-1).querySelectorAll('.bar')"
     lengths = page.evaluate(

@@ -3,6 +3,8 @@
 Each test tries a few inputs, always the same. This tries 100,000 in each, other ones every time:
 
     FASTGEN_FUZZ=100000 pytest tests/stability/test_fuzzed_input.py
+
+test_poses.py and test_storage.py take their number of poses or kills from it, too.
 """
 
 import os

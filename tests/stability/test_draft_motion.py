@@ -10,6 +10,7 @@ from fastgen import Config, Generator
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.scene import Spreader
 from fastgen.srgb import encoded
+from tests.panned_camera import panned
 
 SIDE = 320
 TIMES = 8
@@ -46,23 +47,13 @@ def far_camera(camera):
     return replace(camera, position_mm=(x, y, max(z, 1500.0)), focal_mm=45.0)
 
 
-def panned(camera):
-    """Return a camera that is turned to the side by half a pixel."""
-    target = np.array(camera.target_mm)
-    ahead = target - camera.position_mm
-    side = np.cross(ahead, (0, 0, 1))
-    half_pixel = 0.5 * 36 / (SIDE * camera.focal_mm) * np.linalg.norm(ahead)
-    moved = target + half_pixel * side / np.linalg.norm(side)
-    return replace(camera, target_mm=tuple(moved.tolist()))
-
-
 def motion(generator, index, cameras, place=lambda camera: camera):
     """Return the change of images relative to the true change, over some cameras."""
     found, expected = 0.0, 0.0
     scene = replace(generator.scene(index), damages=())
     for name in cameras:
         camera = place(scene.camera(name))
-        views = (camera, panned(camera))
+        views = (camera, panned(camera, SIDE))
         images = [encoded(np.clip(drawn(generator, scene, view)[0], 0, 1)) for view in views]
         (first, seen), (second, also) = (truth(generator, scene, view) for view in views)
         near = binary_dilation(seen | also, np.ones((3, 3)))

@@ -20,9 +20,11 @@ from fastgen.classes import (
     MARKER_CLASSES,
     UNDAMAGED_CONTAINER,
 )
+from fastgen.damages.creased import CREASED
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render import renderer as rendering
 from fastgen.render.draw_inputs import regions_of
+from fastgen.scene.damage_kinds import forms_of
 
 SIZE = (320, 240)
 DAMAGED = {"damage": {"probability": 1, "count": [12, 14], "kinds": list(ALL_DAMAGE_CLASSES)}}
@@ -36,7 +38,8 @@ def without_effect(damage_values):
         values["damage_inward"] = [(*row[:3], 0.0) for row in values["damage_inward"]]
         values["damage_bare"] = [(*row[:3], 0.0) for row in values["damage_bare"]]
         shape = np.array(values["damage_shape"]).reshape(-1, 12)
-        creased = slice(values["concave_plain_end"], values["concave_creased_end"])
+        number = forms_of(args[2]).index(CREASED)
+        creased = slice(values[f"form_{number - 1}_end"], values[f"form_{number}_end"])
         shape[creased, 7] = 0.0  # share by which the corrugation is flattened
         values["damage_shape"] = shape.reshape(-1, 4)
         holes = values["hole_count"]
@@ -123,7 +126,7 @@ def separation(scores, marked):
 
 def classes_of(sample):
     """Return the class of each pixel [H, W]: a damage class, plain, text, marker or other."""
-    names = np.full(sample.ids.shape, "other", "<U12")
+    names = np.full(sample.ids.shape, "other", object)
     names[(sample.ids == CONTAINER_ID) & (sample.damage == UNDAMAGED_CONTAINER)] = "plain"
     for value, name in enumerate(ALL_DAMAGE_CLASSES, start=2):
         names[(sample.ids == CONTAINER_ID) & (sample.damage // 100 == value)] = name

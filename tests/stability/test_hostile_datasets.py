@@ -19,6 +19,8 @@ from fastgen.dataset.verify import examine
 from fastgen.errors import FastgenError
 from fastgen.render.settings import RenderSettings
 
+pytestmark = pytest.mark.usefixtures("no_workers")
+
 JSON_VALUES: tuple[Any, ...] = (
     *(None, True, 0, -1, 1.5, 1e300, 10**30, "", "x", "\x1b[31m", "../x"),
     *([], [1], ["x"], [[]], [None, None], {}, {"x": 1}, {"0": "x"}, {"x": {}}, {"x": [1, "x"]}),

@@ -18,7 +18,7 @@ from fastgen.light.environment import load_environment
 from fastgen.scene import Scene
 from tests.stability.special_files import KINDS, put
 
-pytestmark = pytest.mark.usefixtures("guarded")
+pytestmark = pytest.mark.usefixtures("guarded", "no_workers")
 
 ARGUMENTS = ["--images", "4", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 

@@ -15,7 +15,7 @@ from tests.folders import content
 from tests.stability.special_files import KINDS, put
 from tests.stability.test_hostile_datasets import sealed
 
-pytestmark = pytest.mark.usefixtures("guarded")
+pytestmark = pytest.mark.usefixtures("guarded", "no_workers")
 
 ARGUMENTS = ["--images", "4", "--size", "64x64", "--cameras", "A,Cr", "--seed", "3"]
 SHARD = "shards/000000.json"

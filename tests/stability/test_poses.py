@@ -1,4 +1,7 @@
-"""Ids, damage and depth from 1,000 random poses equal rays, except within 0.01 pixels of edges."""
+"""Ids, damage and depth from random poses equal rays, except within 0.01 pixels of edges.
+
+There are 400 poses around ten containers; FASTGEN_FUZZ=100 tries 1,000.
+"""
 
 from collections import Counter
 
@@ -8,8 +11,9 @@ from label_accuracy import differences
 from fastgen import Config, Generator
 from fastgen.scene import Camera
 from fastgen.scene.container_kinds import KINDS
+from tests.stability.fuzzing import COUNT
 
-SCENES, POSES = 10, 100
+SCENES, POSES = 10, COUNT or 40
 SIZE = (64, 64)
 
 

@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from fastgen.classes import DRAWN_DAMAGE_CLASSES
 from fastgen.errors import ConfigError
 from fastgen.geometry.mesh import Mesh
 from fastgen.geometry.unfold import GUTTER_MM
@@ -190,12 +191,20 @@ def _atlas(images: list[NDArray[np.uint8]], texel_mm: float) -> Atlas:
     return Atlas(base_color, surface, texel_mm)
 
 
-def bake_program(programs: Programs, damage: str) -> ShaderProgram:
-    """Return the program that bakes a mesh of one of DAMAGE_VARIANTS; holes are not cut out."""
+def bake_program(
+    programs: Programs, damage: str = "undamaged", kinds: tuple[str, ...] = DRAWN_DAMAGE_CLASSES
+) -> ShaderProgram:
+    """Return the program that bakes a mesh of one of DAMAGE_VARIANTS; holes are not cut out.
+
+    Args:
+        programs: The programs of the renderer.
+        damage: One of DAMAGE_VARIANTS.
+        kinds: Kinds of damage that it can draw.
+    """
     if damage == "undamaged":
         variant = ShaderVariant(damage="undamaged", pixel_class="decal")
     else:
-        variant = ShaderVariant(damage="damaged", pixel_class="damaged")
+        variant = ShaderVariant(damage="damaged", kinds=kinds, pixel_class="damaged")
     return programs.get(("bake.vert", "bake.frag"), variant)
 
 

@@ -11,6 +11,7 @@ from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.program import Programs, ShaderProgram
 from fastgen.render.regions import around, within
 from fastgen.render.variant import DAMAGE_VARIANTS, ShaderVariant
+from fastgen.scene.damage_kinds import form_of
 
 
 class GeometryPass:
@@ -23,11 +24,12 @@ class GeometryPass:
     the visibility buffer.
     """
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
+    def __init__(self, ctx: moderngl.Context, programs: Programs, kinds: tuple[str, ...]) -> None:
         self._ctx = ctx
         stages = ("geometry.vert", "geometry.frag")
         self._programs: dict[str, ShaderProgram] = {
-            damage: programs.get(stages, ShaderVariant(damage=damage)) for damage in DAMAGE_VARIANTS
+            damage: programs.get(stages, ShaderVariant(damage=damage, kinds=kinds))
+            for damage in DAMAGE_VARIANTS
         }
         masks = lobe_masks(LOBE_CELLS)
         self._lobes = ctx.texture(masks.shape[1::-1], 4, masks.tobytes(), dtype="u4")
@@ -60,7 +62,7 @@ class GeometryPass:
             # before the container: damaged surfaces behind a seal must not leave a rest position
             inputs.seals.draw("undamaged", inputs.seals.seen_from(inputs.eye_mm))
         # a dent may tilt a face into view that the rest mesh turns away
-        tilted = [d.face for d in damages if d.kind == "axis" or outward_mm(d) > 0]
+        tilted = [d.face for d in damages if form_of(d).along_edge or outward_mm(d) > 0]
         bent = {face for place in tilted for face in place.split(".")}
         container = inputs.container
         seen = container.seen_from(inputs.eye_mm, bent)

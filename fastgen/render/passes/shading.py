@@ -1,5 +1,7 @@
 """Shading passes: pixels that see surfaces are sorted into classes, and each class is shaded."""
 
+import os
+import random
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -24,6 +26,10 @@ class ShadingPass:
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self._ctx = ctx
         self._programs = programs
+        # A driver compiles a program at its first dispatch, which takes seconds. Processes that
+        # start together compile in different orders, and find the rest in the driver's cache.
+        self._order = list(PIXEL_CLASSES)
+        random.Random(os.getpid()).shuffle(self._order)
 
     def run(self, inputs: DrawInputs) -> None:
         """Classify and shade the pixels, in bands of as many rows as the lists have room for."""
@@ -59,9 +65,10 @@ class ShadingPass:
             program.dispatch(-(-across * down // LIST_GROUP))
 
     def _shade(self, inputs: DrawInputs) -> None:
-        """Shade the listed pixels of each class."""
-        for name in listed_classes(inputs.variant.samples_per_axis):
-            if _occurs(name, inputs.variant):
+        """Shade the listed pixels of each class; no pixel is in two lists, so any order will do."""
+        listed = listed_classes(inputs.variant.samples_per_axis)
+        for name in self._order:
+            if name in listed and _occurs(name, inputs.variant):
                 # scenes with and without damage share the programs
                 damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "undamaged"
                 variant = replace(inputs.variant, pixel_class=name, damage=damage)

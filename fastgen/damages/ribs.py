@@ -7,8 +7,9 @@ shaders/damage_ribs.glsl is the GLSL twin.
 
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import Array, Form, above_zero, bump, half_size
+from fastgen.damages.fields import above_zero, bump
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import PHASE, Array, Form, Parameter, half_size, millimetres
 
 _PLACES = 129
 """Places along a row at which its largest displacement is looked for."""
@@ -46,4 +47,18 @@ def _largest(damage: Damage) -> float:
     return float(give * above_zero(object_mm, softness_mm))
 
 
-RIBS = Form("dented", "ribs", "ribs", _pressed, half_size, largest=_largest)
+RIBS = Form(
+    name="ribs",
+    glsl="ribs",
+    shader="damage_ribs.glsl",
+    amount=_pressed,
+    largest=_largest,
+    parameters=(
+        millimetres("length over which the edge of a mark is rounded"),
+        millimetres("length over which the row runs out at its ends"),
+        Parameter("unevenness of the depth along the row", 0.0, 1.0),
+        millimetres("wavelength of the unevenness"),
+        PHASE,
+        Parameter("displacement, as a share of how far the object reaches in", 0.0, 1.0),
+    ),
+)

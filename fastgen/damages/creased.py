@@ -8,15 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import (
-    Array,
-    Form,
-    above_zero,
-    depth_span,
-    half_size,
-    lesser,
-)
+from fastgen.damages.fields import SOFTNESS, above_zero, lesser
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import PHASE, Array, Form, Parameter, depth_span, half_size
 
 SIDES = 5
 EDGE_STEEPNESS = 2.5
@@ -89,4 +83,26 @@ def _apex(shape: tuple[float, ...]) -> float:
     return float(above_zero(np.array(height), softness))
 
 
-CREASED = Form("concave", "creased", "creased", _creased, half_size, _span, _largest)
+CREASED = Form(
+    name="creased",
+    glsl="creased",
+    shader="damage_creased.glsl",
+    amount=_creased,
+    span=_span,
+    largest=_largest,
+    parameters=(
+        PHASE,
+        *(
+            Parameter(f"distance of side {k + 1}, as a share of half the size", 0.1, 2.0)
+            for k in range(SIDES)
+        ),
+        SOFTNESS,
+        Parameter("share by which the corrugation is flattened", 0.0, 1.0),
+    ),
+    constants={
+        "CREASED_EDGE": f"{EDGE_STEEPNESS:.1f}",
+        "CREASED_FLATTENED_AT": f"{FLATTENED_AT:g}",
+        "CREASED_LEVEL_MM": f"{LEVEL_MM:.1f}",
+        "CREASED_DEEPEST_MM": f"{DEEPEST_MM:.1f}",
+    },
+)

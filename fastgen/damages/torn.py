@@ -6,8 +6,8 @@ edges. A second slit at its end, across it, makes an L. shaders/damage_torn.glsl
 
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import Array, Form, half_size
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import PHASE, Array, Form, Parameter, half_size, millimetres
 
 WEDGE_END = 5.0
 """Steepness of the blunt end of a wedge."""
@@ -87,4 +87,27 @@ def _span(damage: Damage) -> tuple[float, float]:
     return min(upper_mm, lower_mm), max(upper_mm, lower_mm)
 
 
-TORN = Form("perforation", "torn", "torn", _torn, _reach, _span, outline=outside_mm)
+TORN = Form(
+    name="torn",
+    glsl="torn",
+    shader="damage_torn.glsl",
+    amount=_torn,
+    reach=_reach,
+    span=_span,
+    outline=outside_mm,
+    parameters=(
+        millimetres("width of the rim"),
+        Parameter("share of the gape below the line of the tear", 0.0, 1.0),
+        Parameter("likeness to a wedge", 0.0, 1.0),
+        millimetres("height of the teeth", 0.0),
+        PHASE,
+        millimetres("length of the second slit", 0.0),
+        Parameter("amount by which the lower lip bends less than the upper", 0.0, 2.0),
+    ),
+    constants={
+        "TORN_WEDGE_END": f"{WEDGE_END:.1f}",
+        "TORN_LONG_TEETH_MM": f"{TEETH_MM[0]:.1f}",
+        "TORN_SHORT_TEETH_MM": f"{TEETH_MM[1]:.1f}",
+        "TORN_ARM_GAPE": f"{ARM_GAPE:g}",
+    },
+)

@@ -6,9 +6,16 @@ shaders/damage_plain.glsl is the GLSL twin.
 
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import Array, Form, bump, half_size, smoothstep
+from fastgen.damages.fields import bump, smoothstep
 from fastgen.scene import Damage
-from fastgen.scene.limits import LOBE_LIMIT, LOBES
+from fastgen.scene.damage_kinds import PHASE, Array, Form, Parameter, half_size, millimetres
+
+LOBES = 5
+"""Harmonics of a hole's outline; higher ones would be finer than the mesh and most pixels."""
+
+LOBE_LIMIT = 0.19
+"""Largest amplitude of each harmonic, as a share of the mean radius. The sum of all harmonics then
+stays below the radius, so the outline runs once around its centre."""
 
 HOLE_REACH = 1 + LOBES * LOBE_LIMIT
 """Largest distance of a star's outline from its centre, in mean radii."""
@@ -75,7 +82,41 @@ def _star_reach(damage: Damage) -> tuple[float, float]:
     return reach, reach
 
 
-STAR = Form("perforation", "plain", "star", _star, _star_reach, outline=_outside_star)
-FOLD = Form("dented", "plain", "fold", _fold, _fold_reach)
-BOW = Form("concave", "plain", "bow", _bow, half_size)
-EDGE = Form("axis", "plain", "edge", _edge, half_size, along_edge=True)
+_SHADER = "damage_plain.glsl"
+
+STAR = Form(
+    name="plain",
+    glsl="star",
+    shader=_SHADER,
+    amount=_star,
+    reach=_star_reach,
+    outline=_outside_star,
+    parameters=(
+        millimetres("width of the rim"),
+        *(
+            parameter
+            for k in range(2, 2 + LOBES)
+            for parameter in (
+                Parameter(f"share of harmonic {k}", -LOBE_LIMIT, LOBE_LIMIT),
+                Parameter(f"phase in radians of harmonic {k}", PHASE.low, PHASE.high),
+            )
+        ),
+    ),
+)
+FOLD = Form(
+    name="plain",
+    glsl="fold",
+    shader=_SHADER,
+    amount=_fold,
+    reach=_fold_reach,
+    parameters=(
+        millimetres("half width of the crease"),
+        Parameter("depth of the sunken area, as a share of the depth", 0.0, 1.0),
+        millimetres("amplitude", PHASE.low),
+        millimetres("wavelength"),
+        PHASE,
+        millimetres("stretch length"),
+    ),
+)
+BOW = Form(name="plain", glsl="bow", shader=_SHADER, amount=_bow)
+EDGE = Form(name="plain", glsl="edge", shader=_SHADER, amount=_edge, along_edge=True)

@@ -1,16 +1,15 @@
-// bool scraped(int i, vec3 q): whether local coordinates q are in the area of a scrape.
-// float scrape_wear(int i, vec3 q): share of bare surface there, 0..1.
-// Twin of fastgen/geometry/damage_forms/scraped.py.
+// DamageMark scrape_mark(int i, vec3 q): scratches at local coordinates q.
+// Twin of fastgen/damages/scrape.py.
 
-#include "damage.constants"
 #include "damage.block"
+#include "damage_field.glsl"
 
 bool scraped(int i, vec3 q) {
     vec4 a = damage_shape[3 * i];       // Pitch, density, contact, raggedness.
     vec4 b = damage_shape[3 * i + 1];   // Phase, waviness.
     float ragged = 0.5 + 0.3 * sin(q.y / (3.1 * a.x) + b.x) + 0.2 * sin(q.y / a.x - b.x);
     float outside = max(abs(q.y) - damage_across[i].w, abs(q.x) - damage_along[i].w + a.w * ragged);
-    return outside < 0.0 && q.z < a.z && q.z > -SCRAPED_PROUD_MM;
+    return outside < 0.0 && in_contact(q.z, a.z);
 }
 
 // Two layers of scratches. Each cell of height `pitch` across has one, of its own length and depth.
@@ -34,4 +33,8 @@ float scrape_wear(int i, vec3 q) {
         wear = max(wear, along * profile * depth);
     }
     return wear;
+}
+
+DamageMark scrape_mark(int i, vec3 q) {
+    return DamageMark(scraped(i, q), scrape_wear(i, q), damage_fresh(i), damage_bare[i].rgb, false);
 }

@@ -5,8 +5,9 @@ shaders/damage_kinked.glsl is the GLSL twin.
 
 import numpy as np
 
-from fastgen.geometry.damage_forms.form import Array, Form, above_zero, bump, half_size, lesser
+from fastgen.damages.fields import SOFTNESS, above_zero, bump, lesser
 from fastgen.scene import Damage
+from fastgen.scene.damage_kinds import Array, Form, Parameter, half_size
 
 
 def _kinked(damage: Damage, u: Array, v: Array, w: Array) -> Array:
@@ -26,4 +27,15 @@ def _largest(damage: Damage) -> float:
     return abs(damage.depth_mm) * float(tip)
 
 
-KINKED = Form("axis", "kinked", "kinked", _kinked, half_size, largest=_largest, along_edge=True)
+KINKED = Form(
+    name="kinked",
+    glsl="kinked",
+    shader="damage_kinked.glsl",
+    amount=_kinked,
+    largest=_largest,
+    along_edge=True,
+    parameters=(
+        Parameter("place of the deepest point, in half lengths from the middle", -0.9, 0.9),
+        SOFTNESS,
+    ),
+)

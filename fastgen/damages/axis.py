@@ -1,0 +1,101 @@
+"""Axis damage: edges and corner posts that are pushed in."""
+
+import math
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from fastgen.damages.draws import (
+    FRAME_MM,
+    Depth,
+    Extent,
+    Reach,
+    draw,
+    draw_wear,
+    rounded_vector,
+)
+from fastgen.damages.kinked import KINKED
+from fastgen.damages.plain import EDGE
+from fastgen.scene import Damage, Vec3
+from fastgen.scene.damage_kinds import Kind
+from fastgen.validation import Range, Share
+
+_KINK_APEX = Range(-0.5, 0.5)
+"""Place of a kink's deepest point, in half lengths from its middle."""
+
+_KINK_SOFTNESS = Range(0.03, 0.15)
+"""Rounding of a kink's folds, as a share of its depth."""
+
+_KINKS_ABOVE = 0.25
+"""Share of the kinks in posts that are just below the upper casting; others are above the lower."""
+
+
+@dataclass(frozen=True)
+class AxisConfig:
+    """Edge or corner post that is pushed in.
+
+    Attributes:
+        length_mm: Length along the edge.
+        reach_mm: Distance from the edge up to which the faces beside it are bent.
+        depth_mm: Largest displacement.
+        kinked: Probability that the edge has a local kink instead: a notch of a rail or a bent
+            post.
+        kink_length_mm: Length of a kink along the edge.
+        kink_reach_mm: Distance from the edge up to which a kink bends the faces beside it.
+        kink_depth_mm: Largest displacement of a kink.
+        kinked_posts: Probability that a kink is in a corner post, just above its lower casting or
+            below its upper one. Other kinks may be in any edge.
+    """
+
+    length_mm: Extent = Range(700, 1900)
+    reach_mm: Reach = Range(320, 650)
+    depth_mm: Depth = Range(110, 260)
+    kinked: Share = 0.85
+    kink_length_mm: Extent = Range(200, 500)
+    kink_reach_mm: Reach = Range(120, 260)
+    kink_depth_mm: Depth = Range(40, 130)
+    kinked_posts: Share = 0.5
+
+
+def _place(c: AxisConfig, size_mm: Vec3, rng: np.random.Generator) -> Damage:
+    """Sample a dent of one of the twelve edges, pushed in diagonally and clear of the castings."""
+    half = np.array(size_mm) / 2
+    kinked = bool(rng.random() < c.kinked)
+    post = kinked and bool(rng.random() < c.kinked_posts)
+    axis = 2 if post else int(rng.integers(3))
+    others = [i for i in range(3) if i != axis]
+    signs = rng.choice([-1.0, 1.0], size=2)
+    inward, middle = np.zeros(3), np.array([0.0, 0.0, half[2]])
+    for i, sign in zip(others, signs, strict=True):
+        inward[i] = -sign / math.sqrt(2)
+        middle[i] += sign * half[i]
+    along = np.eye(3)[axis]
+    room = 2 * half[axis] - 2 * FRAME_MM
+    length = draw(rng, c.kink_length_mm if kinked else c.length_mm, room)
+    slack = (room - length) / 2
+    at = float(rng.uniform(-slack, slack))
+    if post:
+        at = slack * (1.0 if rng.random() < _KINKS_ABOVE else -1.0)
+    damage = Damage(
+        kind="axis",
+        face=_edge_name(others, signs),
+        origin_mm=rounded_vector(middle + along * at, 1),
+        along=rounded_vector(along),
+        across=rounded_vector(np.cross(inward, along)),
+        inward=rounded_vector(inward),
+        size_mm=(length, 2 * draw(rng, c.kink_reach_mm if kinked else c.reach_mm)),
+        depth_mm=draw(rng, c.kink_depth_mm if kinked else c.depth_mm),
+    )
+    if not kinked:
+        return damage
+    shape = (draw(rng, _KINK_APEX, digits=3), draw(rng, _KINK_SOFTNESS, digits=4))
+    return replace(damage, form="kinked", shape=shape, **asdict(draw_wear(rng)))
+
+
+def _edge_name(others: list[int], signs: np.ndarray) -> str:
+    """Return the two faces that meet at an edge, for example 'front.door'."""
+    names = (("no_door", "door"), ("front", "back"), ("underside", "roof"))
+    return ".".join(names[i][int(sign > 0)] for i, sign in zip(others, signs, strict=True))
+
+
+KIND = Kind("axis", (EDGE, KINKED), AxisConfig, place=_place)
