@@ -23,7 +23,7 @@ from fastgen.config.cameras import direction_from, face_frame
 from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.sample import Object, Sample
 from fastgen.sampling.scene import stream
 from fastgen.scene import Camera, Decal, Scene
@@ -280,7 +280,7 @@ def texts_of(sample: Sample) -> list[Text]:
     for item in sample.objects:
         if item.class_name != "text" or item.truncated or item.visible_fraction < _SEEN:
             continue
-        decal = decal_of(sample.scene, item.id)
+        decal = labelled_decals(sample.scene)[item.id]
         if item.quad and decal.cap_mm * _px_per_mm(item, decal) >= _LEAST_CAP_PX:
             found.append(_text(sample, item, decal))
     return found

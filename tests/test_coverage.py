@@ -16,7 +16,7 @@ from fastgen.geometry import damage_law
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
 from fastgen.labels.coverage import covered
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.scene import Camera, Lens, Spreader
 from tests import oracle
 
@@ -71,7 +71,7 @@ def all_hits(scene, chart, view):
 @lru_cache(64)
 def dense(scene, item_id):
     """Return world points all over a decal after damage, mostly along its edge."""
-    decal = decal_of(scene, item_id)
+    decal = labelled_decals(scene)[item_id]
     mesh = PreparedScene(scene).container
     coarse, fine = np.linspace(-0.5, 0.5, 41), np.linspace(-0.5, 0.5, 6001)
     points = [np.stack(np.meshgrid(coarse, coarse), axis=-1).reshape(-1, 2)]
@@ -128,7 +128,7 @@ def test_decal_coverage_matches_rays(samples):
         view = unbounded(sample.view)
         hits = {}
         for item in (o for o in sample.objects if o.class_name == "text" or o.class_name[0] == "C"):
-            decal = decal_of(sample.scene, item.id)
+            decal = labelled_decals(sample.scene)[item.id]
             number = mesh.chart_index(decal.face)
             if number not in hits:
                 hits[number] = all_hits(sample.scene, decal.face, view)

@@ -6,7 +6,7 @@ import pytest
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config.config import Config
 from fastgen.generator import Generator
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.labels.visibility import mask_box, value_boxes
 from tests import oracle
 
@@ -39,7 +39,7 @@ def test_objects_carry_class_text_and_running_instance(samples):
     for sample in samples:
         seen: dict[str, list[int]] = {}
         for item in sample.objects[1:]:
-            decal = decal_of(sample.scene, item.id)
+            decal = labelled_decals(sample.scene)[item.id]
             assert item.class_name == decal.class_name
             assert item.text == " ".join(decal.lines)
             assert item.class_name in (*MARKER_CLASSES, "text")

@@ -21,7 +21,7 @@ from fastgen.geometry.container import build_container
 from fastgen.geometry.divided_mesh import divided
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.geometry.spreader import build_spreader
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.render.gl import open_context
 from fastgen.render.regions import region_of
 from fastgen.scene import Camera, Scene
@@ -187,7 +187,7 @@ def test_visible_fractions_equal_ray_casts_over_a_larger_image(seen):
             x0, y0, x1, y1 = item.amodal_bbox
             if min(x0, y0) < -pad or x1 > SIZE[0] + pad or y1 > SIZE[1] + pad:
                 continue
-            decal = decal_of(sample.scene, item.id)
+            decal = labelled_decals(sample.scene)[item.id]
             number = mesh.chart_index(decal.face)
             if number not in hits:
                 hits[number] = all_hits(sample.scene, decal.face, whole)

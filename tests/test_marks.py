@@ -19,7 +19,7 @@ from fastgen.config.presets import PRESETS
 from fastgen.decals.artwork import stickers
 from fastgen.generator import Generator
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.render.settings import RenderSettings
 from tests import oracle
 
@@ -92,7 +92,7 @@ def test_labels_of_marks_cover_the_pixels_that_they_change(generators):
         for camera in ("Cl", "Cr"):
             sample = generator.render(scene=scene, camera=camera, layer="decals")
             for thing in (t for t in sample.objects if t.class_name in MARK_CLASSES and t.area):
-                others = tuple(d for d in scene.decals if d is not decal_of(scene, thing.id))
+                others = tuple(d for d in scene.decals if d is not labelled_decals(scene)[thing.id])
                 bare = generator.render(
                     scene=replace(scene, decals=others), camera=camera, layer="decals"
                 )

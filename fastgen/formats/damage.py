@@ -83,8 +83,11 @@ class _Damage(Format):
             # the place for readers that know images by another folder
             f"damage/yolo/{name}.txt": Same(f"damage/labels/{name}.txt"),
         }
+        containers = {UNDAMAGED_CONTAINER + each.container: each.id for each in item.containers}
         facts = [
-            item.annotation(value // 100, box, window(mask, box), ignored)
+            item.container_annotations[containers[value]]
+            if value in containers
+            else item.annotation(value // 100, box, window(mask, box), ignored)
             for value, box, mask, ignored in found
         ]
         return files, facts + item.background_annotations

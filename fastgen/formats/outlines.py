@@ -29,7 +29,7 @@ def borders(mask: NDArray[np.bool_], holes: bool = True) -> list[list[Points]]:
     inner: list[tuple[int, Points]] = []
     for number, contour in enumerate(contours):
         corners = (contour[:, 0] + 1) // 2
-        moved = (corners != np.roll(corners, 1, axis=0)).any(axis=1)
+        moved = (corners != corners[np.arange(-1, len(corners) - 1)]).any(axis=1)
         points = corners[moved].astype(np.float64)
         outer = int(tree[0, number, 3])
         if outer < 0:

@@ -104,8 +104,9 @@ def detection_lines(
 
 def line(index: int, values: Iterable[float]) -> str:
     """Return one label: class index, then the values clipped to 0..1."""
-    clipped = tuple([min(max(v, 0.0), 1.0) for v in values])
-    # outlines have hundreds of values; one format string takes half the time of one per value
+    # outlines have hundreds of values; min and max take four times as long
+    clipped = tuple([0.0 if v < 0.0 else 1.0 if v > 1.0 else v for v in values])
+    # one format string takes half the time of one per value
     return f"{index}{' %.6f' * len(clipped)}\n" % clipped
 
 

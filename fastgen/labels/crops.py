@@ -1,6 +1,6 @@
 """Text crops: pixels of the legible texts of an image."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import cv2
 import numpy as np
@@ -10,7 +10,7 @@ from fastgen.decals.glyphs import glyph_tiles
 from fastgen.decals.lettering import TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
-from fastgen.labels.objects import decal_of
+from fastgen.labels.objects import labelled_decals
 from fastgen.sample import Box, LabelledPart, Object, Sample
 from fastgen.scene import Decal
 
@@ -33,8 +33,9 @@ def text_crops(sample: Sample, min_text_px: float) -> Iterator[tuple[Object, NDA
     Yields:
         The text's object and its pixels uint8 [h, w, 3] with a small margin, as a view.
     """
+    decals = labelled_decals(sample.scene)
     for item in sample.objects:
-        if item.class_name != "text" or not _legible(sample, item, min_text_px):
+        if item.class_name != "text" or not _legible(sample, item, decals, min_text_px):
             continue
         assert item.bbox is not None
         x0, y0, x1, y1 = crop_box(item.bbox, sample.view.size)
@@ -91,14 +92,14 @@ def upright_crop(image: NDArray[np.uint8], quad: NDArray[np.float64]) -> NDArray
     return np.asarray(warped, np.uint8)
 
 
-def _legible(sample: Sample, item: Object, min_text_px: float) -> bool:
+def _legible(sample: Sample, item: Object, decals: Mapping[int, Decal], min_text_px: float) -> bool:
     """Test whether a text is large enough along both sides, inside the image, and hardly occluded.
 
     At most half of each letter may be occluded.
     """
     if item.bbox is None or item.truncated or item.visible_fraction < _LEGIBLE_FRACTION:
         return False
-    decal = decal_of(sample.scene, item.id)
+    decal = decals[item.id]
     upper_left, _, lower_right, lower_left = np.array(item.quad).reshape(4, 2)
     across = np.linalg.norm(lower_right - lower_left) / decal.size_mm[0]
     up = np.linalg.norm(upper_left - lower_left) / decal.size_mm[1]

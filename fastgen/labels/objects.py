@@ -39,21 +39,15 @@ _SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), 
 """Sides of the outer box as indices into CORNER_SIGNS, counter-clockwise from outside."""
 
 
-def decal_of(scene: Scene, object_id: int) -> Decal:
-    """Return the decal with an id.
-
-    Args:
-        scene: The scene.
-        object_id: Value in the id target, 2 or more.
-
-    Raises:
-        KeyError: No decal has this id.
-    """
+def labelled_decals(scene: Scene) -> dict[int, Decal]:
+    """Return the labelled decals of all containers by their ids."""
     carried = [scene.decals, *(each.decals for each in scene.neighbours)]
-    for decals, numbers in zip(carried, scene_numbers(scene), strict=True):
-        if object_id and object_id in numbers.decals:
-            return decals[numbers.decals.index(object_id)]
-    raise KeyError(f"no decal has id {object_id} in scene {scene.index}")
+    return {
+        number: decal
+        for decals, numbers in zip(carried, scene_numbers(scene), strict=True)
+        for decal, number in zip(decals, numbers.decals, strict=True)
+        if number
+    }
 
 
 def label(shot: Shot) -> list[Object]:
