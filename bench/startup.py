@@ -8,7 +8,7 @@ whose rounds alternate with those of this one. The table has medians over the ro
 time of all processes, and the largest memory of a worker. PSS divides a page by the number of
 processes that share it; RSS does not.
 
-Nothing is written but the table, because the figures depend on what else the machine does.
+The table is only printed, because the figures depend on the load of the machine.
 """
 
 import argparse
