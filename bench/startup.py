@@ -29,7 +29,7 @@ from throughput import generate_command
 _POLL_S = 0.2
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _LEAST_WORKER_MB = 150.0
-"""A process of the run with less memory is not a worker; those have OpenGL and its textures."""
+"""Resident memory of every worker is above this, because of OpenGL and its textures."""
 
 
 class Run(NamedTuple):

@@ -51,7 +51,7 @@ bool within_reach(int i, vec3 p) {
 }
 
 // Runs USE(i, change) for all damages of one form that may act on p. damage.constants has such a loop for
-// each form: EACH_DAMAGE(USE) for those that move the sheet, EACH_MARK(USE) for the others. One loop with
+// each form: EACH_DAMAGE(USE) if it moves the sheet, EACH_MARK(USE) if it does not. One loop with
 // branches would cost the work of all forms per damage on llvmpipe, which executes both sides of a branch.
 #define EACH_NEAR(FROM, END, TYPE, CHANGE, USE)               \
     for (int i = next_damage_near(FROM, END, p); i < END;     \
