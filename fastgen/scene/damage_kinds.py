@@ -199,8 +199,8 @@ class Kind:
         """Refuse names that labels cannot have, and kinds that cannot be drawn."""
         if not re.fullmatch(CLASS_NAME, self.name) or self.name in _RESERVED:
             raise ConfigError(
-                f"damage kind {self.name!r}: not a name for a new class; give letters, digits and . "
-                "_ + -, and none of the names of other classes"
+                f"damage kind {self.name!r}: not a name for a new class; give letters, digits and "
+                ". _ + -, and none of the names of other classes"
             )
         if not self.forms or (self.draw is None) == (self.place is None):
             raise ConfigError(f"damage kind {self.name}: give forms, and either draw or place")
