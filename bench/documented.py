@@ -35,7 +35,7 @@ def cpu_ms(quality: str) -> float:
 
 
 def equal_cycles() -> tuple[Equal, float]:
-    """Return the Cycles setting with the error of `balanced`, and its time relative to it."""
+    """Return the Cycles setting with the error of `balanced`, and their ratio of times."""
     points = stored("pareto")["points"]
     balanced = next(p for p in points if (p["renderer"], p["setting"]) == ("fastgen", "balanced"))
     curve = [
@@ -46,14 +46,14 @@ def equal_cycles() -> tuple[Equal, float]:
 
 
 def label_sentence() -> str:
-    """Return how many labels differ from cast rays."""
+    """Return a sentence on how many labels differ from cast rays."""
     views = stored("label_accuracy")["views"].values()
     pixels, labels, depth, unexplained = (
         sum(view[key] for view in views) for key in ("pixels", "labels", "depth", "unexplained")
     )
     if unexplained:
         raise SystemExit(
-            f"label_accuracy: {unexplained} differences are not at an edge; look first"
+            f"label_accuracy: {unexplained} differences are not at an edge; explain them first"
         )
     return (
         f"Of {pixels / 1e6:.1f} million pixels, {labels} labels and {depth} depths differ from "

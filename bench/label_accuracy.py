@@ -222,7 +222,7 @@ def component_outcomes(scenes: int) -> Counter[str]:
 
 
 def draw(figures: charts.Figures) -> Figure:
-    """Return the time against the number of markers, and the share of correct boxes."""
+    """Return a chart of the time against the number of markers, and of correct boxes."""
     figure, (left, right) = charts.panels(1, 2, 3.0, width_ratios=(3, 2))
     for key, mark, name in (
         ("one_draw_ms", "o-", "ids in the same draw"),

@@ -221,7 +221,7 @@ def show(found: dict[str, dict[str, Any]]) -> None:
 
 
 def draw(figures: charts.Figures) -> Figure:
-    """Return bars of wall and CPU time per labelled image on a logarithmic axis."""
+    """Return a bar chart of wall and CPU time per labelled image, on a logarithmic axis."""
     rows = {name: row for name, row in figures["peers"].items() if "failed" not in row}
     figure, axes = charts.panels(1, 1, 0.55 * len(rows) + 1.0)
     for shift, key, label in ((-0.2, "image", "wall time"), (0.2, "cores", "CPU time")):

@@ -8,7 +8,7 @@ whose rounds alternate with those of this one. The table has medians over the ro
 time of all processes, and the largest memory of a worker. PSS divides a page by the number of
 processes that share it; RSS does not.
 
-Nothing is written but the table, because the figures depend on what else the machine does.
+The table is only printed, because the figures depend on the load of the machine.
 """
 
 import argparse
@@ -29,7 +29,7 @@ from throughput import generate_command
 _POLL_S = 0.2
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _LEAST_WORKER_MB = 150.0
-"""A process of the run with less memory is not a worker; those have OpenGL and its textures."""
+"""Resident memory of every worker is above this, because of OpenGL and its textures."""
 
 
 class Run(NamedTuple):

@@ -236,7 +236,7 @@ def table(rows: list[dict[str, Any]], about: str, images: int, long: tuple[int, 
 
 
 def draw(figures: charts.Figures) -> Figure:
-    """Return the stages stacked on the left and the images per second on the right."""
+    """Return a chart of the stages, stacked, and of the images per second."""
     rows = figures["rows"]
     figure, (left, right) = charts.panels(1, 2, 0.36 * len(rows) + 1.6, sharey=True)
     places = np.arange(len(rows))

@@ -1,4 +1,4 @@
-"""Pictures of scenes under many settings, for docs/gallery.md: docs/gallery/NAME.jpg.
+"""Pictures of scenes with many settings, for docs/gallery.md: docs/gallery/NAME.jpg.
 
 python examples/gallery.py [presets light ...]
 """
@@ -55,7 +55,7 @@ class Tile:
         index: Index of the scene.
         changes: Changed values of the configuration, nested by section.
         quality: Quality preset of the renderer.
-        near: Show the only damage of the scene from near by instead of the camera's view.
+        near: Show the only damage of the scene from 1.8 m away, not the camera's view.
     """
 
     caption: str
@@ -212,7 +212,7 @@ SECTIONS = {
 
 
 def near_damage(scene: Scene, camera: Camera) -> Camera:
-    """Return a camera 1.8 m before the scene's damage, from beside it."""
+    """Return a camera 1.8 m in front of the scene's damage that looks at it from one side."""
     (damage,) = scene.damages
     target = np.array(damage.origin_mm)
     away = np.array([0.0, 0.0, 0.2]) - 0.85 * np.array(damage.inward)

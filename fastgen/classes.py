@@ -34,20 +34,21 @@ DAMAGE_CLASSES = ("axis", "concave", "dented", "perforation")
 """The four kinds of the SeaFront paper, section 3.3.2."""
 
 DRAWN_DAMAGE_CLASSES = (*DAMAGE_CLASSES, "scrape")
-"""Kinds that every renderer can draw. It compiles others if a configuration or scene has them."""
+"""Kinds that every damage program of the renderer can draw. Programs for others are compiled when a
+configuration or scene has them."""
 
 BUNDLED_DAMAGE_CLASSES = (*DRAWN_DAMAGE_CLASSES, "rust_through", "missing_paint", "graffiti")
 """Kinds of fastgen; each is a module of fastgen.damages. New ones are appended."""
 
 DAMAGE_GROUP = "fastgen.damages"
-"""Entry points by which packages offer kinds of damage."""
+"""Group of entry points by which packages offer kinds of damage."""
 
 PACKAGE_DAMAGE_CLASSES = tuple(plugins.names(DAMAGE_GROUP))
-"""Kinds of installed packages, which are not loaded for their names."""
+"""Names of the kinds of installed packages. Reading them does not load the packages."""
 
 ALL_DAMAGE_CLASSES = tuple(dict.fromkeys((*BUNDLED_DAMAGE_CLASSES, *PACKAGE_DAMAGE_CLASSES)))
-"""All kinds: those of fastgen, then those of packages in alphabetical order. Only the paper's are
-drawn unless `damage.kinds` lists others."""
+"""All kinds: those of fastgen, then those of packages in alphabetical order. Scenes have only the
+paper's unless `damage.kinds` lists others."""
 
 SEGMENTATION_CLASSES = ("container", *DAMAGE_CLASSES)
 """The five classes of the damage task, in the order of YOLO labels."""

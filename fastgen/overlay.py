@@ -61,7 +61,7 @@ _REACH = 10
 """Distance in line heights up to which a caption may be moved."""
 
 _HIDING, _COVERING = 30.0, 60.0
-"""Distance in line heights that is as bad as hiding a whole box, or as covering a caption."""
+"""Costs of hiding a whole box and of covering a caption, as distances in line heights."""
 
 ID_GREYS = MappingProxyType({CONTAINER_ID: 200, SPREADER_ID: 110})
 DAMAGE_GREYS = MappingProxyType(
@@ -170,7 +170,7 @@ def caption_place(
     taken: NDArray[np.floating],
     image_size: Sequence[int],
 ) -> NDArray[np.float64]:
-    """Return the place of a caption near its box: a compromise of closeness and what it covers.
+    """Return a place for a caption that is near its box and covers little else.
 
     Args:
         boxes: x0, y0, x1 and y1 of all boxes [N, 4] in pixels.

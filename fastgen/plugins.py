@@ -1,4 +1,4 @@
-"""Presets and formats of other packages, which they offer as entry points (PyPA specification)."""
+"""Presets, formats and kinds of damage that other packages offer as entry points (PyPA)."""
 
 from collections.abc import Mapping
 from functools import cache

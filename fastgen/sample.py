@@ -76,7 +76,7 @@ class Object:
             Scene.neighbours[k - 1]; -1 for containers of the panorama.
         face: Face or edge of the container that a damage is on, as in `scene.Damage`; '' for other
             objects.
-        severity_mm: Largest displacement by a damage, or length of a hole or scrape; 0 for other
+        severity_mm: Largest displacement by a damage, or length of a hole or mark; 0 for other
             objects.
         background: Whether the object is a container of the panorama around the scene. It has no
             amodal box, polygon or keypoints, and no pixels in the id target; see Sample.background.

@@ -1,4 +1,4 @@
-"""Messages of `fastgen.validation`: pydantic's errors in words, with the field and what to give."""
+"""Messages of `fastgen.validation`: they name the field of a pydantic error and what to give."""
 
 import dataclasses
 import math
@@ -19,7 +19,7 @@ NUMBER = "[number]"
 
 
 def is_number(value: Any) -> bool:
-    """Return whether `value` is a real number of any numeric type; booleans are none."""
+    """Return whether `value` is a real number of any numeric type; False for booleans."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
@@ -27,6 +27,12 @@ def in_words(cls: type, errors: "list[ErrorDetails]", root: str, base: Any) -> C
     """Return the first of pydantic's errors as a ConfigError.
 
     Unknown keys come first, because a misspelt key also leaves a field missing.
+
+    Args:
+        cls: The dataclass that was validated.
+        errors: Errors of pydantic, at least one.
+        root: Path of the value, '' at the top.
+        base: Values that the given ones change, or None; its names are suggested.
     """
     error = min(errors, key=lambda each: each["type"] != "unexpected_keyword_argument")
     kind, loc, value, context = error["type"], error["loc"], error["input"], error.get("ctx", {})
@@ -99,7 +105,7 @@ def _path(root: str, loc: tuple[int | str, ...]) -> str:
 
 
 def _names_beside(base: Any, loc: tuple[int | str, ...]) -> list[str]:
-    """Return the names in the table of `base` that a location is in; none for other locations."""
+    """Return the names in the table of `base` that holds a location; [] if no table holds it."""
     for step in loc[:-1]:
         base = vars(base).get(str(step)) if dataclasses.is_dataclass(base) else None
     return list(base) if isinstance(base, Mapping) else []

@@ -1,4 +1,4 @@
-// DamageField: displacement of one damage. DamageMark: what a damage without displacement changes.
+// DamageField: displacement of one damage. DamageMark: surface of a damage without displacement.
 // float sheet_fade(float w): weight of a field. float damage_fresh(int i): Damage.fresh of damage i.
 // Functions for the forms of damage in damage_*.glsl. Twin of fastgen/damages/fields.py.
 
@@ -15,11 +15,11 @@ struct DamageField {
 };
 
 struct DamageMark {
-    bool here;     // In the mask of the damage.
-    float wear;    // Share of the surface that it covers, 0..1; 0 outside the mask.
-    float fresh;   // Share of that which has not rusted.
-    vec3 albedo;   // Of the fresh share.
-    bool covers;   // Hides the marks of earlier kinds below it.
+    bool here;     // Whether the point is in the mask of the damage.
+    float wear;    // Share of the surface that it changes, 0..1; ignored outside the mask.
+    float fresh;   // Share of the changed surface that has not rusted.
+    vec3 albedo;   // Albedo of the fresh share.
+    bool covers;   // Whether it hides the marks of earlier kinds below it.
 };
 
 float damage_fresh(int i) { return damage_shape[3 * i + 2].w; }

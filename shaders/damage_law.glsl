@@ -50,10 +50,9 @@ bool within_reach(int i, vec3 p) {
     return all(lessThan(abs(damage_local(i, p)), damage_reach[i].xyz + REACH_MARGIN_MM));
 }
 
-// Runs USE(i, change) for all damages of one form that may act on p. EACH_DAMAGE(USE) of damage.constants
-// has such a loop for each form that moves sheet, EACH_MARK(USE) for each that does not: one loop with
-// branches would cost the work of all forms per damage on llvmpipe, which executes both sides of every
-// branch.
+// Runs USE(i, change) for all damages of one form that may act on p. damage.constants has such a loop for
+// each form: EACH_DAMAGE(USE) if it moves the sheet, EACH_MARK(USE) if it does not. One loop with
+// branches would cost the work of all forms per damage on llvmpipe, which executes both sides of a branch.
 #define EACH_NEAR(FROM, END, TYPE, CHANGE, USE)               \
     for (int i = next_damage_near(FROM, END, p); i < END;     \
          i = next_damage_near(i + 1, END, p)) {               \

@@ -1,4 +1,4 @@
-"""Single values of a configuration by their keys, as in damage.probability=0.8."""
+"""Changes of single values of a configuration by key, as in damage.probability=0.8."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
@@ -13,7 +13,7 @@ from fastgen.validation import to_plain
 
 
 def assigned(config: Config, texts: Iterable[str]) -> Config:
-    """Return a configuration with the values of `--set` options, see `changed`.
+    """Return a configuration changed by `--set` options, see `changed`.
 
     Args:
         config: The configuration to start from.
@@ -76,5 +76,5 @@ def _assign(nested: dict[str, Any], base: Any, steps: list[str], value: Any) -> 
 
 
 def _names(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table of names that is equal to `table` where it replaces it."""
+    """Return plain values that leave `table` as it is when they replace it."""
     return {name: {} if is_dataclass(value) else to_plain(value) for name, value in table.items()}

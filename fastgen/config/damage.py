@@ -86,7 +86,7 @@ class _Frequencies:
         if not (self.probability > 0 and self.count[1] > 0):
             return 0.0
         kinds = map(kind_named, self.kinds)
-        return max((kind.bulge_mm(self.ranges_of(kind.name)) for kind in kinds), default=0.0)
+        return max([0.0, *(kind.bulge_mm(self.ranges_of(kind.name)) for kind in kinds)])
 
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Functions that several forms of damage use. shaders/damage_field.glsl is the GLSL twin."""
+"""Functions that several forms of damage share. shaders/damage_field.glsl is the GLSL twin."""
 
 import numpy as np
 from numpy.typing import NDArray

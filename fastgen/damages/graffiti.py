@@ -38,10 +38,10 @@ PIECES = 48
 """Straight pieces of the line."""
 
 DRIP_EVERY, DRIP_WIDTH = 7, 0.16
-"""Every so many pieces a drip runs down; its width as a share of the line's."""
+"""Number of pieces between drips, and width of a drip as a share of the width of the line."""
 
 SLOW, FAST = 0.37, 1.83
-"""Speeds of the waves that make the letters differ, relative to one wave per letter."""
+"""Frequencies of the waves that make the letters differ, relative to one wave per letter."""
 
 _PAINTS = (
     *((0.012, 0.012, 0.014), (0.72, 0.72, 0.7), (0.5, 0.5, 0.52), (0.45, 0.02, 0.03)),

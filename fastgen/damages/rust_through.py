@@ -1,6 +1,7 @@
 """Sheet that corrosion has perforated: an area of thick rust with dark pits and small holes.
 
-It moves nothing, and its holes show no inside. shaders/damage_rust_through.glsl is the GLSL twin.
+It moves nothing, and its holes do not show the interior. shaders/damage_rust_through.glsl is the
+GLSL twin.
 """
 
 from dataclasses import dataclass

@@ -82,7 +82,7 @@ class ScrapeConfig:
 
 
 def _marked(damage: Damage, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
-    """The ends are ragged: each height ends elsewhere."""
+    """Test which points are scraped. The ends are ragged: their place varies with the height."""
     pitch_mm, _, contact_mm, ragged_mm, phase, _ = damage.shape
     half_length, half_width = half_size(damage)
     ragged = 0.5 + 0.3 * np.sin(v / (3.1 * pitch_mm) + phase) + 0.2 * np.sin(v / pitch_mm - phase)

@@ -1,4 +1,4 @@
-"""Imports and tables of every worker, loaded once in the process that workers are forked from.
+"""Imports and tables that all workers share, loaded in the process that workers are forked from.
 
 Nothing here depends on environment variables or opens OpenGL.
 """

@@ -3,8 +3,8 @@
 Each process has its own pipe. A shared queue has a lock, which stays locked if its holder dies.
 
 Workers are forked from a server process that has imported the package, so they start at once and
-share the memory of its modules. The server has no OpenGL context; a context that was opened before
-a fork hangs the child.
+share the memory of its modules. The server opens no OpenGL context, because a child hangs if a
+context was opened before the fork.
 """
 
 import contextlib
@@ -253,7 +253,7 @@ def in_words(error: Exception, place: str) -> str:
 
 def _work(pipe: Connection, setup: Setup, environment: Mapping[str, str]) -> None:
     """Main function of a worker: do tasks from the pipe until the parent kills it or exits."""
-    os.environ.clear()  # those of the server may be older
+    os.environ.clear()  # the server may have started with other variables
     os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)

@@ -91,7 +91,7 @@ def container_map_path(hdri: Path) -> Path:
 def load_container_map(hdri: Path) -> ContainerMap | None:
     """Return the container map beside a panorama, None if there is none, as for photographs.
 
-    A map takes 6 MB, which processes share, because it is mapped from the disk cache.
+    A map takes 6 MB. It is mapped from the disk cache, so processes share its memory.
 
     Raises:
         AssetError: The file is not a 16-bit grey PNG that is twice as wide as high.

@@ -139,7 +139,7 @@ class GpuMesh:
 
         Args:
             program: Damage variant of the geometry program. 'holed' draws the interior into the
-                inner view, without the sheet that perforations tore away.
+                inner view, without the sheet that damages tore away.
             triangles: Slices of the mesh's triangles.
         """
         if not triangles:

@@ -1,4 +1,4 @@
-"""Light by rays: the passes of recent image sizes, and the bodies of recent scenes."""
+"""Light of visible surfaces by rays, with caches for recent image sizes and scenes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from fastgen.render.surface_values import SceneMaterials
 
 
 class RayLight:
-    """Lights the visible surfaces of images by rays, and caches what it needs for recent ones.
+    """Light of visible surfaces by rays, with caches of passes and of bodies that rays can hit.
 
     Args:
         gl: Current context.

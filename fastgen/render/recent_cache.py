@@ -7,7 +7,7 @@ from typing import Generic, Protocol, TypeVar
 from fastgen.scene.limits import MAX_NEIGHBOURS
 
 CACHED_CONTAINERS = 2 + MAX_NEIGHBOURS
-"""Containers whose tables are cached: those of one scene, and one more."""
+"""Number of containers whose tables are cached: those of one scene, and one more."""
 
 
 class _Releasable(Protocol):

@@ -79,8 +79,8 @@ class Renderer:
             light: Returns the prefiltered environment of a name, such as `load_environment`.
             quality: Samples, lookups and light. Images whose samples do not fit the driver's
                 textures get fewer samples. A traced quality needs `ray_bodies.check_rays`.
-            damage: Threshold of masks, and kinds to compile programs for; None for the defaults. A
-                scene with other kinds takes time to compile theirs.
+            damage: Threshold of masks, and kinds to compile programs for; None for the defaults.
+                The first scene with another kind takes longer, because its programs are compiled.
             read: Returns the text of a shader file by its name.
             without: Material layers of LAYERS to leave out of images.
             own_art: Artwork of a configuration by name, see own_art.art_of.
@@ -188,7 +188,7 @@ class Renderer:
         return inputs.targets
 
     def _compile_for(self, prepared: PreparedScene) -> None:
-        """Compile programs for kinds of damage that the renderer could not draw so far."""
+        """Compile programs for kinds of damage that the current programs cannot draw."""
         members = (member.prepared.scene.damages for member in prepared.members)
         kinds = {damage.kind for damages in members for damage in damages}
         if not kinds <= set(self._kinds):

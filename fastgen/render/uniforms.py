@@ -92,7 +92,7 @@ class Block:
 
 
 class BlockBuffers:
-    """Buffers of uniform blocks, bound to the binding points of their blocks.
+    """Buffers of uniform blocks, each bound to the binding point of its block.
 
     All are bound from the start, because some shaders declare blocks that they do not read.
 

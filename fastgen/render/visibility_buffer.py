@@ -20,10 +20,10 @@ _OUT_OF_REACH_MM = 1e6
 """Rest position, along each axis, of samples that no damage touches."""
 
 _STEP_ROWS = 240
-"""Rows by which textures grow. No multiple is a power of two, see textures.data_texture.
+"""Number of rows by which textures grow. No multiple is a power of two, see textures.data_texture.
 
-Cables and distant containers of `draft`, which get more samples than the rest of the image, are
-usually far above its lower edge."""
+The buffer with more samples, which `draft` uses for cables and distant containers only, rarely
+needs the rows near the lower edge of the image."""
 
 
 class VisibilityBuffer:

@@ -11,7 +11,7 @@ SEAL_ZONE = SPREADER_ZONE - SEAL_ZONES
 """First zone number of the seals. The container's zones have smaller numbers."""
 
 HOLE_ZONE = 1000
-"""Zone number of sheet that a perforation tore away. Real zones have smaller numbers."""
+"""Zone number of sheet that a damage tore away. Real zones have smaller numbers."""
 
 ZONE_TURN, ZONE_GEAR, ZONE_SMALL, ZONE_LEVEL, ZONE_SHEET = 16, 64, 128, 256, 512
 """Parts of a zone's code, see shaders/zone.glsl: the step of one quarter turn, above the material's

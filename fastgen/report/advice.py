@@ -111,7 +111,7 @@ def _under_represented(
 
 
 def _raised(manifest: Mapping[str, Any], task: str) -> str:
-    """Return how the configuration can give more labels of a task."""
+    """Return advice on the key that gives more labels of a task, as in 'raise KEY'."""
     part, key = ("damage", "probability") if task == "damage" else ("markings", "marked_containers")
     if manifest.get("config", {}).get(part, {}).get(key) != 1:
         return f"raise {part}.{key}"

@@ -1,4 +1,4 @@
-"""What a kind of damage consists of, and the kinds of fastgen and of installed packages.
+"""Parts of a kind of damage, and the kinds of fastgen and of installed packages by name.
 
 Local coordinates of a point at rest are u along the damage, v across it and w inward, in mm from
 its origin.
@@ -81,19 +81,19 @@ def half_size(damage: Damage) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Form:
-    """One form of one kind of damage. It has a field `amount`, or else `marked`.
+    """One form of a kind of damage. It has either `amount` or `marked`.
 
     Attributes:
         name: Value of `Damage.form`.
         glsl: Name in the shaders. The file `shader` defines `DamageField NAME_field(int i, vec3 q)`
-            with the displacement, for forms with a hole `float outside_NAME(int i, vec2 q)`, and
-            for forms without displacement `DamageMark NAME_mark(int i, vec3 q)` instead.
-        shader: GLSL file, the twin of `amount`, `outline` and `marked`: a file of fastgen by its
-            name, or the absolute path of another one.
+            with the displacement, or `DamageMark NAME_mark(int i, vec3 q)` for forms without
+            displacement. Forms with a hole also have `float outside_NAME(int i, vec2 q)`.
+        shader: GLSL file, the twin of `amount`, `outline` and `marked`: the name of a file of
+            fastgen, or the absolute path of another file.
         amount: Function of a damage and of u, v and w [...] to the displacement along its inward
             axis [...] in mm, without the fade that keeps it off the opposite wall.
-        marked: Function of a damage and of u, v and w [...] to bool [...]: a form without
-            displacement changes the surface there.
+        marked: Function of a damage and of u, v and w [...] to bool [...], True where a form
+            without displacement changes the surface.
         reach: Function of a damage to the distances along and across within which it acts.
         span: Function of a damage to the lowest and the highest displacement of the outermost
             sheet in mm, 0 included. They are bounds that some damages do not reach.
@@ -120,7 +120,7 @@ class Form:
     constants: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse a form with both fields or none, or with too many parameters."""
+        """Refuse a form with both `amount` and `marked` or neither, or with too many parameters."""
         if (self.amount is None) == (self.marked is None):
             raise ConfigError(f"form {self.name}: give either amount or marked")
         if len(self.parameters) > MOST_PARAMETERS:
@@ -149,7 +149,7 @@ class SheetForm:
         shape: Further parameters of the form, see `scene.Damage`.
         turn_deg: Angle of its length against the face's horizontal.
         half_mm: Distances along and across from the origin that the displaced sheet reaches; half
-            of `size_mm` where it is None.
+            of `size_mm` if None.
         name: Form of the kind, see `scene.Damage`.
         wear: Its surface.
         place: 'anywhere' on the face, at the 'bottom', or near a 'casting'.
@@ -178,12 +178,12 @@ class Kind:
         ranges: Frozen dataclass of the ranges that a configuration may change. Every field has a
             default, and the docstring describes them.
         draw: Function of `ranges`, the name of a face, its width and height in mm and a random
-            generator to a damage of the sheet. None for kinds with `place`.
+            generator to a damage of the sheet, which fastgen places. None for kinds with `place`.
         place: Function of `ranges`, the container's outer length, width and height in mm and a
-            random generator to a placed damage.
+            random generator to a placed damage. None for kinds with `draw`.
         bulge_mm: Function of `ranges` to the largest outward displacement in mm.
-        leaks: Rust may run down below it.
-        rubbed: It may have a scrape beside it.
+        leaks: Whether rust may run down below it.
+        rubbed: Whether it may have a scrape beside it.
     """
 
     name: str
@@ -199,8 +199,8 @@ class Kind:
         """Refuse names that labels cannot have, and kinds that cannot be drawn."""
         if not re.fullmatch(CLASS_NAME, self.name) or self.name in _RESERVED:
             raise ConfigError(
-                f"damage kind {self.name!r}: labels need another name, of letters, digits and . _ "
-                "+ - that no other class has"
+                f"damage kind {self.name!r}: not a name for a new class; give letters, digits and "
+                ". _ + -, and none of the names of other classes"
             )
         if not self.forms or (self.draw is None) == (self.place is None):
             raise ConfigError(f"damage kind {self.name}: give forms, and either draw or place")
@@ -239,7 +239,7 @@ def form_of(damage: Damage) -> Form:
 
 
 def program_kinds(kinds: Collection[str]) -> tuple[str, ...]:
-    """Return the kinds that a program has to know to draw some kinds, in the order of classes."""
+    """Return the kinds of a program that draws these kinds, in the order of classes."""
     wanted = {*DRAWN_DAMAGE_CLASSES, *kinds}
     return tuple(name for name in ALL_DAMAGE_CLASSES if name in wanted)
 

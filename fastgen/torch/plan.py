@@ -183,7 +183,7 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
     if made.damage.segmentation_classes != base.damage.segmentation_classes:
         raise ConfigError(
             f"curriculum: epoch {epoch} changes which classes there are; list the "
-            "same last kind in damage.kinds of every epoch"
+            "same last kind in damage.kinds of every epoch, in the order of the classes"
         )
     if list(made.cameras) != list(base.cameras):
         raise ConfigError(f"curriculum: epoch {epoch} changes which cameras there are; keep them")

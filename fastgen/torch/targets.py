@@ -78,8 +78,8 @@ def class_names(task: str, config: Config | None = None) -> tuple[str, ...]:
     Args:
         task: damage, imdg, text, door or seal.
         config: Configuration of the dataset. With `markings.marks` the imdg task has five more
-            classes, and with further kinds in `damage.kinds` the damage task has more. None
-            stands for a configuration without either.
+            classes, and with kinds after `perforation` in `damage.kinds` the damage task has
+            more. None stands for a configuration without either.
 
     Raises:
         ConfigError: The task is unknown.

@@ -27,7 +27,8 @@ class ShadingPass:
         self._ctx = ctx
         self._programs = programs
         # A driver compiles a program at its first dispatch, which takes seconds. Processes that
-        # start together compile in different orders, and find the rest in the driver's cache.
+        # start together compile in different orders, so that each finds some programs in the
+        # driver's cache.
         self._order = list(PIXEL_CLASSES)
         random.Random(os.getpid()).shuffle(self._order)
 
@@ -65,7 +66,7 @@ class ShadingPass:
             program.dispatch(-(-across * down // LIST_GROUP))
 
     def _shade(self, inputs: DrawInputs) -> None:
-        """Shade the listed pixels of each class; no pixel is in two lists, so any order will do."""
+        """Shade the listed pixels of each class, in any order, because no pixel is in two lists."""
         listed = listed_classes(inputs.variant.samples_per_axis)
         for name in self._order:
             if name in listed and _occurs(name, inputs.variant):
