@@ -8,7 +8,9 @@ from fastgen.cli.stopping import ended_at_once
 def main() -> int:
     """Run the command line and return its exit code; see `fastgen.cli.main.main`."""
     with ended_at_once():
-        if sys.argv[1:2] == ["generate"]:  # it imports the package while this process does
+        local = not {"-h", "--help", "--ray"}.intersection(sys.argv)
+        if sys.argv[1:2] == ["generate"] and local:
+            # it imports the package while this process does
             from fastgen.dataset.workers import start_server
 
             start_server()

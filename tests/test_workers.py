@@ -8,6 +8,7 @@ import threading
 import time
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -101,6 +102,40 @@ def test_workers_start_no_matrix_threads_unless_the_user_asks_for_them(variables
         [sys.executable, "-c", code], env={**others, **variables}, capture_output=True, check=True
     )
     assert int(said.stdout) == threads
+
+
+SCRIPT = """
+from tests import test_workers
+if __name__ == "__main__":
+    print(test_workers.heard_from(test_workers.TellsItsVariable))
+"""
+
+
+@pytest.mark.parametrize("temporary", ["short", "x" * 120])
+def test_workers_start_beside_any_modules_and_temporary_folder(tmp_path, temporary):
+    """Modules in the current folder do not replace installed ones, and the path of the folder for
+    temporary files may be too long for a socket."""
+    script, here = tmp_path / "scripts" / "run.py", tmp_path / "here"
+    for folder in (script.parent, here, tmp_path / temporary):
+        folder.mkdir()
+    script.write_text(SCRIPT)
+    for name in ("yaml", "cv2", "fastgen"):
+        (here / f"{name}.py").write_text("raise RuntimeError('the wrong module')")
+    paths = [str(Path(__file__).parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    variables = {
+        "FASTGEN_TEST": "heard",
+        "PYTHONPATH": os.pathsep.join(paths),
+        "TMPDIR": str(tmp_path / temporary),
+    }
+    said = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=here,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert (said.stdout, said.stderr) == ("heard\n", "")
 
 
 def test_workers_have_the_environment_of_the_time_of_their_start(monkeypatch):

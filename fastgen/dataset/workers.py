@@ -11,6 +11,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -70,33 +71,62 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _one_matrix_thread() -> Iterator[None]:
-    """Let a process started in the block use one OpenBLAS thread, unless the user has set a number.
+def _set_variables(values: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for processes that are started in the block."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _one_matrix_thread() -> dict[str, str]:
+    """Return the variable that gives OpenBLAS one thread, unless the user has set a number.
 
     Further threads spin while they wait, on the cores of other workers, and do not survive a fork.
     """
     set_by_user = any(name in os.environ for name in _MATRIX_THREADS)
-    if not set_by_user:
-        os.environ[_MATRIX_THREADS[0]] = "1"
-    try:
-        yield
-    finally:
-        if not set_by_user:
-            os.environ.pop(_MATRIX_THREADS[0], None)
+    return {} if set_by_user else {_MATRIX_THREADS[0]: "1"}
 
 
-def start_server() -> None:
-    """Start the process that workers are forked from, unless it runs. Does not wait for it."""
-    # Ctrl-C reaches the whole process group, but the parent decides what happens. The server and
-    # its workers inherit this mask until they are ready. Starting the tracker would lift the mask.
-    resource_tracker.ensure_running()
-    with undisturbed(), _one_matrix_thread():
+@contextlib.contextmanager
+def _started_quietly() -> Iterator[None]:
+    """Keep Ctrl-C away from processes that are started in the block, until they are ready.
+
+    It reaches the whole process group, but the parent decides what happens. Children inherit the
+    signal mask.
+    """
+    resource_tracker.ensure_running()  # its start would lift the mask
+    with undisturbed(), _set_variables(_one_matrix_thread()):
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPS)
         try:
-            forkserver.set_forkserver_preload([_WARM_START])
-            forkserver.ensure_running()
+            yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def start_server() -> bool:
+    """Start the process that workers are forked from, unless it runs. Does not wait for it.
+
+    It searches modules where this process does, and not in the current folder first, as
+    `python -c` would (Python's documentation of PYTHONSAFEPATH).
+
+    Returns:
+        False if there is no folder for its socket, whose path may have about 100 characters.
+    """
+    paths = os.pathsep.join(os.path.abspath(path) for path in sys.path)
+    with _started_quietly(), _set_variables({"PYTHONSAFEPATH": "1", "PYTHONPATH": paths}):
+        forkserver.set_forkserver_preload([_WARM_START])
+        try:
+            forkserver.ensure_running()
+        except OSError:
+            return False
+    return True
 
 
 class Waiting:
@@ -128,12 +158,11 @@ class _Worker:
     """One process, its current task, and the time of its last report."""
 
     def __init__(self, setup: Setup) -> None:
-        context = multiprocessing.get_context("forkserver")
+        context = multiprocessing.get_context("forkserver" if start_server() else "spawn")
         self.pipe, theirs = context.Pipe()
         arguments = theirs, setup, dict(os.environ)
         self.process = context.Process(target=_work, args=arguments, name=_NAME, daemon=True)
-        with undisturbed():
-            start_server()
+        with _started_quietly():
             self.process.start()
         theirs.close()
         self.task: Any = None

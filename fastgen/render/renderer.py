@@ -192,11 +192,12 @@ class Renderer:
         members = (member.prepared.scene.damages for member in prepared.members)
         kinds = {damage.kind for damages in members for damage in damages}
         if not kinds <= set(self._kinds):
-            self._kinds = program_kinds(kinds.union(self._kinds))
+            more = program_kinds(kinds.union(self._kinds))
+            geometry = GeometryPass(self.ctx, self._programs, more)  # may fail
             self._geometry.release()
             self._shapes.release()
-            self._geometry = GeometryPass(self.ctx, self._programs, self._kinds)
-            self._shapes = Shapes(self.ctx, self._geometry.programs)
+            self._kinds, self._geometry = more, geometry
+            self._shapes = Shapes(self.ctx, geometry.programs)
 
     def _shade(
         self,

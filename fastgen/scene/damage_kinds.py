@@ -120,9 +120,11 @@ class Form:
     constants: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse a form with both `amount` and `marked` or neither, or with too many parameters."""
+        """Refuse a form that the renderer cannot draw."""
         if (self.amount is None) == (self.marked is None):
             raise ConfigError(f"form {self.name}: give either amount or marked")
+        if self.outline is not None and self.amount is None:
+            raise ConfigError(f"form {self.name}: a form with an outline, a hole, needs amount")
         if len(self.parameters) > MOST_PARAMETERS:
             raise ConfigError(
                 f"form {self.name}: {len(self.parameters)} parameters; the shaders read at most "
