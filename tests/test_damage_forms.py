@@ -8,6 +8,8 @@ import pytest
 
 from fastgen import Config, Generator
 from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+from fastgen.config.damage import DamageConfig
+from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import (
     amount_mm,
     in_hole,
@@ -23,7 +25,7 @@ from fastgen.render.constants import constants_text
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
 from fastgen.render.variant import ShaderVariant
-from fastgen.scene.damage_kinds import forms_of
+from fastgen.scene.damage_kinds import Form, forms_of
 from tests.glsl import blocks, run
 from tests.random_damages import AXES, FORM_NAMES, FORMS, points_around, random_damage
 
@@ -159,3 +161,17 @@ def test_the_shaders_change_nothing_outside_the_reach(gl):
         assert not changed[outside].any()
         inside += np.bincount(number[changed] // 9, minlength=len(FORM_NAMES))
     assert (inside > 20).all()
+
+
+def test_a_form_with_a_hole_must_move_the_sheet():
+    def hole(damage, u, v):
+        return u
+
+    with pytest.raises(ConfigError, match="a form with an outline, a hole, needs amount"):
+        Form("plain", "pit", "pit.glsl", marked=lambda *_: True, outline=hole)
+
+
+def test_faces_never_bulge_by_less_than_nothing():
+    values = {"damage": {"kinds": ["perforation"], "perforation": {"twist": 0.5}}}
+    assert Config.from_values(values).damage.bulge_mm == 0
+    assert DamageConfig(probability=0.0).bulge_mm == 0
