@@ -20,6 +20,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import islice
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkServerContext, SpawnContext
 from typing import Any
 
 from fastgen.errors import FastgenError, OutputError
@@ -158,7 +159,11 @@ class _Worker:
     """One process, its current task, and the time of its last report."""
 
     def __init__(self, setup: Setup) -> None:
-        context = multiprocessing.get_context("forkserver" if start_server() else "spawn")
+        context: ForkServerContext | SpawnContext = (
+            multiprocessing.get_context("forkserver")
+            if start_server()
+            else multiprocessing.get_context("spawn")
+        )
         self.pipe, theirs = context.Pipe()
         arguments = theirs, setup, dict(os.environ)
         self.process = context.Process(target=_work, args=arguments, name=_NAME, daemon=True)
