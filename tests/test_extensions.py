@@ -289,6 +289,9 @@ def test_a_broken_package_is_named(
     for folder in (site, tmp_path):
         monkeypatch.syspath_prepend(folder)
     given = [each.format(out=tmp_path / "out") for each in arguments]
+    if "fastgen.damages" in groups:  # the names of kinds are read when fastgen is imported
+        assert fastgen(*given, path=[tmp_path, site], code=2).startswith(f"fastgen: {words}")
+        return
     assert main(given) == 2
     assert capsys.readouterr().err.startswith(f"fastgen: {words}")
     assert main(["presets"]) == 0

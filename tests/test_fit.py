@@ -204,7 +204,7 @@ def test_a_fit_recovers_the_camera_of_photographs(generators):
     assert sum(sensor.white_balance_ev) / 2 == pytest.approx(0.3, abs=0.15)
     assert 120 < sensor.noise.full_well_e.lo <= sensor.noise.full_well_e.hi < 800
     # the two make up for each other, and where the search ends depends on the CPU's rounding
-    assert sensor.response.contrast.lo > 1.1
+    assert sensor.response.contrast.lo > 1.05
     assert sensor.response.saturation.lo > 1.1
     assert sensor.response.contrast.lo + sensor.response.saturation.lo > 2.4
 

@@ -138,7 +138,7 @@ def test_pixels_of_a_marker_and_of_a_sticker_have_the_colour_of_their_file(confi
 
 def test_the_example_of_the_docs_page_is_drawn(tmp_path):
     page = (Path(__file__).parent.parent / "docs/extend.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"^```yaml\n([^`]*)```$", page, re.MULTILINE)
+    block = re.findall(r"^```yaml\n([^`]*)```$", page, re.MULTILINE)[0]
     (tmp_path / "art").mkdir()
     for name in ("env", "tag", "emblem"):
         Image.new("RGB", (90, 90)).save(tmp_path / f"art/{name}.png")
