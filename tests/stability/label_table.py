@@ -28,7 +28,7 @@ SIGNIFICANT = 6
 """Digits of the numbers of scenes that are hashed. CPUs differ in the last of a double's 16."""
 
 LABEL_DIGITS = 4
-"""Digits of the numbers of labels, a tenth of a pixel or less. With six, CPUs disagreed in five rows."""
+"""Digits of the numbers of labels, a tenth of a pixel. With six, CPUs disagreed in five rows."""
 
 
 def rounded(value: Any, digits: int) -> Any:
