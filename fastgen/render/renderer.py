@@ -22,8 +22,8 @@ from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
 from fastgen.light.environment import Ambient, EnvironmentLight
-from fastgen.render.blocks import DAMAGE_BLOCK, SCENE_BLOCK, VIEW_BLOCK
 from fastgen.render.decal_tables import scale_for
+from fastgen.render.draw_blocks import DrawBlocks
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
 from fastgen.render.gl import GLContext
 from fastgen.render.gpu_mesh import GpuMesh
@@ -44,10 +44,8 @@ from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes
-from fastgen.render.surface_values import SceneMaterials, damage_values, scene_values
-from fastgen.render.uniforms import BlockBuffers
+from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.variant import ShaderVariant
-from fastgen.render.view_values import view_values
 from fastgen.render.zone_codes import SPREADER_ZONE
 from fastgen.scene import Camera, EnvironmentView, Scene
 from fastgen.scene.boxes import back_to_front
@@ -89,7 +87,6 @@ class Renderer:
         self.ctx = gl.ctx
         self._quality = quality
         damage = damage or DamageConfig()
-        self._mask_threshold_mm = damage.mask_threshold_mm
         self._without = without
         self._programs = programs = Programs(self.ctx, read)
         self._kinds = program_kinds(damage.kinds)
@@ -103,7 +100,7 @@ class Renderer:
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights = SceneLights(gl, light, quality)
         self._scenes: ReleasingCache[SceneResources] = ReleasingCache(CACHED_CONTAINERS)
-        self._blocks = BlockBuffers(self.ctx, (SCENE_BLOCK, VIEW_BLOCK, DAMAGE_BLOCK))
+        self._blocks = DrawBlocks(self.ctx, damage.mask_threshold_mm)
         bundled = art_layers()
         own_layers = {name: len(bundled) + i for i, name in enumerate(own_art)}
         self._art_layers = {**bundled, **own_layers}
@@ -219,7 +216,7 @@ class Renderer:
         if inputs.regions.cables:
             _, per_axis = self._targets.samples_per_axis(member.prepared, inputs.view)
             finer = inputs.of_cables(self._targets.samples(inputs.view.size, per_axis))
-            self._set_view(finer, member, exposure)
+            self._blocks.view(finer, member.prepared.scene, exposure)
             self._geometry.run_cables(finer)
             self._shade(finer, member, exposure, normals)
 
@@ -245,13 +242,9 @@ class Renderer:
         )
         seals = self._shapes.seals(prepared, lit[0])
         decals = resources.decals(scale_for(prepared.container, view))
-        self._blocks.fill(
-            SCENE_BLOCK, {**scene_values(prepared, len(light.background)), **decals.values}
-        )
+        self._blocks.scene(prepared, decals, len(light.background))
         if damage != "undamaged":
-            threshold_mm, row = self._mask_threshold_mm, samples.inner_row
-            values = damage_values(prepared, damages, self._kinds, threshold_mm, row)
-            self._blocks.fill(DAMAGE_BLOCK, values)
+            self._blocks.damages(prepared, damages, self._kinds, samples.inner_row)
         return DrawInputs(
             view=view,
             damages=damages,
@@ -300,12 +293,7 @@ class Renderer:
         if shadow is not None:
             inputs.textures["shadow_map"] = shadow.depth
         inputs.lights.update(light_values(lights, shadow, view.position_m))
-        self._set_view(inputs, member, exposure)
-
-    def _set_view(self, inputs: DrawInputs, member: Member, exposure: float) -> None:
-        """Fill the uniform block of the view for the samples of `inputs`."""
-        values = view_values(member.prepared.scene, inputs.view, inputs.samples, exposure)
-        self._blocks.fill(VIEW_BLOCK, {**values, **inputs.lights})
+        self._blocks.view(inputs, scene, exposure)
 
     def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
@@ -364,10 +352,9 @@ class Renderer:
         scene, mesh = prepared.scene, self._shapes.container(prepared)
         damage = variant(scene.damages)
         if damage != "undamaged":
-            values = damage_values(prepared, scene.damages, self._kinds, self._mask_threshold_mm, 0)
-            self._blocks.fill(DAMAGE_BLOCK, values)
+            self._blocks.damages(prepared, scene.damages, self._kinds)
         decals = self._resources(prepared).decals()
-        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.scene(prepared, decals)
         textures = self._material_textures(decals, mesh, None)
         program = bake_program(self._programs, damage, self._kinds)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
@@ -378,7 +365,7 @@ class Renderer:
         if spreader is None:
             return None
         decals = self._resources(prepared).decals()
-        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.scene(prepared, decals)
         container = self._shapes.container(prepared)
         textures = self._material_textures(decals, container, spreader)
         program = bake_program(self._programs)
@@ -389,7 +376,7 @@ class Renderer:
     def bake_ground(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None where it has none."""
         decals = self._resources(prepared).decals()
-        self._blocks.fill(SCENE_BLOCK, {**scene_values(prepared, 0), **decals.values})
+        self._blocks.scene(prepared, decals)
         return self._ground.bake(prepared.scene, self._tables, texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:

@@ -1,12 +1,11 @@
-"""Uniform blocks: GLSL declaration, std140 packing and buffers from one list of members.
+"""Uniform blocks: GLSL declaration and std140 packing from one list of members.
 
 Layout: OpenGL 4.5 core specification, section 7.6.2.2 (standard uniform block layout).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -89,30 +88,3 @@ class Block:
                 raise AssertionError(f"{name}: {len(rows)} values do not fit {max(length, 1)}")
             data[offset : offset + rows.nbytes] = rows.view(np.uint8).ravel()
         return data.tobytes()
-
-
-class BlockBuffers:
-    """Buffers of uniform blocks, each bound to the binding point of its block.
-
-    All are bound from the start, because some shaders declare blocks that they do not read.
-
-    Args:
-        ctx: Current context.
-        blocks: The blocks.
-    """
-
-    def __init__(self, ctx: moderngl.Context, blocks: Sequence[Block]) -> None:
-        self._buffers = {block.name: ctx.buffer(reserve=block.size) for block in blocks}
-        for block in blocks:
-            self._buffers[block.name].bind_to_uniform_block(block.binding)
-
-    def fill(self, block: Block, values: Mapping[str, ArrayLike]) -> None:
-        """Fill the buffer of a block for the draws that follow, and bind it; see Block.pack."""
-        buffer = self._buffers[block.name]
-        buffer.write(block.pack(values))
-        buffer.bind_to_uniform_block(block.binding)
-
-    def release(self) -> None:
-        """Free all GL objects."""
-        for buffer in self._buffers.values():
-            buffer.release()
