@@ -1,10 +1,9 @@
 // DamageMark missing_paint_mark(int i, vec3 q): flaked paint at local coordinates q.
 // Twin of fastgen/damages/missing_paint.py. Colours and blend weights are artistic choices.
 
+#include "damage.constants"
 #include "damage.block"
 #include "damage_field.glsl"
-
-const vec3 STEEL_ALBEDO = vec3(0.42, 0.41, 0.39);
 
 DamageMark missing_paint_mark(int i, vec3 q) {
     vec4 shape = damage_shape[3 * i];   // Scale, phase, height, share of steel.
@@ -16,5 +15,5 @@ DamageMark missing_paint_mark(int i, vec3 q) {
     float edge = mix(0.7, 1.0, smoothstep(0.0, 0.05, inside));
     return DamageMark(inside > 0.0 && in_contact(q.z, damage_shape[3 * i + 1].x), 1.0,
                       mix(1.0, damage_fresh(i), steel),
-                      edge * mix(damage_bare[i].rgb, STEEL_ALBEDO, steel), true);
+                      edge * mix(damage_bare[i].rgb, MISSING_PAINT_STEEL, steel), true);
 }

@@ -21,8 +21,8 @@ Depth = Annotated[Range, Bounds(0.0, 2400.0, "mm")]
 """Displacement. A container is 2438 mm wide; a deeper dent would come out on the other side."""
 
 MOST_CONTACT_MM = 200.0
-"""Largest depth behind the face up to which a damage marks the sheet. Corrugation is a quarter of
-that depth. A limit a few times larger would reach the opposite wall."""
+"""Largest depth behind the face up to which a damage marks the sheet, four times the depth of the
+corrugation. A limit a few times larger would reach the opposite wall."""
 
 Contact = Annotated[Range, Bounds(5.0, MOST_CONTACT_MM, "mm")]
 """Depth behind the outermost sheet up to which it is marked."""

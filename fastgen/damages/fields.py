@@ -86,6 +86,14 @@ def patch(damage: Damage, u: Array, v: Array) -> Array:
     return ripples(u, v, scale_mm, phase) - 1 + (1 + cover) * inside
 
 
+def in_patch(damage: Damage, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
+    """Test which points at u, v and w [...] are in such a patch and near enough to the face.
+
+    The last number of `Damage.shape` is the depth up to which the patch reaches. bool [...].
+    """
+    return np.asarray((patch(damage, u, v) > 0) & in_contact(w, damage.shape[-1]))
+
+
 PATCH = (
     millimetres("scale of the outline", 5.0),
     PHASE,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastgen.damages.draws import (
     MOST_CONTACT_MM,
@@ -19,9 +18,8 @@ from fastgen.damages.draws import (
     draw_bare,
     fitted,
 )
-from fastgen.damages.fields import PATCH, in_contact, patch
-from fastgen.scene import Damage
-from fastgen.scene.damage_kinds import Array, Form, Kind, Parameter, SheetForm, Wear, millimetres
+from fastgen.damages.fields import PATCH, in_patch
+from fastgen.scene.damage_kinds import STEEL, Form, Kind, Parameter, SheetForm, Wear, millimetres
 from fastgen.validation import UNIT, Bounds, Range
 
 _HEIGHT = Range(0.0, 0.5)
@@ -49,10 +47,6 @@ class MissingPaintConfig:
     fresh: Annotated[Range, UNIT] = Range(0.3, 1.0)
 
 
-def _marked(damage: Damage, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
-    return np.asarray((patch(damage, u, v) > 0) & in_contact(w, damage.shape[4]))
-
-
 def _draw(c: MissingPaintConfig, _face: str, size: Size, rng: np.random.Generator) -> SheetForm:
     extents = fitted((draw(rng, c.length_mm), draw(rng, c.height_mm)), size)
     shape = (
@@ -73,7 +67,7 @@ KIND = Kind(
             name="plain",
             glsl="missing_paint",
             shader="damage_missing_paint.glsl",
-            marked=_marked,
+            marked=in_patch,
             parameters=(
                 *PATCH,
                 Parameter("share that is bare to the steel", 0.0, 1.0),
@@ -81,6 +75,7 @@ KIND = Kind(
                     "depth behind the face up to which paint is missing", high=MOST_CONTACT_MM
                 ),
             ),
+            constants={"MISSING_PAINT_STEEL": "vec3({}, {}, {})".format(*STEEL)},
         ),
     ),
     MissingPaintConfig,

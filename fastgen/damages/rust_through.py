@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastgen.damages.draws import MOST_CONTACT_MM, Contact, Extent, Size, draw, draw_angle, fitted
-from fastgen.damages.fields import PATCH, in_contact, patch
-from fastgen.scene import Damage
-from fastgen.scene.damage_kinds import Array, Form, Kind, Parameter, SheetForm, millimetres
+from fastgen.damages.fields import PATCH, in_patch
+from fastgen.scene.damage_kinds import Form, Kind, Parameter, SheetForm, millimetres
 from fastgen.validation import UNIT, Range, Share
 
 _SCALE = Range(0.06, 0.12)
@@ -42,10 +40,6 @@ class RustThroughConfig:
     at_bottom: Share = 0.6
 
 
-def _marked(damage: Damage, u: Array, v: Array, w: Array) -> NDArray[np.bool_]:
-    return np.asarray((patch(damage, u, v) > 0) & in_contact(w, damage.shape[4]))
-
-
 def _draw(c: RustThroughConfig, face: str, size: Size, rng: np.random.Generator) -> SheetForm:
     length, height = fitted((draw(rng, c.length_mm), draw(rng, c.height_mm)), size)
     shape = (
@@ -66,7 +60,7 @@ KIND = Kind(
             name="plain",
             glsl="rust_through",
             shader="damage_rust_through.glsl",
-            marked=_marked,
+            marked=in_patch,
             parameters=(
                 *PATCH,
                 Parameter("amount of pits", 0.0, 1.0),
