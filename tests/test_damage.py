@@ -396,15 +396,3 @@ def test_undamaged_places_do_not_change(generator):
     same = (damaged.image == undamaged.image).all(axis=-1)
     assert far.mean() > 0.5
     assert same[far].mean() > 0.9
-
-
-def test_a_concave_damage_moves_points_by_hand_computed_amounts():
-    """A concave damage is a bump, checked at its centre, half way out and at its rim."""
-    damage = damage_law.Damage(
-        "concave", "front", (0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (2000, 1000), 80.0
-    )
-    points = np.array([[0, 0, 0], [500, 0, 0], [0, 0, 250], [1000, 0, 0], [0, 300, 0]], float)
-    assert damage_law.amount_mm(damage, points)[:4] == pytest.approx([80, 45, 45, 0])
-    assert 0 < damage_law.amount_mm(damage, points)[4] < 80
-    moved = damage_law.deform((damage,), points)
-    np.testing.assert_allclose(moved[0], [0, 80, 0])

@@ -12,6 +12,7 @@ from fastgen.config.damage import DamageConfig
 from fastgen.errors import ConfigError
 from fastgen.geometry.damage_law import (
     amount_mm,
+    deform,
     in_hole,
     inward_mm,
     is_marked,
@@ -25,6 +26,7 @@ from fastgen.render.constants import constants_text
 from fastgen.render.gl import open_context
 from fastgen.render.surface_values import damage_values
 from fastgen.render.variant import ShaderVariant
+from fastgen.scene import Damage
 from fastgen.scene.damage_kinds import Form, forms_of
 from tests.glsl import blocks, run
 from tests.random_damages import AXES, FORM_NAMES, FORMS, points_around, random_damage
@@ -175,3 +177,15 @@ def test_faces_never_bulge_by_less_than_nothing():
     values = {"damage": {"kinds": ["perforation"], "perforation": {"twist": 0.5}}}
     assert Config.from_values(values).damage.bulge_mm == 0
     assert DamageConfig(probability=0.0).bulge_mm == 0
+
+
+def test_a_concave_damage_moves_points_by_hand_computed_amounts():
+    """A concave damage is a bump, checked at its centre, half way out and at its rim."""
+    damage = Damage(
+        "concave", "front", (0, 0, 0), (1, 0, 0), (0, 0, 1), (0, 1, 0), (2000, 1000), 80.0
+    )
+    points = np.array([[0, 0, 0], [500, 0, 0], [0, 0, 250], [1000, 0, 0], [0, 300, 0]], float)
+    assert amount_mm(damage, points)[:4] == pytest.approx([80, 45, 45, 0])
+    assert 0 < amount_mm(damage, points)[4] < 80
+    moved = deform((damage,), points)
+    np.testing.assert_allclose(moved[0], [0, 80, 0])

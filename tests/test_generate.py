@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-import tracemalloc
 from pathlib import Path
 
 import cv2
@@ -314,27 +313,6 @@ def test_a_run_whose_scenes_all_fail_still_ends_normally(tmp_path, monkeypatch):
     made = generate(job, 1, runner=run_inside)
     assert [each["scene"] for each in made["failed"]] == [0, 1]
     assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
-
-
-def test_a_large_run_does_not_list_all_its_shards_in_advance(tmp_path):
-    class Stopped(Exception):
-        pass
-
-    def first(job, tasks, on_report):
-        assert next(iter(tasks)).shard == 0
-        raise Stopped
-
-    def peak(images, name):
-        job = Job(str(tmp_path / name), images, cameras=("A",), render=SMALL)
-        tracemalloc.start()
-        with pytest.raises(Stopped):
-            generate(job, 1, runner=first)
-        most = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return most
-
-    peak(4, "warm")
-    assert peak(10**6, "large") < peak(4, "small") + 1e6
 
 
 def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):

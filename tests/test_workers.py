@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -192,6 +193,27 @@ def test_tasks_are_fetched_only_when_a_worker_is_free():
 
     workers.run(Reports, tasks(), 2, hear, on_death)
     assert sorted(done) == list(range(20))
+
+
+def test_a_large_run_does_not_list_all_its_shards_in_advance(tmp_path):
+    class Stopped(Exception):
+        pass
+
+    def first(job, tasks, on_report):
+        assert next(iter(tasks)).shard == 0
+        raise Stopped
+
+    def peak(images, name):
+        job = Job(str(tmp_path / name), images, cameras=("A",), render=RenderSettings((64, 64)))
+        tracemalloc.start()
+        with pytest.raises(Stopped):
+            generate(job, 1, runner=first)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(4, "warm")
+    assert peak(10**6, "large") < peak(4, "small") + 1e6
 
 
 def test_a_task_put_back_comes_next_and_no_task_is_fetched_early():
