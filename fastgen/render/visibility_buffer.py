@@ -19,6 +19,12 @@ T = TypeVar("T")
 _OUT_OF_REACH_MM = 1e6
 """Rest position, along each axis, of samples that no damage touches."""
 
+_STEP_ROWS = 240
+"""Number of rows by which textures grow. No multiple is a power of two, see textures.data_texture.
+
+The buffer with more samples, which `draft` uses for cables and distant containers only, rarely
+needs the rows near the lower edge of the image."""
+
 
 class VisibilityBuffer:
     """Textures that the geometry pass writes, one texel per sample.
@@ -93,7 +99,7 @@ class VisibilityBuffer:
             holes: Regions that `limit_inside` will name.
             over: The surfaces are drawn over an image, which has its sky already.
         """
-        self._make_room(damage)
+        self._make_room(damage, seen)
         for box in (*map(self._texels, seen), *map(self._texels_inside, holes)):
             self._clear(self._keys, box, NUMBERS, 0)
         # with single samples the depth separates sky from surfaces, see ImageTargets.begin
@@ -117,10 +123,14 @@ class VisibilityBuffer:
         target.use()
         target.viewport = (0, 0, *self._fine)
 
-    def _make_room(self, damage: str) -> None:
+    def _make_room(self, damage: str, seen: Sequence[Region | None]) -> None:
         rows = self._fine[1]
         if damage == "holed":
             rows += self.inner_row
+        elif self.per_axis > 1:  # the background pass needs all rows of single samples
+            _, tops, _, heights = zip((0, 0, 0, 0), *map(self._texels, seen), strict=True)
+            lowest = max(top + height for top, height in zip(tops, heights, strict=True))
+            rows = min(-(-max(lowest, 1) // _STEP_ROWS) * _STEP_ROWS, rows)
         if rows > self._rows:
             self.release()
             self._rows = rows
