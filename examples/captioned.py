@@ -7,18 +7,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP_PX, _STRIP_PX = 6, 42
-"""Gap between pictures, and height of captions."""
+_GAP_PX = 6
+"""Gap between pictures."""
 
 _MARGIN = 255
 """Grey level of gaps and captions."""
 
 
-def captioned(image: NDArray[np.uint8], words: str) -> NDArray[np.uint8]:
-    """Return an image uint8 [H, W, 3] with a caption below."""
-    strip = np.full((_STRIP_PX, image.shape[1], 3), _MARGIN, np.uint8)
-    place, black = (2, _STRIP_PX - 13), (30, 30, 30)
-    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.95, black, 1, cv2.LINE_AA)
+def captioned(
+    image: NDArray[np.uint8], words: str, strip_px: int = 42, letters: float = 0.95
+) -> NDArray[np.uint8]:
+    """Return an image uint8 [H, W, 3] with a caption below.
+
+    Args:
+        image: The image.
+        words: The caption.
+        strip_px: Height of the caption with its margins.
+        letters: Scale of the letters, see cv2.putText.
+    """
+    strip = np.full((strip_px, image.shape[1], 3), _MARGIN, np.uint8)
+    place, black = (2, strip_px - round(0.315 * strip_px)), (30, 30, 30)
+    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, letters, black, 1, cv2.LINE_AA)
     return np.concatenate([image, strip])
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from captioned import captioned
 from numpy.typing import NDArray
 
 from fastgen import Config, Generator
@@ -23,13 +24,10 @@ SIDE, GAP, STRIP = 640, 6, 34
 """Pixels: side of the large image, gap between images, and height of the captions."""
 
 
-def captioned(image: NDArray[np.uint8], side: int, words: str) -> NDArray[np.uint8]:
+def scaled(image: NDArray[np.uint8], side: int, words: str) -> NDArray[np.uint8]:
     """Return an image scaled to a side, with a caption below."""
-    scaled = cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA)
-    strip = np.full((STRIP, side, 3), 255, np.uint8)
-    place, black = (2, STRIP - 11), (30, 30, 30)
-    cv2.putText(strip, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.58, black, 1, cv2.LINE_AA)
-    return np.concatenate([scaled, strip])
+    image = np.asarray(cv2.resize(image, (side, side), interpolation=cv2.INTER_AREA), np.uint8)
+    return captioned(image, words, STRIP, letters=0.58)
 
 
 def picture(large: NDArray[np.uint8], sample: Sample) -> NDArray[np.uint8]:
@@ -41,12 +39,12 @@ def picture(large: NDArray[np.uint8], sample: Sample) -> NDArray[np.uint8]:
         "depth": depth_colors(sample.depth),
         "damage classes": label_colors(sample.damage, DAMAGE_GREYS),
     }
-    small = [captioned(image, side, words) for words, image in parts.items()]
+    small = [scaled(image, side, words) for words, image in parts.items()]
     white = np.full((small[0].shape[0], GAP, 3), 255, np.uint8)
     rows = [np.concatenate([a, white, b], axis=1) for a, b in (small[:2], small[2:])]
     line = np.full((GAP, rows[0].shape[1], 3), 255, np.uint8)
     right = np.concatenate([rows[0], line, rows[1]])
-    left = captioned(large, SIDE, "image")
+    left = scaled(large, SIDE, "image")
     between = np.full((left.shape[0], GAP, 3), 255, np.uint8)
     return np.concatenate([left, between, right], axis=1)
 

@@ -118,7 +118,8 @@ def start_server() -> bool:
     `python -c` would (Python's documentation of PYTHONSAFEPATH).
 
     Returns:
-        False if there is no folder for its socket, whose path may have about 100 characters.
+        False if it cannot have a socket, because the path of the folder for temporary files is
+        longer than about 75 characters or cannot be written.
     """
     paths = os.pathsep.join(os.path.abspath(path) for path in sys.path)
     with _started_quietly(), _set_variables({"PYTHONSAFEPATH": "1", "PYTHONPATH": paths}):

@@ -212,7 +212,7 @@ _RESERVED = {*ALL_DETECTION_CLASSES, *UNDAMAGED_CLASSES}
 
 
 def bundled_kind(name: str) -> Kind:
-    """Return a kind of fastgen by name; only its module is imported."""
+    """Return a kind of fastgen by its name, and import its module."""
     kind: Kind = import_module(f"fastgen.damages.{name}").KIND
     return kind
 
