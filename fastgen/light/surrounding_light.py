@@ -71,14 +71,19 @@ class SurroundingLight:
             mesh: Its mesh.
         """
         corner, weight = _lattice_places(mesh)
-        factor = np.zeros((len(values), 3), np.float32)
-        for points, share in zip(corner, weight, strict=True):
-            factor += share[:, None] * self.factor.take(points, axis=0)
         found = values.copy()
-        found[:, 4:7] = np.minimum(values[:, 4:7] * factor + 0.5, 255)
+        found[:, 4:7] = np.minimum(values[:, 4:7] * self.vertex_factors(mesh) + 0.5, 255)
         nearest = np.take_along_axis(corner, weight.argmax(axis=0)[None], axis=0)[0]
         found[:, 8:] &= self.open_bits.take(nearest, axis=0)
         return found
+
+    def vertex_factors(self, mesh: Mesh) -> NDArray[np.float32]:
+        """Return the factor float32 [V, 3] on the light at each vertex of the container's mesh."""
+        corner, weight = _lattice_places(mesh)
+        factor = np.zeros((len(mesh.positions_mm), 3), np.float32)
+        for points, share in zip(corner, weight, strict=True):
+            factor += share[:, None] * self.factor.take(points, axis=0)
+        return factor
 
 
 def _counts(size_mm: Array) -> list[tuple[int, int]]:

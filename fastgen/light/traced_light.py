@@ -13,7 +13,7 @@ Keller and Heidrich 2001, Interleaved Sampling.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fastgen.light.environment import to_map_frame
 from fastgen.light.ray_bodies import LIFT_MM, RayBodies
@@ -49,7 +49,7 @@ class Points:
     Attributes:
         column: [K], column in the grid of points.
         row: [K], row in the grid of points.
-        place_mm: float32 [K, 3], world position.
+        place_mm: float32 [K, 3], positions.
         normal: float32 [K, 3], unit vector.
         toward_eye: float32 [K, 3], unit vector.
         roughness: float32 [K], perceptual.
@@ -66,6 +66,20 @@ class Points:
         """Return the points of the given indices."""
         arrays = (self.place_mm, self.normal, self.toward_eye, self.roughness)
         return Points(self.column[which], self.row[which], *(array[which] for array in arrays))
+
+    def turned(self, rotation: NDArray[np.floating], origin_mm: ArrayLike) -> "Points":
+        """Return the points in another frame.
+
+        Args:
+            rotation: [3, 3], from this frame to the other.
+            origin_mm: Origin [3] of this frame in the other.
+        """
+        place, normal, eye = (
+            array @ rotation.T.astype(np.float32)
+            for array in (self.place_mm, self.normal, self.toward_eye)
+        )
+        moved = place + np.asarray(origin_mm, np.float32)
+        return Points(self.column, self.row, moved, normal, eye, self.roughness)
 
 
 def traced_light(points: Points, bodies: RayBodies, sky: SkyRays, yaw_deg: float) -> Floats:

@@ -1,22 +1,27 @@
 """Light of visible surfaces by rays, with caches for recent image sizes and scenes."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 
-from fastgen.geometry.damage_law import deform
-from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.light.environment import Ambient, to_map_frame
-from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
+from fastgen.geometry.prepared_scene import Member, PreparedScene
+from fastgen.light.environment import Ambient
+from fastgen.light.ground_light import GroundLight
+from fastgen.light.ray_bodies import RayBodies
 from fastgen.light.sky_rays import SkyRays
 from fastgen.render.draw_inputs import DrawInputs
 from fastgen.render.gl import GLContext
 from fastgen.render.passes.ray_points import RayPass
 from fastgen.render.program import Programs
-from fastgen.render.recent_cache import CACHED_CONTAINERS, RecentCache, ReleasingCache
-from fastgen.render.sky_visibility_probe import LitMesh
-from fastgen.render.surface_values import SceneMaterials
+from fastgen.render.recent_cache import RecentCache, ReleasingCache
+from fastgen.render.scene_bodies import LitMember, scene_bodies
+from fastgen.render.scene_lights import Around
+from fastgen.render.scene_resources import SceneResources
+from fastgen.render.shapes import Shapes
+from fastgen.scene import EnvironmentView
+
+_SCENES = 2
+"""Number of scenes whose bodies are kept, for their other cameras."""
 
 
 class RayLight:
@@ -25,81 +30,64 @@ class RayLight:
     Args:
         gl: Current context.
         programs: Programs of this context.
+        resources: Returns what the renderer keeps for a scene.
+        ambient: Returns the light of an environment.
     """
 
-    def __init__(self, gl: GLContext, programs: Programs) -> None:
+    def __init__(
+        self,
+        gl: GLContext,
+        programs: Programs,
+        resources: Callable[[PreparedScene], SceneResources],
+        ambient: Callable[[EnvironmentView], Ambient],
+    ) -> None:
         self._gl = gl
         self._programs = programs
+        self._resources = resources
+        self._ambient = ambient
         self._passes: ReleasingCache[RayPass] = ReleasingCache(2)
-        self._bodies: RecentCache[RayBodies] = RecentCache(CACHED_CONTAINERS)
+        self._bodies: RecentCache[RayBodies] = RecentCache(_SCENES)
 
     def run(
         self,
         inputs: DrawInputs,
-        prepared: PreparedScene,
-        materials: SceneMaterials,
+        member: Member,
+        whole: PreparedScene,
+        shapes: Shapes,
+        around: Around | None,
+        ground: GroundLight | None,
         sky: SkyRays,
-        ambient: Ambient,
     ) -> None:
         """Light the surfaces in the visibility buffer, and add that light to `inputs.textures`.
 
         Args:
-            inputs: The image.
-            prepared: The container that it shows, with its spreader.
-            materials: Materials of its surfaces.
+            inputs: The image, with the view in the frame of the container.
+            member: The container that is drawn.
+            whole: Its scene.
+            shapes: Returns the light at vertices.
+            around: What surroundings change in the light on each container, if there are any.
+            ground: Light on the ground, if there is one.
             sky: The environment as directions of its light.
-            ambient: The light of the environment and its lamps.
         """
         size, lens = inputs.view.size, inputs.view.distortion is not None
+        scene = whole.scene
+
+        def lit(each: Member) -> LitMember:
+            prepared, materials = each.prepared, self._resources(each.prepared).materials
+            light = shapes.light(
+                prepared, materials, lens, self._ambient(prepared.scene.environment)
+            )
+            paints = np.array(materials.reflectances, np.float32)
+            return LitMember(each, paints, light, None if around is None else around[prepared])
+
+        def found() -> RayBodies:
+            ambient = self._ambient(scene.environment)
+            return scene_bodies(map(lit, whole.present), scene, lens, ambient, ground)
+
         rays = self._passes.get(size, lambda: RayPass(self._gl, self._programs, size))
-        bodies = self._bodies.get(
-            (prepared, lens), lambda: _bodies_of(prepared, materials, lens, inputs.lit, ambient)
-        )
-        rays.run(inputs, bodies, sky, prepared.scene.environment.yaw_deg)
+        bodies = self._bodies.get((whole, lens), found)
+        rays.run(inputs, member.pose, bodies, sky, scene.environment.yaw_deg)
 
     def release(self) -> None:
         """Free all GL objects."""
         self._passes.release()
-
-
-def _bodies_of(
-    prepared: PreparedScene,
-    materials: SceneMaterials,
-    lens: bool,
-    lit: Sequence[LitMesh],
-    light: Ambient,
-) -> RayBodies:
-    """Return the bodies of a scene that rays can hit.
-
-    The container is damaged but has no holes, and carries the light of the undamaged one.
-
-    Args:
-        prepared: The scene.
-        materials: Its materials.
-        lens: Whether the image has lens distortion.
-        lit: Light at the vertices of container and spreader.
-        light: Light of the scene's environment.
-    """
-    scene, shape = prepared.scene, prepared.spreader
-    meshes = [prepared.container] if shape is None else [prepared.container, shape.drawn(lens)]
-    paints = np.array(materials.reflectances, np.float32)
-    bodies = [
-        LitBody(
-            mesh.positions_mm,
-            mesh.triangles,
-            paints[[chart.material_index for chart in mesh.charts]][mesh.chart],
-            one.without_lights,
-        )
-        for mesh, one in zip(meshes, lit, strict=True)
-    ]
-    if scene.damages:
-        moved = deform(scene.damages, bodies[0].positions_mm).astype(np.float32)
-        bodies[0] = replace(bodies[0], positions_mm=moved)
-    suns = [
-        DistantLight(
-            to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
-            np.array(sun.light, np.float32),
-        )
-        for sun in light.lights
-    ]
-    return RayBodies(bodies, suns)

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
 from fastgen.config.damage import DamageConfig
-from fastgen.decals.artwork import art_layers
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
@@ -26,9 +25,8 @@ from fastgen.render.decal_tables import scale_for
 from fastgen.render.draw_blocks import DrawBlocks
 from fastgen.render.draw_inputs import DrawInputs, DrawOptions, regions_of
 from fastgen.render.gl import GLContext
-from fastgen.render.gpu_mesh import GpuMesh
 from fastgen.render.image_targets import ImageTargets
-from fastgen.render.material_tables import Textures, material_tables
+from fastgen.render.material_textures import MaterialTextures
 from fastgen.render.passes.background import BackgroundPass
 from fastgen.render.passes.bake import Atlas, bake_atlas, bake_program
 from fastgen.render.passes.geometry import GeometryPass
@@ -37,10 +35,8 @@ from fastgen.render.passes.normals import NormalsPass
 from fastgen.render.passes.shading import ShadingPass
 from fastgen.render.program import Programs, Read, shader_text
 from fastgen.render.ray_light import RayLight
-from fastgen.render.recent_cache import CACHED_CONTAINERS, ReleasingCache
 from fastgen.render.recent_targets import RecentTargets
 from fastgen.render.scene_lights import Around, SceneLights
-from fastgen.render.scene_resources import DecalTextures, SceneResources
 from fastgen.render.settings import Quality
 from fastgen.render.shadow_map import ShadowMap, light_values, shader_lights
 from fastgen.render.shapes import Shapes
@@ -95,16 +91,12 @@ class Renderer:
         self._ground = GroundPass(self.ctx, programs, self.ambient)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
-        self._rays = RayLight(gl, programs)
+        self._materials = MaterialTextures(gl, own_art)
+        self._rays = RayLight(gl, programs, self._materials.resources, self.ambient)
         self._targets = RecentTargets(gl, quality)
         self._shapes = Shapes(self.ctx, self._geometry.programs)
         self._lights = SceneLights(gl, light, quality)
-        self._scenes: ReleasingCache[SceneResources] = ReleasingCache(CACHED_CONTAINERS)
         self._blocks = DrawBlocks(self.ctx, damage.mask_threshold_mm)
-        bundled = art_layers()
-        own_layers = {name: len(bundled) + i for i, name in enumerate(own_art)}
-        self._art_layers = {**bundled, **own_layers}
-        self._tables = material_tables(gl, list(own_art.values()))
 
     def render(
         self,
@@ -159,13 +151,13 @@ class Renderer:
         exposure = self._lights.exposure(scene, camera, view).factor
         several = bool(scene.neighbours or scene.ground)
         options = DrawOptions(layer, radiance, over=several)
-        around = self._lights.around(prepared, self._resources) if several else None
+        around = self._lights.around(prepared, self._materials.resources) if several else None
         inputs = self._inputs(prepared, view, options, around)
         first = prepared.members[0]
         self._light(inputs, first, prepared, exposure)
         if not several:
             self._geometry.run(inputs)
-            self._trace(inputs, prepared)
+            self._trace(inputs, first, prepared, around)
             self._background.run(inputs)
             self._shade(inputs, first, exposure, normals)
             return inputs.targets
@@ -180,7 +172,7 @@ class Renderer:
             if inputs.regions.surfaces:
                 self._light(inputs, member, prepared, exposure)
                 self._geometry.run(inputs)
-                self._trace(inputs, member.prepared)
+                self._trace(inputs, member, prepared, around)
                 self._shade(inputs, member, exposure, normals)
         return inputs.targets
 
@@ -235,7 +227,7 @@ class Renderer:
         samples = self._targets.samples(size, per_axis)
         environment = scene.environment
         light, ambient = self._lights.of(environment.name), self.ambient(environment)
-        resources = self._resources(prepared)
+        resources = self._materials.resources(prepared)
         near = None if around is None else around[prepared]
         container, spreader, lit = self._shapes.of(
             prepared, resources.materials, lens, ambient, near
@@ -269,7 +261,7 @@ class Renderer:
                 over=options.over,
             ),
             textures={
-                **self._material_textures(decals, container, spreader),
+                **self._materials.of(decals, self._shapes.zone_table(container, spreader)),
                 "specular_map": light.specular,
                 "irradiance_map": light.irradiance,
                 "environment_map": self._lights.background(scene.environment.name),
@@ -295,13 +287,14 @@ class Renderer:
         inputs.lights.update(light_values(lights, shadow, view.position_m))
         self._blocks.view(inputs, scene, exposure)
 
-    def _trace(self, inputs: DrawInputs, prepared: PreparedScene) -> None:
+    def _trace(
+        self, inputs: DrawInputs, member: Member, whole: PreparedScene, around: Around | None
+    ) -> None:
         """Light the visible surfaces by rays, if the quality asks for it."""
-        environment = prepared.scene.environment
-        light = self._lights.of(environment.name)
-        if inputs.variant.traced and light.sky_rays is not None and inputs.regions.surfaces:
-            materials = self._resources(prepared).materials
-            self._rays.run(inputs, prepared, materials, light.sky_rays, self.ambient(environment))
+        sky = self._lights.of(whole.scene.environment.name).sky_rays
+        if not inputs.variant.traced or sky is None or not inputs.regions.surfaces:
+            return
+        self._rays.run(inputs, member, whole, self._shapes, around, self._ground.light(whole), sky)
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Prepare the shapes of a scene, so that drawing them takes no more time or memory.
@@ -353,9 +346,9 @@ class Renderer:
         damage = variant(scene.damages)
         if damage != "undamaged":
             self._blocks.damages(prepared, scene.damages, self._kinds)
-        decals = self._resources(prepared).decals()
+        decals = self._materials.resources(prepared).decals()
         self._blocks.scene(prepared, decals)
-        textures = self._material_textures(decals, mesh, None)
+        textures = self._materials.of(decals, self._shapes.zone_table(mesh, None))
         program = bake_program(self._programs, damage, self._kinds)
         return bake_atlas(self.ctx, program, textures, mesh.mesh, texel_mm)
 
@@ -364,10 +357,10 @@ class Renderer:
         spreader = self._shapes.spreader(prepared)
         if spreader is None:
             return None
-        decals = self._resources(prepared).decals()
+        decals = self._materials.resources(prepared).decals()
         self._blocks.scene(prepared, decals)
         container = self._shapes.container(prepared)
-        textures = self._material_textures(decals, container, spreader)
+        textures = self._materials.of(decals, self._shapes.zone_table(container, spreader))
         program = bake_program(self._programs)
         return bake_atlas(
             self.ctx, program, textures, spreader.mesh, texel_mm, first_zone=SPREADER_ZONE
@@ -375,31 +368,18 @@ class Renderer:
 
     def bake_ground(self, prepared: PreparedScene, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None where it has none."""
-        decals = self._resources(prepared).decals()
+        decals = self._materials.resources(prepared).decals()
         self._blocks.scene(prepared, decals)
-        return self._ground.bake(prepared.scene, self._tables, texel_mm)
+        return self._ground.bake(prepared.scene, self._materials.shared, texel_mm)
 
     def exposure(self, scene: Scene, camera: Camera, size: tuple[int, int]) -> Exposure:
         """Return the exposure of a camera; its factor applies to radiance before the tone curve."""
         return self._lights.exposure(scene, camera, view_of(camera, size))
 
-    def _resources(self, prepared: PreparedScene) -> SceneResources:
-        return self._scenes.get(
-            prepared, lambda: SceneResources(self.ctx, prepared, self._art_layers)
-        )
-
-    def _material_textures(
-        self, decals: DecalTextures, mesh: GpuMesh, spreader: GpuMesh | None
-    ) -> Textures:
-        """Return the textures that the material layers read."""
-        zones = self._shapes.zone_table(mesh, spreader)
-        return {**self._tables, "zone_table": zones, **decals.textures}
-
     def release(self) -> None:
         """Free every GL object of this renderer."""
-        owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._scenes]
-        owners += [self._geometry, self._ground, self._programs, self._blocks]
-        for item in [*owners, *self._tables.values()]:
+        owners: list[Any] = [self._targets, self._rays, self._shapes, self._lights, self._materials]
+        for item in [*owners, self._geometry, self._ground, self._programs, self._blocks]:
             item.release()
 
     def __enter__(self) -> Self:

@@ -64,25 +64,39 @@ class Shapes:
             The container, the spreader or None, and the light at the vertices of each.
         """
         mesh, shape = self.container(prepared), prepared.spreader
-        usual = prepared.usual_spreader
-        sky = Sky(light, prepared.scene.environment.yaw_deg)
-        below = self._probe.container_light(mesh.mesh, None if usual is None else usual.mesh, sky)
+        lit = self.light(prepared, materials, lens, light)
+        below, *above = lit
         values = below.values
         if surroundings is not None:
             values = self._surrounded.get(
                 (below, surroundings), lambda: surroundings.applied(below.values, mesh.mesh)
             )
         mesh.set_sky_visibility(values)
-        if shape is None or usual is None:
-            return mesh, None, (below,)
+        if shape is None:
+            return mesh, None, lit
         spreader = self._drawn_spreader(shape.drawn(lens))
+        spreader.set_sky_visibility(above[0].values)
+        return mesh, spreader, lit
+
+    def light(
+        self, prepared: PreparedScene, materials: SceneMaterials, lens: bool, light: Ambient
+    ) -> tuple[LitMesh, ...]:
+        """Return the light in the open of the container and the spreader, if there is one.
+
+        The arguments are those of `of`.
+        """
+        mesh, shape, usual = prepared.container, prepared.spreader, prepared.usual_spreader
+        sky = Sky(light, prepared.scene.environment.yaw_deg)
+        below = self._probe.container_light(mesh, None if usual is None else usual.mesh, sky)
+        if shape is None or usual is None:
+            return (below,)
         # a mesh with lens distortion has other vertices, which are probed at their own gap
-        probed, outline = (spreader.mesh, shape.outline) if lens else (usual.mesh, usual.outline)
-        lit = self._probe.spreader_light(
+        probed = shape.drawn(True) if lens else usual.mesh
+        outline = shape.outline if lens else usual.outline
+        above = self._probe.spreader_light(
             probed, outline, prepared.nominal_outline, below, sky, materials.reflectances
         )
-        spreader.set_sky_visibility(lit.values)
-        return mesh, spreader, (below, lit)
+        return below, above
 
     def preload(self, prepared: PreparedScene, lens: bool, damages: bool) -> None:
         """Load the meshes of a scene and all that their light needs; see Renderer.preload."""

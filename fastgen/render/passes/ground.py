@@ -104,27 +104,36 @@ class GroundPass:
 
     def _fill_block(self, prepared: PreparedScene) -> "_SceneLight":
         """Fill and bind the ground's uniform block, and return the light on the ground."""
+        scene, kept = prepared.scene, self._light_of(prepared)
+        assert scene.ground is not None
+        toward = _first_light(scene, self._ambient(scene.environment))
+        values = ground_values(scene.ground, prepared.present, scene.props, kept.light, toward)
+        self._block.write(GROUND_BLOCK.pack(values))
+        self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
+        return kept
+
+    def _light_of(self, prepared: PreparedScene) -> "_SceneLight":
+        """Return the light on the ground of a scene that has one."""
         scene, present = prepared.scene, prepared.present
-        ground, ambient = scene.ground, self._ambient(scene.environment)
+        ground = scene.ground
         assert ground is not None
-        kept = self._scenes.get(
+        return self._scenes.get(
             prepared,
             lambda: _SceneLight(
                 self._ctx,
                 ground_light(
                     [member.box for member in present],
                     [member.prepared.scene.surface.paint.albedo for member in present],
-                    ambient,
+                    self._ambient(scene.environment),
                     scene.environment.yaw_deg,
                     ground.height_mm,
                 ),
             ),
         )
-        toward = _first_light(scene, ambient)
-        values = ground_values(ground, present, scene.props, kept.light, toward)
-        self._block.write(GROUND_BLOCK.pack(values))
-        self._block.bind_to_uniform_block(GROUND_BLOCK.binding)
-        return kept
+
+    def light(self, prepared: PreparedScene) -> GroundLight | None:
+        """Return the light on the ground of a scene; None if it has none."""
+        return None if prepared.scene.ground is None else self._light_of(prepared).light
 
     def bake(self, scene: Scene, textures: Textures, texel_mm: float) -> Atlas | None:
         """Bake the material of a scene's ground within its reach; None if it has none.

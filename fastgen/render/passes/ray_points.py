@@ -16,6 +16,8 @@ from fastgen.render.gl import GLContext
 from fastgen.render.gl_enums import GL_COLOR
 from fastgen.render.program import Programs
 from fastgen.render.regions import Region
+from fastgen.scene import Pose
+from fastgen.scene.boxes import rotation_of
 from fastgen.scene.limits import MM
 
 _NO_KEY = (ctypes.c_uint * 4)(0)
@@ -59,23 +61,26 @@ class RayPass:
             "glClearBufferuiv", None, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
         )
 
-    def run(self, inputs: DrawInputs, bodies: RayBodies, sky: SkyRays, yaw_deg: float) -> None:
+    def run(
+        self, inputs: DrawInputs, pose: Pose, bodies: RayBodies, sky: SkyRays, yaw_deg: float
+    ) -> None:
         """Light the visible surfaces, and add the textures of that light to `inputs.textures`.
 
         Args:
-            inputs: The image.
-            bodies: What rays hit.
+            inputs: The image, with the view in the frame of the container.
+            pose: The container's frame in the world.
+            bodies: What rays hit, in the world frame.
             sky: The environment as directions of its light.
             yaw_deg: Rotation of the environment about the vertical.
         """
-        points = self.read(inputs)
+        points = self.read(inputs).turned(rotation_of(pose), pose.position_mm)
         self._store(points, traced_light(points, bodies, sky, yaw_deg))
         inputs.textures["ray_point_ids"] = self._keys
         inputs.textures["ray_point_positions"] = self._places
         inputs.textures["ray_point_light"] = self._light
 
     def read(self, inputs: DrawInputs) -> Points:
-        """Return the points of the visible surfaces in the world frame."""
+        """Return the points of the visible surfaces in the frame of the view."""
         self._draw(inputs)
         width, height = self._cells
         keys = np.frombuffer(self._keys.read(alignment=1), np.uint32).reshape(height, width)

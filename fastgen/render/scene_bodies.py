@@ -1,0 +1,113 @@
+"""Bodies of a scene that rays can hit: containers, the spreader and the ground, in their light."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fastgen.geometry.damage_law import deform
+from fastgen.geometry.prepared_scene import Member
+from fastgen.light.environment import Ambient, to_map_frame
+from fastgen.light.ground_light import GroundLight
+from fastgen.light.ray_bodies import DistantLight, LitBody, RayBodies
+from fastgen.light.surrounding_light import SurroundingLight
+from fastgen.render.sky_visibility_probe import LitMesh
+from fastgen.scene import Ground, Scene
+from fastgen.scene.boxes import rotation_of
+from fastgen.scene.limits import MM
+
+
+class LitMember(NamedTuple):
+    """A container of a scene in its light.
+
+    Attributes:
+        member: The container.
+        paints: Diffuse reflectance [M, 3] of each of mesh.MATERIALS.
+        lit: Light in the open at the vertices of the container, and of its spreader if it has one.
+        around: What other containers and the ground change in the light on the container.
+    """
+
+    member: Member
+    paints: NDArray[np.float32]
+    lit: tuple[LitMesh, ...]
+    around: SurroundingLight | None
+
+
+def scene_bodies(
+    members: Iterable[LitMember],
+    scene: Scene,
+    lens: bool,
+    ambient: Ambient,
+    ground: GroundLight | None,
+) -> RayBodies:
+    """Return what rays can hit, in the world frame.
+
+    Containers are damaged but have no holes, and carry the light of undamaged ones. The ground has
+    one colour, and no props.
+
+    Args:
+        members: The containers that the scene shows.
+        scene: The scene.
+        lens: Whether the image has lens distortion.
+        ambient: Light of its environment.
+        ground: Light on its ground; None if it has none.
+    """
+    bodies = [body for each in members for body in _of_member(each, lens)]
+    if scene.ground is not None and ground is not None:
+        bodies.append(_of_ground(scene.ground, ground))
+    suns = [
+        DistantLight(
+            to_map_frame(sun.direction, -scene.environment.yaw_deg).astype(np.float32),
+            np.array(sun.light, np.float32),
+        )
+        for sun in ambient.lights
+    ]
+    return RayBodies(bodies, suns)
+
+
+def _of_member(one: LitMember, lens: bool) -> list[LitBody]:
+    pose, prepared = one.member.pose, one.member.prepared
+    damages, shape = prepared.scene.damages, prepared.spreader
+    turn, origin = rotation_of(pose), np.array(pose.position_mm)
+    # the light of a spreader is that at its usual gap
+    meshes = [prepared.container] if shape is None else [prepared.container, shape.drawn(lens)]
+    bodies = []
+    for number, (mesh, lit) in enumerate(zip(meshes, one.lit, strict=True)):
+        place: NDArray[np.floating] = mesh.positions_mm
+        light = lit.without_lights
+        if number == 0:
+            place = deform(damages, place) if damages else place
+            light = light if one.around is None else light * one.around.vertex_factors(mesh)
+        bodies.append(
+            LitBody(
+                (place @ turn.T + origin).astype(np.float32),
+                mesh.triangles,
+                one.paints[[chart.material_index for chart in mesh.charts]][mesh.chart],
+                light,
+            )
+        )
+    return bodies
+
+
+def _of_ground(ground: Ground, light: GroundLight) -> LitBody:
+    """Return the grid of the light on the ground, whose border is moved out to its reach."""
+    rows, columns = light.texels.shape[:2]
+    reach = ground.reach_mm
+    x, y = (
+        (low + step * np.arange(count)) / MM
+        for low, step, count in zip(light.low_m, light.step_m, (columns, rows), strict=True)
+    )
+    for along in (x, y):
+        along[0], along[-1] = min(along[0], -reach), max(along[-1], reach)
+    place = np.full((rows, columns, 3), ground.height_mm)
+    place[..., 0], place[..., 1] = np.meshgrid(x, y)
+    corner = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    return LitBody(
+        place.reshape(-1, 3).astype(np.float32),
+        triangles,
+        np.broadcast_to(np.array(ground.albedo, np.float32), (rows * columns, 3)),
+        light.texels[..., :3].reshape(-1, 3),
+    )
