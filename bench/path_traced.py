@@ -33,6 +33,7 @@ from bpy_extras.object_utils import world_to_camera_view
 _CENTER_SAMPLES = 16  # for ambient occlusion; depth and index use the first sample
 _MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # Cycles' narrowest filter: rays go through the pixel centre
+_LIGHT_MAP_WIDTH = 8192  # Blender's largest
 _SURROUNDINGS = ("ground", "prop_")
 
 
@@ -69,6 +70,9 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     world = bpy.data.worlds.new("environment")
     world.use_nodes = True
     scene.world = world
+    # the automatic map is too coarse for the sun's disc, which then leaves bright specks
+    world.cycles.sampling_method = "MANUAL"
+    world.cycles.sample_map_resolution = _LIGHT_MAP_WIDTH
     nodes, links = world.node_tree.nodes, world.node_tree.links
     picture = nodes.new("ShaderNodeTexEnvironment")
     picture.image = bpy.data.images.load(str(hdri))

@@ -1,11 +1,11 @@
 """Path-trace the references that `bench/accuracy.py` compares with.
 
-    python bench/trace_references.py --blender-python PYTHON [--cases 32] [--twice 8] [--series 8]
+    python bench/trace_references.py --blender-python PYTHON [--cases 8] [--twice 2] [--series 8]
     python bench/trace_references.py --blender-python PYTHON --only 32,33,34,35,36
 
-Run it once, in the background: with these defaults it takes an hour on two cores. PYTHON is a
-Python 3.11 with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be
-continued. Cases that are already in bench/references keep the scene stored there.
+Run it once, in the background: a reference takes 150 to 1,500 CPU seconds. PYTHON is a Python 3.11
+with bpy==4.5.15. Existing files are not traced again, so an interrupted run can be continued. Cases
+that are already in bench/references keep the scene stored there.
 
 --only traces the cases with these numbers, once each. From 32 on they are the cases of
 surrounded_cases.py, which have a ground.
@@ -123,8 +123,8 @@ def main() -> None:
     """Trace the missing references."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--blender-python", type=Path, required=True)
-    parser.add_argument("--cases", type=int, default=32)
-    parser.add_argument("--twice", type=int, default=8)
+    parser.add_argument("--cases", type=int, default=8)
+    parser.add_argument("--twice", type=int, default=2)
     parser.add_argument("--series", type=int, default=8)
     parser.add_argument("--only", help="numbers of the cases to trace, such as 32,33")
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
