@@ -20,7 +20,8 @@ from panel_crops import Pixels, panels_of, square_crop
 from fastgen import Config, Generator
 from fastgen.classes import MARKER_CLASSES
 from fastgen.config.cameras import direction_from, face_frame
-from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS
+from fastgen.decals.glyphs import BOX
+from fastgen.decals.lettering import TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
 from fastgen.labels.objects import labelled_decals

@@ -11,6 +11,7 @@ from fastgen.camera.sensor import apply_camera_model, is_needed, needs_radiance
 from fastgen.classes import with_marks
 from fastgen.config.config import Config, LabelConfig
 from fastgen.decals.own_art import art_of
+from fastgen.decals.own_fonts import OwnPrints
 from fastgen.errors import ConfigError, nearest
 from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.labels.background import background_objects
@@ -104,8 +105,13 @@ class Generator:
         # the cameras of a scene are usually rendered one after the other
         self._sampled: tuple[tuple[Config, int, int], PreparedScene] | None = None
         self._given: tuple[Scene, PreparedScene] | None = None
-        own_art = self.config.markings.own_art
-        self._own_decals = OwnDecals(self.config.markings.detection_classes, tuple(own_art))
+        markings = self.config.markings
+        own = OwnPrints(
+            {name: art_of(text) for name, text in markings.own_art.items()}, markings.read_fonts()
+        )
+        self._own_decals = OwnDecals(
+            markings.detection_classes, tuple(own.art), tuple(each.font.name for each in own.fonts)
+        )
         self.gpu = GpuSession(
             partial(open_context, self.settings.backend, self.settings.device_index),
             partial(
@@ -113,7 +119,7 @@ class Generator:
                 light=partial(_load_light, self._hdris),
                 quality=QUALITY[quality],
                 damage=self.config.damage,
-                own_art={name: art_of(text) for name, text in own_art.items()},
+                own=own,
             ),
         )
 

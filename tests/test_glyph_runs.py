@@ -2,7 +2,13 @@
 
 import numpy as np
 
-from fastgen.decals.glyphs import GLYPH_EXTENT_STEPS, GLYPH_TILE_SIZE, glyph_coverage, glyph_tiles
+from fastgen.decals.glyphs import (
+    GLYPH_EXTENT_STEPS,
+    GLYPH_TILE_SIZE,
+    glyph_coverage,
+    glyph_extents,
+    glyph_tiles,
+)
 from fastgen.decals.lettering import layout
 from fastgen.render.glyph_runs import glyph_run
 from fastgen.scene.limits import GLYPH_RANGE
@@ -42,7 +48,7 @@ def test_the_extent_of_a_letter_holds_its_ink_closely():
     font = next(iter(fonts.values()))
     texel = np.abs(np.arange(GLYPH_TILE_SIZE) + 0.5 - GLYPH_TILE_SIZE / 2) + 0.5
     for char in "IWQ80,":
-        run = glyph_run(layout((char,), font, 100.0))
+        run = glyph_run(layout((char,), font, 100.0), glyph_extents())
         tile, *extent = (part[0] for part in unpacked(run.glyphs[:, 2]))
         assert tile == font.glyphs[char].tile
         ink = glyph_coverage()[tile] > 0
@@ -56,7 +62,7 @@ def test_a_part_lists_every_letter_that_reaches_into_it():
     rng = np.random.default_rng(6)
     for lines, cap_mm, vertical in texts():
         lettering = layout(lines, font, cap_mm, vertical)
-        run = glyph_run(lettering)
+        run = glyph_run(lettering, glyph_extents())
         size = np.array(lettering.size_mm)
         boxes = np.array([g[2:] for g in lettering.glyphs]).reshape(-1, 2, 2) - size / 2
         centers = boxes.mean(axis=1)
@@ -81,7 +87,7 @@ def test_a_part_lists_every_letter_that_reaches_into_it():
 
 def test_a_part_of_a_long_line_lists_few_letters():
     font = next(iter(glyph_tiles()[1].values()))
-    run = glyph_run(layout(("CSQU3054383" * 4,), font, 100.0))
+    run = glyph_run(layout(("CSQU3054383" * 4,), font, 100.0), glyph_extents())
     first, end = np.divmod(run.glyphs[:, 3].astype(int), GLYPH_RANGE)
     assert (end - first).mean() < 5
 
@@ -89,7 +95,7 @@ def test_a_part_of_a_long_line_lists_few_letters():
 def test_letter_numbers_of_the_longest_text_are_exact():
     count = GLYPH_RANGE - 1
     font = next(iter(glyph_tiles()[1].values()))
-    run = glyph_run(layout(("A" * count,), font, 10.0))
+    run = glyph_run(layout(("A" * count,), font, 10.0), glyph_extents())
     first, end = np.divmod(run.glyphs[:, 3].astype(np.int64), GLYPH_RANGE)
     assert end[-1] == count
     assert (np.diff(first) >= 0).all()

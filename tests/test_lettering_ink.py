@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from fastgen.decals.glyphs import glyph_sums, glyph_tiles
+from fastgen.decals.glyphs import glyph_extents, glyph_sums, glyph_tiles
 from fastgen.decals.lettering import layout
 from fastgen.render.gl import open_context
 from fastgen.render.glyph_runs import glyph_run
@@ -59,7 +59,7 @@ def seen_ink(text, widths_mm):
     y = np.arange(-MARGIN_MM, height + MARGIN_MM, STEP_MM) + low
     points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     table = np.zeros((1, 256, 4), np.float32)
-    made, parts_per_mm = glyph_run(lettering)
+    made, parts_per_mm = glyph_run(lettering, glyph_extents())
     table[0, : len(made)] = made
     from_middle = points - np.array(lettering.size_mm) / 2
     tiles, _ = glyph_tiles()

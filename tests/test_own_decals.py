@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from fastgen.config.config import Config
 from fastgen.decals.own_art import art_of
 from fastgen.errors import ConfigError
 from fastgen.generator import Generator
+from fastgen.resources import asset_path
 from fastgen.torch import class_counts, class_names
 
 pytestmark = pytest.mark.usefixtures("no_workers")
@@ -142,13 +144,16 @@ def test_the_example_of_the_docs_page_is_drawn(tmp_path):
     (tmp_path / "art").mkdir()
     for name in ("env", "tag", "emblem"):
         Image.new("RGB", (90, 90)).save(tmp_path / f"art/{name}.png")
+    shutil.copy(asset_path("fonts", "antonio.woff"), tmp_path / "art/dock.ttf")
     (tmp_path / "port.yaml").write_text(block)
     config = Config.load(tmp_path / "port.yaml")
     assert config.markings.detection_classes[-3:] == ("ENV", "fleet_tag", "owner_plate")
     config = Config.from_values({"markings": {"marked_containers": 1}}, config)
     generator = Generator(config, seed=1)
-    found = {decal.art for index in range(30) for decal in generator.scene(index).decals}
-    assert found >= {"marker/ENV", "sticker/fleet_tag", "emblem/Ours"}
+    decals = [decal for index in range(30) for decal in generator.scene(index).decals]
+    assert {decal.art for decal in decals} >= {"marker/ENV", "sticker/fleet_tag", "emblem/Ours"}
+    fonts = {decal.font.partition("-")[0] for decal in decals if decal.class_name == "text"}
+    assert fonts == {"dock", "oswald"}
 
 
 def test_weights_are_the_frequencies_of_markers(config):

@@ -19,10 +19,10 @@ from common.reader import (
     whole_canvas,
 )
 
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import BOX, glyph_tiles
 from fastgen.decals.identifier_layout import TYPE_PLACES, Form, identifier_parts
 from fastgen.decals.iso6346 import Identifier, check_digit
-from fastgen.decals.lettering import BOX, TILE_BASELINE_CAPS, layout
+from fastgen.decals.lettering import TILE_BASELINE_CAPS, layout
 
 CODE = "CSQU3054383"
 IDENTIFIER = Identifier("CSQU", "305438", "3", "22G1")

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from annotated_types import MaxLen
+
 from fastgen.classes import DETECTION_CLASSES, MARK_CLASSES, MARKER_CLASSES
-from fastgen.config.fields import Weight
+from fastgen.config.fields import FontFile, Weight
 from fastgen.config.identifiers import IdentifierConfig
 from fastgen.config.own_decals import (
     BrandConfig,
@@ -15,7 +17,8 @@ from fastgen.config.own_decals import (
     check_class_names,
 )
 from fastgen.decals.artwork import stickers as bundled_stickers
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import add_font, glyph_tiles
+from fastgen.decals.own_fonts import MOST_FONTS, OwnFont, own_font
 from fastgen.errors import ConfigError, did_you_mean
 from fastgen.validation import (
     LENGTH,
@@ -104,7 +107,9 @@ class MarkingsConfig:
         marks: Probability of each mark of the IMDG Code on a container. A mark is on all
             marker_faces, but the fumigation warning is on the door alone. Marks that are not named
             are not drawn. If any is named, the marker task has all five as its classes 28 to 32.
-        fonts: Names of the fonts to draw from; an empty list stands for all bundled fonts.
+        fonts: Names of the fonts to draw from; an empty list stands for all.
+        own_fonts: New fonts by name: paths of TTF, OTF or WOFF files, relative to the file that
+            names them. The configuration keeps the letters themselves.
         cap_mm: Height of an identifier's capitals. ISO 6346 requires 100 mm. Identifiers on
             the door have the lowest height.
         weights_cap_mm: Height of the capitals of the weights on the door. ISO 6346 requires 50 mm.
@@ -149,6 +154,9 @@ class MarkingsConfig:
     other_marker_weight: Weight = 1.0
     marks: dict[Annotated[str, OneOf(MARK_CLASSES)], Share] = field(default_factory=dict)
     fonts: tuple[str, ...] = ()
+    own_fonts: Annotated[dict[OwnName, Annotated[str, FontFile()]], MaxLen(MOST_FONTS)] = field(
+        default_factory=dict
+    )
     cap_mm: Annotated[Range, Bounds(100, 2000, "mm")] = Range(100, 165)
     weights_cap_mm: Annotated[Range, Bounds(50, 1000, "mm")] = Range(50, 62)
     text_wear: Annotated[Range, UNIT] = Range(0.0, 0.4)
@@ -201,12 +209,32 @@ class MarkingsConfig:
         found |= {f"emblem/{name}": each.emblem for name, each in self.brands.items()}
         return {name: text for name, text in found.items() if text}
 
+    def read_fonts(self) -> tuple[OwnFont, ...]:
+        """Return the fonts of the configuration, which scenes can name from then on."""
+        found = tuple(own_font(name, text) for name, text in self.own_fonts.items())
+        for own in found:
+            add_font(own.font)
+        return found
+
+    @property
+    def drawn_fonts(self) -> tuple[str, ...]:
+        """Names of the fonts to draw from, as scenes give them."""
+        own = {
+            name: each.font.name
+            for name, each in zip(self.own_fonts, self.read_fonts(), strict=True)
+        }
+        names = self.fonts or (*sorted(glyph_tiles()[1]), *own)
+        return tuple(own.get(name, name) for name in names)
+
     def __post_init__(self) -> None:
         """Refuse unknown fonts and stickers, repeated names, and classes that cannot be."""
-        if self.fonts:
+        if self.fonts or self.own_fonts:
             _, bundled = glyph_tiles()
+            for name in self.own_fonts:
+                if name in bundled:
+                    raise ConfigError(f"own_fonts.{name}: is a font of fastgen; rename yours")
             for font in self.fonts:
-                check_known("fonts", font, bundled)
+                check_known("fonts", font, {*bundled, *self.own_fonts})
         check_distinct("marker_faces", self.marker_faces, "increase markers_per_face instead")
         for name, marker in self.markers.items():
             if not marker.art and name not in MARKER_CLASSES:

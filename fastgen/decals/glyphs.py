@@ -16,6 +16,12 @@ from fastgen.resources import asset_path
 
 VERSION = 1  # raise when the stored arrays change
 
+BOX = "\N{WHITE RECTANGLE}"
+"""Character of the frame around a check digit, in every font."""
+
+CHARACTERS = f"ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-./:,&'()+{BOX}"
+"""Characters of every font."""
+
 GLYPH_TILE_SIZE = 64
 """Width and height of a glyph tile, texels."""
 
@@ -34,7 +40,7 @@ class Glyph:
     """Tile and metrics of one character; lengths are in cap heights from the pen position.
 
     Attributes:
-        tile: Index into the tiles of `glyph_tiles`.
+        tile: Index into the tiles of the font, see `glyph_tiles` for those of fastgen.
         ink_left: Left end of the ink.
         ink_right: Right end of the ink.
         advance: Distance to the next pen position.
@@ -87,6 +93,21 @@ def glyph_tiles() -> tuple[NDArray[np.uint8], Mapping[str, Font]]:
     return np.ascontiguousarray(tiles[: data["tiles"]]), MappingProxyType(fonts)
 
 
+_OWN: dict[str, Font] = {}
+"""Fonts of configurations by name."""
+
+
+def add_font(font: Font) -> None:
+    """Make a font of a configuration known in this process; its name belongs to its content."""
+    _OWN.setdefault(font.name, font)
+
+
+def font_named(name: str) -> Font:
+    """Return a font of fastgen, or one of a configuration that this process has read."""
+    bundled = glyph_tiles()[1]
+    return bundled[name] if name in bundled else _OWN[name]
+
+
 def glyph_coverage() -> NDArray[np.uint8]:
     """Return the share of ink in each texel of `glyph_tiles`, read-only.
 
@@ -99,18 +120,26 @@ def glyph_coverage() -> NDArray[np.uint8]:
     return glyph_ink()["coverage"]
 
 
-@lru_cache(maxsize=1)
-def glyph_extents() -> NDArray[np.int64]:
+def extents_of(coverage: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Return how far the ink of each glyph reaches from the middle of its tile.
+
+    Args:
+        coverage: Share of ink, see `glyph_coverage`.
 
     Returns:
         int64 [G, 2], half width and half height in GLYPH_EXTENT_STEPS per tile, rounded up.
     """
-    ink = glyph_coverage() > 0
+    ink = coverage > 0
     texel = np.abs(np.arange(GLYPH_TILE_SIZE) + 0.5 - GLYPH_TILE_SIZE / 2) + 0.5
     reach = [(ink.any(axis=axis) * texel).max(axis=1) for axis in (1, 2)]
     steps = GLYPH_EXTENT_STEPS / GLYPH_TILE_SIZE
     return np.ceil(np.stack(reach, axis=1) * steps).astype(np.int64)
+
+
+@lru_cache(maxsize=1)
+def glyph_extents() -> NDArray[np.int64]:
+    """Return `extents_of` the tiles of `glyph_tiles`."""
+    return extents_of(glyph_coverage())
 
 
 def glyph_sums() -> NDArray[np.uint16]:
@@ -127,17 +156,18 @@ def glyph_sums() -> NDArray[np.uint16]:
 def glyph_ink() -> disk_cache.Arrays:
     """Return the arrays of `glyph_coverage` and `glyph_sums`, from the disk cache if possible."""
     tiles, _ = glyph_tiles()
-
-    def make() -> disk_cache.Arrays:
-        coverage = np.stack([_ink(tile) for tile in tiles])
-        sums = (coverage / 255).cumsum(axis=1).cumsum(axis=2)
-        scaled = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
-        return {"coverage": coverage, "sums": scaled}
-
     shape = " ".join(map(str, tiles.shape))
     layout = {"coverage": f"uint8 {shape}", "sums": f"uint16 {shape}"}
     digest = hashlib.sha256(tiles.data).hexdigest()
-    return disk_cache.cached("glyph-ink", VERSION, digest, make, layout=layout)
+    return disk_cache.cached("glyph-ink", VERSION, digest, lambda: ink_of(tiles), layout=layout)
+
+
+def ink_of(tiles: NDArray[np.uint8]) -> disk_cache.Arrays:
+    """Return the arrays "coverage" and "sums" of tiles, see `glyph_coverage` and `glyph_sums`."""
+    coverage = np.stack([_ink(tile) for tile in tiles])
+    sums = (coverage / 255).cumsum(axis=1).cumsum(axis=2)
+    scaled = np.rint(sums * (65535 / GLYPH_MOST_INK)).astype(np.uint16)
+    return {"coverage": coverage, "sums": scaled}
 
 
 def _ink(distances: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-from fastgen.decals.glyphs import Font
+from fastgen.decals.glyphs import BOX, Font
 from fastgen.decals.iso6346 import Identifier
 from fastgen.decals.lettering import (
-    BOX,
     BOX_MARGIN_CAPS,
     GLYPH_PITCH_CAPS,
     LINE_PITCH_CAPS,

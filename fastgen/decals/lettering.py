@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated, NamedTuple
 
-from fastgen.decals.glyphs import Font
+from fastgen.decals.glyphs import BOX, Font
 from fastgen.errors import AssetError
 from fastgen.validation import Bounds, Flag, OneOf
 
@@ -32,9 +32,6 @@ GLYPH_PITCH_CAPS = 1.35
 
 _SPACE_CAPS = 0.45
 """Width of a space in a line, in cap heights."""
-
-BOX = "\N{WHITE RECTANGLE}"
-"""Character of the frame around a check digit, in every font."""
 
 BOX_MARGIN_CAPS = 0.15
 """Distance from a digit's capitals or widest ink to the outside of its frame, in cap heights."""
@@ -95,7 +92,7 @@ class PlacedGlyph(NamedTuple):
 
     Attributes:
         char: The character.
-        tile: Index into the tiles of `glyph_tiles`.
+        tile: Index into the tiles of the text's font.
         x0: Left edge.
         y0: Bottom edge.
         x1: Right edge.

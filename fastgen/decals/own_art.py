@@ -48,7 +48,7 @@ def read_art(path: Path, square: bool) -> str:
         raise ConfigError(f"{path}: cannot be read ({words})") from None
     if path.suffix.lower() == ".svg":
         data = _drawn(path, data)
-    width, height = _png_size(path, data)
+    width, height = png_size(path, data)
     if square and width != height:
         raise ConfigError(
             f"{path}: is {width}x{height}; give a square image, which the marker's four tips touch "
@@ -73,7 +73,7 @@ def art_of(text: str) -> NDArray[np.uint8]:
         data = base64.b64decode(text.removeprefix(PREFIX), validate=True)
     except (binascii.Error, ValueError):
         raise ConfigError(words) from None
-    if _png_size("image", data) != (ART_SIZE, ART_SIZE):
+    if png_size("image", data) != (ART_SIZE, ART_SIZE):
         raise ConfigError(words)
     image = _decoded("image", data)
     image.flags.writeable = False
@@ -90,7 +90,7 @@ def _drawn(path: Path, data: bytes) -> bytes:
         ) from None
     try:
         text = data.decode("utf-8")
-        size = _png_size(path, bytes(resvg_py.svg_to_bytes(text, skip_system_fonts=True)))
+        size = png_size(path, bytes(resvg_py.svg_to_bytes(text, skip_system_fonts=True)))
         width, height = (_SVG_SIDE, None) if size[0] >= size[1] else (None, _SVG_SIDE)
         drawn = bytes(
             resvg_py.svg_to_bytes(text, skip_system_fonts=True, width=width, height=height)
@@ -104,7 +104,7 @@ def _drawn(path: Path, data: bytes) -> bytes:
     return drawn
 
 
-def _png_size(path: Path | str, data: bytes) -> tuple[int, int]:
+def png_size(path: Path | str, data: bytes) -> tuple[int, int]:
     """Return (width, height) of a PNG from its header, before anything is decoded."""
     if not data.startswith(_PNG) or len(data) < 24:
         raise ConfigError(f"{path}: not a PNG or SVG image; give one")

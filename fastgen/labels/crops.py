@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import font_named
 from fastgen.decals.lettering import TILE_BASELINE_CAPS
 from fastgen.geometry.damage_law import deform
 from fastgen.geometry.shape_library import SHAPES
@@ -111,7 +111,7 @@ def _legible(sample: Sample, item: Object, decals: Mapping[int, Decal], min_text
 
 def _least_letter(sample: Sample, item: Object, decal: Decal) -> float:
     """Return the smallest visible share of any letter; a locking bar can hide an I."""
-    font = glyph_tiles()[1][decal.font]
+    font = font_named(decal.font)
     lettering = decal.lettering
     middle = np.array(lettering.size_mm) / 2
     steps = (np.arange(_LETTER_POINTS) + 0.5) / _LETTER_POINTS - 0.5

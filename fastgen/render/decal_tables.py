@@ -15,7 +15,7 @@ from fastgen.camera.projection import View
 from fastgen.errors import FastgenError
 from fastgen.geometry.mesh import UNIT_CUBE, Mesh
 from fastgen.render.constants import DECAL_CELL_MM
-from fastgen.render.glyph_runs import GlyphRun, glyph_run
+from fastgen.render.glyph_runs import GlyphRun, GlyphTable, all_glyphs, glyph_run
 from fastgen.render.zone_codes import DECAL_SHEET, SHEET_NUMBERS
 from fastgen.scene import Decal
 from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS, MM, MOST_NEARBY
@@ -83,6 +83,7 @@ def pack_decals(
     mesh: Mesh,
     art_layers: Mapping[str, int],
     scale: float = 1.0,
+    glyphs: GlyphTable | None = None,
 ) -> DecalTables:
     """Compute the decal tables of a container.
 
@@ -92,6 +93,7 @@ def pack_decals(
         mesh: Mesh of the container.
         art_layers: Texture layer of each artwork by name.
         scale: See DecalTables; from `scale_for`.
+        glyphs: Glyphs of all fonts; None for fastgen's fonts alone.
 
     Returns:
         Tables for the shader.
@@ -110,6 +112,7 @@ def pack_decals(
     table = np.zeros((max(count, 1), DECAL_TEXELS, 4), np.float32)
     table[:count, 0, :2] = np.stack([cos, sin], axis=1)
     table[:count, 1] = np.concatenate([center, half], axis=1)
+    known = all_glyphs() if glyphs is None else glyphs
     runs: list[GlyphRun] = []
     letters = 0
     for row, decal, object_id in zip(table, decals, ids, strict=False):
@@ -119,7 +122,7 @@ def pack_decals(
         row[3] = code, object_id, art_layers.get(decal.art, 0), decal.fade
         row[4] = decal.torn
         if decal.kind == "text":
-            run = glyph_run(decal.lettering)
+            run = glyph_run(decal.lettering, known.extents, known.first.get(decal.font, 0))
             row[4] = decal.cap_mm, letters, len(run.glyphs), run.parts_per_mm
             letters += len(run.glyphs)
             runs.append(run)

@@ -7,21 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.decals.artwork import art_levels, mip_levels, premultiplied
-from fastgen.decals.glyphs import glyph_sums, glyph_tiles
 from fastgen.files import disk_cache
 from fastgen.light.reflectance import dfg_table
 from fastgen.render.gl import GLContext
+from fastgen.render.glyph_runs import GlyphTable
 from fastgen.render.textures import clamped_array, levelled_texture, noise_texture
 
 Textures = dict[str, moderngl.Texture | moderngl.TextureArray]
 """Textures by sampler name."""
 
 
-def material_tables(gl: GLContext, own_art: Sequence[NDArray[np.uint8]] = ()) -> Textures:
+def material_tables(
+    gl: GLContext, glyphs: GlyphTable, own_art: Sequence[NDArray[np.uint8]] = ()
+) -> Textures:
     """Return the textures, which the caller releases.
 
     Args:
         gl: Current context.
+        glyphs: Glyphs of all fonts.
         own_art: Further artwork, uint8 [ART_SIZE, ART_SIZE, 4], in layers after the bundled.
     """
     table = dfg_table()
@@ -31,12 +34,11 @@ def material_tables(gl: GLContext, own_art: Sequence[NDArray[np.uint8]] = ()) ->
     art = levelled_texture(gl, _with_own(levels, own_art), srgb=True)
     for level in levels:  # 20 MB that only the next context needs
         disk_cache.unload(level)
-    tiles, _ = glyph_tiles()
     return {
         "noise_tiles": noise_texture(gl),
         "art": art,
-        "glyph_tiles": clamped_array(gl.ctx, tiles),
-        "glyph_sums": clamped_array(gl.ctx, glyph_sums()),
+        "glyph_tiles": clamped_array(gl.ctx, glyphs.tiles),
+        "glyph_sums": clamped_array(gl.ctx, glyphs.sums),
         "dfg_table": dfg,
     }
 

@@ -6,9 +6,8 @@ that see surfaces into classes, and shade each class. Colour, ids, damage and de
 draw. Labels are taken at the pixel centre and never filtered: a sample lies exactly on each centre.
 """
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from fastgen.camera.exposure import Exposure
 from fastgen.camera.projection import View, view_of
 from fastgen.config.damage import DamageConfig
+from fastgen.decals.own_fonts import OwnPrints
 from fastgen.frame import Frame
 from fastgen.geometry.damage_law import seen_damages, variant
 from fastgen.geometry.prepared_scene import Member, PreparedScene
@@ -48,6 +48,8 @@ from fastgen.scene.boxes import back_to_front
 from fastgen.scene.damage_kinds import program_kinds
 from fastgen.scene.limits import MM
 
+_NO_PRINTS = OwnPrints()
+
 
 class Renderer:
     """Draws scenes on one GL context. A context manager: leaving it frees everything it made.
@@ -64,7 +66,7 @@ class Renderer:
         damage: DamageConfig | None = None,
         read: Read = shader_text,
         without: tuple[str, ...] = (),
-        own_art: Mapping[str, NDArray[np.uint8]] = MappingProxyType({}),
+        own: OwnPrints = _NO_PRINTS,
     ) -> None:
         """Prepare a renderer.
 
@@ -77,7 +79,7 @@ class Renderer:
                 The first scene with another kind takes longer, because its programs are compiled.
             read: Returns the text of a shader file by its name.
             without: Material layers of LAYERS to leave out of images.
-            own_art: Artwork of a configuration by name, see own_art.art_of.
+            own: Artwork and fonts of a configuration.
         """
         self._gl = gl
         self.ctx = gl.ctx
@@ -91,7 +93,7 @@ class Renderer:
         self._ground = GroundPass(self.ctx, programs, self.ambient)
         self._shading = ShadingPass(self.ctx, programs)
         self._normals = NormalsPass(self.ctx, programs)
-        self._materials = MaterialTextures(gl, own_art)
+        self._materials = MaterialTextures(gl, own)
         self._rays = RayLight(gl, programs, self._materials.resources, self.ambient)
         self._targets = RecentTargets(gl, quality)
         self._shapes = Shapes(self.ctx, self._geometry.programs)

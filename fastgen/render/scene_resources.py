@@ -1,6 +1,7 @@
 """Everything that the renderer keeps for one scene."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import moderngl
 from numpy.typing import ArrayLike
@@ -9,8 +10,21 @@ from fastgen.geometry.prepared_scene import PreparedScene
 from fastgen.render.constants import DECAL_CELL_MM
 from fastgen.render.decal_tables import MARGIN_MM, pack_decals
 from fastgen.render.decals_near import decals_near
+from fastgen.render.glyph_runs import GlyphTable
 from fastgen.render.surface_values import SceneMaterials
 from fastgen.render.textures import data_texture
+
+
+class Prints(NamedTuple):
+    """What decals can show.
+
+    Attributes:
+        art_layers: Texture layer of each artwork by name.
+        glyphs: Glyphs of all fonts.
+    """
+
+    art_layers: Mapping[str, int]
+    glyphs: GlyphTable
 
 
 class DecalTextures:
@@ -23,7 +37,7 @@ class DecalTextures:
     Args:
         ctx: The context that draws.
         prepared: The scene.
-        art_layers: Texture layer of each artwork, see decal_tables.pack_decals.
+        prints: What decals can show.
         scale: See decal_tables.scale_for.
     """
 
@@ -31,11 +45,13 @@ class DecalTextures:
         self,
         ctx: moderngl.Context,
         prepared: PreparedScene,
-        art_layers: Mapping[str, int],
+        prints: Prints,
         scale: float,
     ) -> None:
         scene, mesh = prepared.scene, prepared.container
-        tables = pack_decals(scene.decals, prepared.numbers.decals, mesh, art_layers, scale)
+        ids = prepared.numbers.decals
+        layers, glyphs = prints
+        tables = pack_decals(scene.decals, ids, mesh, layers, scale, glyphs)
         margin_mm = scale * MARGIN_MM
         near = decals_near(tables.table[: len(scene.decals)], mesh.atlas_size_mm, margin_mm)
         self.textures = {
@@ -65,23 +81,23 @@ class SceneResources:
     Args:
         ctx: The context that draws.
         prepared: The scene.
-        art_layers: Texture layer of each artwork, see decal_tables.pack_decals.
+        prints: What decals can show.
     """
 
     def __init__(
         self,
         ctx: moderngl.Context,
         prepared: PreparedScene,
-        art_layers: Mapping[str, int],
+        prints: Prints,
     ) -> None:
-        self._ctx, self._prepared, self._art_layers = ctx, prepared, art_layers
+        self._ctx, self._prepared, self._prints = ctx, prepared, prints
         self.materials = SceneMaterials(prepared)
-        self._decals = {1.0: DecalTextures(ctx, prepared, art_layers, 1.0)}
+        self._decals = {1.0: DecalTextures(ctx, prepared, prints, 1.0)}
 
     def decals(self, scale: float = 1.0) -> DecalTextures:
         """Return the decals for views of one scale, see decal_tables.scale_for."""
         if scale not in self._decals:
-            made = DecalTextures(self._ctx, self._prepared, self._art_layers, scale)
+            made = DecalTextures(self._ctx, self._prepared, self._prints, scale)
             self._decals[scale] = made
         return self._decals[scale]
 

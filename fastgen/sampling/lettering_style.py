@@ -7,7 +7,7 @@ import numpy as np
 from fastgen.config.identifiers import IdentifierConfig
 from fastgen.config.markings import MarkingsConfig
 from fastgen.decals.artwork import Brand, brands
-from fastgen.decals.glyphs import Font, glyph_tiles
+from fastgen.decals.glyphs import Font, font_named
 from fastgen.decals.iso6346 import Identifier, sample_identifier
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.sampling.sheet import Sheet
@@ -37,10 +37,8 @@ class Style:
 
 def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) -> Style:
     """Sample font, colour, brand and identifier of a container."""
-    _, fonts = glyph_tiles()
-    names = config.fonts or tuple(sorted(fonts))
     rng = streams("lettering")
-    font = fonts[str(rng.choice(names))]
+    font = font_named(str(rng.choice(config.drawn_fonts)))
     light = float(np.array(paint) @ REC_709) < 0.22
     albedo = _LIGHT if light else _DARK
     if rng.random() < config.colored_lettering:
@@ -82,9 +80,8 @@ def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Stre
 
 def in_any_font(config: MarkingsConfig, style: Style, rng: np.random.Generator) -> list[Style]:
     """Return the style, then the same with other fonts, for places where only a narrow one fits."""
-    fonts = glyph_tiles()[1]
-    names = rng.permutation(config.fonts or sorted(fonts))
-    return [style, *(replace(style, font=fonts[str(name)]) for name in names)]
+    names = rng.permutation(config.drawn_fonts)
+    return [style, *(replace(style, font=font_named(str(name))) for name in names)]
 
 
 def text_decal(lines: tuple[str, ...], cap_mm: float, style: Style, wear: float) -> Decal:

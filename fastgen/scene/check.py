@@ -8,7 +8,7 @@ import numpy as np
 
 from fastgen.classes import ALL_DETECTION_CLASSES
 from fastgen.decals.artwork import art_layers
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import font_named, glyph_tiles
 from fastgen.errors import ConfigError, shown
 from fastgen.scene import Camera, Damage, Decal, Neighbour, Scene
 from fastgen.scene.boxes import away_mm, prop_box
@@ -33,10 +33,12 @@ class OwnDecals(NamedTuple):
     Attributes:
         classes: Names of its classes.
         art: Names of its artwork.
+        fonts: Names of its fonts.
     """
 
     classes: tuple[str, ...] = ()
     art: tuple[str, ...] = ()
+    fonts: tuple[str, ...] = ()
 
 
 _NONE = OwnDecals()
@@ -155,7 +157,7 @@ def _check_decal(decal: Decal, path: str, own: OwnDecals) -> None:
     classes = ("", *ALL_DETECTION_CLASSES[1:], *own.classes)
     check_known(f"{path}.class_name", decal.class_name, classes)
     if decal.kind == "text":
-        check_known(f"{path}.font", decal.font, glyph_tiles()[1])
+        check_known(f"{path}.font", decal.font, {*glyph_tiles()[1], *own.fonts})
         if not decal.cap_mm > 0:
             raise ConfigError(f"{path}.cap_mm: {decal.cap_mm:g} is out of range; give more than 0")
         if not decal.text.strip():
@@ -165,7 +167,7 @@ def _check_decal(decal: Decal, path: str, own: OwnDecals) -> None:
             raise ConfigError(f"{path}.lines: {letters} letters; give fewer than {GLYPH_RANGE}")
         for char in decal.text:
             if char != " ":
-                check_known(f"{path}.lines", char, glyph_tiles()[1][decal.font].glyphs)
+                check_known(f"{path}.lines", char, font_named(decal.font).glyphs)
         spoken = "".join(part.text for part in decal.parts).replace(" ", "")
         if decal.parts and spoken != "".join(decal.lines).replace(" ", ""):
             raise ConfigError(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import CLASS_NAME
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import font_named
 from fastgen.decals.lettering import Lettering, TextPart, layout
 from fastgen.scene.faces import SHEET_FACES
 from fastgen.scene.limits import COMPUTED_ART, DECAL_KINDS, Degrees, Length, Millimetres
@@ -39,7 +39,7 @@ class Decal:
             another, and lines are columns from left to right.
         parts: Parts of a text with places of their own; they decide the layout if there are any,
             and hold the letters of `lines` in the same order.
-        font: Name of the font of a text.
+        font: Name of the font of a text, as in `glyphs.font_named`.
         vertical: Whether a text is vertical.
         cap_mm: Height of the capitals of a text.
         albedo: Linear color of texts, emblems, stripes and patches.
@@ -81,8 +81,7 @@ class Decal:
     @property
     def lettering(self) -> Lettering:
         """Size of a text, and position of each of its glyphs and parts."""
-        font = glyph_tiles()[1][self.font]
-        return layout(self.lines, font, self.cap_mm, self.vertical, self.parts)
+        return layout(self.lines, font_named(self.font), self.cap_mm, self.vertical, self.parts)
 
     @property
     def turn(self) -> NDArray[np.float64]:

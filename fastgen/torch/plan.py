@@ -180,6 +180,11 @@ def config_of(curriculum: Any, base: Config, epoch: int) -> Config:
             f"curriculum: epoch {epoch} changes the images of markers, stickers or brands; keep "
             "them, and change their weights"
         )
+    if made.markings.own_fonts != base.markings.own_fonts:
+        raise ConfigError(
+            f"curriculum: epoch {epoch} changes markings.own_fonts; keep them, and change "
+            "markings.fonts"
+        )
     if made.damage.segmentation_classes != base.damage.segmentation_classes:
         raise ConfigError(
             f"curriculum: epoch {epoch} changes which classes there are; list the "
