@@ -61,6 +61,16 @@ def label_sentence() -> str:
     )
 
 
+def version_sentence() -> str:
+    """Return a sentence on the CPU time of this version, for rates of an older one."""
+    found = stored("versions")
+    draft, balanced = (found["qualities"][q]["ratio"] for q in ("draft", "balanced"))
+    return (
+        f"Version {found['fastgen']} takes {draft:.2f} and {balanced:.2f} times the CPU time of "
+        f"{found['other']} (`python bench/versions.py`)."
+    )
+
+
 def readme_lines() -> list[str]:
     """Return the section of README.md."""
     rates = {q: usual_row(q)["steady_images_per_s"]["2"] for q in ("draft", "balanced")}
@@ -71,7 +81,8 @@ def readme_lines() -> list[str]:
         f"""- **Speed.** {rates["draft"]:.0f} labelled 640x640 images per second with `draft` and
         {rates["balanced"]:.0f} with `balanced` on two CPU cores (version
         {stored("throughput")["fastgen"]}). Blender Cycles takes {min(traced):.0f} to
-        {max(traced):.0f} s of CPU time per image ([benchmarks](docs/benchmarks.md#results)).""",
+        {max(traced):.0f} s of CPU time per image ([benchmarks](docs/benchmarks.md#results)).
+        {version_sentence()}""",
         f"""- **Accuracy.** `balanced` is as close to a path-traced reference as Cycles with
         {equal.words} samples per pixel, at 1/{ratio:.0f} of its CPU time
         ([accuracy](docs/accuracy.md), version {stored("pareto")["fastgen"]}).""",
