@@ -113,7 +113,7 @@ class _Part:
             yield manifest
 
     def _number(self, stem: str) -> int:
-        """Return the number that an image of this dataset, which was not merged, has by its name."""
+        """Return the number of an image by its name, if the dataset was not merged."""
         scene, camera = scene_and_camera(stem)
         cameras: list[str] = self.manifest.get("cameras", ())
         if camera not in cameras:
