@@ -10,6 +10,8 @@ import pytest
 from pycocotools import mask as coco_mask
 
 from fastgen.cli.main import main
+from fastgen.dataset.job import LAYOUTS
+from fastgen.formats.registry import known_formats
 
 pytestmark = pytest.mark.usefixtures("no_workers")
 
@@ -22,7 +24,7 @@ ARGUMENTS = ["--images", "8", "--size", "320x240", "--seed", "5", "--split", "0.
 def places(tmp_path_factory):
     """The dataset in each layout, by the name that the page gives its folder."""
     folder = tmp_path_factory.mktemp("recipes")
-    made = {"OUT": ["--also", "obb,coco,hub,semantic,voc"]}
+    made = {"OUT": ["--also", "obb,coco,hub,semantic,voc,kitti,bop,depth,ids,normals"]}
     made["OUT_TARS"] = ["--format", "webdataset", "--also", "ids"]
     made["OUT_PARQUET"] = ["--format", "parquet", "--also", "ids"]
     for name, more in made.items():
@@ -33,6 +35,17 @@ def places(tmp_path_factory):
     return made
 
 
+@pytest.fixture(scope="module")
+def crops(tmp_path_factory):
+    """A dataset with crops of texts and seals, which need more pixels."""
+    out = tmp_path_factory.mktemp("crops") / "out"
+    options = ["--images", "4", "--size", "720x540", "--seed", "5", "--cameras", "Cr"]
+    options += ["--tasks", "text", "--also", "text_parts,seal", "--split", "train"]
+    options += ["--set", "seals.probability=0.8", "--quality", "draft", "--workers", "1"]
+    assert main(["generate", str(out), *options]) == 0
+    return out
+
+
 @pytest.fixture
 def recipe(places, monkeypatch, tmp_path):
     """A function that runs the code below a heading and returns its names."""
@@ -40,14 +53,15 @@ def recipe(places, monkeypatch, tmp_path):
     monkeypatch.setenv("HF_DATASETS_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("datasets.config.HF_DATASETS_CACHE", tmp_path / "cache")
 
-    def run(heading):
+    def run(heading, **others):
+        """Run a section; `others` has folders that take the place of those with the same name."""
         section = PAGE.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
         blocks = re.findall(r"```python\n(.*?)```", section, re.DOTALL)
         assert blocks
         names: dict = {}
         for code in blocks:
-            for name in sorted(places, key=len, reverse=True):
-                code = re.sub(rf"\b{name}\b", str(places[name]), code)
+            for name, place in {**places, **others}.items():
+                code = re.sub(rf"\b{name}\b", str(place), code)
             exec(code, names)
         return names
 
@@ -139,6 +153,16 @@ def test_globox(recipe, scenes):
         assert rounded(found) == boxes(scenes[Path(each.image_id).stem])
 
 
+def test_labelformat(recipe, scenes):
+    labels = recipe("labelformat")["labels"]
+    assert {Path(each.image.filename).stem for each in labels} == scenes.keys()
+    for each in labels:
+        assert (each.image.width, each.image.height) == SIZE
+        found = [thing.box for thing in each.objects if thing.category.name != "DontCare"]
+        sides = [(box.xmin, box.ymin, box.xmax, box.ymax) for box in found]
+        assert rounded(sides) == boxes(scenes[Path(each.image.filename).stem])
+
+
 def test_transformers(recipe):
     names = recipe("Transformers")
     (labels,) = names["inputs"]["labels"]
@@ -164,6 +188,35 @@ def test_segformer_and_mmsegmentation(recipe, places, scenes):
         assert mask[own & sure].max() < len(listed)
         assert set(np.unique(mask[~own])) <= {0, 1, 255}  # containers of the background
         assert (places["OUT"] / f"semantic/images/train/{stem}.jpg").is_file()
+
+
+def test_crops(recipe, crops):
+    names = recipe("Crops of texts and seals", OUT=crops)
+    things = {
+        (path.stem, thing["instance"]): thing
+        for path in crops.glob("scenes/train/*.json")
+        for thing in json.loads(path.read_text())["objects"]
+        if thing["class_name"] == "text"
+    }
+    assert names["texts"]
+    for name, picture, (text,) in names["texts"]:
+        stem, instance = name.removesuffix(".png").rsplit("_", 1)
+        thing = things[stem, int(instance)]
+        assert text == thing["text"]
+        x0, y0, x1, y1 = thing["bbox"]
+        assert x1 - x0 <= picture.width <= x1 - x0 + 10
+        assert y1 - y0 <= picture.height <= y1 - y0 + 10
+    assert names["parts"]
+    for name, picture, (role, text) in names["parts"]:
+        stem, instance, named = name.removesuffix(".png").rsplit("_", 2)
+        (part,) = (p for p in things[stem, int(instance)]["parts"] if p["role"] == role)
+        assert (named, text) == (role, part["text"])
+        assert picture.width > picture.height or role == "check"
+    kinds = names["seals"].features["label"]
+    assert kinds.names == ["open", "sealed"]
+    assert [kinds.int2str(each) for each in names["seals"]["label"]] == [
+        path.parent.name for path in sorted(crops.glob("seal/train/*/*.png"))
+    ]
 
 
 def test_datasets(recipe, scenes, places):
@@ -210,6 +263,45 @@ def test_webdataset(recipe, scenes):
     assert {"jpg", "json", "damage.png", "imdg.txt", "text.txt"} <= next(iter(members))
 
 
+def test_opencv(recipe, scenes):
+    names = recipe("OpenCV")
+    assert {Path(name).stem for name in names["names"]} == scenes.keys()
+    seen = 0
+    for at, name in enumerate(names["names"]):
+        scene, ids = scenes[Path(name).stem], names["ids"][at]
+        damage, depth = names["damage"][at], names["depth_mm"][at]
+        assert (ids.dtype, damage.dtype, depth.dtype) == (np.uint16,) * 3
+        for thing in scene["objects"]:
+            if thing["id"] < 100_000 and thing["bbox"] and thing["class_name"] != "container":
+                image = damage if 200 <= thing["id"] < 600 else ids
+                assert (image == thing["id"]).sum() == thing["area"]
+                seen += 1
+        container = damage > 0
+        assert container.sum() == scene["objects"][0]["area"]
+        view = {key: np.array(value) for key, value in scene["view"].items()}
+        outer = np.array(np.meshgrid((-6900, 6900), (-1300, 1300), (0, 2950))).reshape(3, -1)
+        z = (view["rotation"] @ outer + view["translation_mm"][:, None])[2]
+        assert z.min() < depth[container].min() <= depth[container].max() < z.max()
+        assert (depth[ids == 0] == 0).all()
+        normals = names["normals"][at][container]
+        lengths = np.linalg.norm(normals, axis=1)
+        assert np.median(lengths) == pytest.approx(1, abs=0.02)
+        assert (normals[:, 2] < 0.3).mean() > 0.99  # they face the camera
+    assert seen > len(scenes)
+
+
+def test_trimesh(recipe, places, scenes):
+    outlines = recipe("trimesh")["outlines"]
+    manifests = map(json.loads, map(Path.read_text, places["OUT"].glob("shards/*.json")))
+    stems = {r["number"]: r["stem"] for manifest in manifests for r in manifest["records"]}
+    assert {stems[image] for image, _ in outlines} == scenes.keys()
+    for (image, _), pixels in outlines.items():
+        box = scenes[stems[image]]["objects"][0]["amodal_bbox"]
+        # centres of pixels are at whole numbers; wall profiles vary by some millimetres
+        found = (*pixels.min(axis=0) + 0.5, *pixels.max(axis=0) + 0.5)
+        np.testing.assert_allclose(found, box, atol=1.0)
+
+
 @pytest.mark.parametrize("task", ["imdg", "damage", "container"])
 def test_folders_of_coco_name_images_beside_their_annotations(places, task):
     start = "person_keypoints" if task == "container" else "instances"
@@ -253,17 +345,15 @@ def test_mirrored_castings_change_sides():
         assert CASTINGS[other] == "_".join(swapped.get(word, word) for word in words)
 
 
-def test_every_row_of_the_table_has_a_recipe_and_a_test():
-    rows = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| ")][2:]
-    assert len(rows) > 10
-    headings = {
-        "Pillow, for SegFormer and mmsegmentation": "SegFormer and mmsegmentation",
-        "datasets": "datasets of Hugging Face",
-        "datumaro": "datumaro, CVAT and FiftyOne",
-    }
-    for row in rows:
-        reader, checked = row[0].removeprefix("| "), row[-1].removesuffix(" |")
-        heading = headings.get(reader, reader)
-        assert f"\n## {heading}\n" in PAGE
-        test = f"test_{heading.lower().replace(' of hugging face', '').replace(' ', '_')}"
-        assert (test in globals()) == (checked == "test"), reader
+def test_every_output_has_a_row_and_every_row_a_test():
+    rows = [line.strip("|").split(" | ") for line in PAGE.splitlines() if line.startswith("| ")][2:]
+    files = set(re.findall(r"\w+", " ".join(row[3] for row in rows)))
+    assert {*known_formats(), *LAYOUTS} - {"seafront"} <= files
+    sections = PAGE.split("\n## ")[1:]
+    for reader, *_, checked in rows:
+        if checked.strip() == "by hand":
+            assert any(each.startswith(reader.strip()) for each in sections), reader
+        else:
+            assert callable(globals()[checked.strip(" `")])
+    run = set(re.findall(r'recipe\("(.*?)"', Path(__file__).read_text()))
+    assert run == {each.partition("\n")[0] for each in sections if "```python" in each}

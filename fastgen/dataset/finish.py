@@ -1,6 +1,5 @@
 """Last step of a run: files that cover whole splits, the contact sheet, and dataset.json."""
 
-import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
@@ -9,7 +8,7 @@ from fastgen.dataset.console import hint
 from fastgen.dataset.contact_sheet import contact_sheet
 from fastgen.dataset.dataset_json import MANIFEST, shard_manifest, unsealed
 from fastgen.dataset.job import ARCHIVE_ENDINGS, Job, manifest_path
-from fastgen.dataset.seal import digest, seal
+from fastgen.dataset.seal import Sums, digest, seal
 from fastgen.dataset.shards import MADE_BY
 from fastgen.dataset.storage import Folder, Storage
 from fastgen.errors import OutputError
@@ -58,7 +57,7 @@ def finish(
     files: dict[str, list[Any]] = {}
 
     def put(path: str, pieces: Iterable[bytes]) -> None:
-        sums = _Sums(pieces)
+        sums = Sums(pieces)
         storage.write(path, sums)
         files[path] = sums.entry()
 
@@ -157,19 +156,3 @@ def _records(
             yield from (record for record in manifest["records"] if record["split"] == split)
 
     return through
-
-
-class _Sums:
-    """Iterator that passes pieces of a file on and adds up their size and hash."""
-
-    def __init__(self, pieces: Iterable[bytes]) -> None:
-        self._pieces, self._size, self._hash = pieces, 0, hashlib.sha256()
-
-    def __iter__(self) -> Iterator[bytes]:
-        for piece in self._pieces:
-            self._size += len(piece)
-            self._hash.update(piece)
-            yield piece
-
-    def entry(self) -> list[Any]:
-        return [self._size, self._hash.hexdigest()]

@@ -96,6 +96,7 @@ class _Record:
     split: Annotated[str, OneOf(SPLITS)]
     size: tuple[_Side, _Side]
     facts: dict[str, Any]
+    number: _Count = 0
 
 
 @dataclass(frozen=True)

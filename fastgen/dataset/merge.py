@@ -2,11 +2,11 @@
 
 The merged dataset has all shards of the others under new numbers, and its own files over whole
 splits. Image files are hard links. Images whose names lack the seed get it, because other datasets
-have images with the same names; label files that contain such a name are written anew.
+have images with the same names. Images are numbered anew for the same reason. Files that contain
+what changed are written anew.
 """
 
 import contextlib
-import io
 import os
 import re
 import shutil
@@ -14,7 +14,7 @@ import tarfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import orjson
 
@@ -23,18 +23,18 @@ from fastgen.dataset.addresses import place_of
 from fastgen.dataset.dataset_json import shard_manifest
 from fastgen.dataset.finish import finish
 from fastgen.dataset.finished import open_finished
-from fastgen.dataset.job import Job, manifest_path
+from fastgen.dataset.job import Job, manifest_path, scene_and_camera
 from fastgen.dataset.progress import Progress
-from fastgen.dataset.seal import digest, seal
+from fastgen.dataset.renaming import Renaming
+from fastgen.dataset.seal import Sums, digest, seal
 from fastgen.dataset.storage import LOCK, Folder
 from fastgen.errors import ConfigError, OutputError
 from fastgen.formats.format import Files
+from fastgen.formats.parquet import opened_table
+from fastgen.formats.registry import formats_of
 
 _RESULTS = ("images", "counts", "failed", "files", "shards", "digest")
 """Keys of dataset.json that do not say how the dataset was made."""
-
-_LABEL_SUFFIXES = (".json", ".xml", ".txt")
-"""Suffixes of files that may contain the name of their image."""
 
 
 def merge(sources: Sequence[str], out: str) -> dict[str, Any]:
@@ -58,6 +58,7 @@ def merge(sources: Sequence[str], out: str) -> dict[str, Any]:
     root = _new_place(out, parts)
     config = _check_alike(parts)
     _check_names(parts)
+    _check_columns(parts)
     first = parts[0].manifest
     job = Job(
         out=out,
@@ -106,7 +107,18 @@ class _Part:
             manifest = shard_manifest(self.intact(path, hashed), int(number))
             if manifest is None:
                 raise self.damaged(path)
+            for record in manifest["records"]:
+                if "number" not in record:  # version 0.30 and earlier
+                    record["number"] = self._number(record["stem"])
             yield manifest
+
+    def _number(self, stem: str) -> int:
+        """Return the number of an image by its name, if the dataset was not merged."""
+        scene, camera = scene_and_camera(stem)
+        cameras: list[str] = self.manifest.get("cameras", ())
+        if camera not in cameras:
+            raise OutputError(f"{self.out}: is damaged; run fastgen verify {self.out}")
+        return scene * len(cameras) + cameras.index(camera)
 
     def config(self) -> Config:
         """Return the configuration, of the first source if the dataset was merged itself."""
@@ -127,12 +139,27 @@ class _Part:
             raise self.damaged(path)
         return content
 
-    def link(self, path: str, hashed: str, storage: Folder, new_path: str) -> None:
-        """Make a hard link to a file, or a copy of it, in another dataset."""
+    def check(self, path: str, hashed: str) -> None:
+        """Raise OutputError if a file, which may be larger than memory, was changed."""
         with self._damaged_if_unreadable(path):
             same = self.storage.content_hash(path) == hashed
         if not same:
             raise self.damaged(path)
+
+    @contextlib.contextmanager
+    def opened(self, path: str) -> Iterator[BinaryIO]:
+        """Open an archive, whose errors in the block become those of a damaged file."""
+        with contextlib.ExitStack() as stack:
+            with self._damaged_if_unreadable(path):
+                stream = stack.enter_context(self.storage.opened(path))
+            try:
+                yield stream
+            except (tarfile.TarError, ValueError):
+                raise self.damaged(path) from None
+
+    def link(self, path: str, hashed: str, storage: Folder, new_path: str) -> None:
+        """Make a hard link to a file, or a copy of it, in another dataset."""
+        self.check(path, hashed)
         storage.adopt(self.storage, path, new_path)
 
     def damaged(self, path: str) -> OutputError:
@@ -147,65 +174,6 @@ class _Part:
             yield
         except (FileNotFoundError, OutputError):
             raise self.damaged(path) from None
-
-
-@dataclass(frozen=True)
-class _Renaming:
-    """New names of the files of one shard.
-
-    Attributes:
-        prefix: Put before the stem of each image; may be empty.
-        stems: Old stems of the images.
-        shard: Old and new number of the shard.
-    """
-
-    prefix: str
-    stems: tuple[str, ...]
-    shard: tuple[int, int]
-
-    def path(self, path: str) -> str:
-        """Return the new path of a file."""
-        old, new = self.shard
-        folder, slash, name = path.rpartition("/")
-        tar = re.fullmatch(rf"(\w+)-{old:06d}\.tar", name)
-        return f"{tar[1]}-{new:06d}.tar" if tar else f"{folder}{slash}{self.name(name)}"
-
-    def name(self, name: str) -> str:
-        """Return the new name of a file, or any other text unchanged."""
-        return f"{self.prefix}{name}" if name.startswith(self.stems) else name
-
-    def values(self, value: Any) -> Any:
-        """Return a JSON value with the new names."""
-        if isinstance(value, str):
-            return self.name(value)
-        if isinstance(value, list):
-            return [self.values(each) for each in value]
-        if isinstance(value, dict):
-            return {key: self.values(each) for key, each in value.items()}
-        return value
-
-    def content(self, path: str, content: bytes) -> bytes:
-        """Return the content of a file with the new names."""
-        if path.endswith(".tar"):
-            return self._tar(content)
-        if not path.endswith(_LABEL_SUFFIXES):
-            return content
-        stems = b"|".join(re.escape(stem.encode()) for stem in self.stems)
-        names = re.compile(rb"(?<![A-Za-z0-9_.-])(?:" + stems + rb")(?![A-Za-z0-9-])")
-        return names.sub(lambda found: self.prefix.encode() + found[0], content)
-
-    def _tar(self, content: bytes) -> bytes:
-        buffer = io.BytesIO()
-        with (
-            tarfile.open(fileobj=io.BytesIO(content)) as old,
-            tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as new,
-        ):
-            for member in old:
-                stream = old.extractfile(member)
-                data = self.content(member.name, stream.read() if stream else b"")
-                member.name, member.size = self.name(member.name), len(data)
-                new.addfile(member, io.BytesIO(data))
-        return buffer.getvalue()
 
 
 def _part(out: str) -> _Part:
@@ -245,11 +213,6 @@ def _new_place(out: str, parts: Sequence[_Part]) -> Path:
 def _check_alike(parts: Sequence[_Part]) -> Config:
     """Check that datasets fit together, and return a configuration with their classes."""
     first = parts[0]
-    if first.manifest["format"] == "parquet":
-        raise OutputError(
-            f"{first.out}: has the format parquet, whose readers take the files of several "
-            "datasets; merge works on seafront and webdataset"
-        )
     config, classes = first.config(), _classes(first)
     for part in parts[1:]:
         for key, option in (("format", "--format"), ("formats", "--tasks and --also")):
@@ -280,27 +243,25 @@ def _listed(value: str | Sequence[str]) -> str:
     return value if isinstance(value, str) else ", ".join(value)
 
 
-def _renaming(part: _Part, shard: dict[str, Any], number: int) -> _Renaming:
-    stems = tuple(shard["images"])
-    seedless = any(re.match("[0-9]", stem) for stem in stems)
-    prefix = f"s{part.manifest['seed']}_" if seedless else ""
-    return _Renaming(prefix, stems, (shard["shard"], number))
-
-
-def _numbered_shards(parts: Sequence[_Part]) -> Iterator[tuple[_Part, dict[str, Any], _Renaming]]:
+def _numbered_shards(parts: Sequence[_Part]) -> Iterator[tuple[_Part, dict[str, Any], Renaming]]:
     """Yield each shard of each dataset with its new names."""
-    number = 0
+    number = images = 0
+    formats = formats_of(parts[0].manifest["formats"])
     for part in parts:
         for shard in part.shards:
-            yield part, shard, _renaming(part, shard, number)
+            stems = tuple(shard["images"])
+            seedless = any(re.match("[0-9]", stem) for stem in stems)
+            prefix = f"s{part.manifest['seed']}_" if seedless else ""
+            yield part, shard, Renaming(prefix, stems, (shard["shard"], number), images, formats)
             number += 1
+        images += part.manifest["images"]
 
 
 def _check_names(parts: Sequence[_Part]) -> None:
     """Raise OutputError if files of two datasets would get the same path."""
     owners: dict[str, _Part] = {}
     for part, shard, names in _numbered_shards(parts):
-        images = tuple(names.values(shard["images"]))
+        images = tuple(map(names.text, shard["images"]))
         paths = map(names.path, shard["files"])
         others = [path for path in paths if not path.rpartition("/")[2].startswith(images)]
         for name in (*images, *others):
@@ -312,6 +273,25 @@ def _check_names(parts: Sequence[_Part]) -> None:
             else:
                 why = "its name does not contain the seed; generate both without such files"
             raise OutputError(f"{owner.out} and {part.out}: both contain {name}; {why}")
+
+
+def _check_columns(parts: Sequence[_Part]) -> None:
+    """Raise OutputError if tables of two datasets have different columns."""
+    if parts[0].manifest["format"] != "parquet":
+        return
+    first = None
+    for part in parts:
+        for path in (path for shard in part.shards for path in shard["files"]):
+            with part.opened(path) as stream, opened_table(stream) as table:
+                schema = table.schema_arrow
+            first = schema if first is None else first
+            if not schema.equals(first, check_metadata=True):
+                unlike = sorted({each.name for each in {*schema} ^ {*first}})
+                raise OutputError(
+                    f"{part.out}: the columns of {path} differ from those of {parts[0].out} "
+                    f"({', '.join(unlike) or 'the features'}); generate both with the same version "
+                    "of fastgen and of the packages that it uses"
+                )
 
 
 def _copy_shards(parts: Sequence[_Part], storage: Folder, images: int) -> int:
@@ -328,18 +308,22 @@ def _copy_shards(parts: Sequence[_Part], storage: Folder, images: int) -> int:
     return number + 1
 
 
-def _copy_shard(part: _Part, shard: dict[str, Any], names: _Renaming, storage: Folder) -> None:
+def _copy_shard(part: _Part, shard: dict[str, Any], names: Renaming, storage: Folder) -> None:
     entries: dict[str, Any] = {}
     changed: Files = {}
     for path, (size, hashed) in shard["files"].items():
         new_path = names.path(path)
         entries[new_path] = [size, hashed]
-        if names.prefix and path.endswith((*_LABEL_SUFFIXES, ".tar")):
+        if names.changes_archive(path):
+            part.check(path, hashed)
+            with part.opened(path) as stream:
+                sums = Sums(names.archive(path, stream))
+                storage.write(new_path, sums)
+            entries[new_path] = sums.entry()
+            continue
+        if names.changes_label(path):
             content = part.intact(path, hashed)
-            try:
-                renamed = names.content(path, content)
-            except tarfile.TarError:
-                raise part.damaged(path) from None
+            renamed = names.content(content)
             if renamed != content:
                 changed[new_path] = renamed
                 entries[new_path] = [len(renamed), digest(renamed)]
@@ -351,9 +335,9 @@ def _copy_shard(part: _Part, shard: dict[str, Any], names: _Renaming, storage: F
     manifest = {
         **shard,
         "shard": number,
-        "images": names.values(shard["images"]),
+        "images": [names.text(stem) for stem in shard["images"]],
         "files": entries,
-        "records": names.values(shard["records"]),
+        "records": [names.record(record) for record in shard["records"]],
     }
     del manifest["digest"]
     storage.write(manifest_path(number), [seal(orjson.dumps(manifest))])

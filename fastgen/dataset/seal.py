@@ -1,6 +1,8 @@
 """Content hashes, and JSON files that contain a hash of their own content."""
 
 import hashlib
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 _LAST = b'"digest": "'
 
@@ -26,3 +28,20 @@ def is_sealed(text: bytes) -> bool:
         body.endswith(before) and seal(body.removesuffix(before) + end) == text
         for end, before in _LAYOUTS
     )
+
+
+class Sums:
+    """Iterator that passes pieces of a file on and adds up their size and hash."""
+
+    def __init__(self, pieces: Iterable[bytes]) -> None:
+        self._pieces, self._size, self._hash = pieces, 0, hashlib.sha256()
+
+    def __iter__(self) -> Iterator[bytes]:
+        for piece in self._pieces:
+            self._size += len(piece)
+            self._hash.update(piece)
+            yield piece
+
+    def entry(self) -> list[Any]:
+        """Return size and SHA-256 of the pieces so far, as manifests list them."""
+        return [self._size, self._hash.hexdigest()]

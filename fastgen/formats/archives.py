@@ -2,8 +2,9 @@
 
 import io
 import tarfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import PurePosixPath
+from typing import BinaryIO
 
 from fastgen.formats.format import Files, Record, Same
 from fastgen.sampling.scene import SPLITS
@@ -53,6 +54,40 @@ def tar_files(made: Sequence[Made], shard: int) -> Files:
                     tar.addfile(member, io.BytesIO(content))
         packed[f"{split}-{shard:06d}.tar"] = buffer.getvalue()
     return packed
+
+
+def renamed_tar(
+    stream: BinaryIO, rename: Callable[[str, bytes], tuple[str, bytes]]
+) -> Iterator[bytes]:
+    """Yield a tar file with other names in pieces, so that memory does not depend on its size.
+
+    Args:
+        stream: A file that `tar_files` made.
+        rename: Returns new name and new content of a member.
+
+    Raises:
+        tarfile.TarError: The file is not a tar file.
+    """
+    buffer = io.BytesIO()
+    with (
+        tarfile.open(fileobj=stream) as old,
+        tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as new,
+    ):
+        for member in old:
+            content = old.extractfile(member)
+            member.name, data = rename(member.name, content.read() if content else b"")
+            member.size = len(data)
+            new.addfile(member, io.BytesIO(data))
+            yield drained(buffer)
+    yield drained(buffer)
+
+
+def drained(buffer: io.BytesIO) -> bytes:
+    """Return the content of a buffer and empty it."""
+    content = buffer.getvalue()
+    buffer.seek(0)
+    buffer.truncate()
+    return content
 
 
 def _extension(path: str, stem: str) -> str:

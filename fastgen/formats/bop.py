@@ -1,13 +1,15 @@
 """BOP format for the poses of containers: bop_toolkit, docs/bop_datasets_format.md.
 
 Lengths are in millimetres, matrices are row-major and pixel centres are at whole numbers. Each
-split is one BOP scene. Image ids count the images of the whole dataset.
+split is one BOP scene. Image ids count the images of the whole dataset, and go on counting when
+datasets are merged.
 
 Masks of full silhouettes (`mask`) are not written; `scene_gt_info.json` has their boxes and pixel
 counts. `px_count_valid` counts pixels of the visible part only.
 """
 
 import json
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -25,6 +27,9 @@ from fastgen.scene.container_kinds import KINDS
 OBJECT_IDS = {kind: i + 1 for i, kind in enumerate(KINDS)}
 """Object id by kind of container."""
 
+
+_OF_IMAGE = re.compile(r"(bop/\w+/\d+/(?:rgb|depth|mask_visib)/)(\d{6,})(\D.*)")
+"""Path of a file of one image: its folder, the number of the image, and the rest."""
 
 _LENS_KEYS = ("distortion_model", "distortion")
 
@@ -72,7 +77,11 @@ class _Bop(Format):
                     "visib_fract": thing.visible_fraction,
                 }
             )
-        return files, {"id": item.number, "camera": camera, "gt": poses, "info": infos}
+        return files, {"camera": camera, "gt": poses, "info": infos}
+
+    def renumbered(self, path: str, by: int) -> str:
+        found = _OF_IMAGE.fullmatch(path)
+        return f"{found[1]}{int(found[2]) + by:06d}{found[3]}" if found else path
 
     def dataset_files(self, split: str, records: Records, config: Config) -> DatasetFiles:
         for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
@@ -86,7 +95,7 @@ def _by_image(records: Records, key: str) -> Iterator[str]:
     yield "{"
     for count, record in enumerate(records()):
         fact = record["facts"]["bop"]
-        yield f'{"," if count else ""}\n"{fact["id"]}": {json.dumps(fact[key])}'
+        yield f'{"," if count else ""}\n"{record["number"]}": {json.dumps(fact[key])}'
     yield "}\n"
 
 

@@ -72,6 +72,17 @@ class Format(ABC):
         The shard's manifest keeps the facts; the other methods work on them.
         """
 
+    def renumbered(self, path: str, by: int) -> str:
+        """Return the path of a sample's file after the number of its image rose.
+
+        Numbers rise when datasets are merged, and `Record["number"]` rises too.
+
+        Args:
+            path: Path of a file of any format.
+            by: By how much.
+        """
+        return path
+
     def with_classes(self, classes: Sequence[str]) -> "Format":
         """Return this format for the class list of a dataset, which a configuration may change."""
         return self

@@ -5,18 +5,25 @@ of a sample in tar files with `_` for `.`, as in `damage_png`; and for each task
 annotations a column of labels: lists of boxes, categories from 0, areas, and flags of crowds.
 """
 
+import contextlib
 import io
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from fastgen.config.config import Config
+from fastgen.errors import OutputError
 from fastgen.formats import coco
-from fastgen.formats.archives import Made, by_split, members
+from fastgen.formats.archives import Made, by_split, drained, members
 from fastgen.formats.format import Files, Format
+
+if TYPE_CHECKING:
+    import pyarrow.parquet as pq
 
 _ROWS = 100
 """Rows per row group, so that readers of single rows need not load hundreds of images."""
+
+_COMPRESSION = "zstd"
 
 _RENAMED = {"jpg": "image", "json": "scene"}
 
@@ -46,9 +53,65 @@ def parquet_files(
         )
         buffer = io.BytesIO()
         table = pa.Table.from_pylist(rows, schema)
-        pq.write_table(table, buffer, row_group_size=_ROWS, compression="zstd")
+        pq.write_table(table, buffer, row_group_size=_ROWS, compression=_COMPRESSION)
         packed[f"{split}-{shard:06d}.parquet"] = buffer.getvalue()
     return packed
+
+
+@contextlib.contextmanager
+def opened_table(stream: BinaryIO) -> Iterator["pq.ParquetFile"]:
+    """Open a Parquet file for the length of a block.
+
+    Raises:
+        OutputError: pyarrow is not installed.
+        ValueError: The file is not as `parquet_files` made it.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise OutputError(
+            "parquet: reading this dataset needs pyarrow: pip install 'fastgen[parquet]'"
+        ) from None
+    try:
+        yield pq.ParquetFile(stream)
+    except (pa.ArrowException, AttributeError, KeyError, OSError, TypeError) as error:
+        raise ValueError(f"is not as fastgen writes it ({error})") from None
+
+
+def renamed_table(stream: BinaryIO, rename: Callable[[str], str], by: int) -> Iterator[bytes]:
+    """Yield a Parquet file with other names in pieces, so that memory holds one row group.
+
+    Args:
+        stream: A file that `parquet_files` made.
+        rename: Returns the new form of a text that may contain names of images.
+        by: Added to each `image_id`.
+
+    Raises:
+        ValueError: The file is not such a file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    buffer = io.BytesIO()
+    with opened_table(stream) as old:
+        with pq.ParquetWriter(buffer, old.schema_arrow, compression=_COMPRESSION) as new:
+            for group in range(old.num_row_groups):
+                rows = [_texts(row, rename) for row in old.read_row_group(group).to_pylist()]
+                for row in rows:
+                    row["image_id"] += by
+                new.write_table(pa.Table.from_pylist(rows, old.schema_arrow))
+                yield drained(buffer)
+        yield drained(buffer)
+
+
+def _texts(value: Any, rename: Callable[[str], str]) -> Any:
+    """Return a value of a row with its texts in their new form."""
+    if isinstance(value, str):
+        return rename(value)
+    if isinstance(value, dict):
+        return {key: _texts(each, rename) for key, each in value.items()}
+    return value
 
 
 def _row(sample: Made, tasks: Mapping[str, coco.Task | None]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from fastgen.dataset.job import ARCHIVE_ENDINGS, scene_and_camera
 from fastgen.dataset.manifest_types import parsed_json, unfit
 from fastgen.errors import OutputError
 from fastgen.formats.format import Record
+from fastgen.formats.parquet import opened_table
 from fastgen.report.labels import is_box
 
 MOST_ARCHIVES = 24
@@ -209,16 +210,8 @@ def _tar_members(stream: io.BufferedReader, stems: set[str]) -> dict[str, tuple[
 
 def _parquet_rows(stream: io.BufferedReader, stems: set[str]) -> dict[str, tuple[bytes, bytes]]:
     """Return image and scene file of the rows with these stems."""
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise OutputError(
-            "parquet: reading this dataset needs pyarrow: pip install 'fastgen[parquet]'"
-        ) from None
     found = {}
-    try:
-        table = pq.ParquetFile(stream)
+    with opened_table(stream) as table:
         for group in range(table.num_row_groups):
             names = table.read_row_group(group, ["stem"])["stem"].to_pylist()
             if stems.isdisjoint(names):
@@ -230,8 +223,6 @@ def _parquet_rows(stream: io.BufferedReader, stems: set[str]) -> dict[str, tuple
                 if name in stems:
                     image, scene = (rows[column][at].as_py() for column in ("image", "scene"))
                     found[name] = (image["bytes"], scene.encode())
-    except (pa.ArrowException, KeyError, AttributeError, TypeError) as error:
-        raise ValueError(f"is not as fastgen writes it ({error})") from None
     return found
 
 
