@@ -1,7 +1,5 @@
 """Shading passes: pixels that see surfaces are sorted into classes, and each class is shaded."""
 
-import os
-import random
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -26,11 +24,6 @@ class ShadingPass:
     def __init__(self, ctx: moderngl.Context, programs: Programs) -> None:
         self._ctx = ctx
         self._programs = programs
-        # A driver compiles a program at its first dispatch, which takes seconds. Processes that
-        # start together compile in different orders, so that each finds some programs in the
-        # driver's cache.
-        self._order = list(PIXEL_CLASSES)
-        random.Random(os.getpid()).shuffle(self._order)
 
     def run(self, inputs: DrawInputs) -> None:
         """Classify and shade the pixels, in bands of as many rows as the lists have room for."""
@@ -68,7 +61,7 @@ class ShadingPass:
     def _shade(self, inputs: DrawInputs) -> None:
         """Shade the listed pixels of each class, in any order, because no pixel is in two lists."""
         listed = listed_classes(inputs.variant.samples_per_axis)
-        for name in self._order:
+        for name in PIXEL_CLASSES:
             if name in listed and _occurs(name, inputs.variant):
                 # scenes with and without damage share the programs
                 damage = "holed" if "DAMAGE" in PIXEL_CLASSES[name] else "undamaged"
