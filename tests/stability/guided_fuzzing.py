@@ -3,8 +3,8 @@
     pip install atheris
     python -m tests.stability.guided_fuzzing exr FOLDER -runs=20000 -rss_limit_mb=3072 -timeout=60
 
-The first word is a key of READERS. FOLDER keeps the inputs that reached new code, and a later run
-continues from them. The options are those of libFuzzer. A run stops with a traceback at the first
+The first word is a key of READERS. FOLDER keeps the inputs that reached new code or failed, and a later
+run continues from them. The options are those of libFuzzer. A run stops with a traceback at the first
 input that is neither read nor refused in one clear line, that takes longer than the timeout, or
 more memory than the limit.
 """
@@ -126,8 +126,10 @@ def main() -> None:
     corpus.mkdir(parents=True, exist_ok=True)
     for number, seed in enumerate(seeds(name)):
         (corpus / f"seed_{number}").write_bytes(seed)
+    found = f"-artifact_prefix={corpus}/"  # inputs that fail
     atheris.Setup(
-        [sys.argv[0], str(corpus), *options], lambda data: refused_clearly(lambda: read(data))
+        [sys.argv[0], str(corpus), found, *options],
+        lambda data: refused_clearly(lambda: read(data)),
     )
     atheris.Fuzz()
 
