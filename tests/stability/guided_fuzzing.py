@@ -3,10 +3,10 @@
     pip install atheris
     python -m tests.stability.guided_fuzzing exr FOLDER -runs=20000 -rss_limit_mb=3072 -timeout=60
 
-The first word is a key of READERS. FOLDER keeps the inputs that reached new code or failed, and a later
-run continues from them. The options are those of libFuzzer. A run stops with a traceback at the first
-input that is neither read nor refused in one clear line, that takes longer than the timeout, or
-more memory than the limit.
+The first word is a key of READERS. FOLDER keeps the inputs that reached new code or failed, and a
+later run continues from them. The options are those of libFuzzer. A run stops with a traceback at
+the first input that is neither read nor refused in one clear line, that takes longer than the
+timeout, or more memory than the limit.
 """
 
 import json
