@@ -1,17 +1,11 @@
 """The page of `fastgen report` in Chromium, from a file and without network."""
 
 import shutil
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import sync_playwright
+from screenshots import chromium
 
 from fastgen.report.page import write_report
-
-FLAGS = (
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -24,17 +18,8 @@ def report(report_dataset, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+    with chromium() as opened:
         yield opened
-        opened.close()
-
-
-def chromium():
-    """Return the path of Debian's Chromium, which the tests need."""
-    path = Path("/usr/bin/chromium")
-    assert path.exists(), "install chromium: apt-get install chromium"
-    return str(path)
 
 
 @pytest.fixture

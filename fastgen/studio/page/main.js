@@ -50,10 +50,10 @@ const hooks = {
     clearErrors();
     // messages begin with the key or the setting that is wrong
     const named = (name) => error.message.startsWith(name) && /^[:.[]/.test(error.message.slice(name.length));
-    const [culprit] = [...controls, ...Object.values(fields)]
+    const [{ key } = {}] = [...controls, ...Object.values(fields)]
       .filter((each) => named(each.key)).sort((a, b) => b.key.length - a.key.length);
-    culprit?.fail(error.message);
-    if (culprit) get("status").textContent = `Not drawn: ${error.message}`;
+    for (const each of [...controls, ...Object.values(fields)]) if (each.key === key) each.fail(error.message);
+    if (key) get("status").textContent = `Not drawn: ${error.message}`;
   },
 };
 
