@@ -100,11 +100,10 @@ function choose(item, behind = []) {
 }
 
 function recordOf(item) {
-  const skipped = ["polygon", "quad", "parts", "keypoints", "color"];
   const words = (value) => (Array.isArray(value) ? value.map((v) => Math.round(v * 10) / 10).join(", ")
     : typeof value === "number" ? `${Number(value.toFixed(3))}` : `${value}`);
   return Object.entries(item)
-    .filter(([name, value]) => !skipped.includes(name) && value !== "" && value !== null && value !== false)
+    .filter(([name, value]) => name !== "color" && value !== "" && value !== null && value !== false)
     .map(([name, value]) => [name.replaceAll("_", " "), words(value)]);
 }
 
