@@ -3,9 +3,9 @@
     python bench/studio_latency.py [--moves 40] [--size 640x640] [--preset seafront]
 
 Each move waits until the draft of the last one is on the screen. The table has medians over the
-moves of one slider: wall time from the event of the slider to the frame with the picture, what the
-server reports as the time for sampling and rendering, and what is left for requests, copies and
-painting. CPU time is a mean per move; Chromium's includes Playwright.
+moves of one slider. "picture" is the wall time from the event of the slider to the frame with the
+picture. "render" is the part that the server reports for sampling and rendering, and "rest" is
+left for requests, copies and painting. CPU time is a mean per move; Chromium's includes Playwright.
 
 It needs Playwright (`pip install playwright`) and Chromium (`make chromium`). The table is only
 printed, because the figures depend on the load of the machine.
