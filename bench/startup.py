@@ -59,8 +59,8 @@ def measured(tree: Path, cache: Path, images: int, quality: str) -> Run:
             stderr=subprocess.DEVNULL,
         )
         while process.poll() is None:
-            for pid in _family(process.pid):
-                cpu_s[pid] = max(_cpu_s(pid), cpu_s.get(pid, 0.0))
+            for pid in family(process.pid):
+                cpu_s[pid] = max(cpu_seconds(pid), cpu_s.get(pid, 0.0))
                 memory = _memory_mb(pid) if pid != process.pid else (0.0, 0.0)
                 most = max(most, memory, key=lambda each: each[0])
             time.sleep(_POLL_S)
@@ -70,17 +70,17 @@ def measured(tree: Path, cache: Path, images: int, quality: str) -> Run:
     return Run(wall_s, sum(cpu_s.values()), *most)
 
 
-def _family(pid: int) -> list[int]:
+def family(pid: int) -> list[int]:
     """Return a process and all its descendants."""
     try:
         tasks = [task / "children" for task in Path(f"/proc/{pid}/task").iterdir()]
         children = [int(child) for task in tasks for child in task.read_text("ascii").split()]
     except OSError:  # the process has ended
         return [pid]
-    return [pid, *(each for child in children for each in _family(child))]
+    return [pid, *(each for child in children for each in family(child))]
 
 
-def _cpu_s(pid: int) -> float:
+def cpu_seconds(pid: int) -> float:
     """Return the CPU time of a process so far, 0 if it has ended; see proc_pid_stat(5)."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text("ascii").rpartition(")")[2].split()

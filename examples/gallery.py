@@ -156,6 +156,9 @@ SECTIONS = {
             _damage("dented: crush marks", "dented", 11, marks={"probability": 1.0}),
             _damage("perforation: a torn hole", "perforation", 5),
             _damage("scrape", "scrape", 6),
+            _damage("rust_through: pits and holes", "rust_through", 3),
+            _damage("missing_paint: flaked off", "missing_paint", 9),
+            _damage("graffiti: a sprayed tag", "graffiti", 11),
         )
     ),
     "light": Section(

@@ -191,12 +191,12 @@ def caption_place(
     y = np.clip(y, 0, max(image_size[1] - height - 1, 0))
     corners = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     places = np.concatenate([corners, corners + (width, height)], axis=1)
-    hidden = _overlaps(places, boxes) / _areas(boxes)
-    covered = _overlaps(places, taken) / (width * height)
+    hidden = _overlaps(x, y, size, boxes, 1 / _areas(boxes))
+    covered = _overlaps(x, y, size, taken, 1 / (width * height))
     away = np.linalg.norm(np.subtract(*_gap(boxes[index], places)), axis=-1) / height
     # ties go to the caption above the left corner
     usual = np.linalg.norm(corners - (x0, y0 - height), axis=1) / height
-    cost = _HIDING * hidden.sum(axis=1) + _COVERING * covered.sum(axis=1) + away + 0.1 * usual
+    cost = _HIDING * hidden + _COVERING * covered + away + 0.1 * usual
     return np.asarray(places[int(cost.argmin())])
 
 
@@ -205,11 +205,19 @@ def _areas(boxes: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(sides.prod(axis=1))
 
 
-def _overlaps(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return the areas [A, B] that boxes [A, 4] and [B, 4] share."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
-    return np.asarray(np.maximum(high - low, 0).prod(axis=-1))
+def _overlaps(
+    x: NDArray[np.floating],
+    y: NDArray[np.floating],
+    size: tuple[int, int],
+    boxes: NDArray[np.floating],
+    weights: NDArray[np.floating] | float,
+) -> NDArray[np.float64]:
+    """Return the weighted sums [Y * X] of the areas that captions at y and x share with boxes."""
+    width, height = size
+    across = np.minimum(x[:, None] + width, boxes[:, 2]) - np.maximum(x[:, None], boxes[:, 0])
+    down = np.minimum(y[:, None] + height, boxes[:, 3]) - np.maximum(y[:, None], boxes[:, 1])
+    # places are a grid, so an area is the product of a term of the column and one of the row
+    return np.asarray((np.maximum(down, 0) * weights @ np.maximum(across, 0).T).ravel())
 
 
 def _gap(

@@ -28,6 +28,13 @@ def test_every_arrangement_and_preset_has_a_tile():
     assert {tile.preset for tile in gallery.SECTIONS["presets"].tiles} == set(PRESETS)
 
 
+def test_every_bundled_kind_of_damage_has_a_tile():
+    from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+
+    kinds = {kind for tile in gallery.SECTIONS["damage"].tiles for kind in tile.config.damage.kinds}
+    assert kinds == set(BUNDLED_DAMAGE_CLASSES)
+
+
 def test_gallery_pages_show_every_stored_picture():
     for page, folder in (("gallery.md", "gallery"), ("output_pictures.md", "outputs")):
         shown = re.findall(rf"\({folder}/(\w+\.jpg)\)", (PAGES / page).read_text())

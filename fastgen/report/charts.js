@@ -43,7 +43,8 @@ function legend(names, colors) {
 function table(head, rows, kind = "") {
   return el("div", { class: "scroll" }, el("table", { class: kind },
     el("thead", {}, el("tr", {}, head.map((word) => el("th", { scope: "col" }, word)))),
-    el("tbody", {}, rows.map((row) => el("tr", {}, row.map((cell) => el("td", {}, cell)))))));
+    el("tbody", {}, rows.map((row) => el("tr", {},
+      row.map((cell, i) => el("td", { "data-column": head[i] }, cell)))))));
 }
 
 // Horizontal bars of stacked parts. Each row is { name, color, parts }.
@@ -64,25 +65,29 @@ function bars(rows, names, colors, logarithmic) {
   }));
 }
 
+// Width of charts in px. They are scaled down where they do not fit, so that a narrow window would make letters tiny.
+const WIDE = Math.min(640, document.documentElement.clientWidth - 66);
+
 // A histogram of counts between `low` and `high`.
 function histogram(counts, low, high, words) {
-  const [width, height, left, bottom] = [640, 190, 46, 22];
+  const [width, height, left, right, bottom] = [WIDE, 190, 46, 12, 22];
   const most = Math.max(1, ...counts);
-  const step = (width - left) / counts.length;
+  const step = (width - left - right) / counts.length;
   const tall = (value) => (height - bottom - 12) * value / most;
   const chart = el("svg", { class: "chart", viewBox: `0 0 ${width} ${height}`, role: "img",
     "aria-label": words });
+  const edge = (i) => (low + (high - low) * i / counts.length).toFixed(1);
+  const number = (i) => el("text", { x: left + i * step, y: height - 6, "text-anchor": "middle" }, edge(i));
   counts.forEach((value, i) => {
-    const from = low + (high - low) * i / counts.length;
-    const to = low + (high - low) * (i + 1) / counts.length;
     chart.append(
       el("rect", { x: left + i * step + 1, width: step - 2, y: height - bottom - tall(value),
         height: tall(value), style: { fill: "var(--train)" } },
-      el("title", {}, `${from.toFixed(1)} to ${to.toFixed(1)}: ${count(value)}`)),
-      el("text", { x: left + i * step, y: height - 6, "text-anchor": "middle" }, from.toFixed(1)));
+      el("title", {}, `${edge(i)} to ${edge(i + 1)}: ${count(value)}`)),
+      number(i));
   });
   chart.append(
-    el("line", { class: "grid", x1: left, x2: width, y1: height - bottom, y2: height - bottom }),
+    number(counts.length),
+    el("line", { class: "grid", x1: left, x2: width - right, y1: height - bottom, y2: height - bottom }),
     el("text", { x: left - 6, y: 16, "text-anchor": "end" }, count(most)));
   return chart;
 }
@@ -91,7 +96,8 @@ function histogram(counts, low, high, words) {
 function spans(rows, unit) {
   const values = rows.flatMap((row) => row.values);
   const [low, high] = [Math.floor(Math.min(...values)), Math.ceil(Math.max(...values) + 1e-9)];
-  const [width, left, step] = [640, 190, 22];
+  const [width, left, step] = [WIDE, Math.min(190, 0.34 * WIDE), 22];
+  const letters = Math.floor(left / 7.3);
   const height = rows.length * step + 26;
   const at = (value) => left + (width - left - 14) * (value - low) / Math.max(high - low, 1);
   const chart = el("svg", { class: "chart", viewBox: `0 0 ${width} ${height}`, role: "img",
@@ -105,7 +111,7 @@ function spans(rows, unit) {
   rows.forEach((row, i) => {
     const y = i * step + step / 2;
     const [first, second, middle, fourth, last] = row.values;
-    const name = row.name.length > 26 ? `${row.name.slice(0, 25)}…` : row.name;
+    const name = row.name.length > letters ? `${row.name.slice(0, letters - 1)}…` : row.name;
     chart.append(el("g", {},
       el("title", {}, `${row.name}, ${row.note}: median ${middle.toFixed(2)} ${unit}`),
       el("text", { x: left - 8, y: y + 4, "text-anchor": "end" }, name),
@@ -119,26 +125,31 @@ function spans(rows, unit) {
   return chart;
 }
 
+// The line below a chart that describes the cell under the pointer.
+const hint = () => el("p", { class: "small soft" }, "Point at a cell to read its value.");
+
 // A picture of a grid of numbers, row by row from the top. `words(column, row, value)` describes
 // the cell under the pointer.
 function heat(values, columns, rows, words) {
   const side = Math.max(4, Math.floor(440 / Math.max(columns, rows)));
   const canvas = el("canvas", { width: columns * side, height: rows * side, role: "img" });
-  const note = el("p", { class: "small soft" }, "Point at a cell to read its value.");
+  const note = hint();
   const most = Math.max(1, ...values);
   const pen = canvas.getContext("2d");
   values.forEach((value, i) => {
     pen.fillStyle = shade(value / most);
     pen.fillRect((i % columns) * side, Math.floor(i / columns) * side, side, side);
   });
-  canvas.addEventListener("pointermove", (event) => {
+  const read = (event) => {
     const frame = canvas.getBoundingClientRect();
     const column = Math.floor((event.clientX - frame.left) / frame.width * columns);
     const row = Math.floor((event.clientY - frame.top) / frame.height * rows);
     if (column >= 0 && column < columns && row >= 0 && row < rows) {
       note.textContent = words(column, row, values[row * columns + column]);
     }
-  });
+  };
+  canvas.addEventListener("pointermove", read);
+  canvas.addEventListener("pointerdown", read);  // a touch without movement
   return { canvas, note };
 }
 

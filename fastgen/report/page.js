@@ -186,17 +186,19 @@ function exposure() {
 
 function together() {
   const shown = occurring;
+  const note = hint();
   const cell = (row, column) => {
     const share = report.together[row][column] / report.together[row][row];
     const words = `${percent(share)} of the images with ${title(row)} also show ${title(column)}`;
-    return el("td", { title: words, style: { background: shade(share) }, "aria-label": words });
+    const read = () => { note.textContent = words; };
+    return el("td", { title: words, style: { background: shade(share) }, "aria-label": words, onpointerover: read });
   };
   const matrix = el("table", { class: "matrix" },
     el("thead", {}, el("tr", {}, el("td"), shown.map((index) => el("th", { scope: "col" }, title(index))))),
     el("tbody", {}, shown.map((row) => el("tr", {}, el("th", { scope: "row" }, title(row)),
       shown.map((column) => cell(row, column))))));
   section("together", "Classes that appear together", "Share of the images with the class of the row that also "
-    + "show the class of the column. Point at a cell to read it.", el("div", { class: "scroll" }, matrix));
+    + "show the class of the column. Columns are in the order of rows.", el("div", { class: "scroll" }, matrix), note);
 }
 
 function texts() {

@@ -1,5 +1,6 @@
 """Images and records of a rendered sample, as the page shows them."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,14 @@ from fastgen.errors import ConfigError
 from fastgen.files.images import jpeg
 from fastgen.light.hdri import load_radiance
 from fastgen.overlay import DAMAGE_GREYS, ID_GREYS, class_hex, depth_colors, label_colors
-from fastgen.sample import Sample
+from fastgen.sample import Object, Sample
 from fastgen.validation import check_known, to_plain
 
 PICTURE_LAYERS = ("colour", "ids", "damage", "depth", "normals", "background")
 """Layers that are images. The page draws boxes itself."""
+
+_OUTLINES = ("polygon", "quad", "parts", "keypoints")
+"""Fields of objects that the page does not show."""
 
 _THUMBNAIL = (192, 96)
 _THUMBNAIL_MEAN = 0.25
@@ -43,7 +47,7 @@ def layer_image(sample: Sample, layer: str) -> Image:
     check_known("layer", layer, PICTURE_LAYERS)
     match layer:
         case "colour":
-            return _with_alpha(sample.image, np.ones_like(sample.ids, bool))
+            return np.asarray(cv2.cvtColor(sample.image, cv2.COLOR_RGB2RGBA), np.uint8)
         case "ids":
             return _with_alpha(label_colors(sample.ids, ID_GREYS), sample.ids > 0)
         case "damage":
@@ -73,8 +77,13 @@ def pixel_values(sample: Sample) -> bytes:
 
 
 def object_records(sample: Sample) -> list[dict[str, Any]]:
-    """Return the objects of a sample in plain JSON, each with the colour of its box."""
-    return [{**to_plain(item), "color": class_hex(item.class_name)} for item in sample.objects]
+    """Return what the page shows of the objects in plain JSON, with the colours of their boxes."""
+    shown = [field.name for field in fields(Object) if field.name not in _OUTLINES]
+    return [
+        {name: to_plain(getattr(item, name)) for name in shown}
+        | {"color": class_hex(item.class_name)}
+        for item in sample.objects
+    ]
 
 
 def depth_range(sample: Sample) -> tuple[float, float] | None:
@@ -95,4 +104,4 @@ def thumbnail(path: Path) -> bytes:
 
 
 def _with_alpha(colors: Image, known: NDArray[np.bool_]) -> Image:
-    return np.dstack([colors, np.where(known, np.uint8(255), np.uint8(0))])
+    return np.asarray(cv2.merge([colors, np.where(known, np.uint8(255), np.uint8(0))]), np.uint8)

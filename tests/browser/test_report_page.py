@@ -1,17 +1,11 @@
 """The page of `fastgen report` in Chromium, from a file and without network."""
 
 import shutil
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import sync_playwright
+from screenshots import chromium
 
 from fastgen.report.page import write_report
-
-FLAGS = (
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -24,17 +18,8 @@ def report(report_dataset, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def browser():
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+    with chromium() as opened:
         yield opened
-        opened.close()
-
-
-def chromium():
-    """Return the path of Debian's Chromium, which the tests need."""
-    path = Path("/usr/bin/chromium")
-    assert path.exists(), "install chromium: apt-get install chromium"
-    return str(path)
 
 
 @pytest.fixture
@@ -72,6 +57,8 @@ def shown_boxes(page, name):
 @wide_and_narrow
 def test_the_page_fits_its_window(page):
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    tables = "[...document.querySelectorAll('.scroll')]"
+    assert page.evaluate(f"{tables}.every((table) => table.scrollWidth <= table.clientWidth)")
     loaded = "[...document.images].every((image) => image.naturalWidth > 0)"
     assert page.evaluate(loaded)
     assert page.locator(".tile").count() == 8
@@ -140,6 +127,27 @@ def test_cells_of_maps_say_their_value(page):
     canvas.hover()  # its middle
     note = page.locator("#places p.small").inner_text()
     assert note.endswith(": 8 boxes")
+
+
+@wide_and_narrow
+def test_cells_of_the_table_of_pairs_say_their_value(page):
+    row = page.locator("#together tbody tr", has_text="container").first
+    # every image shows a container, so the diagonal is 100 %
+    row.locator("td").nth(
+        page.locator("#together tbody th").all_inner_texts().index("container")
+    ).hover()
+    note = page.locator("#together p.small").inner_text()
+    assert note == "100 % of the images with container also show container"
+
+
+@wide_and_narrow
+def test_letters_of_charts_are_not_scaled_down(page):
+    scales = page.evaluate(
+        "[...document.querySelectorAll('svg.chart')]"
+        ".map((chart) => chart.getBoundingClientRect().width / chart.viewBox.baseVal.width)"
+    )
+    assert len(scales) == 3
+    assert min(scales) > 0.85
 
 
 @wide_and_narrow

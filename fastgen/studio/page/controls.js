@@ -104,9 +104,10 @@ function weights(spec, label, onChange) {
     field.addEventListener("input", onChange);
     return [name, field];
   });
+  const words = (name) => name.replaceAll("_", "_\u200b"); // lines may break after an underscore
   return {
     element: node("div", { className: "weights" },
-      ...fields.map(([name, field]) => node("label", { className: "small" }, `${name} `, field))),
+      ...fields.map(([name, field]) => node("label", { className: "small" }, words(name), field))),
     get: () => Object.fromEntries(
       fields.filter(([, field]) => field.value !== "").map(([name, field]) => [name, Number(field.value)])),
     set: (value) => fields.forEach(([name, field]) => (field.value = value[name] ?? "")),

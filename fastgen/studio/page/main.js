@@ -50,10 +50,10 @@ const hooks = {
     clearErrors();
     // messages begin with the key or the setting that is wrong
     const named = (name) => error.message.startsWith(name) && /^[:.[]/.test(error.message.slice(name.length));
-    const [culprit] = [...controls, ...Object.values(fields)]
+    const [{ key } = {}] = [...controls, ...Object.values(fields)]
       .filter((each) => named(each.key)).sort((a, b) => b.key.length - a.key.length);
-    culprit?.fail(error.message);
-    if (culprit) get("status").textContent = `Not drawn: ${error.message}`;
+    for (const each of [...controls, ...Object.values(fields)]) if (each.key === key) each.fail(error.message);
+    if (key) get("status").textContent = `Not drawn: ${error.message}`;
   },
 };
 
@@ -100,11 +100,10 @@ function choose(item, behind = []) {
 }
 
 function recordOf(item) {
-  const skipped = ["polygon", "quad", "parts", "keypoints", "color"];
   const words = (value) => (Array.isArray(value) ? value.map((v) => Math.round(v * 10) / 10).join(", ")
     : typeof value === "number" ? `${Number(value.toFixed(3))}` : `${value}`);
   return Object.entries(item)
-    .filter(([name, value]) => !skipped.includes(name) && value !== "" && value !== null && value !== false)
+    .filter(([name, value]) => name !== "color" && value !== "" && value !== null && value !== false)
     .map(([name, value]) => [name.replaceAll("_", " "), words(value)]);
 }
 

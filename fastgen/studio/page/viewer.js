@@ -6,6 +6,15 @@ const LARGEST_ZOOM = 64;
 // the picture point `x`, `y` in the middle of the canvas, as fractions of the picture.
 export const camera = { scale: 0, x: 0.5, y: 0.5 };
 
+const colorOf = (item) => (item.background ? "#969696" : item.color);
+
+// Black or white, whichever has more contrast with a colour #rrggbb: the relative luminance of WCAG 2.2, with the
+// transfer curve of sRGB as a power of 2.2.
+function inkOn(color) {
+  const [r, g, b] = [1, 3, 5].map((at) => (parseInt(color.slice(at, at + 2), 16) / 255) ** 2.2);
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b > 0.179 ? "#000" : "#fff";
+}
+
 export class Viewer {
   // onMove: called after zoom or position has changed; onPoint(x, y): called with the picture pixel
   // under the pointer, or with undefined when the pointer leaves.
@@ -147,35 +156,51 @@ export class Viewer {
     pen.clearRect(0, 0, width, height);
     pen.imageSmoothingEnabled = scale < 2;
     pen.imageSmoothingQuality = "high";
+    const frame = [left, top, scale, ratio];
+    const others = this.objects.filter((item) => item !== this.chosen);
+    const captions = []; // places [x, y, width]
     for (const { name, on, opacity } of this.layers) {
       pen.globalAlpha = opacity;
       const image = this.images[name];
       if (on && image) pen.drawImage(image, left, top, this.size[0] * scale, this.size[1] * scale);
-      if (on && name === "boxes") this.paintBoxes(pen, left, top, scale, ratio);
+      if (on && name === "boxes") this.paintBoxes(pen, others, frame, captions);
     }
     pen.globalAlpha = 1;
-    if (this.chosen) this.paintBox(pen, this.chosen, [left, top, scale, ratio], true);
+    if (this.chosen) this.paintBoxes(pen, [this.chosen], frame, captions);
   }
 
-  paintBoxes(pen, left, top, scale, ratio) {
-    for (const item of this.objects) this.paintBox(pen, item, [left, top, scale, ratio], false);
-  }
-
-  paintBox(pen, item, [left, top, scale, ratio], strong) {
-    if (!item.bbox) return;
-    const [x0, y0, x1, y1] = item.bbox;
-    const [x, y] = [left + x0 * scale, top + y0 * scale];
-    pen.lineWidth = (strong ? 3 : 1.5) * ratio;
-    pen.strokeStyle = item.background ? "#969696" : item.color;
-    pen.strokeRect(x, y, (x1 - x0) * scale, (y1 - y0) * scale);
-    if (item.background && !strong) return;
+  // Draw the boxes of objects that are in sight, then their captions, whose places are added to `captions`.
+  paintBoxes(pen, objects, [left, top, scale, ratio], captions) {
     pen.font = `${11 * ratio}px system-ui, sans-serif`;
+    const boxes = objects.filter((item) => item.bbox).map((item) => {
+      const [x0, y0, x1, y1] = item.bbox.map((v, k) => (k % 2 ? top : left) + v * scale);
+      return { item, x0, y0, x1, y1, area: (x1 - x0) * (y1 - y0), isChosen: item === this.chosen };
+    }).filter(({ x0, y0, x1, y1 }) => x1 > 0 && y1 > 0 && x0 < this.canvas.width && y0 < this.canvas.height);
+    for (const { item, x0, y0, x1, y1, isChosen } of boxes) {
+      pen.lineWidth = (isChosen ? 3 : 1.5) * ratio;
+      pen.strokeStyle = colorOf(item);
+      pen.strokeRect(x0, y0, x1 - x0, y1 - y0);
+    }
+    // small boxes have the least choice
+    for (const box of boxes.sort((a, b) => a.area - b.area)) {
+      if (box.isChosen || !box.item.background) captions.push(this.paintCaption(pen, box, captions, ratio));
+    }
+  }
+
+  // Draw a caption beside its box where it covers the least of earlier ones; return its place.
+  paintCaption(pen, { item, x0, y0, x1, y1 }, captions, ratio) {
     const words = item.text ? `${item.class_name} ${item.text}` : `${item.class_name} ${item.instance}`;
-    const tall = 14 * ratio;
-    const base = y >= tall ? y - tall : y;
-    pen.fillStyle = pen.strokeStyle;
-    pen.fillRect(x, base, pen.measureText(words).width + 6 * ratio, tall);
-    pen.fillStyle = "#000";
-    pen.fillText(words, x + 3 * ratio, base + 11 * ratio);
+    const [wide, tall] = [pen.measureText(words).width + 6 * ratio, 14 * ratio];
+    const inside = (v, most) => Math.min(Math.max(v, 0), most);
+    const beside = [[x0, y0 - tall], [x0, y1], [x1 - wide, y0 - tall], [x1 - wide, y1], [x1, y0], [x0 - wide, y0]]
+      .map(([x, y]) => [inside(x, this.canvas.width - wide), inside(y, this.canvas.height - tall), wide]);
+    const shared = ([x, y]) => captions.reduce((sum, [x2, y2, wide2]) => sum
+      + Math.max(Math.min(x + wide, x2 + wide2) - Math.max(x, x2), 0) * Math.max(tall - Math.abs(y - y2), 0), 0);
+    const place = beside.reduce((best, each) => (shared(each) < shared(best) ? each : best));
+    pen.fillStyle = colorOf(item);
+    pen.fillRect(place[0], place[1], wide, tall);
+    pen.fillStyle = inkOn(pen.fillStyle);
+    pen.fillText(words, place[0] + 3 * ratio, place[1] + 11 * ratio);
+    return place;
   }
 }
