@@ -33,7 +33,7 @@ from bpy_extras.object_utils import world_to_camera_view
 _CENTER_SAMPLES = 16  # for ambient occlusion; depth and index use the first sample
 _MARGIN_PX = 4
 _CENTER_WIDTH_PX = 0.01  # Cycles' narrowest filter: rays go through the pixel centre
-_LIGHT_MAP_WIDTH = 8192  # Blender's largest
+_WIDEST_LIGHT_MAP = 8192  # Blender's limit
 _SURROUNDINGS = ("ground", "prop_")
 
 
@@ -70,13 +70,13 @@ def load(path: Path, camera: str, hdri: Path) -> None:
     world = bpy.data.worlds.new("environment")
     world.use_nodes = True
     scene.world = world
-    # the automatic map is too coarse for the sun's disc, which then leaves bright specks
-    world.cycles.sampling_method = "MANUAL"
-    world.cycles.sample_map_resolution = _LIGHT_MAP_WIDTH
     nodes, links = world.node_tree.nodes, world.node_tree.links
     picture = nodes.new("ShaderNodeTexEnvironment")
     picture.image = bpy.data.images.load(str(hdri))
     picture.image.colorspace_settings.name = "Linear Rec.709"
+    # the automatic map is too coarse for the sun's disc, which then leaves bright specks
+    world.cycles.sampling_method = "MANUAL"
+    world.cycles.sample_map_resolution = min(2 * picture.image.size[0], _WIDEST_LIGHT_MAP)
     place = nodes.new("ShaderNodeMapping")
     # radiance(d) = map(Rz(-yaw) d); the node rotates d by its Rotation input
     yaw_deg = tree["scenes"][0]["extras"]["environment"]["yaw_deg"]
