@@ -20,6 +20,8 @@ def _folder(name: str) -> Path:
 
 def _inside(folder: Path, parts: tuple[str, ...]) -> Path:
     path = folder.joinpath(*parts)
+    if not path.exists() and not path.is_relative_to(folder):
+        raise AssetError(f"{path}: is missing; list it in the package data of its package")
     if not path.exists():
         raise AssetError(f"{path}: missing from this copy of fastgen; reinstall it")
     return path
@@ -35,7 +37,7 @@ def asset_path(*parts: str) -> Path:
 
 
 def shader_path(*parts: str) -> Path:
-    """Return the path of a bundled shader file.
+    """Return the path of a bundled shader file, or of one of a package by its absolute path.
 
     Raises:
         AssetError: if it does not exist.

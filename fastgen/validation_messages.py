@@ -66,7 +66,7 @@ def in_words(cls: type, errors: "list[ErrorDetails]", root: str, base: Any) -> C
             instead = f"; write [{shown(value)}]" if isinstance(value, str) else ""
             words = f"expected a {'tuple' if isinstance(value, list) else 'list'}, {got}{instead}"
         case "dict_type":
-            words = f"expected a mapping, {got}"
+            words = f"expected a mapping of names, {got}"
         case "dataclass_type":
             instead = "; remove the key, or write {}" if value is None and path else ""
             words = f"expected a mapping of fields, {got}{instead}"

@@ -170,7 +170,7 @@ def test_the_cameras_of_the_docs_page_can_be_drawn(tmp_path):
     np.testing.assert_allclose(view.intrinsics, wanted, atol=1e-9)
 
 
-GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
+GOOD = "image_width: 640\nimage_height: 480\nK: [900, 0, 300, 0, 900, 200, 0, 0, 1]\n"
 
 
 @pytest.mark.parametrize(
@@ -187,7 +187,32 @@ GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
             "",
             " fov_deg and focal_mm each give the focal length",
         ),
-        ("{matrix: {fx: 1}}", "", "matrix: expected fx, fy, cx, cy, width, height, got {'fx': 1}"),
+        ("{matrix: {fx: 1}}", "", "matrix: lacks fy, cx, cy, width, height; give fx,"),
+        (
+            "{matrix: {fx: 900, fy: 900, cx: 900, cy: 240, width: 640, height: 480}}",
+            "",
+            "matrix.cx: 900 is out of range; give 31.5 to 607.5",
+        ),
+        (
+            "{calibration: c.yaml}",
+            GOOD.replace("640", "wide"),
+            "calibration: {folder}/c.yaml: image_width: expected a number of pixels above 0",
+        ),
+        (
+            "{calibration: c.yaml}",
+            GOOD.replace("900, 0, 300", "900, .nan, 300"),
+            "calibration: {folder}/c.yaml: camera_matrix has nan in place of a number; give",
+        ),
+        (
+            "{calibration: c.yaml}",
+            GOOD + "D: [0, 0]\ndistortion_model: mei",
+            "calibration: {folder}/c.yaml: distortion_model 'mei' is unknown (choose",
+        ),
+        (
+            "{calibration: c.yaml}",
+            GOOD + "D: [0, 0, 0, 0, 1]\ndistortion_model: fisheye",
+            "calibration: {folder}/c.yaml: has distortion coefficients beyond the first 4;",
+        ),
         ("{calibration: 5}", "", "calibration: expected the path of a file, got 5"),
         (
             "{calibration: gone.yaml}",
@@ -217,7 +242,7 @@ GOOD = "image_width: 640\nimage_height: 480\nK: [9, 0, 3, 0, 9, 2, 0, 0, 1]\n"
         ),
         (
             "{calibration: c.yaml}",
-            GOOD.replace("9, 0, 3", "9, 1, 3"),
+            GOOD.replace("900, 0, 300", "900, 1, 300"),
             "calibration: {folder}/c.yaml: camera_matrix has a skew of 1; calibrate without skew",
         ),
         (

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -232,6 +233,55 @@ def test_drawn_ids_are_those_of_rays_at_the_mesh_that_numpy_deforms(site):
 def test_wrong_values_of_a_kind_are_named(value, words, site):
     said = fastgen("config", "--set", f"damage={value}", path=[site], code=2)
     assert words in said
+
+
+def test_statistics_need_no_package_and_a_merge_names_what_is_missing(site, dataset, tmp_path):
+    out = tmp_path / "out"
+    given = ["--images", "2", "--set", "damage={kinds: [buckle], probability: 1}", "--cameras", "A"]
+    fastgen("generate", out, *given, *SIZE, path=[site])
+    assert re.search(r"^\s*buckle +[1-9]", fastgen("stats", out), re.MULTILINE)
+    said = fastgen("merge", dataset, out, tmp_path / "both", code=2)
+    assert "has labels of the format boxes, which is unknown; install the package" in said
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "option", "words"),
+    [
+        (
+            "buckle.glsl",
+            "return",
+            "retrn",
+            ["--set", "damage={kinds: [buckle], probability: 1}"],
+            "damage.kinds: shaders with the GLSL of buckle do not compile (0:",
+        ),
+        (
+            "buckle.glsl",
+            None,
+            None,
+            ["--set", "damage={kinds: [buckle], probability: 1}"],
+            "quaytools/buckle.glsl: is missing; list it in the package data of its package",
+        ),
+        (
+            "boxes.py",
+            "item.detections",
+            "item.detectons",
+            ["--also", "boxes"],
+            "the format boxes of quaytools.boxes failed at s0_000000_A: AttributeError(",
+        ),
+    ],
+)
+def test_a_faulty_package_is_named_in_one_line(site, tmp_path, file, old, new, option, words):
+    copy = tmp_path / "site"
+    shutil.copytree(site, copy)
+    faulty = copy / "quaytools" / file
+    if old is None:
+        faulty.unlink()
+    else:
+        faulty.write_text(faulty.read_text().replace(old, new))
+    given = ["--images", "1", "--cameras", "A", *option]
+    said = fastgen("generate", tmp_path / "out", *given, *SIZE, path=[copy], code=2)
+    assert words in said.splitlines()[-1]
+    assert "Traceback" not in said
 
 
 @pytest.fixture

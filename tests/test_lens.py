@@ -361,7 +361,7 @@ def test_a_rig_that_cannot_be_drawn_is_refused_with_the_focal_length_that_can():
 
     for size in (SIZE, (96, 192)):  # a tall image sees more above and below
         words = (
-            r"^cameras\.A\.focal_mm: 4 mm is too short for this lens at .*; use at least (.*) mm$"
+            r"^cameras\.A\.focal_mm: 4 mm is too short for this lens at .*; use at least (.*) mm,"
         )
         with pytest.raises(ConfigError, match=words) as caught:
             opened(4, size)

@@ -294,6 +294,10 @@ def test_text_in_an_svg_is_refused(tmp_path):
         ("markers: {ENV: {art: gone.png}}", "markings.markers.ENV.art: {folder}/gone.png: cannot"),
         ("markers: {ENV: {art: bad.png}}", "markings.markers.ENV.art: {folder}/bad.png: not a PNG"),
         (
+            "markers: {ENV: {art: clear.png}}",
+            "markings.markers.ENV.art: {folder}/clear.png: is transparent everywhere; give",
+        ),
+        (
             "markers: {ENV: {art: bad.svg}}",
             "markings.markers.ENV.art: {folder}/bad.svg: not an SVG",
         ),
@@ -315,7 +319,7 @@ def test_text_in_an_svg_is_refused(tmp_path):
         ("brands: {X: {wordmark: Y}}", "markings.brands.X.emblem: is missing"),
         (
             "brands: {X: {emblem: wide.png, wordmark: é}}",
-            "markings.brands.X.wordmark: 'é': the fonts lack 'é'; give",
+            "markings.brands.X.wordmark: 'é': no font has 'é'; give capitals, digits and",
         ),
         ("stickers: {X: {faces: [door]}}", "markings.stickers.X.art: is missing"),
         (
@@ -330,6 +334,7 @@ def test_unusable_values_are_refused_by_their_key(values, words, tmp_path):
     Image.new("RGB", (20, 10)).save(tmp_path / "wide.png")
     Image.new("RGB", (10, 10)).save(tmp_path / "square.png")
     (tmp_path / "bad.png").write_text("no image")
+    Image.new("RGBA", (10, 10)).save(tmp_path / "clear.png")
     (tmp_path / "bad.svg").write_text("<svg")
     whole = (tmp_path / "square.png").read_bytes()
     (tmp_path / "cut.png").write_bytes(whole[:40])

@@ -16,13 +16,14 @@ from PIL import Image, ImageDraw, ImageFont
 from fastgen import Config, Generator
 from fastgen.cli.main import main
 from fastgen.decals.glyphs import CHARACTERS
-from fastgen.decals.own_fonts import PREFIX, own_font, read_font
+from fastgen.decals.own_fonts import PREFIX, condensed, own_font, read_font
 from fastgen.errors import ConfigError
 from fastgen.resources import asset_path
 
 pytestmark = pytest.mark.usefixtures("no_workers")
 
 FOREIGN = Path(mpl.get_data_path(), "fonts/ttf/DejaVuSansMono-Bold.ttf")
+WIDE = FOREIGN.with_name("DejaVuSans.ttf")
 SETTINGS = {"size": (192, 192), "quality": "draft"}
 
 
@@ -33,8 +34,12 @@ def with_font(path, more=None):
 
 
 def fonts_of(scene):
-    """Return the fonts of labelled texts; numbers of orange panels have a font of their own."""
-    return {decal.font for decal in scene.decals if decal.class_name == "text"}
+    """Return the fonts of labelled texts, which are condensed on doors.
+
+    Numbers of orange panels have a font of their own.
+    """
+    texts = (decal for decal in scene.decals if decal.class_name == "text")
+    return {decal.font.removesuffix("-condensed") for decal in texts}
 
 
 def test_tiles_agree_with_the_font_drawn_at_another_size():
@@ -204,5 +209,32 @@ def test_names_of_fonts_are_checked():
     with pytest.raises(ConfigError, match=r"own_fonts\.oswald: is a font of fastgen; rename yours"):
         Config.from_values({"markings": {"own_fonts": {"oswald": str(FOREIGN)}}})
     text = read_font(FOREIGN)
-    with pytest.raises(ConfigError, match=r"own_fonts: .*10"):
-        Config.from_values({"markings": {"own_fonts": {f"f{i}": text for i in range(11)}}})
+    with pytest.raises(ConfigError, match=r"own_fonts: .*at most 5"):
+        Config.from_values({"markings": {"own_fonts": {f"f{i}": text for i in range(6)}}})
+
+
+def test_identifiers_and_weights_fit_doors_in_a_wide_font(generators):
+    """Doors have little room between their bars; ISO 6346 prefers identifiers in rows."""
+    generator = generators(with_font(WIDE), seed=1, **SETTINGS)
+    in_rows = weights = 0
+    for index in range(20):
+        texts = [d for d in generator.scene(index).decals if d.kind == "text" and d.face == "door"]
+        (identifier, *_) = (each for each in texts if each.class_name == "text")
+        in_rows += not identifier.vertical
+        weights += any("MAX" in each.text for each in texts)
+    assert in_rows >= 18
+    assert weights >= 15
+
+
+def test_a_condensed_form_keeps_heights_and_narrows_letters():
+    own = own_font("dock", read_font(WIDE))
+    narrow = condensed(own)
+    for char in "H80M":
+        before, after = own.font.glyphs[char], narrow.font.glyphs[char]
+        share = after.advance / before.advance
+        assert 0.5 < share < 0.8
+        ink, less = (font.tiles[before.tile] > 127 for font in (own, narrow))
+        assert (ink.any(axis=1) == less.any(axis=1)).all()
+        assert less.any(axis=0).sum() == pytest.approx(share * ink.any(axis=0).sum(), abs=2)
+        assert less.sum() == pytest.approx(share * ink.sum(), rel=0.08)
+    assert condensed(own_font("narrow", read_font(asset_path("fonts", "antonio.woff")))) is None

@@ -17,6 +17,7 @@ from fastgen.config.cameras import CameraConfig
 from fastgen.config.yaml_values import LONGEST_FILE, loaded
 from fastgen.errors import ConfigError, shown
 from fastgen.files.plain_file import read_plain
+from fastgen.scene.optics import PRINCIPAL_LIMITS
 
 SENSOR_WIDTH_MM = 36.0
 """Width of the sensor if neither the file nor the base gives one."""
@@ -133,11 +134,18 @@ def _of_matrix(path: str, matrix: Any, sensor_mm: float, corner_px: float) -> di
             corner is the origin here. OpenCV's origin is that centre.
     """
     if not isinstance(matrix, Mapping) or set(matrix) != set(_MATRIX):
-        raise ConfigError(f"{path}: expected {', '.join(_MATRIX)}, got {shown(matrix)}")
+        given = set(matrix) if isinstance(matrix, Mapping) else set()
+        lacking = [name for name in _MATRIX if name not in given]
+        wrong = f"lacks {', '.join(lacking)}" if given and lacking else f"got {shown(matrix)}"
+        raise ConfigError(f"{path}: {wrong}; give {', '.join(_MATRIX)}")
     for name, value in matrix.items():
-        if not _is_number(value) or (value <= 0 and name not in ("cx", "cy")):
-            raise ConfigError(f"{path}.{name}: expected a number of pixels, got {shown(value)}")
+        _check_pixels(f"{path}.{name}", value, positive=name not in ("cx", "cy"))
     fx, fy, cx, cy, width, height = (float(matrix[name]) for name in _MATRIX)
+    for name, at, side in (("cx", cx, width), ("cy", cy, height)):
+        most = side / 2 + PRINCIPAL_LIMITS[1] * width - corner_px
+        least = side - 2 * corner_px - most
+        if not least <= at <= most:
+            raise ConfigError(f"{path}.{name}: {at:g} is out of range; give {least:g} to {most:g}")
     return {
         "focal_mm": fx / width * sensor_mm,
         "pixel_aspect": fy / fx,
@@ -146,6 +154,13 @@ def _of_matrix(path: str, matrix: Any, sensor_mm: float, corner_px: float) -> di
             (cy + corner_px - height / 2) / width,
         ],
     }
+
+
+def _check_pixels(path: str, value: Any, positive: bool = True) -> None:
+    """Raise ConfigError, starting with `path`, unless a value is a number of pixels."""
+    if not _is_number(value) or (positive and value <= 0):
+        above = " above 0" if positive else ""
+        raise ConfigError(f"{path}: expected a number of pixels{above}, got {shown(value)}")
 
 
 def _of_file(path: Path, sensor_mm: float) -> dict[str, Any]:
@@ -159,6 +174,8 @@ def _of_file(path: Path, sensor_mm: float) -> dict[str, Any]:
     if missing:
         names = " or ".join(_NAMES[missing[0]])
         raise ConfigError(f"has no {missing[0]}; name it {names}")
+    for part in ("width", "height"):
+        _check_pixels(next(name for name in _NAMES[part] if name in data), found[part])
     entries = _numbers("camera_matrix", found["matrix"])
     if len(entries) != 9:
         raise ConfigError(f"camera_matrix has {len(entries)} numbers; give 9")
@@ -175,10 +192,6 @@ def _of_file(path: Path, sensor_mm: float) -> dict[str, Any]:
 
 def _lens(model: str, numbers_given: list[float]) -> dict[str, Any] | None:
     """Return the values of LensConfig, or None without distortion."""
-    if not any(numbers_given):
-        return (
-            None if model not in _FISHEYES else {"model": "fisheye", **_ordered("k1 k2 k3 k4", [])}
-        )
     if model in _FISHEYES:
         most, names = 4, "k1 k2 k3 k4"
     elif model in (*_PLUMB_BOBS, "rational_polynomial"):
@@ -187,11 +200,15 @@ def _lens(model: str, numbers_given: list[float]) -> dict[str, Any] | None:
         known = ", ".join((*_FISHEYES, *_PLUMB_BOBS[1:]))
         raise ConfigError(f"distortion_model {shown(model)} is unknown (choose from {known})")
     if any(numbers_given[most:]):
-        raise ConfigError(
-            f"has distortion coefficients beyond the first {most}; calibrate without the rational, "
-            "thin prism and tilted models"
+        rest = (
+            f"the model {model} has no more"
+            if model in _FISHEYES
+            else "calibrate without the rational, thin prism and tilted models"
         )
+        raise ConfigError(f"has distortion coefficients beyond the first {most}; {rest}")
     kind = "fisheye" if model in _FISHEYES else "brown_conrady"
+    if kind == "brown_conrady" and not any(numbers_given):
+        return None
     return {"model": kind, **_ordered(names, numbers_given[:most])}
 
 
@@ -222,8 +239,11 @@ def _calibration(path: Path) -> Mapping[str, Any]:
 def _numbers(name: str, value: Any) -> list[float]:
     """Return the numbers of a matrix in a calibration file."""
     data = value.get("data") if isinstance(value, Mapping) else value
-    if not isinstance(data, Sequence) or not all(map(_is_number, data)):
+    if not isinstance(data, Sequence) or isinstance(data, str):
         raise ConfigError(f"{name} is {shown(value)}; give numbers")
+    for each in data:
+        if not _is_number(each):
+            raise ConfigError(f"{name} has {shown(each)} in place of a number; give a number")
     return [float(each) for each in data]
 
 

@@ -53,6 +53,8 @@ class _Frequencies:
         """Refuse kinds that cannot be drawn or numbered, and damages that have no face."""
         for name in ("kinds", "faces"):
             check_distinct(name, getattr(self, name), "each is as likely as any other")
+        if not self.kinds and self.probability > 0 and self.count[1] > 0:
+            raise ConfigError("kinds: the list is empty; give at least one, or probability: 0")
         for kind in self.kinds:
             number = ALL_DAMAGE_CLASSES.index(kind) + 1
             if number > MOST_DAMAGE_CLASSES:
@@ -70,6 +72,8 @@ class _Frequencies:
         for kind in self.ranges:
             if kind in BUNDLED_DAMAGE_CLASSES:
                 raise ConfigError(f"ranges.{kind}: write the ranges under damage.{kind}")
+            if not PACKAGE_DAMAGE_CLASSES:
+                raise ConfigError(f"ranges.{kind}: no installed package offers kinds; install it")
             check_known("ranges", kind, PACKAGE_DAMAGE_CLASSES)
             self.ranges_of(kind)
 

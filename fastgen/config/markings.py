@@ -18,7 +18,7 @@ from fastgen.config.own_decals import (
 )
 from fastgen.decals.artwork import stickers as bundled_stickers
 from fastgen.decals.glyphs import add_font, glyph_tiles
-from fastgen.decals.own_fonts import MOST_FONTS, OwnFont, own_font
+from fastgen.decals.own_fonts import MOST_FONTS, OwnFont, condensed, own_font
 from fastgen.errors import ConfigError, did_you_mean
 from fastgen.validation import (
     LENGTH,
@@ -210,21 +210,31 @@ class MarkingsConfig:
         return {name: text for name, text in found.items() if text}
 
     def read_fonts(self) -> tuple[OwnFont, ...]:
-        """Return the fonts of the configuration, which scenes can name from then on."""
-        found = tuple(own_font(name, text) for name, text in self.own_fonts.items())
-        for own in found:
-            add_font(own.font)
+        """Return all fonts of the configuration, which scenes can name from then on."""
+        own = self._fonts_by_name.values()
+        found = (*own, *filter(None, map(condensed, own)))
+        for each in found:
+            add_font(each.font)
         return found
+
+    @property
+    def _fonts_by_name(self) -> dict[str, OwnFont]:
+        return {name: own_font(name, text) for name, text in self.own_fonts.items()}
 
     @property
     def drawn_fonts(self) -> tuple[str, ...]:
         """Names of the fonts to draw from, as scenes give them."""
-        own = {
-            name: each.font.name
-            for name, each in zip(self.own_fonts, self.read_fonts(), strict=True)
-        }
+        self.read_fonts()
+        own = self._fonts_by_name
         names = self.fonts or (*sorted(glyph_tiles()[1]), *own)
-        return tuple(own.get(name, name) for name in names)
+        return tuple(own[name].font.name if name in own else name for name in names)
+
+    @property
+    def condensed_fonts(self) -> tuple[str, ...]:
+        """Names of condensed forms of the drawn fonts, for places where no other font fits."""
+        own = self._fonts_by_name
+        drawn = [own[name] for name in self.fonts or own if name in own]
+        return tuple(each.font.name for each in filter(None, map(condensed, drawn)))
 
     def __post_init__(self) -> None:
         """Refuse unknown fonts and stickers, repeated names, and classes that cannot be."""

@@ -8,7 +8,7 @@ from annotated_types import MinLen
 
 from fastgen.classes import CLASS_NAME, OTHER_CLASSES
 from fastgen.config.fields import ArtFile, Weight
-from fastgen.decals.glyphs import glyph_tiles
+from fastgen.decals.glyphs import BOX, glyph_tiles
 from fastgen.errors import ConfigError
 from fastgen.scene.container_kinds import KINDS
 from fastgen.scene.faces import SHEET_FACES
@@ -38,8 +38,9 @@ class MarkerConfig:
 
     Attributes:
         art: Path of a square PNG or SVG image, relative to the file that names it. The tips of the
-            marker touch the middle of its sides; what is outside them is not drawn. A marker of
-            fastgen needs none. The configuration keeps the image itself.
+            marker touch the middle of its sides; what is outside them is not drawn. The paint shows
+            through transparent parts. A marker of fastgen needs none. The configuration keeps the
+            image itself.
         weight: Relative frequency. A marker with weight 0 is neither drawn nor a class.
         hazard_number: Number in the upper row of orange panels beside it.
         un_numbers: Numbers in the lower row, all equally likely. A new marker without any has no
@@ -48,7 +49,13 @@ class MarkerConfig:
 
     art: Annotated[str, ArtFile(square=True)] = ""
     weight: Weight = 1.0
-    hazard_number: Annotated[str, Matching("X?[0-9]{2,3}|", "is not a hazard number")] = ""
+    hazard_number: Annotated[
+        str,
+        Matching(
+            "X?[0-9]{2,3}|",
+            "is not a hazard number; give two or three digits in quotes, or X before them",
+        ),
+    ] = ""
     un_numbers: tuple[
         Annotated[str, Matching("[0-9]{4}", "is not a UN number; give four digits in quotes")], ...
     ] = ()
@@ -144,6 +151,6 @@ def _check_text(name: str, text: str) -> None:
     known = {" "}.union(*(font.glyphs for font in fonts))
     wrong = [char for char in text if char not in known]
     if wrong or not text.strip():
-        signs = "".join(sorted(char for char in known if char.isprintable() and len(char) == 1))
-        lacking = f"the fonts lack {''.join(dict.fromkeys(wrong))!r}" if wrong else "is blank"
-        raise ConfigError(f"{name}: {text!r}: {lacking}; give characters of {signs!r}")
+        signs = "".join(sorted(char for char in known - {BOX} if not char.isalnum()))
+        lacking = f"no font has {''.join(dict.fromkeys(wrong))!r}" if wrong else "is blank"
+        raise ConfigError(f"{name}: {text!r}: {lacking}; give capitals, digits and {signs!r}")

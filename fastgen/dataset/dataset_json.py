@@ -10,7 +10,7 @@ from typing import Any
 
 from fastgen.dataset.job import Job, manifest_path, shard_of
 from fastgen.dataset.manifest_types import Shard, parsed_json, unfit, unfit_finished
-from fastgen.dataset.seal import is_sealed
+from fastgen.dataset.seal import digest, is_sealed
 from fastgen.dataset.storage import Storage, UnreadableError
 from fastgen.errors import OutputError, shown_name
 
@@ -167,6 +167,15 @@ def _options(name: str) -> tuple[str, ...]:
     return _OPTIONS.get(name.split(".")[0], ())
 
 
+def _in_words(value: Any) -> str:
+    """Return a setting as short text; files that it holds are told apart by a hash."""
+    if value is _MISSING:
+        return "missing"
+    if isinstance(value, str) and value.startswith("data:"):
+        return f"a file with the content {digest(value.encode())[:8]}"
+    return _words.repr(value)
+
+
 def _differences(name: str, old: Any, new: Any) -> Iterator[tuple[str, str, str]]:
     """Yield name, old and new value of each setting that differs."""
     if isinstance(old, dict) and isinstance(new, dict):
@@ -177,5 +186,5 @@ def _differences(name: str, old: Any, new: Any) -> Iterator[tuple[str, str, str]
             return
         old, new = list(old), list(new)  # their order decides what sampling draws
     if old is _MISSING or new is _MISSING or not _same(old, new):
-        before, now = ("missing" if each is _MISSING else _words.repr(each) for each in (old, new))
+        before, now = (_in_words(each) for each in (old, new))
         yield name, before, now

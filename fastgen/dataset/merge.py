@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 
 import orjson
 
+from fastgen import __version__
 from fastgen.config.config import Config
 from fastgen.dataset.addresses import place_of
 from fastgen.dataset.dataset_json import shard_manifest
@@ -31,7 +32,7 @@ from fastgen.dataset.storage import LOCK, Folder
 from fastgen.errors import ConfigError, OutputError
 from fastgen.formats.format import Files
 from fastgen.formats.parquet import opened_table
-from fastgen.formats.registry import formats_of
+from fastgen.formats.registry import format_names, formats_of
 
 _RESULTS = ("images", "counts", "failed", "files", "shards", "digest")
 """Keys of dataset.json that do not say how the dataset was made."""
@@ -126,9 +127,13 @@ class _Part:
         try:
             return Config.from_values(made_with["config"])
         except ConfigError as error:
+            version = made_with["version"]
+            how = "with that version and its packages"
+            if version == __version__:
+                how = "with the packages that were installed then"
             raise OutputError(
-                f"{self.out}: was made by fastgen {made_with['version']}, whose configuration this "
-                f"version cannot read ({error}); merge with that version"
+                f"{self.out}: was made by fastgen {version}, whose configuration cannot be read "
+                f"({error}); merge {how}"
             ) from None
 
     def intact(self, path: str, hashed: str) -> bytes:
@@ -184,6 +189,12 @@ def _part(out: str) -> _Part:
             f"{out}: is an address; merge works on folders, so copy the dataset first"
         )
     dataset = open_finished(out)
+    unknown = [each for each in dataset.manifest["formats"] if each not in format_names()]
+    if unknown:
+        raise OutputError(
+            f"{out}: has labels of the format {unknown[0]}, which is unknown; install the package "
+            "that offers it"
+        )
     return _Part(out, Folder(Path(place)), dataset.manifest)
 
 

@@ -54,7 +54,10 @@ def read_art(path: Path, square: bool) -> str:
             f"{path}: is {width}x{height}; give a square image, which the marker's four tips touch "
             "in the middle of its sides"
         )
-    image = _fitted(_decoded(path, data))
+    decoded = _decoded(path, data)
+    if not decoded[..., 3].any():
+        raise ConfigError(f"{path}: is transparent everywhere; give an image that shows something")
+    image = _fitted(decoded)
     _, packed = cv2.imencode(".png", image[..., [2, 1, 0, 3]], [cv2.IMWRITE_PNG_COMPRESSION, 9])
     return PREFIX + base64.b64encode(packed.tobytes()).decode("ascii")
 

@@ -29,8 +29,12 @@ from fastgen.files.plain_file import read_plain
 PREFIX = "data:application/x-fastgen-font;base64,"
 """Start of every text that holds a font (RFC 2397)."""
 
-MOST_FONTS = 10
-"""Largest number of fonts in a configuration: their tiles and those of fastgen fit GLYPH_TILES."""
+MOST_FONTS = 5
+"""Largest number of fonts in a configuration. Shaders can number 1,024 tiles: those of fastgen, and
+those of five fonts with a condensed form of each."""
+
+_DOOR_DIGIT_CAPS = 0.58
+"""Mean advance of digits, in cap heights, with which identifiers fit between the bars of a door."""
 
 _LARGEST_FILE = 16 << 20
 _DIGEST = 8
@@ -52,6 +56,25 @@ class OwnFont:
 
     font: Font
     tiles: NDArray[np.uint8]
+
+
+@lru_cache(maxsize=64)
+def condensed(own: OwnFont) -> OwnFont | None:
+    """Return a form of a font for doors, which is less wide; None if the font is narrow enough."""
+    glyphs = own.font.glyphs
+    share = _DOOR_DIGIT_CAPS / (sum(glyphs[digit].advance for digit in "0123456789") / 10)
+    if share >= 1:
+        return None
+    middle = (GLYPH_TILE_SIZE - 1) / 2
+    narrow = np.array([[share, 0.0, (1 - share) * middle], [0.0, 1.0, 0.0]])
+    size = GLYPH_TILE_SIZE, GLYPH_TILE_SIZE
+    tiles = np.stack([cv2.warpAffine(tile, narrow, size) for tile in own.tiles])
+    narrower = {
+        char: Glyph(each.tile, *(share * x for x in (each.ink_left, each.ink_right, each.advance)))
+        for char, each in glyphs.items()
+    }
+    name = f"{own.font.name}-condensed"
+    return OwnFont(Font(name, MappingProxyType(narrower)), np.asarray(tiles, np.uint8))
 
 
 class OwnPrints(NamedTuple):

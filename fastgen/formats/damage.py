@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.classes import (
-    ALL_DAMAGE_CLASSES,
     ALL_SEGMENTATION_CLASSES,
     DAMAGE_VALUES,
     UNDAMAGED_CONTAINER,
@@ -60,6 +59,11 @@ class _Damage(Format):
     name = "damage"
     classes = ALL_SEGMENTATION_CLASSES
 
+    def with_classes(self, classes: Sequence[str]) -> Format:
+        made = _Damage()
+        made.classes = tuple(classes)  # the package of a kind may have been removed
+        return made
+
     def sample_files(self, item: Item) -> tuple[Files, Any]:
         found = list(instances(item.sample))
         height, width = item.sample.damage.shape
@@ -97,7 +101,7 @@ class _Damage(Format):
 
     def counts(self, facts: Iterable[Any]) -> dict[str, int]:
         names = (name for each in facts for name, _ in self.labels(each))
-        return {"damages": sum(name in ALL_DAMAGE_CLASSES for name in names)}
+        return {"damages": sum(name != "container" for name in names)}
 
     def folders(self, split: str) -> Sequence[str]:
         folders = ("images", "labels", "masks", "yolo")

@@ -1,11 +1,13 @@
 """The base class of label formats, the types it uses, and the assembly of one sample's files."""
 
+import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from fastgen.config.config import Config
+from fastgen.errors import OutputError
 from fastgen.formats import coco
 from fastgen.formats.item import Item
 from fastgen.formats.scene_file import scene_file
@@ -175,6 +177,15 @@ def crop_lines(name: str, item: Item, crops: Iterable[tuple[Sequence[float], str
     return {f"{name}/{item.split}/{item.stem}.txt": "".join(lines).encode()}
 
 
+def _failed(each: Format, item: Item, error: Exception) -> str:
+    """Return the message about an error in the format of a package."""
+    *_, last = traceback.extract_tb(error.__traceback__)
+    return (
+        f"the format {each.name} of {type(each).__module__} failed at {item.stem}: {error!r} "
+        f"({last.filename}:{last.lineno}); mend that package"
+    )
+
+
 def assemble(item: Item, formats: Sequence[Format], archived: bool = False) -> tuple[Files, Record]:
     """Return the files of one sample and its record.
 
@@ -189,7 +200,12 @@ def assemble(item: Item, formats: Sequence[Format], archived: bool = False) -> t
     files: Files = {item.image_path: item.jpeg}
     facts = {}
     for each in formats:
-        more, facts[each.name] = each.sample_files(item)
+        try:
+            more, facts[each.name] = each.sample_files(item)
+        except Exception as error:
+            if type(each).__module__.startswith("fastgen."):
+                raise
+            raise OutputError(_failed(each, item, error)) from error
         files.update(each.members(item, more, facts[each.name]) if archived else more)
     record = {
         "stem": item.stem,

@@ -6,6 +6,8 @@ from functools import cache
 
 import moderngl
 
+from fastgen.classes import BUNDLED_DAMAGE_CLASSES
+from fastgen.errors import ConfigError
 from fastgen.render.blocks import BLOCKS
 from fastgen.render.constants import constants_text
 from fastgen.render.variant import ShaderVariant
@@ -14,6 +16,7 @@ from fastgen.scene.damage_kinds import forms_of
 
 _INCLUDE = re.compile(r'#include "([^"]+)"\n')
 _VERSION = re.compile(r"#version .*\n")
+_ERROR = re.compile(r"\d+:(\d+)\(\d+\): error: [^\n]*")
 _SAMPLER = re.compile(r"^uniform [iu]?sampler\w+ (\w+);", re.M)
 
 Read = Callable[[str], str]
@@ -83,6 +86,22 @@ def expand(text: str, variant: ShaderVariant, read: Read = shader_text) -> str:
     return "".join([version[0], extension, *constants, *blocks, body.replace(version[0], "", 1)])
 
 
+def _blame_packages(log: str, texts: Sequence[str], variant: ShaderVariant) -> None:
+    """Raise ConfigError for a program that does not compile and holds GLSL of packages."""
+    kinds = [kind for kind in variant.kinds if kind not in BUNDLED_DAMAGE_CLASSES]
+    if not kinds:
+        return
+    found = _ERROR.search(log)
+    words, line = (found[0], int(found[1])) if found else (log.strip(), 0)
+    stage = texts[-1] if "fragment_shader" in log else texts[0]
+    sources = stage.splitlines()
+    where = f" in {sources[line - 1].strip()!r}" if 0 < line <= len(sources) else ""
+    raise ConfigError(
+        f"damage.kinds: shaders with the GLSL of {', '.join(kinds)} do not compile "
+        f"({words}{where}); mend the package of that kind"
+    ) from None
+
+
 class ShaderProgram:
     """A linked program that knows which textures it reads, and binds exactly those.
 
@@ -108,10 +127,14 @@ class ShaderProgram:
         """
         texts = [expand(read(stage), variant, read) for stage in stages]
         self.linked: moderngl.Program | moderngl.ComputeShader
-        if len(texts) == 1:
-            self.linked = ctx.compute_shader(texts[0])
-        else:
-            self.linked = ctx.program(vertex_shader=texts[0], fragment_shader=texts[1])
+        try:
+            if len(texts) == 1:
+                self.linked = ctx.compute_shader(texts[0])
+            else:
+                self.linked = ctx.program(vertex_shader=texts[0], fragment_shader=texts[1])
+        except moderngl.Error as error:
+            _blame_packages(str(error), texts, variant)
+            raise
         declared = dict.fromkeys(name for text in texts for name in _SAMPLER.findall(text))
         self.reads = tuple(name for name in declared if name in self.linked)
         for unit, name in enumerate(self.reads):

@@ -36,7 +36,7 @@ def check_lenses(config: Config, size: tuple[int, int]) -> None:
         width, height = size
         raise ConfigError(
             f"cameras.{name}.focal_mm: {rig.focal_mm:g} mm is too short for this lens at "
-            f"{width}x{height}; use at least {least_mm:g} mm"
+            f"{width}x{height}; use at least {least_mm:g} mm, or check the distortion coefficients"
         )
 
 

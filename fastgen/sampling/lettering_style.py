@@ -80,7 +80,7 @@ def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Stre
 
 def in_any_font(config: MarkingsConfig, style: Style, rng: np.random.Generator) -> list[Style]:
     """Return the style, then the same with other fonts, for places where only a narrow one fits."""
-    names = rng.permutation(config.drawn_fonts)
+    names = (*rng.permutation(config.drawn_fonts), *config.condensed_fonts)
     return [style, *(replace(style, font=font_named(str(name))) for name in names)]
 
 
