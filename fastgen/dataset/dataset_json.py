@@ -168,7 +168,7 @@ def _options(name: str) -> tuple[str, ...]:
 
 
 def _in_words(value: Any) -> str:
-    """Return a setting as short text; files that it holds are told apart by a hash."""
+    """Return a setting as short text; files in it are named by a hash of their content."""
     if value is _MISSING:
         return "missing"
     if isinstance(value, str) and value.startswith("data:"):

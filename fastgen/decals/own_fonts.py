@@ -78,7 +78,7 @@ def condensed(own: OwnFont) -> OwnFont | None:
 
 
 class OwnPrints(NamedTuple):
-    """What decals of a configuration can show beside what fastgen has.
+    """Artwork and fonts of a configuration, which its decals can use.
 
     Attributes:
         art: Images by name, uint8 [ART_SIZE, ART_SIZE, 4], see own_art.art_of.

@@ -16,7 +16,7 @@ from fastgen.render.textures import data_texture
 
 
 class Prints(NamedTuple):
-    """What decals can show.
+    """Artwork and glyphs that decals can use.
 
     Attributes:
         art_layers: Texture layer of each artwork by name.
@@ -37,7 +37,7 @@ class DecalTextures:
     Args:
         ctx: The context that draws.
         prepared: The scene.
-        prints: What decals can show.
+        prints: Artwork and glyphs that decals can use.
         scale: See decal_tables.scale_for.
     """
 
@@ -81,7 +81,7 @@ class SceneResources:
     Args:
         ctx: The context that draws.
         prepared: The scene.
-        prints: What decals can show.
+        prints: Artwork and glyphs that decals can use.
     """
 
     def __init__(
