@@ -41,11 +41,7 @@ def read_art(path: Path, square: bool) -> str:
     Raises:
         ConfigError: The file cannot be used. The message names it.
     """
-    try:
-        data = read_plain(path, _LARGEST_FILE)
-    except (OSError, ValueError) as error:
-        words = error.strerror if isinstance(error, OSError) else "give a path"
-        raise ConfigError(f"{path}: cannot be read ({words})") from None
+    data = content_of(path)
     if path.suffix.lower() == ".svg":
         data = _drawn(path, data)
     width, height = png_size(path, data)
@@ -81,6 +77,19 @@ def art_of(text: str) -> NDArray[np.uint8]:
     image = _decoded("image", data)
     image.flags.writeable = False
     return image
+
+
+def content_of(path: Path) -> bytes:
+    """Return the content of a file that a configuration names.
+
+    Raises:
+        ConfigError: It cannot be read, or has more than 16 MB.
+    """
+    try:
+        return read_plain(path, _LARGEST_FILE)
+    except (OSError, ValueError) as error:
+        words = error.strerror if isinstance(error, OSError) else "give a path"
+        raise ConfigError(f"{path}: cannot be read ({words})") from None
 
 
 def _drawn(path: Path, data: bytes) -> bytes:

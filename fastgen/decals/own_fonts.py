@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastgen.decals.glyphs import CHARACTERS, GLYPH_TILE_SIZE, Font, Glyph
-from fastgen.decals.own_art import png_size
+from fastgen.decals.own_art import content_of, png_size
 from fastgen.errors import ConfigError
-from fastgen.files.plain_file import read_plain
 
 PREFIX = "data:application/x-fastgen-font;base64,"
 """Start of every text that holds a font (RFC 2397)."""
@@ -36,7 +35,6 @@ those of five fonts with a condensed form of each."""
 _DOOR_DIGIT_CAPS = 0.58
 """Mean advance of digits, in cap heights, with which identifiers fit between the bars of a door."""
 
-_LARGEST_FILE = 16 << 20
 _DIGEST = 8
 _MOST_CAPS = 4.0
 """Bound of ends of ink and of advances."""
@@ -99,11 +97,7 @@ def read_font(path: Path) -> str:
     """
     from fastgen.decals import font_tiles  # Pillow takes 30 ms, and only this needs it
 
-    try:
-        data = read_plain(path, _LARGEST_FILE)
-    except (OSError, ValueError) as error:
-        words = error.strerror if isinstance(error, OSError) else "give a path"
-        raise ConfigError(f"{path}: cannot be read ({words})") from None
+    data = content_of(path)
     try:
         face = font_tiles.typeface(io.BytesIO(data))
     except OSError:
