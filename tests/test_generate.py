@@ -21,6 +21,7 @@ from fastgen.dataset.generate import generate
 from fastgen.dataset.job import Job, manifest_path, shard_of
 from fastgen.dataset.shards import Maker
 from fastgen.dataset.storage import storage_of
+from fastgen.errors import OutputError
 from fastgen.generator import Generator
 from fastgen.render.settings import RenderSettings
 from fastgen.sampling.scene import split_of
@@ -266,6 +267,13 @@ def test_verify_names_the_damaged_file(dataset, tmp_path, capsys, name, spoil):
     assert spoilt.relative_to(out).as_posix() in capsys.readouterr().out
 
 
+def run_inside(job, tasks, on_report):
+    """Do all tasks in this process."""
+    maker = Maker(job, False, on_report)
+    for task in tasks:
+        maker(task)
+
+
 def test_a_scene_that_always_fails_is_reported_and_the_rest_is_made(tmp_path, capfd, monkeypatch):
     asked = []
 
@@ -275,11 +283,6 @@ def test_a_scene_that_always_fails_is_reported_and_the_rest_is_made(tmp_path, ca
             if scene.index == 1:
                 raise RuntimeError("no such luck")
             return super().render(scene=scene, camera=camera, normals=normals)
-
-    def run_inside(job, tasks, on_report):
-        maker = Maker(job, False, on_report)
-        for task in tasks:
-            maker(task)
 
     monkeypatch.setattr("fastgen.dataset.job.Generator", Broken)
     job = Job(str(tmp_path / "out"), 6, cameras=("A", "Cr"), render=SMALL)
@@ -303,16 +306,27 @@ def test_a_run_whose_scenes_all_fail_still_ends_normally(tmp_path, monkeypatch):
         def render(self, **_):
             raise RuntimeError("no such luck")
 
-    def run_inside(job, tasks, on_report):
-        maker = Maker(job, False, on_report)
-        for task in tasks:
-            maker(task)
-
     monkeypatch.setattr("fastgen.dataset.job.Generator", Broken)
     job = Job(str(tmp_path / "out"), 2, cameras=("A",), render=SMALL)
     made = generate(job, 1, runner=run_inside)
     assert [each["scene"] for each in made["failed"]] == [0, 1]
     assert json.loads((tmp_path / "out/dataset.json").read_text())["failed"] == made["failed"]
+
+
+def test_a_long_run_stops_when_its_first_scenes_all_fail(tmp_path, monkeypatch):
+    asked = []
+
+    class Broken(Generator):
+        def render(self, *, scene, **_):
+            asked.append(scene.index)
+            raise RuntimeError("no such luck")
+
+    monkeypatch.setattr("fastgen.dataset.job.Generator", Broken)
+    job = Job(str(tmp_path / "out"), 1000, cameras=("A",), render=SMALL)
+    with pytest.raises(OutputError, match=r"first 8 scenes of a process failed.*no such luck"):
+        generate(job, 1, runner=run_inside)
+    assert sorted(set(asked)) == list(range(8))
+    assert not (tmp_path / "out/dataset.json").exists()
 
 
 def test_a_second_run_on_the_same_folder_is_refused(dataset, tmp_path, capsys):

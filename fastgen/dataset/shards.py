@@ -43,6 +43,9 @@ page before it is used again."""
 ATTEMPTS = 3
 """A scene that fails this many times is given up."""
 
+_HOPELESS = 8
+"""A process whose first scenes all meet internal errors ends the run after this many."""
+
 Report = Callable[[str, Any], None]
 """Sends a report to the parent process.
 
@@ -107,6 +110,9 @@ class Maker:
 
     _since_trim = 0
     """Images made since freed memory was returned."""
+
+    _failed: int | None = 0
+    """Number of scenes that met internal errors before any image was made; None afterwards."""
 
     def __init__(self, job: Job, whole_machine: bool, report: Report) -> None:
         if whole_machine:
@@ -177,7 +183,9 @@ class Maker:
         """Return one image, or None with the reason in `skip` if it fails repeatedly."""
         for attempt in range(ATTEMPTS):
             try:
-                return self._image(index, camera)
+                image = self._image(index, camera)
+                self._failed = None
+                return image
             except (AssetError, ContextError, OutputError, OSError):
                 raise  # a missing HDRI, no driver, a full disk: another attempt cannot help
             except FastgenError as error:  # this scene cannot be drawn; others may
@@ -187,7 +195,18 @@ class Maker:
                 if attempt + 1 == ATTEMPTS:
                     traceback.print_exc()
                     skip[index] = f"camera {camera}: {error!r}"
+                    self._count_failure(error)
         return None
+
+    def _count_failure(self, error: Exception) -> None:
+        if self._failed is None:
+            return
+        self._failed += 1
+        if self._failed >= _HOPELESS:
+            raise OutputError(
+                f"the first {self._failed} scenes of a process failed, the last one with {error!r}; "
+                "see the traceback above; run fastgen doctor, or mend the package that it names"
+            )
 
     def _image(self, index: int, camera: str) -> tuple[Files, Record]:
         job = self._job
