@@ -204,8 +204,8 @@ class Maker:
         self._failed += 1
         if self._failed >= _HOPELESS:
             raise OutputError(
-                f"the first {self._failed} scenes of a process failed, the last one with {error!r}; "
-                "see the traceback above; run fastgen doctor, or mend the package that it names"
+                f"the first {self._failed} scenes of a process failed, the last one with "
+                f"{error!r}; run fastgen doctor, or mend the package that the traceback names"
             )
 
     def _image(self, index: int, camera: str) -> tuple[Files, Record]:
