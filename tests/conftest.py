@@ -7,6 +7,7 @@ from collections import OrderedDict
 import pytest
 
 from fastgen import Config, Generator
+from fastgen.dataset.console import LOGGER
 from tests import in_process
 from tests.report_makers import make_dataset
 
@@ -15,10 +16,17 @@ OPEN_GENERATORS = 4
 
 LONGEST = (
     "test_ray.py",
+    "test_damage_sampling.py",
+    "test_hostile_paths.py",
+    "test_config.py",
+    "test_giveaways.py",
     "test_damage.py",
     "test_examples.py",
     "test_storage.py",
     "test_stopping.py",
+    "test_sky_visibility.py",
+    "test_extensions.py",
+    "test_export.py",
     "test_renderer.py",
     "test_coverage.py",
     "test_generate.py",
@@ -36,6 +44,15 @@ def pytest_collection_modifyitems(items):
     """Put the longest files first; pytest-xdist hands out files in this order."""
     places = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: places.get(item.path.name, len(LONGEST)))
+
+
+@pytest.fixture(autouse=True)
+def log_handlers():
+    """Take back the handlers of a Maker that a test runs in this process."""
+    handlers, level = LOGGER.handlers, LOGGER.level
+    yield
+    LOGGER.handlers = handlers
+    LOGGER.setLevel(level)
 
 
 @pytest.fixture

@@ -154,7 +154,7 @@ def test_annotations_are_found_inside_a_type():
         ({"ends": [4, 2]}, "ends: the lowest value 4 is above the highest 2"),
         ({"inner": 4}, "inner: expected a mapping of fields, got 4"),
         ({"inner": None}, "inner: .*, got None; remove the key, or write {}"),
-        ({"many": []}, r"many: expected a mapping, got \[\]"),
+        ({"many": []}, r"many: expected a mapping of names, got \[\]"),
         ({"many": {"z": {"size": 9}}}, "many.z.size: 9 is out of range"),
         ({"pair": [1]}, "pair: expected 2 values, got 1"),
         ({"pair": [1, 1, 1]}, "pair: expected at most 2 values, got 3"),

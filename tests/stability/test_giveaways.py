@@ -22,7 +22,7 @@ from fastgen.classes import (
 )
 from fastgen.damages.creased import CREASED
 from fastgen.geometry.prepared_scene import PreparedScene
-from fastgen.render import renderer as rendering
+from fastgen.render import draw_blocks as rendering
 from fastgen.render.draw_inputs import regions_of
 from fastgen.scene.damage_kinds import forms_of
 
