@@ -1,6 +1,6 @@
 """Screenshots of `fastgen studio` and `fastgen report`: docs/studio.jpg and docs/report.jpg.
 
-python examples/screenshots.py [studio report]
+    python examples/screenshots.py [studio report]
 
 It needs Playwright (`pip install playwright`) and Chromium (`make chromium`).
 """

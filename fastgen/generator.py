@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
@@ -107,7 +108,8 @@ class Generator:
         self._given: tuple[Scene, PreparedScene] | None = None
         markings = self.config.markings
         own = OwnPrints(
-            {name: art_of(text) for name, text in markings.own_art.items()}, markings.read_fonts()
+            {name: art_of(text) for name, text in markings.own_art.items()},
+            tuple(chain.from_iterable(markings.read_fonts().values())),
         )
         self._own_decals = OwnDecals(
             markings.detection_classes, tuple(own.art), tuple(each.font.name for each in own.fonts)

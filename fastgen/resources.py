@@ -20,11 +20,11 @@ def _folder(name: str) -> Path:
 
 def _inside(folder: Path, parts: tuple[str, ...]) -> Path:
     path = folder.joinpath(*parts)
-    if not path.exists() and not path.is_relative_to(folder):
-        raise AssetError(f"{path}: is missing; list it in the package data of its package")
-    if not path.exists():
+    if path.exists():
+        return path
+    if path.is_relative_to(folder):
         raise AssetError(f"{path}: missing from this copy of fastgen; reinstall it")
-    return path
+    raise AssetError(f"{path}: is missing; list it in the package data of its package")
 
 
 def asset_path(*parts: str) -> Path:

@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 from fastgen import Config, Generator
 from fastgen.cli.main import main
 from fastgen.decals.glyphs import CHARACTERS
-from fastgen.decals.own_fonts import PREFIX, condensed, own_font, read_font
+from fastgen.decals.own_fonts import PREFIX, forms_of, own_font, read_font
 from fastgen.errors import ConfigError
 from fastgen.resources import asset_path
 
@@ -228,7 +228,8 @@ def test_identifiers_and_weights_fit_doors_in_a_wide_font(generators):
 
 def test_a_condensed_form_keeps_heights_and_narrows_letters():
     own = own_font("dock", read_font(WIDE))
-    narrow = condensed(own)
+    same, narrow = forms_of(own)
+    assert same is own
     for char in "H80M":
         before, after = own.font.glyphs[char], narrow.font.glyphs[char]
         share = after.advance / before.advance
@@ -237,4 +238,5 @@ def test_a_condensed_form_keeps_heights_and_narrows_letters():
         assert (ink.any(axis=1) == less.any(axis=1)).all()
         assert less.any(axis=0).sum() == pytest.approx(share * ink.any(axis=0).sum(), abs=2)
         assert less.sum() == pytest.approx(share * ink.sum(), rel=0.08)
-    assert condensed(own_font("narrow", read_font(asset_path("fonts", "antonio.woff")))) is None
+    slim = own_font("slim", read_font(asset_path("fonts", "antonio.woff")))
+    assert forms_of(slim) == (slim,)

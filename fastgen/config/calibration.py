@@ -142,8 +142,7 @@ def _of_matrix(path: str, matrix: Any, sensor_mm: float, corner_px: float) -> di
         _check_pixels(f"{path}.{name}", value, positive=name not in ("cx", "cy"))
     fx, fy, cx, cy, width, height = (float(matrix[name]) for name in _MATRIX)
     for name, at, side in (("cx", cx, width), ("cy", cy, height)):
-        most = side / 2 + PRINCIPAL_LIMITS[1] * width - corner_px
-        least = side - 2 * corner_px - most
+        least, most = (side / 2 + limit * width - corner_px for limit in PRINCIPAL_LIMITS)
         if not least <= at <= most:
             raise ConfigError(f"{path}.{name}: {at:g} is out of range; give {least:g} to {most:g}")
     return {

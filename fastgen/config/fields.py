@@ -1,5 +1,6 @@
 """Types of configuration fields that several sections share, and the colours that they hold."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,16 +25,16 @@ Weight = Annotated[float, Bounds(0.0, 1e6)]
 """Relative frequency."""
 
 
-class EmbeddedFile:
+class EmbeddedFile(ABC):
     """Text field for a path, replaced by the content of the file."""
 
+    @abstractmethod
     def embedded(self, text: str, folder: Path) -> str:
         """Return the content of a path relative to a folder, or a checked content as it is.
 
         Raises:
             ConfigError: It cannot be used.
         """
-        raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> "CoreSchema":
         from pydantic_core import core_schema

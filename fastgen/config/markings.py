@@ -1,6 +1,7 @@
 """Ranges and probabilities of everything that is printed or stuck on a container."""
 
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Annotated
 
 from annotated_types import MaxLen
@@ -18,7 +19,7 @@ from fastgen.config.own_decals import (
 )
 from fastgen.decals.artwork import stickers as bundled_stickers
 from fastgen.decals.glyphs import add_font, glyph_tiles
-from fastgen.decals.own_fonts import MOST_FONTS, OwnFont, condensed, own_font
+from fastgen.decals.own_fonts import MOST_FONTS, OwnFont, forms_of, own_font
 from fastgen.errors import ConfigError, did_you_mean
 from fastgen.validation import (
     LENGTH,
@@ -209,32 +210,25 @@ class MarkingsConfig:
         found |= {f"emblem/{name}": each.emblem for name, each in self.brands.items()}
         return {name: text for name, text in found.items() if text}
 
-    def read_fonts(self) -> tuple[OwnFont, ...]:
-        """Return all fonts of the configuration, which scenes can name from then on."""
-        own = self._fonts_by_name.values()
-        found = (*own, *filter(None, map(condensed, own)))
-        for each in found:
+    def read_fonts(self) -> dict[str, tuple[OwnFont, ...]]:
+        """Return the forms of each own font by name: as it is, and condensed if it is wide.
+
+        Scenes can name them from then on.
+        """
+        read = {name: forms_of(own_font(name, text)) for name, text in self.own_fonts.items()}
+        for each in chain.from_iterable(read.values()):
             add_font(each.font)
-        return found
+        return read
 
-    @property
-    def _fonts_by_name(self) -> dict[str, OwnFont]:
-        return {name: own_font(name, text) for name, text in self.own_fonts.items()}
+    def drawn_fonts(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Return the fonts to draw from, and condensed forms for places where none of them fits.
 
-    @property
-    def drawn_fonts(self) -> tuple[str, ...]:
-        """Names of the fonts to draw from, as scenes give them."""
-        self.read_fonts()
-        own = self._fonts_by_name
-        names = self.fonts or (*sorted(glyph_tiles()[1]), *own)
-        return tuple(own[name].font.name if name in own else name for name in names)
-
-    @property
-    def condensed_fonts(self) -> tuple[str, ...]:
-        """Names of condensed forms of the drawn fonts, for places where no other font fits."""
-        own = self._fonts_by_name
-        drawn = [own[name] for name in self.fonts or own if name in own]
-        return tuple(each.font.name for each in filter(None, map(condensed, drawn)))
+        Both are names as scenes give them.
+        """
+        own = self.read_fonts()
+        chosen = self.fonts or (*sorted(glyph_tiles()[1]), *own)
+        forms = [[each.font.name for each in own[n]] if n in own else [n] for n in chosen]
+        return tuple(first for first, *_ in forms), tuple(n for _, *rest in forms for n in rest)
 
     def __post_init__(self) -> None:
         """Refuse unknown fonts and stickers, repeated names, and classes that cannot be."""

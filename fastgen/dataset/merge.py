@@ -32,7 +32,7 @@ from fastgen.dataset.storage import LOCK, Folder
 from fastgen.errors import ConfigError, OutputError
 from fastgen.formats.format import Files
 from fastgen.formats.parquet import opened_table
-from fastgen.formats.registry import format_names, formats_of
+from fastgen.formats.registry import formats_of, unknown_format
 
 _RESULTS = ("images", "counts", "failed", "files", "shards", "digest")
 """Keys of dataset.json that do not say how the dataset was made."""
@@ -189,10 +189,10 @@ def _part(out: str) -> _Part:
             f"{out}: is an address; merge works on folders, so copy the dataset first"
         )
     dataset = open_finished(out)
-    unknown = [each for each in dataset.manifest["formats"] if each not in format_names()]
-    if unknown:
+    unknown = unknown_format(dataset.manifest["formats"])
+    if unknown is not None:
         raise OutputError(
-            f"{out}: has labels of the format {unknown[0]}, which is unknown; install the package "
+            f"{out}: has labels of the format {unknown}, which is unknown; install the package "
             "that offers it"
         )
     return _Part(out, Folder(Path(place)), dataset.manifest)

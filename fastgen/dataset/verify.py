@@ -17,7 +17,7 @@ from fastgen.dataset.seal import is_sealed
 from fastgen.dataset.storage import Storage, storage_of
 from fastgen.errors import FastgenError, OutputError, shown
 from fastgen.formats.format import Format, Read, Record
-from fastgen.formats.registry import format_names, formats_for
+from fastgen.formats.registry import formats_for, unknown_format
 from fastgen.sampling.scene import SPLITS
 from fastgen.scene import Scene
 
@@ -70,9 +70,9 @@ def examine(out: str) -> Findings:
     problem = unfit_finished(text)
     if problem:
         return Findings([f"{MANIFEST}: {problem}; {_AGAIN}"])
-    unknown = [name for name in manifest["formats"] if name not in format_names()]
-    if unknown:
-        words = f"format {shown(unknown[0])} is unknown; install the package that offers it"
+    unknown = unknown_format(manifest["formats"])
+    if unknown is not None:
+        words = f"format {shown(unknown)} is unknown; install the package that offers it"
         return Findings([f"{MANIFEST}: {words}"])
     faults = [
         f"scene {each['scene']} is missing: it failed ({each['error']})"

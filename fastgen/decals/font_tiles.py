@@ -5,7 +5,8 @@ is TILE_BASELINE_CAPS above the bottom. The value 127.5 is on the outline; 0 and
 TILE_RANGE_CAPS away from it.
 """
 
-from typing import NamedTuple
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import cv2
 import numpy as np
@@ -95,7 +96,7 @@ class Typeface:
         return FontTile(_distances(ink), left / _CAP_PX, right / _CAP_PX, advance / _CAP_PX)
 
 
-def typeface(file: object) -> Typeface:
+def typeface(file: Path | BinaryIO) -> Typeface:
     """Open a font.
 
     Args:
@@ -105,7 +106,7 @@ def typeface(file: object) -> Typeface:
         OSError: It is not a font.
         ValueError: It has no letter H.
     """
-    return Typeface(ImageFont.truetype(file, _PROBE_PX))  # type: ignore[arg-type]
+    return Typeface(ImageFont.truetype(file, _PROBE_PX))
 
 
 def font_tiles(face: Typeface) -> dict[str, FontTile]:

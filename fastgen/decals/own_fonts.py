@@ -57,12 +57,12 @@ class OwnFont:
 
 
 @lru_cache(maxsize=64)
-def condensed(own: OwnFont) -> OwnFont | None:
-    """Return a form of a font for doors, which is less wide; None if the font is narrow enough."""
+def forms_of(own: OwnFont) -> tuple[OwnFont, ...]:
+    """Return a font, and a condensed form for doors if it is too wide for them."""
     glyphs = own.font.glyphs
     share = _DOOR_DIGIT_CAPS / (sum(glyphs[digit].advance for digit in "0123456789") / 10)
     if share >= 1:
-        return None
+        return (own,)
     middle = (GLYPH_TILE_SIZE - 1) / 2
     narrow = np.array([[share, 0.0, (1 - share) * middle], [0.0, 1.0, 0.0]])
     size = GLYPH_TILE_SIZE, GLYPH_TILE_SIZE
@@ -72,7 +72,7 @@ def condensed(own: OwnFont) -> OwnFont | None:
         for char, each in glyphs.items()
     }
     name = f"{own.font.name}-condensed"
-    return OwnFont(Font(name, MappingProxyType(narrower)), np.asarray(tiles, np.uint8))
+    return own, OwnFont(Font(name, MappingProxyType(narrower)), np.asarray(tiles, np.uint8))
 
 
 class OwnPrints(NamedTuple):

@@ -34,6 +34,12 @@ def format_names() -> list[str]:
     return sorted({*known_formats(), *plugins.names(_GROUP)})
 
 
+def unknown_format(names: Sequence[str]) -> str | None:
+    """Return the first name that no format of fastgen or of an installed package has."""
+    known = format_names()
+    return next((name for name in names if name not in known), None)
+
+
 def formats_of(names: Sequence[str], option: str = "also") -> list[Format]:
     """Return formats by name.
 
@@ -45,11 +51,10 @@ def formats_of(names: Sequence[str], option: str = "also") -> list[Format]:
         ConfigError: A name is unknown.
     """
     known = known_formats()
-    for name in names:
-        if name not in format_names():
-            check_known(
-                option, name, set(format_names()) - (set(SEAFRONT) if option == "also" else set())
-            )
+    unknown = unknown_format(names)
+    if unknown is not None:
+        choices = set(format_names()) - (set(SEAFRONT) if option == "also" else set())
+        check_known(option, unknown, choices)
     return [_chosen(name, known) for name in names]
 
 

@@ -38,7 +38,8 @@ class Style:
 def sample_style(config: MarkingsConfig, kind: str, paint: Color, streams: Streams) -> Style:
     """Sample font, colour, brand and identifier of a container."""
     rng = streams("lettering")
-    font = font_named(str(rng.choice(config.drawn_fonts)))
+    names, _ = config.drawn_fonts()
+    font = font_named(str(rng.choice(names)))
     light = float(np.array(paint) @ REC_709) < 0.22
     albedo = _LIGHT if light else _DARK
     if rng.random() < config.colored_lettering:
@@ -80,8 +81,9 @@ def _identifier(config: IdentifierConfig, kind: str, brand: Brand, streams: Stre
 
 def in_any_font(config: MarkingsConfig, style: Style, rng: np.random.Generator) -> list[Style]:
     """Return the style, then the same with other fonts, for places where only a narrow one fits."""
-    names = (*rng.permutation(config.drawn_fonts), *config.condensed_fonts)
-    return [style, *(replace(style, font=font_named(str(name))) for name in names)]
+    names, condensed = config.drawn_fonts()
+    others = (*rng.permutation(names), *condensed)
+    return [style, *(replace(style, font=font_named(str(name))) for name in others)]
 
 
 def text_decal(lines: tuple[str, ...], cap_mm: float, style: Style, wear: float) -> Decal:
